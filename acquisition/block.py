@@ -1,0 +1,104 @@
+"""A block of consecutive samples: what every source delivers and everything else consumes."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["F8", "I8", "U8", "Block", "Flag", "concatenate"]
+
+F8 = NDArray[np.float64]
+I8 = NDArray[np.int64]
+U8 = NDArray[np.uint8]
+
+
+class Flag(enum.IntFlag):
+    """Why a sample may not be taken at face value; a sample carries the sum of its bits.
+
+    The values are part of the run file (CF ``flag_masks``) and never change.
+    """
+
+    MISSING = 1
+    FALSE_ECHO = 2
+    CLIPPED = 4
+    DUPLICATE_TIME = 8
+    NON_MONOTONIC_TIME = 16
+    MALFORMED = 32
+    GAP_BEFORE = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """Consecutive samples of one rangefinder.
+
+    Parameters
+    ----------
+    first : int
+        Index of the first sample within the run.
+    t : (n,) float64, s
+        Sensor time since the start of the run.
+    distance : (n,) float64, m
+        Distance from the sensor; NaN where unmeasured.
+    flags : (n,) uint8
+        Sums of :class:`Flag` bits.
+    host_ns : (n,) int64, ns, or None
+        Host clock at which each sample arrived; None where no host was there (an old file).
+    velocity : (n,) float64, m/s, or None
+        Velocity as the recording states it, where it states one; NaN where it does not.
+    """
+
+    first: int
+    t: F8
+    distance: F8
+    flags: U8
+    host_ns: I8 | None = None
+    velocity: F8 | None = None
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    def __getitem__(self, rows: slice) -> Block:
+        """Return the samples of a slice (step 1) as a block of views."""
+        start, stop, step = rows.indices(len(self))
+        if step != 1:
+            raise ValueError(f"a block is sliced with step 1, got step {step}; index its arrays instead")
+        cut = slice(start, stop)
+        return Block(
+            self.first + start,
+            self.t[cut],
+            self.distance[cut],
+            self.flags[cut],
+            None if self.host_ns is None else self.host_ns[cut],
+            None if self.velocity is None else self.velocity[cut],
+        )
+
+
+def concatenate(blocks: Iterable[Block]) -> Block:
+    """Join blocks in the order given into one.
+
+    A column that some blocks lack is filled there: velocity with NaN, host time with -1. No block at all
+    gives an empty one.
+    """
+    parts = list(blocks)
+    if not parts:
+        empty = np.empty(0)
+        return Block(0, empty, empty, np.empty(0, np.uint8))
+    host = velocity = None
+    if any(b.host_ns is not None for b in parts):
+        host = np.concatenate([b.host_ns if b.host_ns is not None else np.full(len(b), -1) for b in parts])
+    if any(b.velocity is not None for b in parts):
+        velocity = np.concatenate(
+            [b.velocity if b.velocity is not None else np.full(len(b), np.nan) for b in parts]
+        )
+    return Block(
+        parts[0].first,
+        np.concatenate([b.t for b in parts]),
+        np.concatenate([b.distance for b in parts]),
+        np.concatenate([b.flags for b in parts]),
+        host,
+        velocity,
+    )

@@ -1,0 +1,53 @@
+"""The error tree of acquisition.
+
+::
+
+    AcquisitionError
+    |-- FormatError          a recording cannot be read        springmass exits with 3
+    |   |-- UnknownFormat    no family recognises the content
+    |   `-- NeedsAnswer      the file leaves something out that must not be guessed (rate, unit, channel)
+    `-- SourceError          a source failed while it was delivering
+
+Every message is one line: what was demanded, what was got, where, and what to do.
+"""
+
+from __future__ import annotations
+
+__all__ = ["AcquisitionError", "FormatError", "NeedsAnswer", "SourceError", "UnknownFormat"]
+
+
+class AcquisitionError(Exception):
+    """Anything that acquisition refuses; its text is a single line meant for the user."""
+
+
+class FormatError(AcquisitionError):
+    """A recording that cannot be read.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+    demand : str
+        What was expected there and what was found instead.
+    remedy : str
+        What the user can do.
+    line : int, optional
+        One-based line of the offence.
+    """
+
+    def __init__(self, path: str, demand: str, remedy: str, *, line: int | None = None) -> None:
+        self.path, self.demand, self.remedy, self.line = path, demand, remedy, line
+        where = path if line is None else f"{path}, line {line}"
+        super().__init__(f"{where}: {demand}; {remedy}")
+
+
+class UnknownFormat(FormatError):
+    """No family of recordings recognises the file's content."""
+
+
+class NeedsAnswer(FormatError):
+    """The file lacks something that is never guessed: the user must name it."""
+
+
+class SourceError(AcquisitionError):
+    """A source failed while it was delivering; what came before it stands."""

@@ -1,0 +1,147 @@
+"""What a family of recordings must offer, and how a file's bytes are fetched for it."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import Protocol
+
+from acquisition.errors import FormatError
+from acquisition.recording import Recording
+
+__all__ = ["HEAD_BYTES", "Format", "PairFormat", "read_bytes", "read_head"]
+
+HEAD_BYTES = 8192
+"""How much of a file a format sees to recognise it."""
+
+_LONGEST_LINE = 1 << 20
+
+
+class Format(Protocol):
+    """A family of recordings, told by content and never by suffix.
+
+    Attributes
+    ----------
+    name : str
+        As the registry and the command line call it.
+    title : str
+        One line for people.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in the registry."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        ...
+
+    def recognises(self, head: bytes) -> bool:
+        """Tell from the first :data:`HEAD_BYTES` whether the file is of this family; cheap, never raises."""
+        ...
+
+    def read(
+        self,
+        path: str,
+        data: bytes,
+        *,
+        channel: str | None = None,
+        rate_hz: float | None = None,
+        unit: str | None = None,
+    ) -> Recording:
+        """Read a file whole.
+
+        Parameters
+        ----------
+        path : str
+            For messages and the recording's name; it is not opened.
+        data : bytes
+            The file's content.
+        channel : str, optional
+            Which quantity or column to take as distance.
+        rate_hz : float, optional
+            The rate where the file does not say it, Hz. It is an error where the file contradicts it.
+        unit : str, optional
+            The unit of distance where the file does not say it.
+
+        Raises
+        ------
+        FormatError
+            With one line for the user, whatever is wrong with the content.
+        """
+        ...
+
+
+class PairFormat(Format, Protocol):
+    """A family that keeps position and velocity in files of their own."""
+
+    def read_pair(
+        self, position: tuple[str, bytes], velocity: tuple[str, bytes], *, rate_hz: float | None = None
+    ) -> Recording:
+        """Read two files, each a path and its content, and join them by time."""
+        ...
+
+
+def read_head(path: str | os.PathLike[str]) -> bytes:
+    """Return the first :data:`HEAD_BYTES` of a file.
+
+    Raises
+    ------
+    FormatError
+        If it is absent, empty, unreadable or no regular file.
+    """
+    return _read(path, HEAD_BYTES)
+
+
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
+    """Return a file's content, but give up at the first MiB that holds no line end.
+
+    Raises
+    ------
+    FormatError
+        If it is absent, empty, unreadable, no regular file, or has a line of more than 1 MiB.
+    """
+    return _read(path, None)
+
+
+def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
+    name = os.fspath(path)
+    try:
+        mode = os.stat(name).st_mode
+        if stat.S_ISDIR(mode):
+            raise FormatError(name, "expected a file, got a directory", "name a recording inside it")
+        if not stat.S_ISREG(mode):
+            raise FormatError(name, "expected a regular file, got a device or pipe", "save it to a file first")
+        with Path(name).open("rb") as file:
+            data = file.read(_LONGEST_LINE if limit is None else limit)
+            if not data:
+                raise FormatError(name, "expected a recording, got an empty file", "check that the export ended")
+            if limit is None and len(data) == _LONGEST_LINE:
+                data = _read_on(name, data, file.read)
+            return data
+    except OSError as error:
+        raise FormatError(
+            name, f"cannot be opened ({error.strerror or error})", "check its name and permissions"
+        ) from error
+    except ValueError as error:  # a NUL in the name
+        raise FormatError(repr(name), f"is no file name ({error})", "check its name") from error
+
+
+def _read_on(name: str, first: bytes, read: _Read) -> bytes:
+    parts = [first]
+    line = 1
+    while parts[-1]:
+        part = parts[-1]
+        if len(part) == _LONGEST_LINE and b"\n" not in part and b"\r" not in part:
+            demand = "expected lines of text, got a line of more than 1 MiB"
+            raise FormatError(name, demand, "this is no text recording; export it again", line=line)
+        line += part.count(b"\n") or part.count(b"\r")
+        parts.append(read(_LONGEST_LINE))
+    return b"".join(parts)
+
+
+class _Read(Protocol):
+    def __call__(self, size: int, /) -> bytes: ...

@@ -1,0 +1,227 @@
+"""Printed times: the rate behind them, the grid they were rounded from, and what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.block import F8, I8, U8, Flag
+
+__all__ = ["Grid", "Rate", "find_rate", "place_unread", "snap", "time_flags"]
+
+_USUAL_RATES_HZ = (100.0, 60.0, 125.0, 50.0, 20.0, 25.0, 30.0, 40.0, 10.0, 200.0, 250.0, 500.0, 1000.0)
+_SHARE_ON_GRID = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Times ``origin_s + i / rate_hz`` for integer i."""
+
+    rate_hz: float
+    origin_s: float = 0.0
+
+    def index(self, t: F8) -> I8:
+        """Return the nearest i of each time."""
+        return np.rint((t - self.origin_s) * self.rate_hz).astype(np.int64)
+
+    def time(self, index: I8) -> F8:
+        """Return the time of each i, s."""
+        return self.origin_s + index / self.rate_hz if self.origin_s else index / self.rate_hz
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """What printed times say about the rate.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Samples per second, Hz.
+    relative_u : float
+        Relative half width of the rates that the rounding of the times allows.
+    grid : Grid or None
+        The grid that the times were rounded from; None where they fit none.
+    """
+
+    rate_hz: float
+    relative_u: float
+    grid: Grid | None
+
+    @property
+    def certain(self) -> bool:
+        """Whether the next whole number of hertz is ruled out."""
+        return self.relative_u * self.rate_hz < 0.5
+
+
+def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate | None:
+    """Infer the rate from printed times.
+
+    Parameters
+    ----------
+    t : (n,) float64, s
+        Times as printed; some may repeat, run backward or be missing.
+    resolution : float
+        Last printed digit, s.
+    rate_hz : float, optional
+        The rate if it is known: only its grid is tried.
+
+    Returns
+    -------
+    Rate or None
+        None where fewer than two different times are there.
+
+    Examples
+    --------
+    >>> find_rate(np.array([0.0, 0.017, 0.033, 0.05, 0.067]), 0.001).rate_hz
+    60.0
+    """
+    apart = np.unique(t[np.isfinite(t)])
+    if apart.size < 2:
+        return None
+    step, relative_u = _mean_step(apart, resolution)
+    rough = 1.0 / step
+    nice_step = round(step / resolution) * resolution
+    tried = [rate_hz] if rate_hz else [*_USUAL_RATES_HZ, round(rough), round(1.0 / nice_step, 9), rough]
+    near = [float(f) for f in tried if f and abs(f - rough) <= rough * relative_u * 1.5 + 1e-9]
+    best: Grid | None = None
+    best_share = _SHARE_ON_GRID
+    for origin in (0.0, float(apart[0])):
+        for rate in near:
+            share = float(np.mean(snap(apart, Grid(rate, origin), resolution)[1]))
+            if share > best_share + 1e-9:
+                best, best_share = Grid(rate, origin), share
+        if best is not None:
+            break
+    return Rate(best.rate_hz if best else rough, relative_u, best)
+
+
+def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
+    """Return the usual step of increasing times, s, and its relative half width, over ever longer spans."""
+    step = max(float(np.median(np.diff(apart))), resolution)
+    span, relative_u = 1, resolution / step
+    while (span := span * 4) < apart.size and relative_u > 1e-6:
+        lengths = apart[span:] - apart[:-span]
+        steps = np.rint(lengths / step)
+        step = float(np.median(lengths / np.maximum(steps, 1)))
+        relative_u = resolution / (span * step)
+    if apart.size > 2:  # the whole length, where the steps in it can be counted
+        length = float(apart[-1] - apart[0])
+        steps_in_all = length / step
+        if steps_in_all * relative_u < 0.5:
+            step, relative_u = length / round(steps_in_all), resolution / length
+    return step, relative_u
+
+
+def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, NDArray[np.bool_]]:
+    """Replace each time by its grid point where the two agree within the rounding of the print.
+
+    Returns
+    -------
+    t : (n,) float64, s
+        Grid points, and times as they were where they do not agree.
+    agrees : (n,) bool
+    """
+    exact = grid.time(grid.index(t))
+    agrees = np.abs(exact - t) <= resolution * 0.5001
+    return np.where(agrees, exact, t), agrees
+
+
+def place_unread(t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dict[int, str], decimals: int) -> F8:
+    """Tell the times of rows that could not be read, from the grid and their neighbours.
+
+    Parameters
+    ----------
+    t : (n,) float64, s
+        Times; those of bad rows are as printed, or NaN.
+    bad : (n,) bool
+    grid : Grid or None
+    expected : dict of int to str
+        The first cell of each bad row.
+    decimals : int
+        Decimals that a time is printed with.
+
+    Returns
+    -------
+    (n,) float64, s
+        Times, NaN for those bad rows that cannot be told: nothing shows that they were samples.
+    """
+    out = np.where(bad, np.nan, t)
+    for start, stop in _runs(bad):
+        before = float(t[start - 1]) if start else np.nan
+        after = float(t[stop]) if stop < t.size else np.nan
+        count = stop - start
+        if grid is not None and round((after - before) * grid.rate_hz if after > before else 0) == count + 1:
+            first = grid.index(np.array([before]))[0]
+            out[start:stop] = grid.time(first + 1 + np.arange(count))
+            continue
+        last = before
+        for row in range(start, stop):
+            ahead, behind = row - start + 1, stop - row
+            guess = _told(float(t[row]), last, after, (before, ahead), behind, grid)
+            if np.isnan(guess) and row == t.size - 1 and grid is not None and np.isfinite(last):
+                # The last row may stop within its time: it must be how the next time begins.
+                follows = float(grid.time(grid.index(np.array([last])) + 1)[0])
+                if expected.get(row, "") and f"{follows:.{decimals}f}".startswith(expected[row]):
+                    guess = follows
+            out[row] = guess
+            last = last if np.isnan(guess) else guess
+    return out
+
+
+def _told(
+    printed: float, last: float, after: float, before: tuple[float, int], behind: int, grid: Grid | None
+) -> float:
+    """Return the time a bad row prints if it lies where it should, on the grid; else NaN."""
+    if not np.isfinite(printed) or printed <= last or printed >= after:
+        return np.nan
+    if grid is None:
+        return printed if np.isfinite(last) and np.isfinite(after) else np.nan
+    exact = float(grid.time(grid.index(np.array([printed])))[0])
+    if np.isfinite(last) and np.isfinite(after):
+        return exact if last < exact < after else np.nan
+    origin, steps = before if np.isfinite(before[0]) else (after, -behind)
+    # At an end of the file only the step that is due counts, or a damaged digit would pass for a time.
+    return exact if abs(exact - origin - steps / grid.rate_hz) < 0.5 / grid.rate_hz else np.nan
+
+
+def _runs(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.view(np.int8), [0]))))
+    for start, stop in edges.reshape(-1, 2).tolist():
+        yield start, stop
+
+
+def time_flags(t: F8, step: float) -> U8:
+    """Flag repeated times, backward times and gaps.
+
+    Parameters
+    ----------
+    t : (n,) float64, s
+    step : float
+        Nominal time between samples, s.
+
+    Returns
+    -------
+    (n,) uint8
+        Times of the samples without DUPLICATE_TIME and NON_MONOTONIC_TIME increase strictly. A single time
+        that shoots ahead of its neighbours is taken for the wrong one, not all that follow it.
+
+    Examples
+    --------
+    >>> [Flag(int(f)).name for f in time_flags(np.array([0.0, 0.1, 0.1, 9.2, 0.3, 0.6]), 0.1)][2:]
+    ['DUPLICATE_TIME', 'NON_MONOTONIC_TIME', 'GAP_BEFORE', 'GAP_BEFORE']
+    """
+    flags = np.zeros(t.size, np.uint8)
+    if t.size == 0:
+        return flags
+    spike = np.zeros(t.size, bool)
+    spike[:-1] = (t[:-1] > t[1:]) & (np.concatenate(([-np.inf], t[:-2])) < t[1:])
+    reached = np.maximum.accumulate(np.where(spike, -np.inf, t))
+    before = np.concatenate(([-np.inf], reached[:-1]))
+    flags[spike | (t < before)] |= Flag.NON_MONOTONIC_TIME.value
+    flags[~spike & (t == before)] |= Flag.DUPLICATE_TIME.value
+    ahead = ~spike & (t > before)
+    flags[ahead & np.isfinite(before) & (t - before > 1.5 * step)] |= Flag.GAP_BEFORE.value
+    return flags

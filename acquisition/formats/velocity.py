@@ -1,0 +1,199 @@
+"""What a velocity column tells: the sensor's tick, the position behind it, and how it joins a position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.block import F8, I8
+
+__all__ = ["Path", "find_quantum", "find_tick", "integrate", "outer_join"]
+
+_FEWEST_VALUES = 20
+_FINEST = 4  # a tick below four last digits cannot be told from the rounding
+_SHARE = 0.95
+_COARSEST = 24
+_COHERENT = 0.9
+
+
+def find_tick(values: F8, resolution: float) -> float | None:
+    """Find the largest step that printed values are multiples of, within their rounding.
+
+    Parameters
+    ----------
+    values : (n,) float64
+        Printed values; NaN is left out.
+    resolution : float
+        Last printed digit, in their unit.
+
+    Returns
+    -------
+    float or None
+        The step, in their unit; None where no step is evident.
+
+    Notes
+    -----
+    Gaps between neighbouring values suggest steps; each is refined by least squares of ``v = k s`` over ever
+    larger v, whose k are known as soon as s is known well enough, and must explain 95 % of the values.
+
+    Examples
+    --------
+    >>> k = np.random.default_rng(1).integers(-900, 900, 400)
+    >>> round(find_tick(np.round(k * 0.25536, 3), 0.001), 5)
+    0.25536
+    """
+    size = np.unique(np.rint(np.abs(values[np.isfinite(values)]) / resolution))
+    if size.size < _FEWEST_VALUES or size[-1] > 2**50:
+        return None
+    gaps, counts = np.unique(np.diff(size), return_counts=True)
+    usual = (gaps >= _FINEST) & (counts >= 0.01 * size.size)
+    for gap in gaps[usual][::-1][:40]:
+        step = _refine(size, float(gap))
+        if step >= _FINEST and np.mean(np.abs(size - step * np.rint(size / step)) <= 0.51) >= _SHARE:
+            return float(step * resolution)
+    return None
+
+
+def _refine(size: F8, step: float) -> float:
+    limit = max(step * step / 4, float(size[size > 0][0]))
+    tolerance = step / 4
+    while True:
+        k = np.rint(size / step)
+        use = (size <= limit) & (k > 0) & (np.abs(size - k * step) <= max(tolerance, 0.75))
+        if use.any():
+            step = float(np.sum(k[use] * size[use]) / np.sum(k[use] ** 2))
+        if limit >= size[-1]:
+            if tolerance <= 0.75:
+                return step
+            tolerance = 0.75
+        limit *= 4
+
+
+def find_quantum(values: F8, tick: float) -> float:
+    """Return the step that values cluster at: ``tick`` itself, or the multiple of it that most are close to.
+
+    Notes
+    -----
+    A device that converts timer ticks to distance in whole numbers leaves values at ``j m tick`` and
+    ``(j m + 1) tick``: exact multiples of a small step, in clusters a timer tick apart. The clusters are the
+    quantum. They are found by phase coherence, ``|mean exp(2 pi i k / m)|``, which must reach 0.9.
+
+    Examples
+    --------
+    >>> j = np.arange(-300, 300)
+    >>> round(find_quantum(0.43 * j + 0.043 * (j % 2), 0.043), 6)
+    0.43
+    """
+    k = np.rint(values[np.isfinite(values)] / tick).astype(np.int64)
+    spread = float(np.std(k)) if k.size else 0.0
+    for m in range(min(_COARSEST, int(spread / 3)), 1, -1):
+        phase = np.exp(2j * np.pi / m * np.arange(m))
+        if abs(np.bincount(k % m, minlength=m) @ phase) >= _COHERENT * k.size:
+            return m * tick
+    return tick
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """Position summed up from velocity.
+
+    Parameters
+    ----------
+    position : (n,) float64, m
+        Zero at the first sample; NaN where the velocity is unknown.
+    bridged : (n,) bool
+        Samples that follow a hole: their offset from what came before is not known.
+    """
+
+    position: F8
+    bridged: NDArray[np.bool_]
+
+
+def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, rounding: float) -> Path:
+    """Sum backward differences up to a position.
+
+    Parameters
+    ----------
+    velocity : (n,) float64, m/s
+        ``(x[i] - x[i-1]) * rate_hz``; NaN where unknown. The first needs no value.
+    index : (n,) int64
+        Sample numbers, increasing; a jump is a hole.
+    rate_hz : float
+    tick : float or None
+        Step of velocity, m/s: a value within ``rounding`` of a multiple is taken for that multiple, so that
+        the rounding of the print does not add up.
+    rounding : float
+        Half the last printed digit, m/s.
+
+    Notes
+    -----
+    Across a hole the position moves on by the velocity interpolated linearly between its two sides. That is a
+    guess of the offset, so the first sample after it is marked.
+    """
+    known = np.isfinite(velocity)
+    v = velocity.copy()
+    if tick is not None:
+        multiple = tick * np.rint(v / tick)
+        v = np.where(np.abs(v - multiple) <= rounding * 1.02, multiple, v)
+    start = velocity.size > 0 and not known[0]
+    rows = np.flatnonzero(known)
+    position = np.full(velocity.size, np.nan)
+    bridged = np.zeros(velocity.size, bool)
+    if start:
+        position[0] = 0.0
+    if rows.size == 0:
+        return Path(position, bridged)
+    # Without a velocity the first sample still has a place, zero: the second stands on it.
+    previous = np.concatenate(([index[0] if start else index[rows[0]] - 1], index[rows[:-1]]))
+    v_before = np.concatenate(([v[rows[0]]], v[rows[:-1]]))
+    lost = index[rows] - previous - 1
+    moved = v[rows] + lost * (v[rows] + v_before) / 2
+    position[rows] = np.cumsum(moved) / rate_hz
+    if not start:
+        position[rows] -= position[rows[0]]
+    bridged[rows] = lost > 0
+    return Path(position, bridged)
+
+
+def outer_join(left: I8, right: I8, regular: NDArray[np.bool_] | None = None) -> tuple[I8, I8]:
+    """Pair the rows of two recordings by their sample numbers.
+
+    Parameters
+    ----------
+    left, right : (n,), (m,) int64
+        Sample numbers. The n-th row of a repeated number pairs with the n-th there.
+    regular : (n,) bool, optional
+        Rows of ``left`` whose number tells where they stand; all, if left out.
+
+    Returns
+    -------
+    from_left, from_right : (k,) int64
+        Row of each joined sample in either; -1 where it has none. Rows of ``left`` keep their order, and rows
+        that only ``right`` has come where their number falls.
+
+    Examples
+    --------
+    >>> [rows.tolist() for rows in outer_join(np.array([2, 3, 4]), np.array([1, 2, 4, 5]))]
+    [[-1, 0, 1, 2, -1], [0, 1, -1, 2, 3]]
+    """
+    rows_of = {key: row for row, key in enumerate(_with_turn(right))}
+    partner = np.array([rows_of.pop(key, -1) for key in _with_turn(left)], np.int64)
+    alone = np.array(sorted(rows_of.values()), np.int64)
+    standing = left if regular is None else np.where(regular, left, np.iinfo(np.int64).min)
+    where = np.searchsorted(np.maximum.accumulate(standing), right[alone], side="right")
+    from_left = np.insert(np.arange(left.size), where, -1)
+    from_right = np.insert(partner, where, alone)
+    return from_left, from_right
+
+
+def _with_turn(numbers: I8) -> list[tuple[int, int]]:
+    if np.all(np.diff(numbers) > 0):
+        return [(number, 0) for number in numbers.tolist()]
+    seen: dict[int, int] = {}
+    keys = []
+    for number in numbers.tolist():
+        keys.append((number, seen.get(number, 0)))
+        seen[number] = seen.get(number, 0) + 1
+    return keys

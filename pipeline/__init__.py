@@ -1,0 +1,1 @@
+"""Stages from a track to findings: arithmetic alone, no input or output."""

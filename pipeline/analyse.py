@@ -1,0 +1,165 @@
+"""The straight line from a track to findings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline import condition as conditioning
+from pipeline import cycles as cycling
+from pipeline import damping as dampings
+from pipeline import demodulate as demodulation
+from pipeline import derive as derivation
+from pipeline import phase as phases
+from pipeline.condition import Conditioned, condition
+from pipeline.cycles import Cycles, NoOscillation, find_cycles
+from pipeline.damping import Damping, fit_damping
+from pipeline.demodulate import Demodulated, demodulate
+from pipeline.derive import Derived, derive
+from pipeline.effects import Effect, tabulate
+from pipeline.errors import AnalysisError
+from pipeline.estimate import Estimate
+from pipeline.judge import Finding, count_quality, judge, judge_samples
+from pipeline.phase import PhaseFit, fit_phase
+from pipeline.rest import Rest, fit_rest
+from pipeline.scene import Scene
+from pipeline.track import U8, Track
+from pipeline.waveform import Waveform, reconstruct
+
+__all__ = ["Analysis", "Motion", "Params", "analyse"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of every stage."""
+
+    condition: conditioning.Params = field(default_factory=conditioning.Params)
+    cycles: cycling.Params = field(default_factory=cycling.Params)
+    demodulate: demodulation.Params = field(default_factory=demodulation.Params)
+    damping: dampings.Params = field(default_factory=dampings.Params)
+    phase: phases.Params = field(default_factory=phases.Params)
+    derive: derivation.Params = field(default_factory=derivation.Params)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """What the stages found in a record that oscillates."""
+
+    cycles: Cycles
+    demodulated: Demodulated
+    damping: Damping
+    phase: PhaseFit
+    rest: Rest
+    waveform: Waveform
+    derived: Derived
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysis:
+    """One run, analysed.
+
+    Parameters
+    ----------
+    track : Track
+    scene : Scene
+    params : Params
+    conditioned : Conditioned
+    motion : Motion or NoOscillation
+        The latter says why there is nothing to fit; ``estimates`` then holds offset and noise alone.
+    effects : tuple of Effect
+    findings : tuple of Finding
+        Gravest first.
+    estimates : mapping of str to Estimate
+    """
+
+    track: Track
+    scene: Scene
+    params: Params
+    conditioned: Conditioned
+    motion: Motion | NoOscillation
+    effects: tuple[Effect, ...]
+    findings: tuple[Finding, ...]
+    estimates: Mapping[str, Estimate]
+
+    @property
+    def flags(self) -> U8:
+        """(n,) uint8: the final flags of every sample."""
+        return self.motion.demodulated.flags if isinstance(self.motion, Motion) else self.conditioned.flags
+
+    @property
+    def quality(self) -> dict[str, int]:
+        """Counts of samples by flag, and of those used."""
+        return count_quality(self.flags)
+
+
+def analyse(track: Track, scene: Scene | None = None, params: Params | None = None) -> Analysis:
+    """Turn a track into estimates, laws, effects and findings.
+
+    Parameters
+    ----------
+    track : Track
+    scene : Scene, optional
+        What is known of the bench; left out, nothing is.
+    params : Params, optional
+
+    Returns
+    -------
+    Analysis
+
+    Raises
+    ------
+    AnalysisError
+        If fewer than eight samples are usable.
+
+    Examples
+    --------
+    >>> t = np.arange(1000) / 100
+    >>> rng = np.random.default_rng(1)
+    >>> y = 0.2 + 0.05 * np.exp(-0.01 * t) * np.cos(8.3 * t) + 1e-4 * rng.standard_normal(1000)
+    >>> print(analyse(Track.from_arrays(t, y)).estimates["period"])  # 2 pi / 8.3 = 0.757010
+    0.757006 +- 0.000023 s
+    """
+    scene, params = scene or Scene(), params or Params()
+    conditioned = condition(track, params.condition)
+    cycles = find_cycles(conditioned, params.cycles)
+    if isinstance(cycles, NoOscillation):
+        return _still(track, scene, params, conditioned, cycles)
+    demodulated = demodulate(conditioned, cycles, params.demodulate)
+    start = float(track.t[np.flatnonzero(conditioned.used)[0]])
+    damping = fit_damping(demodulated, start, params.damping)
+    phase = fit_phase(demodulated, damping, params.phase)
+    rest = fit_rest(demodulated)
+    effects = tabulate(
+        scene,
+        damping,
+        phase,
+        rest,
+        noise_m=demodulated.noise_m,
+        clock=track.clock,
+        u_clock=params.derive.u_clock_nominal,
+    )
+    derived = derive(demodulated, damping, phase, rest, scene, effects, clock=track.clock, params=params.derive)
+    waveform = reconstruct(track, demodulated, phase, rest)
+    findings = judge(conditioned, cycles, demodulated, damping, phase, rest, waveform)
+    motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived)
+    return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
+
+
+def _still(
+    track: Track, scene: Scene, params: Params, conditioned: Conditioned, why: NoOscillation
+) -> Analysis:
+    y = track.y[conditioned.used]
+    if not y.size:
+        raise AnalysisError("no usable sample is left; see the counts of flagged samples")
+    u = float(np.std(y)) / np.sqrt(y.size)
+    estimates = {
+        "offset": Estimate(float(np.mean(y)), float(u), "m"),
+        "noise": Estimate(conditioned.noise_m, conditioned.noise_m / np.sqrt(2.0 * y.size), "m"),
+    }
+    findings = (
+        Finding("no_oscillation", "error", why.why),
+        *judge_samples(track, conditioned.flags, conditioned.noise_m, conditioned.plateaus_m),
+    )
+    return Analysis(track, scene, params, conditioned, why, (), findings, estimates)

@@ -1,0 +1,31 @@
+"""The error tree of the pipeline.
+
+::
+
+    PipelineError
+    |-- SceneError      a scene says something impossible (file, key, value, what is allowed)
+    |-- TrackError      arrays that are no track: lengths differ, no finite sample, not one-dimensional
+    `-- AnalysisError   a track that a stage cannot work on (too short, no motion)
+
+Every message is one line: what was demanded, what was got, where, and what to do.
+"""
+
+from __future__ import annotations
+
+__all__ = ["AnalysisError", "PipelineError", "SceneError", "TrackError"]
+
+
+class PipelineError(Exception):
+    """Anything that the pipeline refuses; its text is a single line meant for the user."""
+
+
+class SceneError(PipelineError):
+    """A scene with an unknown key, a wrong unit, or an impossible value."""
+
+
+class TrackError(PipelineError):
+    """Arrays that do not make a track."""
+
+
+class AnalysisError(PipelineError):
+    """A track that a stage cannot work on; the message names the stage."""

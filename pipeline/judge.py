@@ -1,0 +1,226 @@
+"""Judge: say in words what holds, what does not, and what the record cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.condition import Conditioned
+from pipeline.cycles import Cycles
+from pipeline.damping import Damping
+from pipeline.demodulate import Demodulated
+from pipeline.phase import PhaseFit
+from pipeline.rest import Rest
+from pipeline.track import U8, UNUSABLE, Quality, Track
+from pipeline.waveform import Waveform
+
+__all__ = ["Finding", "Severity", "count_quality", "judge", "judge_samples"]
+
+Severity = Literal["info", "warning", "error"]
+
+LAW_IN_WORDS = {
+    "none": "no damping at all",
+    "linear": "a lone exponential (linear drag)",
+    "quadratic": "a lone hyperbola (quadratic drag)",
+    "linear+quadratic": "linear and quadratic drag together",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One sentence about a run.
+
+    Parameters
+    ----------
+    code : str
+        From the closed list of the program's findings.
+    severity : {"info", "warning", "error"}
+        An error means that a number of the result must not be used.
+    message : str
+    """
+
+    code: str
+    severity: Severity
+    message: str
+
+
+def count_quality(flags: U8) -> dict[str, int]:
+    """Return how many samples carry each flag, and how many were used.
+
+    Examples
+    --------
+    >>> count_quality(np.array([0, 1, 2, 2], np.uint8))["false_echo"]
+    2
+    """
+    counts = {
+        quality.name.lower(): int(np.count_nonzero(flags & np.uint8(quality)))
+        for quality in Quality
+        if quality.name and quality not in (Quality.GAP_BEFORE, Quality.MALFORMED)
+    }
+    return {**counts, "used": int(np.count_nonzero((flags & UNUSABLE) == 0))}
+
+
+def judge_samples(track: Track, flags: U8, noise_m: float, plateaus_m: tuple[float, ...]) -> tuple[Finding, ...]:
+    """Return what the samples alone say, whether they oscillate or not.
+
+    Parameters
+    ----------
+    track : Track
+    flags : (n,) uint8
+    noise_m : float
+        Standard deviation of one sample, m.
+    plateaus_m : tuple of float
+        Distances at which the record is clipped, m.
+    """
+    return tuple(_sample_findings(track, flags, noise_m, plateaus_m))
+
+
+def judge(
+    conditioned: Conditioned,
+    cycles: Cycles,
+    demodulated: Demodulated,
+    damping: Damping,
+    phase: PhaseFit,
+    rest: Rest,
+    waveform: Waveform,
+) -> tuple[Finding, ...]:
+    """Return every finding on a run that oscillates, the gravest first.
+
+    Parameters
+    ----------
+    conditioned, cycles, demodulated, damping, phase, rest, waveform
+        Outputs of the stages of those names.
+    """
+    findings = [
+        *_damping_findings(damping),
+        *_motion_findings(cycles, demodulated, phase, rest, waveform),
+        *judge_samples(conditioned.track, demodulated.flags, demodulated.noise_m, conditioned.plateaus_m),
+    ]
+    rank = {"error": 0, "warning": 1, "info": 2}
+    return tuple(sorted(findings, key=lambda finding: rank[finding.severity]))
+
+
+def _sample_findings(track: Track, flags: U8, noise_m: float, plateaus_m: tuple[float, ...]) -> Iterator[Finding]:
+    counts, n = count_quality(flags), len(track)
+    if counts["clipped"]:
+        levels = " and ".join(f"{level * 1e3:.1f} mm" for level in plateaus_m) or "a level flagged in the record"
+        yield Finding(
+            "clipped",
+            "warning",
+            f"{counts['clipped']} of {n} samples lie on a plateau at {levels}: a fixed object or a lost target cut the "
+            "motion there; they were left out and the amplitude comes from the rest of each cycle",
+        )
+    if counts["false_echo"]:
+        share = counts["false_echo"] / n
+        yield Finding(
+            "false_echoes",
+            "warning" if share > 0.1 else "info",
+            f"{counts['false_echo']} of {n} samples ({share:.1%}) are false echoes and were left out of the fit",
+        )
+    if counts["missing"]:
+        yield Finding("missing_samples", "info", f"{counts['missing']} of {n} samples carry no distance")
+    if counts["duplicate_time"]:
+        yield Finding("duplicate_time", "warning", f"{counts['duplicate_time']} samples repeat an earlier time")
+    if counts["non_monotonic_time"]:
+        yield Finding(
+            "non_monotonic_time", "warning", f"{counts['non_monotonic_time']} samples run backward in time"
+        )
+    if track.clock == "nominal":
+        yield Finding(
+            "nominal_clock",
+            "info",
+            "times are row numbers over the nominal rate; a crystal's 50 ppm is part of every period's uncertainty",
+        )
+    if track.stated_error_m is not None and track.stated_error_m > 3.0 * noise_m:
+        yield Finding(
+            "stated_error_is_not_noise",
+            "info",
+            f"the file states an error of {track.stated_error_m * 1e3:.2f} mm for every distance; the samples scatter by "
+            f"{noise_m * 1e3:.2g} mm, so the stated error was not used as noise",
+        )
+    if track.quantum_m is not None and noise_m > 0 and track.quantum_m > 3.0 * noise_m:
+        yield Finding(
+            "quantised",
+            "warning",
+            f"distances come in steps of {track.quantum_m * 1e3:.3g} mm, more than three times their noise: amplitudes may "
+            "err by several times their stated uncertainty",
+        )
+
+
+def _damping_findings(damping: Damping) -> Iterator[Finding]:
+    rejected = [name for name, fit in damping.fits.items() if fit.rejected]
+    if damping.fits and len(rejected) == len(damping.fits):
+        yield Finding(
+            "law_rejected", "error", "every damping law tried is rejected: none describes the amplitude's fall"
+        )
+    for name in rejected:
+        fit = damping.fits[name]
+        yield Finding(
+            "law_rejected",
+            "info",
+            f"{LAW_IN_WORDS[name]} is rejected as the damping law: {_reason(damping, name)} "
+            f"({fit.dof:.0f} degrees of freedom)",
+        )
+    drags = [name for name in damping.admissible if name != "none"]
+    if len(damping.admissible) > 1:
+        names = ", ".join(damping.admissible)
+        tail = "" if drags == list(damping.admissible) else "; it does not even show for certain that there is any"
+        yield Finding(
+            "laws_not_separable", "info", f"the record cannot tell these damping laws apart: {names}{tail}"
+        )
+
+
+def _reason(damping: Damping, name: str) -> str:
+    fit = damping.fits[name]
+    if not fit.converged:
+        return "its fit did not converge"
+    best = damping.best
+    if fit.reduced_chi2 > best.reduced_chi2:
+        return (
+            f"reduced chi-square {fit.reduced_chi2:.3g} where {damping.selected} leaves {best.reduced_chi2:.2g}"
+        )
+    return f"a coefficient is negative beyond three standard uncertainties (reduced chi-square {fit.reduced_chi2:.3g})"
+
+
+def _motion_findings(
+    cycles: Cycles, demodulated: Demodulated, phase: PhaseFit, rest: Rest, waveform: Waveform
+) -> Iterator[Finding]:
+    if demodulated.t.size < 4:
+        yield Finding(
+            "short_record",
+            "warning",
+            f"only {cycles.count:.1f} periods were recorded: damping and its law need ten and more",
+        )
+    if demodulated.lost:
+        yield Finding(
+            "missing_samples",
+            "warning",
+            f"{demodulated.lost} of {demodulated.lost + demodulated.t.size} periods hold too few usable samples and carry "
+            "no amplitude",
+        )
+    if phase.backbone is not None:
+        start = phase.damping.best.joint["A0"].value
+        shift = phase.backbone.value * start**2 / phase.angular_frequency.value
+        yield Finding(
+            "amplitude_dependent_frequency",
+            "warning",
+            f"the frequency depends on amplitude: it is {abs(shift):.2%} {'higher' if shift > 0 else 'lower'} at "
+            f"{start * 1e3:.0f} mm than at rest; the period given is the record's mean, its uncertainty covers the bend",
+        )
+    if rest.drifts:
+        yield Finding(
+            "rest_drift", "warning", f"the rest position drifts by {rest.drift_m * 1e3:.2g} mm during the record"
+        )
+    ratio = waveform.rms_m / demodulated.noise_m if demodulated.noise_m > 0 else 1.0
+    excess = phase.damping.scatter.excess
+    if ratio > 1.5:
+        extra = f"; amplitudes of single periods scatter by {excess * 1e3:.2g} mm beyond their noise" if excess else ""
+        yield Finding(
+            "correlated_residuals",
+            "warning",
+            f"the smooth model leaves {waveform.rms_m * 1e3:.2g} mm where samples scatter by "
+            f"{demodulated.noise_m * 1e3:.2g} mm within a period{extra}; uncertainties were widened by what is left",
+        )

@@ -1,0 +1,201 @@
+"""Phase: the oscillation's frequency, and whether it depends on amplitude."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.damping import Damping
+from pipeline.demodulate import Demodulated
+from pipeline.estimate import Estimate
+from pipeline.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, solve_weighted
+from pipeline.track import F8
+
+__all__ = ["Params", "PhaseFit", "fit_phase"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`fit_phase`.
+
+    Parameters
+    ----------
+    evidence : float
+        The frequency counts as amplitude-dependent where that lowers the BIC by more than this; 10 is "very strong".
+    rejection : float
+        Probability at which chi-square finds residuals too large though they are noise.
+    """
+
+    evidence: float = 10.0
+    rejection: float = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhaseFit:
+    """Total phase against time.
+
+    Parameters
+    ----------
+    t0 : float
+        Time of the first sample used, s.
+    angular_frequency : Estimate
+        Mean over the record: slope of a straight line through the phases, rad/s.
+    phase : Estimate
+        At ``t0``, wrapped into (-pi, pi], rad.
+    backbone : Estimate or None
+        :math:`\\kappa` of :math:`\\omega(A) = \\omega_0 + \\kappa A^2`, rad/(s m^2), where the record shows it.
+    reduced_chi2 : float
+        Of the model kept, against the noise of the windows' phases and their excess scatter.
+    correlation : float
+        Windows that count as one in the residuals of the straight line.
+    residual : (w,) float64, rad
+        Phases less the straight line.
+    coefficients : (2 or 3,) float64
+        Of 1, t - middle and the backbone's column.
+    middle : float
+        Weighted middle of the record, s.
+    damping : Damping
+        Whose amplitude the backbone integrates.
+    """
+
+    t0: float
+    angular_frequency: Estimate
+    phase: Estimate
+    backbone: Estimate | None
+    reduced_chi2: float
+    correlation: float
+    residual: F8
+    coefficients: F8
+    middle: float
+    damping: Damping
+
+    def total(self, t: F8) -> F8:
+        """Return the model's total phase at times t (n,), rad."""
+        return np.asarray(_design(t, self.middle, self.damping, self.coefficients.size == 3) @ self.coefficients)
+
+    def rate(self, t: F8) -> F8:
+        """Return the model's angular frequency at times t (n,), rad/s."""
+        omega = np.full(t.size, self.coefficients[1])
+        if self.coefficients.size == 3:
+            omega += self.coefficients[2] * self.damping.best.amplitude(t - self.t0) ** 2
+        return omega
+
+
+def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None = None) -> PhaseFit:
+    """Fit a constant frequency to the windows' phases and test it against one that depends on amplitude.
+
+    Parameters
+    ----------
+    demodulated : Demodulated
+    damping : Damping
+    params : Params, optional
+
+    Returns
+    -------
+    PhaseFit
+
+    Notes
+    -----
+    The frequency reported is the record's mean whether or not it varies. Where residuals of the straight line are
+    not white its uncertainty grows by the root of chi-square and of the correlation length, so that a bend of the
+    phase is covered by the interval and not hidden.
+    """
+    params = params or Params()
+    t, phase = demodulated.t, demodulated.phase
+    noise = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
+    if t.size < 2:
+        return _single(demodulated, damping, float(noise[0]))
+    turning = phase - demodulated.angular_frequency * (t - t[0])
+    spread = scatter(t, turning, noise)
+    kept = spread.kept
+    u = spread.u[kept]
+    middle = float(np.average(t[kept], weights=1.0 / u**2))
+    straight = solve_weighted(_design(t[kept], middle, damping, False), phase[kept], u)
+    bent = None
+    if t[kept].size >= 8 and damping.selected != "none":
+        trial = solve_weighted(_design(t[kept], middle, damping, True), phase[kept], u)
+        gain = (straight.chi2 - trial.chi2) / spread.correlation - math.log(t[kept].size / spread.correlation)
+        bent = trial if gain > params.evidence else None
+    widened, length = _widening(straight, u, spread, params)
+    covariance = straight.covariance * widened
+    model = bent or straight
+    start = np.array([1.0, damping.t0 - middle])
+    at_start = float((_design(np.array([damping.t0]), middle, damping, bent is not None) @ model.values)[0])
+    residual = phase - _design(t, middle, damping, False) @ straight.values
+    free = max(t[kept].size - model.values.size, 1)
+    return PhaseFit(
+        damping.t0,
+        Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),
+        Estimate(_wrapped(at_start), math.sqrt(float(start @ covariance @ start)), "rad"),
+        None if bent is None else _backbone(bent, spread, free),
+        model.chi2 / free,
+        length,
+        residual,
+        model.values,
+        middle,
+        damping,
+    )
+
+
+def _design(t: F8, middle: float, damping: Damping, bent: bool) -> F8:
+    columns = [np.ones(t.size), t - middle]
+    if bent:
+        columns.append(_squared_amplitude_integral(t, middle, damping))
+    return np.stack(columns, axis=1)
+
+
+def _squared_amplitude_integral(t: F8, middle: float, damping: Damping) -> F8:
+    """Integral of A^2 from the middle of the record, m^2 s, by Simpson's rule on a fixed fine grid.
+
+    The grid does not depend on which times are asked for, so that windows and samples see one function.
+    """
+    end = max(2.0 * middle - damping.t0, float(np.max(t)), damping.t0 + 1e-9)
+    grid = np.linspace(min(damping.t0, float(np.min(t))), end, 513)
+    half = 0.5 * (grid[1:] + grid[:-1])
+    squared = damping.best.amplitude(grid - damping.t0) ** 2
+    inner = damping.best.amplitude(half - damping.t0) ** 2
+    pieces = (grid[1] - grid[0]) / 6.0 * (squared[:-1] + 4.0 * inner + squared[1:])
+    integral = np.concatenate([[0.0], np.cumsum(pieces)])
+    return np.asarray(np.interp(t, grid, integral) - np.interp(middle, grid, integral))
+
+
+def _widening(line: Line, u: F8, spread: Scatter, params: Params) -> tuple[float, float]:
+    """Factor on the straight line's covariance, and the correlation length behind it."""
+    free = line.residual.size - 2
+    if free < 1:
+        return 1.0, 1.0
+    length = max(correlation_length(line.residual / u), spread.correlation)
+    too_large = line.chi2 > chi2_quantile(1.0 - params.rejection, free)
+    return length * (line.chi2 / free if too_large else 1.0), length
+
+
+def _backbone(bent: Line, spread: Scatter, free: int) -> Estimate:
+    widened = spread.correlation * max(1.0, bent.chi2 / free)
+    return Estimate(float(bent.values[2]), math.sqrt(bent.covariance[2, 2] * widened), "rad/(s m^2)")
+
+
+def _single(demodulated: Demodulated, damping: Damping, noise: float) -> PhaseFit:
+    """One window: its frequency is the spectrum's, known to a share of the record's own line width."""
+    t, omega = float(demodulated.t[0]), demodulated.angular_frequency
+    phase = float(demodulated.phase[0]) + omega * (damping.t0 - t)
+    reach = max(2.0 * (t - damping.t0), 1e-9)
+    u_omega = math.pi / reach
+    return PhaseFit(
+        damping.t0,
+        Estimate(omega, u_omega, "rad/s"),
+        Estimate(_wrapped(phase), math.hypot(noise, 0.5 * math.pi), "rad"),
+        None,
+        math.nan,
+        1.0,
+        np.zeros(1),
+        np.array([float(demodulated.phase[0]), omega]),
+        t,
+        damping,
+    )
+
+
+def _wrapped(angle: float) -> float:
+    turned = math.remainder(angle, 2.0 * math.pi)
+    return math.pi if turned == -math.pi else turned

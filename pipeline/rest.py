@@ -1,0 +1,76 @@
+"""Rest position against time: constant unless the record shows otherwise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.demodulate import Demodulated
+from pipeline.estimate import Estimate
+from pipeline.regression import correlation_length, scatter, solve_weighted
+from pipeline.track import F8
+
+__all__ = ["Rest", "fit_rest"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rest:
+    """The rest position.
+
+    Parameters
+    ----------
+    mean : Estimate
+        Over the record, m.
+    drift_m : float
+        Peak to peak of the smooth curve through the windows' rest positions, m.
+    drifts : bool
+        Whether the curve is far better than a constant.
+    t, curve : (w,) float64, s, m
+        The curve at the windows' centres.
+    """
+
+    mean: Estimate
+    drift_m: float
+    drifts: bool
+    t: F8
+    curve: F8
+
+    def at(self, t: F8) -> F8:
+        """Return the rest position at times t (n,), m."""
+        if not self.drifts:
+            return np.full(t.size, self.mean.value)
+        return np.asarray(np.interp(t, self.t, self.curve))
+
+
+def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.0) -> Rest:
+    """Fit a constant and a polynomial to the windows' rest positions and keep the constant unless it fails.
+
+    Parameters
+    ----------
+    demodulated : Demodulated
+    degree : int
+        Of the polynomial, fewer where windows are few.
+    evidence : float
+        By how much the polynomial must lower the BIC.
+    """
+    t, offset = demodulated.t, demodulated.offset
+    u = np.maximum(np.sqrt(demodulated.covariance[:, 2, 2]), 1e-15)
+    spread = scatter(t, offset, u, degree=degree)
+    kept = spread.kept
+    constant = solve_weighted(np.ones((int(kept.sum()), 1)), offset[kept], spread.u[kept])
+    mean = float(constant.values[0])
+    order = min(degree, t.size // 4 - 1)
+    length = max(spread.correlation, correlation_length(constant.residual / spread.u[kept]))
+    widened = length * max(1.0, constant.chi2 / max(constant.residual.size - 1, 1))
+    estimate = Estimate(mean, math.sqrt(float(constant.covariance[0, 0]) * widened), "m")
+    if order < 1:
+        return Rest(estimate, 0.0, False, t, np.full(t.size, mean))
+    design = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, order)
+    curve = solve_weighted(design[kept], offset[kept], spread.u[kept])
+    gain = (constant.chi2 - curve.chi2) / spread.correlation - order * math.log(
+        max(kept.sum() / spread.correlation, 2.0)
+    )
+    smooth = design @ curve.values
+    return Rest(estimate, float(np.ptp(smooth)), bool(gain > evidence), t, smooth)

@@ -1,0 +1,135 @@
+"""The pipeline's border: a track is one run as plain arrays, in metres and seconds."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pipeline.errors import TrackError
+
+__all__ = ["F8", "U8", "Quality", "Track"]
+
+F8 = NDArray[np.float64]
+U8 = NDArray[np.uint8]
+
+
+class Quality(enum.IntFlag):
+    """Why a sample may not be taken at face value; the bits of the run file's ``quality``.
+
+    The same table as ``acquisition.Flag``, which the pipeline may not import; a test holds them equal.
+    """
+
+    MISSING = 1
+    FALSE_ECHO = 2
+    CLIPPED = 4
+    DUPLICATE_TIME = 8
+    NON_MONOTONIC_TIME = 16
+    MALFORMED = 32
+    GAP_BEFORE = 64
+
+
+UNUSABLE = ~np.uint8(Quality.GAP_BEFORE)
+"""Any of these bits keeps a sample out of a fit; a gap before a sample says nothing against it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """One run as arrays.
+
+    Parameters
+    ----------
+    t : (n,) float64, s
+        Time since the start of the run.
+    y : (n,) float64, m
+        Distance from the sensor; NaN where unmeasured.
+    flags : (n,) uint8
+        Sums of :class:`Quality` bits known before any analysis.
+    rate_hz : float
+        Nominal samples per second, Hz.
+    sigma_m : float or None
+        Standard deviation of one distance, m, where somebody knows it; None: estimated from the record.
+    quantum_m : float or None
+        Smallest step of a distance, m.
+    stated_error_m : float or None
+        The error column of the file, m, if there is one.
+    clock : str
+        "nominal", "device" or "host".
+    kind : str
+        "live", "replay" or "simulated".
+    velocity : (n,) float64, m/s, or None
+        The velocity that the recording states.
+    """
+
+    t: F8
+    y: F8
+    flags: U8
+    rate_hz: float
+    sigma_m: float | None = None
+    quantum_m: float | None = None
+    stated_error_m: float | None = None
+    clock: str = "nominal"
+    kind: str = "replay"
+    velocity: F8 | None = None
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t: ArrayLike,
+        y: ArrayLike,
+        *,
+        rate_hz: float | None = None,
+        flags: ArrayLike | None = None,
+        sigma_m: float | None = None,
+        quantum_m: float | None = None,
+        kind: str = "replay",
+    ) -> Track:
+        """Make a track of anything array-like.
+
+        Parameters
+        ----------
+        t : (n,) array_like, s
+        y : (n,) array_like, m
+            NaN where unmeasured.
+        rate_hz : float, optional
+            Samples per second; left out, it is the reciprocal of the median time step.
+        flags : (n,) array_like of int, optional
+        sigma_m, quantum_m : float, optional
+            As the attributes.
+        kind : str
+            "live", "replay" or "simulated".
+
+        Raises
+        ------
+        TrackError
+            If the arrays are not one-dimensional or of different lengths, if fewer than two samples are
+            there, or if the rate is not positive.
+
+        Examples
+        --------
+        >>> track = Track.from_arrays([0.0, 0.01, 0.02], [0.2, 0.21, float("nan")])
+        >>> track.rate_hz, len(track)
+        (100.0, 3)
+        """
+        t_s, y_m = np.array(t, np.float64), np.array(y, np.float64)
+        if t_s.ndim != 1 or t_s.shape != y_m.shape:
+            raise TrackError(f"t and y must be one-dimensional and of one length, got {t_s.shape} and {y_m.shape}")
+        bits = np.zeros(t_s.size, np.uint8) if flags is None else np.array(flags, np.uint8)
+        if bits.shape != t_s.shape:
+            raise TrackError(f"flags must have the shape of t, {t_s.shape}, got {bits.shape}")
+        if t_s.size < 2:
+            raise TrackError(f"a track needs two samples at least, got {t_s.size}")
+        if rate_hz is None:
+            steps = np.diff(t_s)
+            steps = steps[np.isfinite(steps) & (steps > 0)]
+            if not steps.size:
+                raise TrackError("time never increases, so no rate can be told: give rate_hz")
+            rate_hz = float(np.round(1.0 / np.median(steps), 6))
+        if not (np.isfinite(rate_hz) and rate_hz > 0):
+            raise TrackError(f"rate_hz must be positive and finite, got {rate_hz}")
+        return cls(t_s, y_m, bits, float(rate_hz), sigma_m, quantum_m, kind=kind)

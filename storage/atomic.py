@@ -1,0 +1,220 @@
+"""A file is written whole or not at all: temporary file, fsync, rename, fsync of the folder.
+
+Existence therefore means completeness: whoever finds the file finds all of it, also after a power cut.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from storage.errors import HDF5_ERRORS, RunExists, WriteFailed, one_line
+
+if TYPE_CHECKING:
+    import h5py
+
+__all__ = ["whole_file", "whole_h5", "write_whole", "writing_h5"]
+
+# Some network and FUSE file systems cannot sync a folder, and Windows cannot even open one.
+_FOLDER_CANNOT_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EBADF}
+
+
+def write_whole(path: str | os.PathLike[str], data: bytes | str, *, overwrite: bool = True) -> Path:
+    """Write a file whole.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        The file; its folder must exist.
+    data : bytes or str
+        Its content; text is encoded as UTF-8, its line ends left as they are.
+    overwrite : bool
+        Whether a file that stands there may be replaced.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    RunExists
+        If a file stands there and may not be replaced.
+    WriteFailed
+        If it cannot be written; what stood there before stands.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_whole(folder + "/results.json", "{}").read_text()
+    '{}'
+    """
+    content = data.encode() if isinstance(data, str) else data
+    with whole_file(path, overwrite=overwrite) as temporary:
+        try:
+            temporary.write_bytes(content)
+        except OSError as error:
+            raise _failed(Path(path), error) from error
+    return Path(path)
+
+
+@contextlib.contextmanager
+def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Iterator[Path]:
+    """Give a temporary file to write, and put it in place when the ``with`` ends well.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        The file to be made; its folder must exist.
+    overwrite : bool
+        Whether a file that stands there may be replaced. It is looked for before the work, and the putting in
+        place itself refuses one that has come meanwhile.
+
+    Yields
+    ------
+    Path
+        An empty file in the same folder. It must be closed again by the end of the ``with``.
+
+    Raises
+    ------
+    RunExists
+        If a file stands there and may not be replaced.
+    WriteFailed
+        If the temporary file cannot be made, synced or put in place. After any error, also one of the body,
+        the temporary file is gone and what stood there before stands.
+    """
+    target = Path(path)
+    if not overwrite and os.path.lexists(target):
+        raise _exists(target)
+    temporary = _reserve(target)
+    try:
+        yield temporary
+        try:
+            _sync(temporary)
+            _place(temporary, target, overwrite=overwrite)
+            _sync_folder(target.parent)
+        except OSError as error:
+            raise _failed(target, error) from error
+    finally:
+        # After a rename nothing is left to remove.
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+
+
+@contextlib.contextmanager
+def whole_h5(
+    path: str | os.PathLike[str], *, overwrite: bool = True, libver: tuple[str, str] | None = None
+) -> Iterator[h5py.File]:
+    """Give an empty HDF5 file to fill, and put it in place when the ``with`` ends well.
+
+    Parameters
+    ----------
+    path, overwrite
+        As in :func:`whole_file`.
+    libver : tuple of str, optional
+        Oldest and newest file format, as h5py names them.
+
+    Yields
+    ------
+    h5py.File
+        Open for writing; closed for the caller.
+
+    Raises
+    ------
+    RunExists, WriteFailed
+        As in :func:`whole_file`. Errors of the body pass through: :func:`writing_h5` turns those of HDF5 into
+        :class:`WriteFailed`.
+    """
+    import h5py
+
+    with whole_file(path, overwrite=overwrite) as temporary:
+        with writing_h5(path):
+            file = h5py.File(temporary, "w", libver=libver)
+        try:
+            yield file
+        except BaseException:
+            # Closing writes, and after a failure fails again: the first error is the one to tell.
+            with contextlib.suppress(*HDF5_ERRORS):
+                file.close()
+            raise
+        with writing_h5(path):
+            file.close()
+
+
+@contextlib.contextmanager
+def writing_h5(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Turn what HDF5 raises on a full disk or a value that it cannot hold into one line."""
+    try:
+        yield
+    except HDF5_ERRORS as error:
+        remedy = "check the disk's space and what was handed over"
+        raise WriteFailed(path, f"could not be written ({one_line(error)})", remedy) from error
+
+
+def _reserve(target: Path) -> Path:
+    """Make an empty hidden file beside the target, with the permissions that any new file would get."""
+    # The name is cut, so that a target of the longest allowed name still gets a temporary one.
+    temporary = target.with_name(f".{target.name[:32]}.{secrets.token_hex(4)}.part")
+    try:
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    except OSError as error:
+        raise _failed(target, error) from error
+    return temporary
+
+
+def _sync(file: Path) -> None:
+    # Windows syncs only what was opened for writing.
+    descriptor = os.open(file, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _place(temporary: Path, target: Path, *, overwrite: bool) -> None:
+    if overwrite:
+        os.replace(temporary, target)
+        return
+    # A hard link fails where a name exists, which a rename does not: no gap between looking and placing.
+    try:
+        os.link(temporary, target)
+    except FileExistsError as error:
+        raise _exists(target) from error
+    except OSError:  # a file system without hard links, such as a memory stick's
+        if os.path.lexists(target):
+            raise _exists(target) from None
+        os.replace(temporary, target)
+
+
+def _sync_folder(folder: Path) -> None:
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        if error.errno in _FOLDER_CANNOT_SYNC:
+            return
+        raise
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _FOLDER_CANNOT_SYNC:
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def _exists(target: Path) -> RunExists:
+    demand = "a new file was to be written, but one stands there"
+    return RunExists(target, demand, "choose another name or allow overwriting")
+
+
+def _failed(target: Path, error: OSError) -> WriteFailed:
+    reason = error.strerror or one_line(error)
+    missing = isinstance(error, FileNotFoundError)
+    remedy = "make the folder first" if missing else "check the disk's space and permissions"
+    return WriteFailed(target, f"could not be written ({reason})", remedy)

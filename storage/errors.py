@@ -1,0 +1,82 @@
+"""The error tree of storage.
+
+::
+
+    StorageError
+    |-- NotARun        nothing there, not HDF5, or HDF5 of another layout     springmass exits with 3
+    |-- RunDamaged     a run file whose content is not what was written       springmass exits with 3
+    |-- RunClosed      a run used outside its ``with``
+    `-- WriteFailed    a file could not be written; what stood there before stands
+        `-- RunExists  a file of that name stands already and may not be replaced
+
+Every message is one line: where, what was demanded, what was got, and what to do.
+"""
+
+from __future__ import annotations
+
+import os
+
+__all__ = [
+    "HDF5_ERRORS",
+    "NotARun",
+    "RunClosed",
+    "RunDamaged",
+    "RunExists",
+    "StorageError",
+    "WriteFailed",
+    "one_line",
+]
+
+HDF5_ERRORS = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
+"""What h5py raises on a wrong checksum, a missing object, a full disk or a value that HDF5 cannot hold."""
+
+
+def one_line(error: BaseException) -> str:
+    """Return an error's text on a single line (HDF5 breaks its own over several).
+
+    Examples
+    --------
+    >>> one_line(OSError("no space\\n  left"))
+    'no space left'
+    >>> one_line(MemoryError())
+    'MemoryError'
+    """
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+class StorageError(Exception):
+    """Anything that storage refuses; its text is a single line meant for the user.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        The file.
+    demand : str
+        What was demanded of it and what was got instead.
+    remedy : str
+        What the user can do.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], demand: str, remedy: str) -> None:
+        self.path, self.demand, self.remedy = os.fspath(path), demand, remedy
+        super().__init__(f"{self.path}: {demand}; {remedy}")
+
+
+class NotARun(StorageError):
+    """A path that holds no run file: a missing file, a text, an HDF5 file of another program."""
+
+
+class RunDamaged(StorageError):
+    """A run file whose content is not what was written: a flipped bit, a cut end, an edited attribute."""
+
+
+class RunClosed(StorageError):
+    """A run read after its ``with`` ended."""
+
+
+class WriteFailed(StorageError):
+    """A file that could not be written: a full disk, a missing folder, blocks with a gap between them."""
+
+
+class RunExists(WriteFailed):
+    """A file of that name stands already, and the caller has not said that it may be replaced."""

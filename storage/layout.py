@@ -1,0 +1,344 @@
+"""The run file's layout: names, types, units and attributes, in one place.
+
+::
+
+    /                     @Conventions @NX_class=NXroot @default=entry @kind
+    /entry                NXentry @default=signal; title, start_time where known
+    /entry/signal         NXdata @signal=distance @axes=[time] @kind; on the dimension ``time``:
+        time              f8 s, elapsed; @epoch says when t = 0 was, @clock where the times come from
+        distance          f8 m @ancillary_variables
+        distance_errors   f4 m, standard deviation; only where the source knows it, NaN where unmeasured
+        quality           u1 @flag_masks @flag_meanings
+        velocity          f8 m/s; only where the recording states one
+    /entry/instrument     name, kind, clock, rate_hz, quantum_m, sigma_m, stated_error_m
+    /entry/scene          @json: the scene's tables
+    /entry/provenance     @software @version @configuration @traps ...; header, see below
+    /raw                  sequence u4 (sample index); host_mono_ns i8 where a host was there
+    /wire                 bytes u1; record_offset, record_len, record_mono_ns; one record an original file
+
+The file says everything twice. ``/entry/provenance/header`` is one canonical JSON text (sorted keys, ASCII)
+of all that is not an array, with the SHA-256 of every array's decoded little-endian values; its own SHA-256
+stands beside it. That text alone is what :class:`storage.run.Run` believes. The attributes and fields above are
+drawn from it for people and for other tools, and ``Run.verify`` holds them against it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.block import Block, Flag
+from acquisition.recording import Trap
+from acquisition.source import SourceInfo
+
+__all__ = ["CHUNK", "COLUMNS", "HEADER", "MAGIC", "SCHEMA", "WIRE", "Column", "FileEntry", "Header"]
+
+MAGIC = b"\x89HDF\r\n\x1a\n"
+SCHEMA = 1
+CHUNK = 65536
+HEADER = "/entry/provenance/header"
+SIGNAL = "/entry/signal"
+INSTRUMENT = "/entry/instrument"
+WIRE = "/wire"
+NO_HOST_NS = -1
+"""Stands in ``host_mono_ns`` and ``record_mono_ns`` where no host saw the sample or record."""
+
+FILTERS: Mapping[str, Any] = {
+    "shuffle": True,
+    "compression": "gzip",
+    "compression_opts": 1,
+    "fletcher32": True,
+}
+"""What every reader can undo without a plugin. The checksum makes a flipped bit an error, not a value."""
+
+LIBVER = ("v110", "v110")
+"""HDF5 1.10's file format (2016): the oldest in which all of the file's own bookkeeping carries checksums."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One array of the file with a value a sample.
+
+    Parameters
+    ----------
+    path : str
+        Where it stands.
+    dtype : str
+        Its type, little-endian.
+    attributes : mapping
+        Units and description. What depends on the run is added by :func:`attributes`.
+    fill : float or int
+        Value of samples from before an optional column's first value.
+    """
+
+    path: str
+    dtype: str
+    attributes: Mapping[str, Any]
+    fill: float | int = 0
+
+    @property
+    def name(self) -> str:
+        """The path's last part."""
+        return self.path.rpartition("/")[2]
+
+
+def _quality() -> dict[str, Any]:
+    return {
+        "long_name": "why a sample may not be taken at face value",
+        "standard_name": "quality_flag",
+        "flag_masks": np.array([flag.value for flag in Flag], np.uint8),
+        "flag_meanings": " ".join(str(flag.name).lower() for flag in Flag),
+    }
+
+
+_NAN = {"_FillValue": np.float64("nan")}
+COLUMNS: tuple[Column, ...] = (
+    Column(f"{SIGNAL}/time", "<f8", {"units": "s", "long_name": "time since the start of the run"}),
+    Column(f"{SIGNAL}/distance", "<f8", {"units": "m", "long_name": "distance from the sensor", **_NAN}),
+    Column(
+        f"{SIGNAL}/distance_errors",
+        "<f4",
+        {
+            "units": "m",
+            "long_name": "standard deviation of a distance, as the source knows it",
+            "_FillValue": np.float32("nan"),
+        },
+    ),
+    Column(f"{SIGNAL}/quality", "|u1", _quality()),
+    Column(
+        f"{SIGNAL}/velocity",
+        "<f8",
+        {"units": "m/s", "long_name": "velocity as the recording states it", **_NAN},
+        float("nan"),
+    ),
+    Column("/raw/sequence", "<u4", {"long_name": "index of the sample within the run"}),
+    Column(
+        "/raw/host_mono_ns",
+        "<i8",
+        {"units": "ns", "long_name": "host's monotonic clock at arrival; -1 where no host was there"},
+        NO_HOST_NS,
+    ),
+)
+
+
+def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None]:
+    """Return a block's values by column name; None for a column that it lacks.
+
+    Parameters
+    ----------
+    block : Block
+        n samples.
+    sigma_m : float or None
+        Standard deviation of a distance, m.
+
+    Returns
+    -------
+    dict
+        Arrays of shape (n,), by name.
+    """
+    errors = None
+    if sigma_m is not None:
+        errors = np.where(np.isnan(block.distance), np.nan, sigma_m).astype("<f4")
+    return {
+        "time": block.t,
+        "distance": block.distance,
+        "distance_errors": errors,
+        "quality": block.flags,
+        "velocity": block.velocity,
+        "sequence": np.arange(block.first, block.first + len(block), dtype=np.int64).astype("<u4"),
+        "host_mono_ns": block.host_ns,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class FileEntry:
+    """An original file's name, length in bytes and SHA-256."""
+
+    name: str
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Header:
+    """Everything about a run that is not an array.
+
+    Parameters
+    ----------
+    info : SourceInfo
+        The source.
+    first, samples : int
+        Index of the first sample, and how many there are.
+    columns : mapping of str to str
+        SHA-256 of every column that the file holds, by name.
+    originals : tuple of FileEntry
+        The original files.
+    title, channel, format : str
+        As in a recording.
+    scene, provenance : mapping or None, mapping
+        JSON-able, with string keys.
+    traps : tuple of Trap
+        What was seen on reading.
+    malformed_rows : int
+        Rows that were not samples.
+    """
+
+    info: SourceInfo
+    first: int
+    samples: int
+    columns: Mapping[str, str]
+    originals: tuple[FileEntry, ...] = ()
+    title: str = ""
+    channel: str = "distance"
+    format: str = ""
+    scene: Mapping[str, Any] | None = None
+    traps: tuple[Trap, ...] = ()
+    malformed_rows: int = 0
+    provenance: Mapping[str, Any]
+
+    def encode(self) -> bytes:
+        """Return the canonical JSON text.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the scene or the provenance holds what JSON cannot: an object, NaN, an infinity.
+        """
+        content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return json_text({"schema": SCHEMA, **content}).encode("ascii")
+
+    @classmethod
+    def decode(cls, text: bytes) -> Header:
+        """Read what :meth:`encode` wrote.
+
+        Raises
+        ------
+        TypeError, ValueError, KeyError
+            If the text is of another schema.
+        """
+        content = json.loads(text)
+        if (schema := content.pop("schema")) != SCHEMA:
+            raise ValueError(f"schema {SCHEMA} demanded, got {schema!r}")
+        content["info"] = SourceInfo(**content["info"])
+        content["originals"] = tuple(FileEntry(**entry) for entry in content["originals"])
+        content["traps"] = tuple(Trap(**trap) for trap in content["traps"])
+        return cls(**content)
+
+
+def json_text(value: Any) -> str:
+    """Return canonical JSON: sorted keys, no blanks, ASCII; numpy's numbers as plain ones.
+
+    Examples
+    --------
+    >>> json_text({"b": np.float64(0.5), "a": [1, None]})
+    '{"a":[1,null],"b":0.5}'
+    """
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False, default=_plain)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return dict(value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return dataclasses.asdict(value)
+    raise TypeError(f"{value!r} ({type(value).__name__}) is nothing that JSON can hold")
+
+
+def attributes(header: Header) -> dict[str, dict[str, Any]]:
+    """Return the attributes that other tools see, by the path of the group or array that carries them."""
+    info = header.info
+    tree: dict[str, dict[str, Any]] = {
+        "/": {"Conventions": "CF-1.11", "NX_class": "NXroot", "default": "entry", "kind": info.kind},
+        "/entry": {"NX_class": "NXentry", "default": "signal"},
+        SIGNAL: signal_attributes(header) | _plot(header),
+        INSTRUMENT: {"NX_class": "NXinstrument"},
+        "/entry/provenance": {"NX_class": "NXprocess", **_provenance(header)},
+        "/raw": {"NX_class": "NXcollection"},
+    }
+    if header.scene is not None:
+        tree["/entry/scene"] = {"NX_class": "NXcollection", "json": json_text(header.scene)}
+    if header.originals:
+        names = tuple(entry.name for entry in header.originals)
+        tree[WIRE] = {"NX_class": "NXcollection", "content": "files", "record_name": names}
+    for column in COLUMNS:
+        if column.name in header.columns:
+            tree[column.path] = column_attributes(column, header)
+    for path, units in _field_units(header).items():
+        tree[path] = {"units": units} if units else {}
+    return tree
+
+
+def signal_attributes(header: Header) -> dict[str, Any]:
+    """Return what travels with the samples wherever they go."""
+    texts = {name: getattr(header, name) for name in ("title", "channel", "format")}
+    return {"kind": header.info.kind} | {name: text for name, text in texts.items() if text}
+
+
+def column_attributes(column: Column, header: Header) -> dict[str, Any]:
+    """Return a column's attributes in this run."""
+    found = dict(column.attributes)
+    if column.name == "time":
+        found["clock"] = header.info.clock
+        found["epoch"] = _text(header, "start_time") or "unknown"
+    if column.name == "distance":
+        beside = ("distance_errors", "quality")
+        found["ancillary_variables"] = " ".join(name for name in beside if name in header.columns)
+    return found
+
+
+def fields(header: Header) -> dict[str, Any]:
+    """Return the scalar fields by path: NeXus keeps in fields what it gives a unit."""
+    info = header.info
+    found: dict[str, Any] = {
+        "/entry/title": header.title or None,
+        "/entry/start_time": _text(header, "start_time") or None,
+        f"{INSTRUMENT}/name": info.name or None,
+        f"{INSTRUMENT}/kind": info.kind,
+        f"{INSTRUMENT}/clock": info.clock,
+    }
+    for name in _NUMBER_UNITS:
+        number = getattr(info, name)
+        found[f"{INSTRUMENT}/{name}"] = None if number is None else float(number)
+    return {path: value for path, value in found.items() if value is not None}
+
+
+_NUMBER_UNITS = {"rate_hz": "Hz", "quantum_m": "m", "sigma_m": "m", "stated_error_m": "m"}
+
+
+def _field_units(header: Header) -> dict[str, str | None]:
+    return {path: _NUMBER_UNITS.get(path.rpartition("/")[2]) for path in fields(header)}
+
+
+def _plot(header: Header) -> dict[str, Any]:
+    """What a NeXus tool plots unasked."""
+    found: dict[str, Any] = {"NX_class": "NXdata", "signal": "distance", "axes": ("time",)}
+    if "velocity" in header.columns:
+        found["auxiliary_signals"] = ("velocity",)
+    return found
+
+
+def _provenance(header: Header) -> dict[str, Any]:
+    found: dict[str, Any] = {"malformed_rows": header.malformed_rows}
+    texts = {name: _text(header, name) for name in ("software", "version", "created_utc")}
+    found |= {name: text for name, text in texts.items() if text}
+    if "configuration" in header.provenance:
+        found["configuration"] = json_text(header.provenance["configuration"])
+    if header.traps:
+        found["traps"] = json_text(header.traps)
+    if header.originals:
+        found["original_sha256"] = tuple(entry.sha256 for entry in header.originals)
+    return found
+
+
+def _text(header: Header, key: str) -> str:
+    """Return a text of the provenance, or an empty one."""
+    value = header.provenance.get(key)
+    return value if isinstance(value, str) else ""
