@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
@@ -56,9 +57,9 @@ class Conditioned:
     plateaus_m: tuple[float, ...]
 
     @property
-    def used(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def used(self) -> NDArray[np.bool_]:
         """(n,) bool: samples without any flag that speaks against them."""
-        mask: np.ndarray[tuple[int], np.dtype[np.bool_]] = (self.flags & UNUSABLE) == 0
+        mask: NDArray[np.bool_] = (self.flags & UNUSABLE) == 0
         return mask
 
 
@@ -114,8 +115,9 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
     flags[rows[spikes]] |= np.uint8(Quality.FALSE_ECHO)
     plateaus: list[float] = []
     y_kept, rows = y[~spikes], rows[~spikes]
-    for sign in (1.0, -1.0):
-        level, members = _plateau(sign * y_kept, floor_m, params.plateau_contrast)
+    ordered = np.sort(y_kept)
+    for sign, increasing in ((1.0, ordered), (-1.0, -ordered[::-1])):
+        level, members = _plateau(sign * y_kept, increasing, floor_m, params.plateau_contrast)
         if members.size:
             plateaus.append(sign * level)
             flags[rows[members]] |= np.uint8(Quality.CLIPPED)
@@ -151,7 +153,7 @@ def _time_flags(t: F8) -> U8:
     return flags
 
 
-def _spikes(y: F8, noise_m: float, sigmas: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _spikes(y: F8, noise_m: float, sigmas: float) -> NDArray[np.bool_]:
     """Return which samples stand off the median of five around them by more than noise and curvature do."""
     if y.size < 8:
         return np.zeros(y.size, np.bool_)
@@ -161,7 +163,7 @@ def _spikes(y: F8, noise_m: float, sigmas: float) -> np.ndarray[tuple[int], np.d
     away = np.abs(y - _median_of_five(a, b, c, d, e))
     # What curvature alone does to `away`: a generous quantile of the second differences.
     curvature = float(np.quantile(np.abs(np.diff(y, 2)), 0.75))
-    mask: np.ndarray[tuple[int], np.dtype[np.bool_]] = away > sigmas * noise_m + 3.0 * curvature
+    mask: NDArray[np.bool_] = away > sigmas * noise_m + 3.0 * curvature
     return mask
 
 
@@ -172,14 +174,13 @@ def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:
     return np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e))
 
 
-def _plateau(y: F8, noise_m: float, contrast: float) -> tuple[float, np.ndarray[tuple[int], np.dtype[np.int64]]]:
-    """Find a clipped plateau at the upper end of ``y``.
+def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float, NDArray[np.int64]]:
+    """Find a clipped plateau at the upper end of ``y``, which ``ordered`` holds in increasing order.
 
     A clipped record piles samples into a band a few sigma wide with almost none above and few beneath; an
     unclipped crest thins out as the square root of the depth below it.
     """
     none = np.empty(0, np.int64)
-    ordered = np.sort(y)
     low, high = ordered[0], ordered[-1]
     width = 6.0 * noise_m
     if high - low < 6.0 * width or width == 0.0:

@@ -116,9 +116,9 @@ def _spectral_peak(t: F8, y: F8, rate_hz: float, false_alarm: float) -> float | 
     centred = np.arange(n) - 0.5 * (n - 1)
     values = values - values.mean()
     values -= centred * (centred @ values) / (centred @ centred)
-    size = 1 << (2 * n - 1).bit_length()
+    size = 1 << (n - 1).bit_length()
     power = np.abs(np.fft.rfft(values * np.hanning(n), size)) ** 2
-    least = max(1, math.ceil(size / n))  # slower than one period per record is drift
+    least = max(1, math.floor(size / n))  # slower than one period per record is drift
     k = least + int(np.argmax(power[least:-1]))
     # Half the record's own bins outside the peak's neighbourhood stand for the floor.
     reach = 4 * math.ceil(size / n)

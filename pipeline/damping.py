@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate, Joint
 from pipeline.laws import LAWS, Law
-from pipeline.regression import Scatter, chi2_quantile, scatter
+from pipeline.regression import Scatter, chi2_quantile, covariance_of, scatter
 from pipeline.track import F8
 
 __all__ = ["Damping", "LawFit", "Params", "fit_damping"]
@@ -190,10 +190,7 @@ def _fit(law: Law, t: F8, amplitude: F8, spread: Scatter, params: Params) -> Law
     theta, converged = _levenberg_marquardt(law, t, y, u, law.guess(t, y))
     residual = (y - law.amplitude(t, theta)) / u
     jacobian = law.jacobian(t, theta) / u[:, None]
-    scale = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
-    _, r = np.linalg.qr(jacobian / scale)
-    inverse = np.linalg.pinv(r)
-    covariance = spread.correlation * (inverse @ inverse.T) / np.outer(scale, scale)
+    covariance = spread.correlation * covariance_of(jacobian)[0]
     chi2 = float(residual @ residual)
     count = len(law.parameters)
     free = y.size - count
@@ -216,7 +213,7 @@ def _levenberg_marquardt(law: Law, t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, 
         return residual, value if math.isfinite(value) else math.inf
 
     residual, chi2 = cost(theta)
-    damping = 1e-3
+    damping = 1e-5
     for _ in range(50):
         jacobian = law.jacobian(t, theta) / u[:, None]
         scale = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
@@ -228,7 +225,8 @@ def _levenberg_marquardt(law: Law, t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, 
         gain = chi2 - trial_chi2
         if gain >= 0:
             theta, residual, chi2 = trial, trial_residual, trial_chi2
-            if float(step @ step) <= 1e-10 * max(1.0, chi2 / y.size) or gain <= 1e-12 * chi2:
+            # A thousandth of a standard uncertainty: what is left after this step is its square.
+            if float(step @ step) <= 1e-6 or gain <= 1e-12 * chi2:
                 return theta, True
             damping = max(damping * 0.1, 1e-12)
         else:

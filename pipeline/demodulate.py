@@ -27,14 +27,11 @@ class Params:
     clip_sigmas : float
         Residuals beyond this many standard deviations are false echoes and leave the fit.
     rounds : int
-        Reweighted fits before the final one.
-    passes : int
-        Times that frequency and decay are taken from the result and put back into the basis.
+        Reweighted fits of windows that hold false echoes, before the final ones.
     """
 
     clip_sigmas: float = 4.0
     rounds: int = 5
-    passes: int = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,19 +113,14 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     windows = _Windows.cut(conditioned, cycles.bounds)
     omega = 2.0 * math.pi * cycles.frequency_hz
     decay = np.zeros(len(windows.y))
-    weights = windows.usable
-    solution = None
-    for step in range(params.passes):
-        basis = _Basis.of(windows, omega, decay)
-        if step == 0:
-            weights = _reweighted(windows, basis, conditioned.noise_m, params)
-        solution = _solve(windows, basis, weights)
-        solution, weights = _clip(windows, basis, solution, weights, params)
-        if step == 0:
-            solution, weights = _rescue(windows, basis, solution, weights, omega, params)
-        if step + 1 < params.passes:
-            omega, decay = _retune(windows, solution, omega, decay)
-    assert solution is not None
+    basis = _basis(windows, omega, decay)
+    solution = _robust_start(windows, basis, conditioned.noise_m, params)
+    solution = _rescue(windows, basis, solution, omega, params)
+    solution, weights = _clip(windows, basis, solution, 1, params)
+    omega, decay = _retune(windows, solution, omega, decay)
+    # Once more in a basis that turns and decays as the record does.
+    basis = _basis(windows, omega, decay)
+    solution, weights = _clip(windows, basis, _solve(windows, basis, weights), 2, params)
     return _finish(conditioned, windows, solution, weights, omega)
 
 
@@ -177,36 +169,23 @@ class _Windows:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Basis:
-    """A basis with its products, which every reweighted fit only sums anew."""
-
-    columns: F8  # (w, 3, l)
-    products: F8  # (w, 9, l): the six of the normal matrix, the three of the right-hand side
-
-    @classmethod
-    def of(cls, windows: _Windows, omega: float, decay: F8) -> _Basis:
-        """Rest position, cosine and minus sine, the latter two decaying."""
-        w, length = windows.y.shape
-        columns = np.empty((w, 3, length))
-        angle = omega * windows.tau
-        columns[:, 0] = 1.0
-        columns[:, 1] = np.cos(angle)
-        columns[:, 2] = -np.sin(angle)
-        if decay.any():
-            columns[:, 1:] *= np.exp(-decay[:, None] * windows.tau)[:, None, :]
-        products = np.empty((w, 9, length))
-        for k, (i, j) in enumerate(_PAIRS):
-            np.multiply(columns[:, i], columns[:, j], out=products[:, k])
-        np.multiply(columns, windows.y[:, None, :], out=products[:, 6:])
-        return cls(columns, products)
-
-    def take(self, some: NDArray[np.int64]) -> _Basis:
-        """Return the basis of some of the windows."""
-        return _Basis(self.columns[some], self.products[some])
+def _basis(windows: _Windows, omega: float, decay: F8) -> F8:
+    """(w, 4, l): rest position, decaying cosine and minus sine, and below them the distances themselves."""
+    rows = np.empty((windows.y.shape[0], 4, windows.y.shape[1]))
+    angle = omega * windows.tau
+    rows[:, 0] = 1.0
+    np.cos(angle, out=rows[:, 1])
+    np.sin(angle, out=rows[:, 2])
+    if decay.any():
+        fall = np.exp(-decay[:, None] * windows.tau)
+        rows[:, 1] *= fall
+        rows[:, 2] *= -fall
+    else:
+        np.negative(rows[:, 2], out=rows[:, 2])
+    rows[:, 3] = windows.y
+    return rows
 
 
-_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 # Determinant of the normal matrix per sample: 1/4 for a full period, less where the samples crowd into a part
 # of it, so that rest position and amplitude cannot be told apart.
 LEAST_DETERMINANT = 0.003
@@ -219,12 +198,21 @@ class _Solution:
     residual: F8  # (w, l)
     good: NDArray[np.bool_]  # (w,): enough samples, well spread over the period
 
+    def replaced(self, rows: NDArray[np.int64], other: _Solution, which: NDArray[np.bool_]) -> _Solution:
+        """Return this solution with some windows taken from another."""
+        parts = (self.coefficients.copy(), self.inverse.copy(), self.residual.copy(), self.good.copy())
+        for mine, theirs in zip(
+            parts, (other.coefficients, other.inverse, other.residual, other.good), strict=True
+        ):
+            mine[rows] = theirs[which]
+        return _Solution(*parts)
 
-def _solve(windows: _Windows, basis: _Basis, weights: F8) -> _Solution:
-    sums = (basis.products @ weights[..., None])[..., 0]
-    count = np.maximum(sums[:, 0], 1e-300)
+
+def _solve(windows: _Windows, basis: F8, weights: F8) -> _Solution:
+    sums = (basis[:, :3] * weights[:, None, :]) @ basis.transpose(0, 2, 1)
+    count = np.maximum(sums[:, 0, 0], 1e-300)
     # Divided by the count: 1, m, n, p, q, r are the upper triangle row by row.
-    m, n, p, q, r, *right = (sums[:, 1:] / count[:, None]).T
+    (m, n, p, q, r), right = _halves(sums / count[:, None, None])
     adjugate = np.array(
         [
             [p * r - q * q, q * n - m * r, m * q - n * p],
@@ -235,30 +223,38 @@ def _solve(windows: _Windows, basis: _Basis, weights: F8) -> _Solution:
     determinant = adjugate[0, 0] + m * adjugate[0, 1] + n * adjugate[0, 2]
     good = (count >= 6.0) & (determinant > LEAST_DETERMINANT)
     adjugate /= np.where(good, determinant, np.inf)
-    coefficients = np.einsum("ijw,jw->wi", adjugate, np.array(right))
+    coefficients = np.einsum("ijw,jw->wi", adjugate, right)
     inverse = adjugate.transpose(2, 0, 1) / count[:, None, None]
-    residual = windows.y - (coefficients[:, None, :] @ basis.columns)[:, 0, :]
+    offset, a, b = coefficients.T[:, :, None]
+    residual = windows.y - offset - a * basis[:, 1] - b * basis[:, 2]
     return _Solution(coefficients, inverse, residual, good)
 
 
-def _reweighted(windows: _Windows, basis: _Basis, noise_m: float, params: Params) -> F8:
-    """Weights that have let go of clusters of false echoes."""
-    usable = windows.usable
-    weights = usable
+def _halves(sums: F8) -> tuple[F8, F8]:
+    """Upper triangle of the normal matrices less its first entry (5, w), and right-hand sides (3, w)."""
+    return sums[:, (0, 0, 1, 1, 2), (1, 2, 1, 2, 2)].T, sums[:, :, 3].T
+
+
+def _robust_start(windows: _Windows, basis: F8, noise_m: float, params: Params) -> _Solution:
+    """Fit every window, those that scatter more than the rest with weights that let go of clusters of echoes."""
+    solution = _solve(windows, basis, windows.usable)
+    spread = MAD_TO_SIGMA * _ranked(np.abs(solution.residual), windows.usable, 0.5)
+    odd = np.flatnonzero(spread > 1.3 * max(noise_m, float(np.median(spread[solution.good] if solution.good.any() else 0.0))))
+    if not odd.size:
+        return solution
+    some, part = windows.take(odd), basis[odd]
+    size, spread = np.abs(solution.residual[odd]), spread[odd]
     for _ in range(params.rounds):
-        solution = _solve(windows, basis, weights)
-        size = np.abs(solution.residual)
-        spread = np.maximum(MAD_TO_SIGMA * _ranked(size, usable, 0.5), noise_m)
-        if np.all(spread <= 1.5 * noise_m):
-            break
-        ratio = size / np.maximum(spread, 1e-300)[:, None]
-        weights = usable / (1.0 + ratio**2) ** 2
-    return weights
+        ratio = size / np.maximum(spread, noise_m + 1e-300)[:, None]
+        trial = _solve(some, part, some.usable / (1.0 + ratio**2) ** 2)
+        size = np.abs(trial.residual)
+        spread = MAD_TO_SIGMA * _ranked(size, some.usable, 0.5)
+    return solution.replaced(odd, trial, np.ones(odd.size, np.bool_))
 
 
 def _rescue(
-    windows: _Windows, basis: _Basis, solution: _Solution, weights: F8, omega: float, params: Params
-) -> tuple[_Solution, F8]:
+    windows: _Windows, basis: F8, solution: _Solution, omega: float, params: Params
+) -> _Solution:
     """Fit windows that disagree with their neighbours again, starting from what the neighbours predict.
 
     Where false echoes hold half of a window its own fit may have settled on them; the amplitude, phase and rest
@@ -266,7 +262,7 @@ def _rescue(
     """
     n = len(windows.y)
     if n < 5:
-        return solution, weights
+        return solution
     z = solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]
     # Turned back to one instant, so that medians are taken of slow quantities.
     turning = np.exp(1j * omega * (windows.centre - windows.centre[0]))
@@ -277,24 +273,23 @@ def _rescue(
     smooth = (np.median(steady.real[around], axis=1) + 1j * np.median(steady.imag[around], axis=1)) * turning
     expected[:, 1], expected[:, 2] = smooth.real, smooth.imag
     away = np.abs(solution.coefficients - expected).max(axis=1)
-    kept = (weights > 0).sum(axis=1) / np.maximum(windows.usable.sum(axis=1), 1.0)
-    odd = np.flatnonzero((away > 5.0 * MAD_TO_SIGMA * float(np.median(away))) | (kept < 0.7) | ~solution.good)
-    if not odd.size:
-        return solution, weights
     level = _level(windows, solution)
-    some, part = windows.take(odd), basis.take(odd)
-    size = np.abs(some.y - (expected[odd, None, :] @ part.columns)[:, 0, :])
+    bound = params.clip_sigmas * level
+    before = np.sum((np.abs(solution.residual) <= bound) * windows.usable, axis=1)
+    few = before < 0.7 * windows.usable.sum(axis=1)
+    odd = np.flatnonzero((away > 5.0 * MAD_TO_SIGMA * float(np.median(away))) | few | ~solution.good)
+    if not odd.size:
+        return solution
+    some, part = windows.take(odd), basis[odd]
+    size = np.abs(some.y - (expected[odd, None, :] @ part[:, :3])[:, 0, :])
     for _ in range(params.rounds):
         # A third of the samples is believed at first, so that echoes may hold more than half of a window.
         spread = np.maximum(_ranked(size, some.usable, 0.3) / THIRD_TO_SIGMA, level)
         trial = _solve(some, part, some.usable / (1.0 + (size / spread[:, None]) ** 2) ** 2)
         size = np.abs(trial.residual)
-    bound = params.clip_sigmas * level
-    before = np.sum((np.abs(solution.residual[odd]) <= bound) * some.usable, axis=1) * solution.good[odd]
-    better = np.sum((size <= bound) * some.usable, axis=1) > before
-    weights = weights.copy()
-    weights[odd[better]] = np.where(size <= 2.0 * bound, some.usable, 0.0)[better]
-    return _clip(windows, basis, _solve(windows, basis, weights), weights, params)
+    after = np.sum((size <= bound) * some.usable, axis=1)
+    better = trial.good & ((after > before[odd]) | ~solution.good[odd])
+    return solution.replaced(odd[better], trial, better)
 
 
 def _neighbours(n: int) -> NDArray[np.int64]:
@@ -321,12 +316,13 @@ def _ranked(size: F8, usable: F8, share: float) -> F8:
 
 
 def _clip(
-    windows: _Windows, basis: _Basis, solution: _Solution, weights: F8, params: Params
+    windows: _Windows, basis: F8, solution: _Solution, rounds: int, params: Params
 ) -> tuple[_Solution, F8]:
-    """Take residuals beyond the clip out, twice, so that what the first clip revealed goes too."""
-    for _ in range(2):
+    """Take residuals beyond the clip out; in a second round also what the first one revealed."""
+    weights = windows.usable
+    for _ in range(rounds):
         size = np.abs(solution.residual)
-        spread = MAD_TO_SIGMA * _ranked(size, (weights > 0.05).astype(np.float64), 0.5)
+        spread = MAD_TO_SIGMA * _ranked(size, weights, 0.5)
         level = float(np.median(spread[solution.good])) if solution.good.any() else 0.0
         level = max(level, 1e-300)
         # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.

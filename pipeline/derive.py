@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from pipeline.estimate import Estimate
 from pipeline.phase import PhaseFit
 from pipeline.rest import Rest
 from pipeline.scene import Scene
-from pipeline.track import UNUSABLE
+from pipeline.track import UNUSABLE, Quality
 
 __all__ = ["Derived", "Params", "derive"]
 
@@ -100,25 +101,25 @@ def derive(
     .. [1] JCGM 100:2008, "Guide to the expression of uncertainty in measurement".
     .. [2] K. Lelas, R. Pezer, arXiv:2502.07458.
     """
-    from uncertainties import ufloat, wrap
+    from uncertainties import wrap
 
     params = params or Params()
     omega_stat = phase.angular_frequency
-    rate_error = ufloat(1.0, params.u_clock_nominal if clock == "nominal" else 0.0)
-    omega = ufloat(omega_stat.value, omega_stat.u) * rate_error
+    rate_error = _variable(Estimate(1.0, params.u_clock_nominal if clock == "nominal" else 0.0))
+    omega = _variable(omega_stat) * rate_error
     amplitude = damping.averaged({n: f.joint["A0"] for n, f in damping.fits.items()})
     decay = damping.averaged({n: f.damping_rate() for n, f in damping.fits.items()})
-    start = ufloat(amplitude.value, amplitude.u)
-    lam = ufloat(decay.value, decay.u) * rate_error
-    v_rms = omega * ufloat(*_root_mean_square(damping.best, demodulated))
+    start = _variable(amplitude)
+    lam = _variable(decay) * rate_error
+    v_rms = omega * _variable(_root_mean_square(damping.best, demodulated))
     found = {
         "period": (2 * math.pi / omega, "s"),
         "frequency": (omega / (2 * math.pi), "Hz"),
         "angular_frequency": (omega, "rad/s"),
         "amplitude": (start, "m"),
-        "offset": (ufloat(rest.mean.value, rest.mean.u), "m"),
-        "phase": (ufloat(phase.phase.value, phase.phase.u), "rad"),
-        "noise": (ufloat(*_noise(demodulated)), "m"),
+        "offset": (_variable(rest.mean), "m"),
+        "phase": (_variable(phase.phase), "rad"),
+        "noise": (_variable(_noise(demodulated)), "m"),
         "damping_rate": (lam, "1/s"),
         "velocity_rms": (v_rms, "m/s"),
     }
@@ -133,23 +134,29 @@ def derive(
         if scene.air_temperature_c is not None:
             density, viscosity = wrap(air_density), wrap(air_viscosity)
             given_c = scene.air_temperature_c
-            celsius = ufloat(given_c.value, given_c.u or params.u_air_temperature_k)
+            celsius = _variable(Estimate(given_c.value, given_c.u or params.u_air_temperature_k, "degC"))
             rho = density(celsius, *(_variable(x) for x in _air(scene)))
             found["reynolds_number"] = (rho * v_rms * diameter / viscosity(celsius), "")
             best = damping.best
             if "beta" in best.joint.names and mass is not None:
-                beta = ufloat(best.joint["beta"].value, best.joint["beta"].u)
+                beta = _variable(best.joint["beta"])
                 area = math.pi * diameter**2 / 4
                 found["drag_coefficient"] = (3 * math.pi * mass * beta / (2 * omega * rho * area), "")
-    estimates = {name: Estimate(float(x.nominal_value), float(x.std_dev), unit) for name, (x, unit) in found.items()}
+    estimates = {name: _estimate(x, unit) for name, (x, unit) in found.items()}
     relative = omega_stat.u / omega_stat.value
     statistical = {
         name: Estimate(estimates[name].value, estimates[name].value * relative, estimates[name].unit)
         for name in ("period", "frequency", "angular_frequency")
     }
     return Derived(
-        estimates, statistical, None if mass is None else Estimate(float(mass.nominal_value), float(mass.std_dev), "kg")
+        estimates, statistical, None if mass is None else _estimate(mass, "kg")
     )
+
+
+def _estimate(x: Any, unit: str) -> Estimate:
+    from uncertainties import nominal_value, std_dev
+
+    return Estimate(float(nominal_value(x)), float(std_dev(x)), unit)
 
 
 def _air(scene: Scene) -> tuple[Estimate, Estimate]:
@@ -159,13 +166,14 @@ def _air(scene: Scene) -> tuple[Estimate, Estimate]:
     )
 
 
-def _variable(estimate: Estimate):  # type: ignore[no-untyped-def]  # the package has no types
+def _variable(estimate: Estimate) -> Any:
+    """The estimate as a variable of the ``uncertainties`` package; a plain number where it is exact."""
     from uncertainties import ufloat
 
-    return ufloat(estimate.value, estimate.u)
+    return ufloat(estimate.value, estimate.u) if estimate.u > 0 else estimate.value
 
 
-def _effective_mass(scene: Scene, effects: tuple[Effect, ...]):  # type: ignore[no-untyped-def]
+def _effective_mass(scene: Scene, effects: tuple[Effect, ...]) -> Any:
     if scene.bob_mass_kg is None:
         return None
     mass = _variable(scene.bob_mass_kg)
@@ -175,28 +183,31 @@ def _effective_mass(scene: Scene, effects: tuple[Effect, ...]):  # type: ignore[
     if "added_mass" in included:
         from uncertainties import wrap
 
-        mass = mass + wrap(lambda d: added_mass_kg(scene, d))(_variable(scene.disc_diameter_m))  # type: ignore[no-untyped-call, arg-type]
+        mass = mass + wrap(lambda d: added_mass_kg(scene, d))(_variable(scene.disc_diameter_m))
     return mass
 
 
-def _noise(demodulated: Demodulated) -> tuple[float, float]:
-    """Noise of one sample, m: the residuals' median, and as uncertainty what other measures of spread would say.
+def _noise(demodulated: Demodulated) -> Estimate:
+    """Noise of one sample, m, from the residuals' median.
 
-    Tails heavier than the normal distribution's make "the" standard deviation a matter of definition; the difference
-    to the root mean square of the samples used stands for that.
+    Tails heavier than the normal distribution's make "the" standard deviation a matter of definition. The uncertainty
+    holds the difference to the root mean square of the samples used, and what a share e of wide draws like those left
+    out does to a median: 0.5 e / (2 phi(0.6745)) = 1.17 e of it.
     """
     used = (demodulated.flags & UNUSABLE) == 0
     residual = demodulated.residual[used]
     residual = residual[np.isfinite(residual)]
     dof = float(np.sum(np.maximum(demodulated.count - 3, 1)))
     value = MAD_TO_SIGMA * float(np.median(np.abs(residual))) * math.sqrt(residual.size / dof)
-    return value, math.hypot(1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value)
+    wide = float(np.mean((demodulated.flags & Quality.FALSE_ECHO) != 0))
+    parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)
+    return Estimate(value, math.hypot(*parts), "m")
 
 
-def _root_mean_square(fit: LawFit, demodulated: Demodulated) -> tuple[float, float]:
+def _root_mean_square(fit: LawFit, demodulated: Demodulated) -> Estimate:
     """Of the displacement over the windows, m, with its standard uncertainty."""
     t = demodulated.t - demodulated.t[0]
     amplitude = fit.amplitude(t)
     value = math.sqrt(float(np.mean(amplitude**2)) / 2.0)
     gradient = np.mean(amplitude[:, None] * fit.law.jacobian(t, fit.joint.values), axis=0) / (2.0 * value)
-    return value, math.sqrt(max(float(gradient @ fit.joint.covariance @ gradient), 0.0))
+    return Estimate(value, math.sqrt(max(float(gradient @ fit.joint.covariance @ gradient), 0.0)), "m")

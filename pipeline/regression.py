@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.condition import MAD_TO_SIGMA
 from pipeline.track import F8
 
-__all__ = ["Line", "Scatter", "chi2_quantile", "correlation_length", "scatter", "solve_weighted"]
+__all__ = ["Line", "Scatter", "chi2_quantile", "correlation_length", "covariance_of", "scatter", "solve_weighted"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,15 +68,38 @@ def solve_weighted(design: F8, y: F8, u: F8) -> Line:
     -----
     Columns are scaled to unit length and the problem is solved by QR, so that powers of time do no harm.
     """
-    weighted = design / u[:, None]
-    scale = np.sqrt(np.sum(weighted**2, axis=0))
-    scale[scale == 0] = 1.0
-    q, r = np.linalg.qr(weighted / scale)
-    inverse = np.linalg.pinv(r)
-    values = inverse @ (q.T @ (y / u)) / scale
-    covariance = inverse @ inverse.T / np.outer(scale, scale)
+    weight = 1.0 / u
+    covariance, inverse, q = covariance_of(design * weight[:, None])
+    values = inverse @ (q.T @ (y * weight))
     residual = y - design @ values
-    return Line(values, covariance, residual, float(np.sum((residual / u) ** 2)))
+    deviation = residual * weight
+    return Line(values, covariance, residual, float(deviation @ deviation))
+
+
+def covariance_of(jacobian: F8) -> tuple[F8, F8, F8]:
+    """Return the covariance of a least-squares solution, and the factors that solve for it.
+
+    Parameters
+    ----------
+    jacobian : (n, p) float64
+        Each row divided by its point's standard uncertainty.
+
+    Returns
+    -------
+    covariance : (p, p) float64
+        :math:`(J^T J)^{-1}`, by QR of columns scaled to unit length; the pseudo-inverse where columns depend on each
+        other.
+    inverse : (p, p) float64
+        Times ``q.T`` times weighted data gives the solution.
+    q : (n, p) float64
+    """
+    scale = np.sqrt(np.einsum("ni,ni->i", jacobian, jacobian))
+    scale[scale == 0] = 1.0
+    q, r = np.linalg.qr(jacobian / scale)
+    diagonal = np.abs(np.diagonal(r))
+    dependent = r.shape[0] < r.shape[1] or diagonal.min() <= 1e-13
+    inverse = (np.linalg.pinv(r) if dependent else np.linalg.inv(r)) / scale[:, None]
+    return inverse @ inverse.T, inverse, q
 
 
 def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
@@ -110,8 +133,11 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
         typical = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
         spread = share * min(typical, float(np.sqrt(np.mean(residual[kept] ** 2))))
         excess = _excess(residual, u, spread)
-        total = np.hypot(u, excess)
-        kept = np.abs(residual) <= 5.0 * np.maximum(total, 1e-300)
+        settled = excess == 0.0 and total is u
+        total = np.hypot(u, excess) if excess else u
+        before, kept = kept, np.abs(residual) <= 5.0 * np.maximum(total, 1e-300)
+        if settled and np.array_equal(before, kept):
+            break
         if np.count_nonzero(kept) <= degree + 2:
             kept = everything
             break

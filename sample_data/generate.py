@@ -362,7 +362,7 @@ def truth_values(run: Run) -> dict[str, dict[str, object]]:
         "amplitude": (run.amplitude_m, "m"),
         "offset": (run.offset_m, "m"),
         "phase": (run.phase_rad, "rad"),
-        "noise": (NOISE_M, "m"),
+        "noise": (math.hypot(NOISE_M, run.quantum_nm / 1e9 / math.sqrt(12)), "m"),
         "gamma": (run.gamma_per_s, "1/s"),
         "beta": (run.beta_per_m_s, "1/(m s)"),
         "damping_rate": (rate, "1/s"),
@@ -391,7 +391,7 @@ def truth_file(run: Run, record: Record, files: Sequence[str]) -> bytes:
         "conventions": {
             "motion": "y = offset + A(t) cos(omega (t - t_first) + phase)",
             "damping": "dA/dt = -(gamma A + beta A^2), A(t_first) = amplitude",
-            "noise": "standard deviation of the core",
+            "noise": "standard deviation of a reading's core, rounding to ticks included",
             "rows": "counted from 0 at the first data row of the position file",
         },
         "truth": truth_values(run),

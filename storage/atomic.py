@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import os
 import secrets
 from collections.abc import Iterator
@@ -133,18 +134,25 @@ def whole_h5(
     """
     import h5py
 
-    with whole_file(path, overwrite=overwrite) as temporary:
-        with writing_h5(path):
-            file = h5py.File(temporary, "w", libver=libver)
+    with (
+        whole_file(path, overwrite=overwrite) as temporary,
+        temporary.open("r+b", buffering=0) as raw,
+    ):
+        sink = _Sink(raw)
+        file = h5py.File(sink, "w", libver=libver)
         try:
             yield file
         except BaseException:
-            # Closing writes, and after a failure fails again: the first error is the one to tell.
+            # Closing writes, and may fail where the body did: the first error is the one to tell.
             with contextlib.suppress(*HDF5_ERRORS):
                 file.close()
-            raise
-        with writing_h5(path):
-            file.close()
+            if sink.error is None:
+                raise
+        else:
+            with writing_h5(path):
+                file.close()
+        if sink.error is not None:
+            raise _failed(Path(path), sink.error) from sink.error
 
 
 @contextlib.contextmanager
@@ -155,6 +163,56 @@ def writing_h5(path: str | os.PathLike[str]) -> Iterator[None]:
     except HDF5_ERRORS as error:
         remedy = "check the disk's space and what was handed over"
         raise WriteFailed(path, f"could not be written ({one_line(error)})", remedy) from error
+
+
+class _Sink:
+    """A file for HDF5 that never refuses a write: it keeps the disk's first refusal and drops the rest.
+
+    The HDF5 library takes the process down when the disk is full: closing fails, and what could not be closed
+    is closed again at exit. So it is told that all went well, and the caller is told the truth after closing.
+    """
+
+    def __init__(self, raw: io.FileIO) -> None:
+        self._raw = raw
+        self.error: OSError | None = None
+
+    def write(self, data: memoryview) -> int:
+        rest = memoryview(data).cast("B")
+        size = len(rest)
+        with self._keeping():
+            while len(rest) and self.error is None:  # a nearly full disk takes a part
+                rest = rest[self._raw.write(rest) :]
+        return size
+
+    def read(self, size: int = -1) -> bytes:
+        return self._raw.read(size) or b""
+
+    def readinto(self, buffer: memoryview) -> int:
+        room = memoryview(buffer).cast("B")
+        got = self._raw.readinto(room)
+        room[got:] = bytes(len(room) - got)  # what a full disk did not take
+        return len(room)
+
+    def truncate(self, size: int) -> int:
+        with self._keeping():
+            self._raw.truncate(size)
+        return size
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        return self._raw.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._raw.tell()
+
+    def flush(self) -> None:
+        """Nothing is buffered here."""
+
+    @contextlib.contextmanager
+    def _keeping(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self.error = self.error or error
 
 
 def _reserve(target: Path) -> Path:

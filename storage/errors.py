@@ -41,7 +41,9 @@ def one_line(error: BaseException) -> str:
     >>> one_line(MemoryError())
     'MemoryError'
     """
-    return " ".join(str(error).split()) or type(error).__name__
+    # A KeyError shows its text in quotes.
+    text = error.args[0] if isinstance(error, KeyError) and error.args else error
+    return " ".join(str(text).split()) or type(error).__name__
 
 
 class StorageError(Exception):

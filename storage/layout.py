@@ -16,10 +16,13 @@
     /raw                  sequence u4 (sample index); host_mono_ns i8 where a host was there
     /wire                 bytes u1; record_offset, record_len, record_mono_ns; one record an original file
 
+Texts have a fixed length, as netCDF's own library writes them: xarray, netCDF4 and NeXus tools give them as
+text, h5py as ``bytes``.
+
 The file says everything twice. ``/entry/provenance/header`` is one canonical JSON text (sorted keys, ASCII)
 of all that is not an array, with the SHA-256 of every array's decoded little-endian values; its own SHA-256
-stands beside it. That text alone is what :class:`storage.run.Run` believes. The attributes and fields above are
-drawn from it for people and for other tools, and ``Run.verify`` holds them against it.
+stands beside it. That text alone is what :class:`storage.run.Run` believes. The attributes and fields above
+are drawn from it for people and for other tools, and ``Run.verify`` holds them against it.
 """
 
 from __future__ import annotations

@@ -42,8 +42,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Run", "is_run", "open_run", "write_run"]
 
-_UNICODE = h5py.string_dtype()
-
 
 def is_run(head: bytes) -> bool:
     """Tell from a file's first eight bytes whether it may be a run file: whether it is HDF5.
@@ -373,26 +371,27 @@ class Run:
                 self._check(name, digest.hexdigest())
         self.originals()
         for path, value in layout.fields(self._header).items():
-            self._compare(path, "the field", _shown(value), lambda path=path: self._open()[path][()])
+            with _reading(self.path, f"the field {path}"):
+                found = self._open()[path][()]
+            self._compare(f"the field {path}", found, value)
         for path, expected in layout.attributes(self._header).items():
             self._verify_attributes(path, expected)
 
     def _verify_attributes(self, path: str, expected: Mapping[str, Any]) -> None:
-        with _reading(self.path, f"the attributes of {path}"):
+        with _reading(self.path, f"an attribute of {path}"):
             carrier = self._open()[path].attrs
-            names = {name for name in carrier if name not in _DIMENSION_ATTRIBUTES}
-        if odd := sorted(names ^ set(expected)):
+            found = {name: carrier[name] for name in carrier if name not in _DIMENSION_ATTRIBUTES}
+        if odd := sorted(set(found) ^ set(expected)):
             state = "is missing" if odd[0] in expected else "was added"
             raise _damaged(self.path, f"the attribute {path}@{odd[0]}", f"it {state}")
         for name, value in expected.items():
-            self._compare(f"{path}@{name}", "the attribute", _shown(value), lambda name=name: carrier[name])
+            self._compare(f"the attribute {path}@{name}", found[name], value)
 
-    def _compare(self, where: str, what: str, expected: Any, read: Any) -> None:
-        with _reading(self.path, f"{what} {where}"):
-            found = read()
-            found = found.decode() if isinstance(found, bytes) else found
-        if repr(np.asarray(found).tolist()) != repr(np.asarray(expected).tolist()):
-            raise _damaged(self.path, f"{what} {where}", f"{expected!r} was written, got {found!r}")
+    def _compare(self, what: str, found: Any, value: Any) -> None:
+        data, dtype = _stored(value)
+        expected = np.asarray(data, dtype)
+        if repr(np.asarray(found).tolist()) != repr(expected.tolist()):
+            raise _damaged(self.path, what, f"{expected.tolist()!r} was written, got {found!r}")
 
     def _open(self) -> Any:
         """Return the file, if it is open."""
@@ -579,16 +578,30 @@ _DIMENSION_ATTRIBUTES = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"}
 
 def _write_header(file: Any, header: Header) -> None:
     text = header.encode()
-    # Texts of fixed length stay out of HDF5's global heap, the one part of the file that has no checksum.
     stored = file.create_dataset(layout.HEADER, data=np.bytes_(text))
     stored.attrs["sha256"] = np.bytes_(hashlib.sha256(text).hexdigest())
     for path, value in layout.fields(header).items():
-        file.create_dataset(path, data=_shown(value), dtype=_UNICODE if isinstance(value, str) else None)
+        data, dtype = _stored(value)
+        file.create_dataset(path, data=data, dtype=dtype)
     for path, attributes in layout.attributes(header).items():
         carrier = file.require_group(path) if path not in file else file[path]
         for name, value in attributes.items():
-            texts = isinstance(value, str | tuple)
-            carrier.attrs.create(name, _shown(value), dtype=_UNICODE if texts else None)
+            data, dtype = _stored(value)
+            carrier.attrs.create(name, data, dtype=dtype)
+
+
+def _stored(value: Any) -> tuple[Any, Any]:
+    """Return a value as HDF5 is given it, with its type.
+
+    Texts get a fixed length, as netCDF's own library writes them. Texts of free length would lie in HDF5's
+    global heap, the one part of the file without a checksum: a flipped bit there changes them unseen, or
+    sends the HDF5 library into an endless loop.
+    """
+    if not isinstance(value, str | tuple):
+        return value, None
+    texts = [_shown(text).encode() for text in ((value,) if isinstance(value, str) else value)]
+    dtype = h5py.string_dtype(length=max(1, *map(len, texts)))
+    return (texts[0] if isinstance(value, str) else np.array(texts, dtype)), dtype
 
 
 def _read_header(path: Path, file: Any) -> Header:
@@ -608,13 +621,9 @@ def _read_header(path: Path, file: Any) -> Header:
         raise NotARun(path, demand, "read it with the version of springmass that wrote it") from error
 
 
-def _shown(value: Any) -> Any:
+def _shown(text: str) -> str:
     """Return a text as HDF5 can hold it, without NUL and lone surrogates; the header holds the exact one."""
-    if isinstance(value, tuple):
-        return [_shown(item) for item in value]
-    if isinstance(value, str):
-        return value.replace("\0", "\ufffd").encode("utf-16", "surrogatepass").decode("utf-16", "replace")
-    return value
+    return text.replace("\0", "\ufffd").encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 
 def _damaged(path: Path, what: str, how: str) -> RunDamaged:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -65,6 +66,12 @@ class Column:
         """The file's name without its folder."""
         return PurePath(self.path).name
 
+    @property
+    def simulated(self) -> bool:
+        """Whether the title or the file's name says that nobody measured this."""
+        # The form has no place for it, so the name counts too: simulated must not pass for measured.
+        return re.search(r"simulat|synthe", f"{self.layout.title} {self.name}", re.IGNORECASE) is not None
+
     def tick(self) -> float | None:
         """Return the step that all values are multiples of, m or m/s, if one is evident."""
         return find_tick(self.value, self.resolution)
@@ -98,7 +105,9 @@ def read_column(
     if not is_text(data):
         raise FormatError(path, "expected rows of text, got binary data", "export the run as text again")
     if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise NeedsAnswer(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
+        raise NeedsAnswer(
+            path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz"
+        )
     whole = unify(decode(data))
     text = whole.rstrip("\0\x1a")
     layout = find_layout(path, text, channel, unit)
@@ -112,7 +121,7 @@ def read_column(
         t[~bad] = snap(t[~bad], timing.grid, timing.resolution_s)[0]
     t = place_unread(t, bad, timing.grid, table.unread, table.decimals[0])
     told = np.isfinite(t)
-    value = np.where(bad, np.nan, table.values[:, 1] / layout.per_si)[told]
+    value = np.where(bad, np.nan, _to_si(table.values[:, 1], table.decimals[1], layout.per_si))[told]
     if np.isnan(value).all():
         demand = f"expected numbers as {layout.quantity}, got NaN in all {value.size} rows"
         raise FormatError(path, demand, "record the run again", line=int(table.line[0]))
@@ -148,7 +157,7 @@ def _timing(path: str, printed: F8, resolution: float, rate_hz: float | None) ->
             demand = f"rate_hz {rate_hz:g} was given, but the times say {rate.rate_hz:.6g} Hz"
             raise FormatError(path, demand, "leave the rate out or correct it")
         return Timing(rate_hz, rate.grid, resolution, certain=True)
-    return Timing(rate.rate_hz, rate.grid, resolution, rate.certain and rate.grid is not None)
+    return Timing(rate.rate_hz, rate.grid, resolution, rate.certain)
 
 
 def _flags(t: F8, value: F8, bad: NDArray[np.bool_], layout: Layout, timing: Timing) -> U8:
@@ -161,7 +170,9 @@ def _flags(t: F8, value: F8, bad: NDArray[np.bool_], layout: Layout, timing: Tim
     return flags
 
 
-def _stated_error(path: str, layout: Layout, table: Table, bad: NDArray[np.bool_]) -> tuple[float | None, bool]:
+def _stated_error(
+    path: str, layout: Layout, table: Table, bad: NDArray[np.bool_]
+) -> tuple[float | None, bool]:
     """Return the usual error of the file, m, and whether it is constant."""
     if layout.columns < 3:
         return None, False
@@ -173,7 +184,14 @@ def _stated_error(path: str, layout: Layout, table: Table, bad: NDArray[np.bool_
     constant = bool(np.mean(stated == median) >= _CONSTANT)
     if layout.assumed and not constant:
         raise ask_columns(path, "three columns that all vary", layout.first_line)
-    return median / layout.per_si, constant
+    return float(_to_si(np.array([median]), table.decimals[2], layout.per_si)[0]), constant
+
+
+def _to_si(printed: F8, decimals: int, per_si: float) -> F8:
+    """Convert as a decimal fraction: 16.509 cm is the float 0.16509, which 16.509 / 100 is not."""
+    digits = np.rint(printed * 10.0**decimals)
+    exact = (digits / 10.0**decimals == printed) & (np.abs(digits) < 2.0**53)
+    return np.where(exact, digits / (10.0**decimals * per_si), printed / per_si)
 
 
 def _layout_traps(
@@ -182,35 +200,46 @@ def _layout_traps(
     if layout.assumed:
         yield Trap("unit_assumed", f"no column line: read as time (s) and {layout.assumed}, in {layout.unit}")
     if timing.grid is not None:
-        message = f"times are row numbers over a nominal {timing.rate_hz:g} Hz, not measured; their rounding is undone"
+        message = f"times are row numbers over a nominal {timing.rate_hz:g} Hz, not measured times"
         yield Trap("nominal_clock", message)
     if rate_hz is not None:
         yield Trap("rate_assumed", f"the rate of {rate_hz:g} Hz was given by the user")
     elif not timing.certain:
-        why = "too few rows settle it" if timing.grid is not None else "the times fit no regular grid and stand as printed"
+        why = (
+            "too few rows settle it"
+            if timing.grid is not None
+            else "the times fit no regular grid and stand as printed"
+        )
         yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the likeliest: {why}")
     if stated is not None and constant:
         figure = f"{stated * layout.per_si:g} {layout.unit}"
-        yield Trap("stated_error_is_not_noise", f"the error column is a constant {figure}: a stated figure, not the noise")
+        yield Trap(
+            "stated_error_is_not_noise",
+            f"the error column is a constant {figure}: a stated figure, not the noise",
+        )
 
 
 def _row_traps(
     table: Table, bad: NDArray[np.bool_], told: NDArray[np.bool_], *, ended: bool, zeros: int
 ) -> Iterator[Trap]:
     if zeros:
-        yield Trap("zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted")
+        yield Trap(
+            "zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted"
+        )
     last = bad.size - 1
     cut = bool(bad[last]) and not ended
     if cut:
-        kept = "kept as a missing sample" if told[last] else "its time is not told, so no sample stands for it"
+        kept = (
+            "kept as a missing sample" if told[last] else "its time is not told, so no sample stands for it"
+        )
         yield Trap("truncated_row", f"the last row stops midway; {kept}", 1, int(table.line[last]))
     rows = np.flatnonzero(bad[:-1] if cut else bad)
     if rows.size:
         first = int(table.line[rows[0]])
         kept_rows = int(np.count_nonzero(told[rows]))
         message = (
-            f"{rows.size} rows could not be read, the first in line {first}; {kept_rows} of them are kept as missing "
-            "samples, the others show no sign of having been samples"
+            f"{rows.size} rows could not be read, the first in line {first}; {kept_rows} of them are kept as "
+            "missing samples, the others show no sign of having been samples"
         )
         yield Trap("malformed_rows", message, int(rows.size), first)
 
@@ -218,7 +247,11 @@ def _row_traps(
 def _sample_traps(flags: U8, line: NDArray[np.int64], t: F8, timing: Timing) -> Iterator[Trap]:
     found = (
         ("duplicate_time", Flag.DUPLICATE_TIME, "samples repeat a time"),
-        ("non_monotonic_time", Flag.NON_MONOTONIC_TIME, "samples run back in time or ahead of those around them"),
+        (
+            "non_monotonic_time",
+            Flag.NON_MONOTONIC_TIME,
+            "samples run back in time or ahead of those around them",
+        ),
         ("missing_samples", Flag.MISSING, "samples have no value"),
     )
     for code, flag, what in found:
@@ -229,5 +262,7 @@ def _sample_traps(flags: U8, line: NDArray[np.int64], t: F8, timing: Timing) -> 
     if gaps.size:
         reached = np.maximum.accumulate(np.where(flags & IRREGULAR, -np.inf, t))
         lost = int(np.sum(np.rint((t[gaps] - reached[gaps - 1]) * timing.rate_hz) - 1))
-        message = f"about {lost} samples are missing from the times in {gaps.size} gaps; the sample after each is flagged"
+        message = (
+            f"about {lost} samples are missing in {gaps.size} gaps of time; the sample after each is flagged"
+        )
         yield Trap("missing_samples", message, lost, int(line[gaps[0]]))

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 from acquisition.errors import FormatError, NeedsAnswer
@@ -60,11 +61,6 @@ class Layout:
     body: int = 0
     delimiter: str = "\t"
     assumed: str = ""
-
-    @property
-    def simulated(self) -> bool:
-        """Whether the title says that nobody measured this."""
-        return re.search(r"simulat|synthe", self.title, re.IGNORECASE) is not None
 
 
 def recognises(text: str) -> bool:
@@ -138,7 +134,9 @@ def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
             if (match := _VELOCITY.fullmatch(cells[1])) and len(cells) == 2:
                 return at, _layout("velocity", 2, match[1])
             error = _ERROR.fullmatch(cells[-1]) if len(cells) == 3 else None
-            if (match := _DISTANCE.fullmatch(cells[1])) and (len(cells) == 2 or (error and error[1] == match[1])):
+            if (match := _DISTANCE.fullmatch(cells[1])) and (
+                len(cells) == 2 or (error and error[1] == match[1])
+            ):
                 return at, _layout("distance", len(cells), match[1])
     return None
 
@@ -182,13 +180,19 @@ def _shape(lines: Sequence[str]) -> Layout | None:
         usual = max(set(third), key=third.count)
         if usual > 0 and third.count(usual) >= 0.95 * len(third) and _times_run(three):
             return _layout("distance", 3, "cm", "distance and its error, for the third column is constant")
-    elif len(two) >= 3 and rows[0] == two[0] and math.isnan(two[0][1]) and not math.isnan(two[1][1]) and _times_run(two):
+    elif (
+        len(two) >= 3
+        and rows[0] == two[0]
+        and math.isnan(two[0][1])
+        and not math.isnan(two[1][1])
+        and _times_run(two)
+    ):
         return _layout("velocity", 2, "cm", "velocity, for the first value is NaN")
     return None
 
 
 def _times_run(rows: Sequence[Sequence[float]]) -> bool:
-    forward = sum(a[0] < b[0] for a, b in zip(rows, rows[1:], strict=False))
+    forward = sum(a[0] < b[0] for a, b in pairwise(rows))
     return rows[0][0] >= 0 and forward >= 0.5 * (len(rows) - 1)
 
 

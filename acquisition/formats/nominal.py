@@ -44,16 +44,14 @@ class Rate:
         Relative half width of the rates that the rounding of the times allows.
     grid : Grid or None
         The grid that the times were rounded from; None where they fit none.
+    certain : bool
+        Whether the times fit no grid of a hertz more or less as well.
     """
 
     rate_hz: float
     relative_u: float
     grid: Grid | None
-
-    @property
-    def certain(self) -> bool:
-        """Whether the next whole number of hertz is ruled out."""
-        return self.relative_u * self.rate_hz < 0.5
+    certain: bool
 
 
 def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate | None:
@@ -78,14 +76,14 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
     >>> find_rate(np.array([0.0, 0.017, 0.033, 0.05, 0.067]), 0.001).rate_hz
     60.0
     """
-    apart = np.unique(t[np.isfinite(t)])
+    apart = t if np.all(np.diff(t) > 0) else np.unique(t[np.isfinite(t)])
     if apart.size < 2:
         return None
     step, relative_u = _mean_step(apart, resolution)
     rough = 1.0 / step
     nice_step = round(step / resolution) * resolution
     tried = [rate_hz] if rate_hz else [*_USUAL_RATES_HZ, round(rough), round(1.0 / nice_step, 9), rough]
-    near = [float(f) for f in tried if f and abs(f - rough) <= rough * relative_u * 1.5 + 1e-9]
+    near = dict.fromkeys(float(f) for f in tried if f and abs(f - rough) <= rough * relative_u * 1.5 + 1e-9)
     best: Grid | None = None
     best_share = _SHARE_ON_GRID
     for origin in (0.0, float(apart[0])):
@@ -93,9 +91,15 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
             share = float(np.mean(snap(apart, Grid(rate, origin), resolution)[1]))
             if share > best_share + 1e-9:
                 best, best_share = Grid(rate, origin), share
+            if best_share == 1.0:
+                break
         if best is not None:
             break
-    return Rate(best.rate_hz if best else rough, relative_u, best)
+    if best is None:
+        return Rate(rough, relative_u, None, certain=False)
+    beside = (Grid(best.rate_hz + off, best.origin_s) for off in (-1.0, 1.0) if best.rate_hz + off > 0)
+    certain = all(np.mean(snap(apart, grid, resolution)[1]) < best_share for grid in beside)
+    return Rate(best.rate_hz, relative_u, best, certain)
 
 
 def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
@@ -129,7 +133,9 @@ def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, NDArray[np.bool_]]:
     return np.where(agrees, exact, t), agrees
 
 
-def place_unread(t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dict[int, str], decimals: int) -> F8:
+def place_unread(
+    t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dict[int, str], decimals: int
+) -> F8:
     """Tell the times of rows that could not be read, from the grid and their neighbours.
 
     Parameters
@@ -189,8 +195,7 @@ def _told(
 
 def _runs(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.view(np.int8), [0]))))
-    for start, stop in edges.reshape(-1, 2).tolist():
-        yield start, stop
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
 def time_flags(t: F8, step: float) -> U8:

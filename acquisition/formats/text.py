@@ -17,12 +17,23 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 
-__all__ = ["Table", "decode", "guess_delimiter", "is_text", "parse_number", "read_table", "split_cells", "unify"]
+__all__ = [
+    "Table",
+    "decode",
+    "guess_delimiter",
+    "is_text",
+    "parse_number",
+    "read_table",
+    "split_cells",
+    "unify",
+]
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?(\d*)|\.(\d+))(?:[eE][+-]?\d{1,3})?", re.ASCII)
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n\r\f\x1a")
 _DOT, _MINUS, _NAN, _TAB, _NEWLINE, _ZERO = (ord(c) for c in ".-N\t\n0")
-_MAX_DIGITS = 15  # integers of 15 digits and powers of ten up to 22 are exact, so their quotient rounds as float() does
+_MAX_DIGITS = (
+    15  # integers of 15 digits and powers of ten up to 22 are exact, so their quotient rounds as float() does
+)
 _UNIFORM = 0.9  # a column that prints the same number of decimals in this share of its rows always does
 
 
@@ -125,12 +136,17 @@ def guess_delimiter(line: str) -> str:
     for mark in "\t;":
         if mark in line:
             return mark
-    return "" if len(line.split()) > 1 or "," not in line else ","
+    return "" if " " in line.strip(" ") or "," not in line else ","
 
 
 def split_cells(line: str, delimiter: str) -> list[str]:
-    """Split a row into stripped cells; separators at the end of the row make no cell."""
-    cells = [cell.strip() for cell in (line.split(delimiter) if delimiter else line.split())]
+    """Split a row into stripped cells; separators at the end of the row make no cell.
+
+    Only blanks are stripped: any other white space is damage, and a number beside it may have lost digits.
+    """
+    if not delimiter:
+        return re.findall(r"[^ \t]+", line)
+    cells = [cell.strip(" ") for cell in line.split(delimiter)]
     while cells and not cells[-1]:
         cells.pop()
     return cells
@@ -215,7 +231,8 @@ def _fixed_point(body: str, columns: int, delimiter: str) -> tuple[F8, tuple[int
         return None
     # NaN may stand in the first row (a velocity has no first value): the second then tells the decimals.
     decimals = tuple(
-        max(_decimals(a), _decimals(b)) for a, b in zip(first_row, [*second_row, *[""] * columns], strict=False)
+        max(_decimals(a), _decimals(b))
+        for a, b in zip(first_row, [*second_row, *[""] * columns], strict=False)
     )
     if min(decimals) < 1 or len(decimals) != columns:
         return None
@@ -245,17 +262,17 @@ def _cells_to_numbers(raw: NDArray[np.uint8], ends: I8, decimals: I8) -> F8 | No
     # Place by place from the right, for all cells at once; where a cell is shorter, its digit counts as zero.
     width = int(digits[~nan].max(initial=0))
     padded = np.concatenate((np.zeros(width + 1, np.uint8), np.where(is_digit, raw - np.uint8(_ZERO), 0)))
-    value = np.zeros(ends.size, np.int32 if width < 10 else np.int64)
+    value = np.zeros(ends.size, np.int64)
     least_digits, least_decimals = digits[~nan].min(initial=0), decimals.min(initial=0)
     for place in range(width):
         at = ends + (width - place)
         if place >= least_decimals:
             at -= place >= decimals  # a point is stepped over
-        digit = padded[at].astype(value.dtype)
+        digit = padded[at].astype(np.int64)
         if place >= least_digits:
             digit *= place < digits
-        value += digit * value.dtype.type(10**place)
-    numbers = value / 10.0**decimals
+        value += digit * 10**place
+    numbers: F8 = value / 10.0**decimals
     numbers[negative] *= -1.0
     numbers[nan] = np.nan
     return numbers
@@ -268,7 +285,7 @@ def _row_by_row(body: str, columns: int, delimiter: str, first_line: int) -> Tab
     bad: list[bool] = []
     first_cells: list[str] = []
     for number, text in enumerate(body.split("\n"), first_line):
-        if not text.strip():
+        if not text.strip(" \t"):
             continue
         cells = split_cells(text, delimiter)
         numbers = [parse_number(cell) for cell in cells]

@@ -248,7 +248,7 @@ def test_readings_follow_the_motion_of_the_truth(name: str) -> None:
     residual_mm = 10 * (columns_of(name, "position")[:, 1] - model_cm(truth))
     core = np.ones(truth["samples"], dtype=bool)
     core[[*truth["false_echo_rows"], *truth["clipped_rows"], *truth["heavy_tail_rows"]]] = False
-    expected_mm = 1e3 * math.hypot(value_of(truth, "noise"), value_of(truth, "quantum") / math.sqrt(12))
+    expected_mm = 1e3 * value_of(truth, "noise")
     assert abs(residual_mm[core].mean()) < 4 * expected_mm / math.sqrt(core.sum())
     assert residual_mm[core].std() == pytest.approx(expected_mm, rel=4 / math.sqrt(2 * core.sum()))
 

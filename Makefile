@@ -1,0 +1,53 @@
+# Two commands on a fresh machine: `make demo` and `make test`. Needs git, make and Python 3.11+ with venv.
+PYTHON ?= python3
+VENV ?= .venv
+BIN = $(VENV)/bin
+PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
+# Short linear algebra on small matrices: one thread is faster than several, and it makes timings mean something.
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: help demo test trials bench lint docs-figures clean
+
+help:
+	@echo "make demo     from two old recordings to Table 1 and a report"
+	@echo "make test     the tests (make trials: thousands of seeds)"
+	@echo "make bench    speed, as ratios to named references"
+	@echo "make lint     ruff, mypy, import contracts"
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "springmass needs Python 3.11 or newer, $(PYTHON) is $$($(PYTHON) --version); call make PYTHON=python3.11" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+# A stamp per set of packages: the second call of any target installs nothing.
+$(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) -e .
+	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) -e '.[dev]'
+	@touch $@ $(VENV)/.installed
+
+demo: $(VENV)/.installed
+	$(BIN)/springmass demo --out demo-output
+
+test: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest
+
+trials: $(VENV)/.installed-dev
+	SPRINGMASS_TRIALS=2000 $(BIN)/python -m pytest -m trials -s
+
+bench: $(VENV)/.installed-dev
+	$(BIN)/python benchmarks/ratios.py
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+docs-figures: $(VENV)/.installed
+	$(BIN)/python docs/figures/draw.py
+
+clean:
+	rm -rf $(VENV) demo-output dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,0 +1,309 @@
+"""A recording played again through the interface of a live source.
+
+Time is kept as in rosbag2: the clock is injected, and a snapshot (clock time, record time) is taken anew
+whenever play pauses, jumps or changes speed. Between snapshots every deadline is absolute, so nothing drifts.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from acquisition.block import Block, Flag, concatenate
+from acquisition.clock import Clock
+from acquisition.source import SourceInfo
+
+__all__ = ["Replay"]
+
+_LONGEST_SLEEP_NS = 50_000_000  # how long a change of speed or a pause may take to be noticed
+
+
+class Replay:
+    """Blocks delivered at the pace at which they were recorded, or at another.
+
+    Parameters
+    ----------
+    blocks : iterable of Block
+        A whole run, in order.
+    clock : Clock
+        Waits between blocks; with a :class:`acquisition.clock.VirtualClock` two minutes take no time.
+    info : SourceInfo
+        Of the recording; ``kind`` becomes "replay", but simulated data stay "simulated".
+    speed : float or None
+        Record seconds per clock second; None or infinity never waits.
+    block_samples : int
+        Most samples in a block.
+    loop : bool
+        Whether to begin again after the end.
+
+    Notes
+    -----
+    A block is due when its last sample is, as from a port. Whatever the speed, ``t``, ``distance`` and
+    ``velocity`` are those recorded, bit for bit, and so are ``flags`` within the first segment.
+
+    A seek during play and each turn of a loop begin a new *segment*: ``segment`` counts it, ``t`` is again
+    the record's own time and so may run back, ``first`` goes on counting samples delivered, and the first
+    sample carries ``GAP_BEFORE``. A consumer that keeps state resets it there.
+
+    Control methods may be called from any thread, in particular while another one iterates. One thread
+    iterates at a time; a second iteration goes on where the first one stopped. Entering the ``with`` again
+    after it was left rewinds.
+
+    Examples
+    --------
+    >>> from acquisition.clock import VirtualClock
+    >>> t = np.arange(5) / 100
+    >>> run = Block(0, t, 0.2 + t, np.zeros(5, np.uint8))
+    >>> info = SourceInfo("replay", "run", 100.0)
+    >>> with Replay([run], VirtualClock(), info=info, block_samples=2) as source:
+    ...     [len(block) for block in source]
+    [2, 2, 1]
+    """
+
+    def __init__(
+        self,
+        blocks: Iterable[Block],
+        clock: Clock,
+        *,
+        info: SourceInfo,
+        speed: float | None = 1.0,
+        block_samples: int = 16,
+        loop: bool = False,
+    ) -> None:
+        if block_samples < 1:
+            raise ValueError(f"block_samples must be at least 1, got {block_samples}")
+        self.info = info if info.kind == "simulated" else replace(info, kind="replay")
+        self._run = concatenate(blocks)
+        # Times that run back are due at once: nothing waits for the past.
+        self._due = np.maximum.accumulate(self._run.t) if len(self._run) else self._run.t
+        self._clock = clock
+        self._speed = _checked(speed)
+        self._block_samples = block_samples
+        self._loop = loop
+        self._changed = threading.Condition()
+        self._paused = False
+        self._rewind()
+
+    def _rewind(self) -> None:
+        self._next = 0
+        self._delivered = 0
+        self._segment = 0
+        self._cut = False
+        self._steps = 0
+        self._closed = False
+        self._generation = 0
+        self._reference: tuple[int, float] | None = None  # clock ns, record s; None until play begins
+
+    def __enter__(self) -> Self:
+        """Open; rewind if it was closed."""
+        with self._changed:
+            if self._closed:
+                self._rewind()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close."""
+        self.close()
+
+    def close(self) -> None:
+        """End the iteration, also a paused one; may be repeated."""
+        with self._changed:
+            self._closed = True
+            self._touch()
+
+    @property
+    def segment(self) -> int:
+        """How many seeks and turns of the loop came before the block delivered last."""
+        return self._segment
+
+    @property
+    def paused(self) -> bool:
+        """Whether play stands still."""
+        return self._paused
+
+    @property
+    def speed(self) -> float:
+        """Record seconds per clock second; infinite where play never waits."""
+        return self._speed
+
+    @property
+    def duration_s(self) -> float:
+        """From the first sample to the last, s."""
+        return float(self._due[-1] - self._due[0]) if len(self._run) else 0.0
+
+    @property
+    def position_s(self) -> float:
+        """Record time that play has reached, s."""
+        with self._changed:
+            return self._position()
+
+    def pause(self) -> None:
+        """Stand still until :meth:`resume`; what has not been delivered waits."""
+        with self._changed:
+            if not self._paused:
+                self._move_reference(self._position())
+                self._paused = True
+                self._touch()
+
+    def resume(self) -> None:
+        """Go on from where play stands."""
+        with self._changed:
+            if self._paused:
+                position = self._position()
+                self._paused, self._steps = False, 0
+                self._move_reference(position)
+                self._touch()
+
+    def step(self, n: int = 1) -> None:
+        """Deliver the next ``n`` samples at once and stand still again; only while paused.
+
+        Raises
+        ------
+        ValueError
+            If ``n`` is less than 1 or play is not paused.
+        """
+        with self._changed:
+            if n < 1 or not self._paused:
+                raise ValueError(
+                    f"step needs n of at least 1 and a paused replay, got n={n}, paused={self._paused}"
+                )
+            self._steps += n
+            self._touch()
+
+    def seek(self, t_s: float) -> None:
+        """Go to the first sample at or after a record time, s; past the end, to the end.
+
+        Raises
+        ------
+        ValueError
+            If ``t_s`` is not finite.
+        """
+        if not math.isfinite(t_s):
+            raise ValueError(f"t_s must be a finite time in seconds, got {t_s!r}")
+        with self._changed:
+            self._next = int(np.searchsorted(self._due, t_s))
+            self._cut = self._cut or self._delivered > 0
+            self._steps = 0
+            start, end = (self._due[0], self._due[-1]) if len(self._run) else (0.0, 0.0)
+            self._move_reference(float(min(max(t_s, start), end)))
+            self._touch()
+
+    def set_speed(self, speed: float | None) -> None:
+        """Change the pace from now on; None or infinity never waits."""
+        checked = _checked(speed)
+        with self._changed:
+            self._move_reference(self._position())
+            self._speed = checked
+            self._touch()
+
+    def __iter__(self) -> Iterator[Block]:
+        """Yield the blocks that are left, each when it is due; play begins at the first ``next``."""
+        with self._changed:
+            self._reference = None
+        while (block := self._take()) is not None:
+            yield block
+
+    def _take(self) -> Block | None:
+        """Wait for the next block; None at the end."""
+        while True:
+            with self._changed:
+                while self._paused and not self._steps and not self._closed:
+                    self._changed.wait()
+                if self._closed or not self._find_next():
+                    return None
+                stop = min(self._next + self._block_samples, len(self._run))
+                if self._paused:
+                    stop = min(stop, self._next + self._steps)
+                    self._steps -= stop - self._next
+                    self._take_reference(float(self._due[stop - 1]))
+                    return self._deliver(stop)
+                deadline_ns, generation = self._deadline_ns(stop - 1), self._generation
+                if deadline_ns is None or self._clock.now_ns() >= deadline_ns:
+                    return self._deliver(stop)
+            self._wait(deadline_ns, generation)
+
+    def _wait(self, deadline_ns: int, generation: int) -> None:
+        """Sleep until the deadline in slices, so that a control call is noticed soon."""
+        while self._generation == generation and (now_ns := self._clock.now_ns()) < deadline_ns:
+            self._clock.sleep_until_ns(min(deadline_ns, now_ns + _LONGEST_SLEEP_NS))
+
+    def _find_next(self) -> bool:
+        """Tell whether a sample is left; a loop goes back to the first, as a new segment."""
+        size = len(self._run)
+        if self._next < size:
+            return True
+        if not self._loop or size == 0:
+            return False
+        self._next = 0
+        self._cut = self._delivered > 0
+        if self._reference is not None and not self._paused and math.isfinite(self._speed):
+            # The first sample comes one period after the last one was due, not after it was consumed.
+            reference_ns, reference_s = self._reference
+            lasted = self._due[-1] - reference_s + 1.0 / self.info.rate_hz
+            self._reference = reference_ns + round(lasted / self._speed * 1e9), float(self._due[0])
+        else:
+            self._take_reference(float(self._due[0]))
+        return True
+
+    def _deliver(self, stop: int) -> Block:
+        part = self._run[self._next : stop]
+        flags = part.flags
+        if self._cut:
+            self._cut = False
+            self._segment += 1
+            flags = flags.copy()
+            flags[0] |= Flag.GAP_BEFORE.value
+        block = Block(self._delivered, part.t, part.distance, flags, part.host_ns, part.velocity)
+        self._delivered += len(part)
+        self._next = stop
+        return block
+
+    def _deadline_ns(self, row: int) -> int | None:
+        """Return the clock time at which a sample is due; None where nothing waits."""
+        if self._reference is None:
+            self._take_reference(float(self._due[self._next]))
+        if not math.isfinite(self._speed) or self._reference is None:
+            return None
+        reference_ns, reference_s = self._reference
+        return reference_ns + round((float(self._due[row]) - reference_s) / self._speed * 1e9)
+
+    def _position(self) -> float:
+        if self._reference is None or not math.isfinite(self._speed):
+            if self._next < len(self._run):
+                return float(self._due[self._next])
+            return float(self._due[-1]) if len(self._run) else 0.0
+        reference_ns, reference_s = self._reference
+        if self._paused:
+            return reference_s
+        played = (self._clock.now_ns() - reference_ns) * 1e-9 * self._speed
+        # Play never runs ahead of what is still to be delivered.
+        ahead = self._due[min(self._next, len(self._run) - 1)] + 1.0 / self.info.rate_hz * self._block_samples
+        return float(min(reference_s + played, ahead, self._due[-1]))
+
+    def _move_reference(self, position_s: float) -> None:
+        if self._reference is not None:  # before play begins there is nothing to move
+            self._take_reference(position_s)
+
+    def _take_reference(self, position_s: float) -> None:
+        self._reference = (self._clock.now_ns(), position_s)
+
+    def _touch(self) -> None:
+        self._generation += 1
+        self._changed.notify_all()
+
+
+def _checked(speed: float | None) -> float:
+    """Return the speed, infinite for None."""
+    if speed is None:
+        return math.inf
+    if not speed > 0:
+        raise ValueError(f"speed must be positive, or None to never wait, got {speed!r}")
+    return float(speed)

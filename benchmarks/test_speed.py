@@ -1,0 +1,45 @@
+"""The benchmarked calls as tests: with timing off they still must run and give what they should."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from pipeline.analyse import analyse
+from springmass import load, sample_data
+from springmass.loading import read_scene
+
+RATIOS = Path(__file__).with_name("ratios.py")
+
+
+@pytest.fixture(scope="module")
+def damped():
+    """The damped bundled recording and its scene."""
+    data = sample_data()
+    return load(data / "damped_simulated_position.txt").track, read_scene(data / "damped.scene.toml")
+
+
+def test_reading_a_text_recording(benchmark):
+    """Reading 12,000 rows of text gives 12,000 samples."""
+    loaded = benchmark(load, sample_data() / "damped_simulated_position.txt")
+    assert len(loaded.track) == 12000
+
+
+def test_the_whole_analysis(benchmark, damped):
+    """The analysis at standard accuracy selects the law that made the record."""
+    result = benchmark(analyse, *damped)
+    assert result.motion.damping.selected == "linear+quadratic"
+
+
+def test_every_ratio_can_be_taken():
+    """Each pair of the ratio table runs, so that `make bench` does not rot."""
+    spec = importlib.util.spec_from_file_location("ratios", RATIOS)
+    ratios = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(ratios)
+    for name, _, limit, ours, theirs, _ in ratios.cases():
+        mine, other = ratios.alternate(ours, theirs, 1)
+        assert mine > 0
+        assert other > 0, name
+        assert limit > 0

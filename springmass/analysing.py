@@ -1,0 +1,90 @@
+"""From a loaded input to its analysis and result: the steps that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from pipeline.analyse import Analysis, analyse
+from pipeline.scene import Scene
+from springmass.loading import Loaded
+from springmass.results import result_of
+
+if TYPE_CHECKING:
+    from pipeline.classic import Classic
+
+__all__ = ["Analysed", "analyse_loaded", "now_utc"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysed:
+    """One input with everything that was made of it.
+
+    Parameters
+    ----------
+    loaded : Loaded
+    analysis : Analysis
+    classic : Classic or None
+    result : dict
+        As printed under ``--json``.
+    """
+
+    loaded: Loaded
+    analysis: Analysis
+    classic: Classic | None
+    result: dict[str, Any]
+
+
+def analyse_loaded(
+    loaded: Loaded,
+    scene: Scene | None,
+    *,
+    parameters: Mapping[str, Any],
+    accuracy: str = "standard",
+    with_classic: bool = False,
+    time_utc: str | None = None,
+) -> Analysed:
+    """Analyse one input.
+
+    Parameters
+    ----------
+    loaded : Loaded
+    scene : Scene or None
+        None: the scene that a run file carries, if any.
+    parameters : mapping
+        Options as resolved, stored with the result.
+    accuracy : str
+        Tier.
+    with_classic : bool
+        Whether the report's method is wanted; its estimates then stand in the result.
+    time_utc : str, optional
+        ISO 8601; left out, now.
+
+    Raises
+    ------
+    pipeline.errors.AnalysisError, pipeline.errors.SceneError
+    """
+    if scene is None:
+        scene = Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
+    analysis = analyse(loaded.track, scene)
+    classic = None
+    if with_classic:
+        from pipeline.classic import classic as evaluate
+
+        classic = evaluate(loaded.track, scene)
+    result = result_of(
+        loaded,
+        analysis,
+        time_utc=time_utc or now_utc(),
+        accuracy="classic" if with_classic else accuracy,
+        parameters={**parameters, "scene": scene.to_mapping()},
+        classic=classic,
+    )
+    return Analysed(loaded, analysis, classic, result)
+
+
+def now_utc() -> str:
+    """Return the time as ISO 8601 in UTC, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")

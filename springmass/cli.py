@@ -1,0 +1,185 @@
+"""The command line: arguments here, each command's work in ``springmass.commands``.
+
+Nothing heavier than argparse is imported before a command is known, so that ``--help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+
+from springmass import __version__
+from springmass.errors import INTERRUPTED, OK, UNREADABLE, USAGE
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+__all__ = ["build_parser", "main"]
+
+# Command to the module that adds its arguments and does its work.
+COMMANDS = {
+    "demo": "replay, analyse and compare the bundled recordings: Table 1 in one command",
+    "analyse": "turn recordings into Table 1, findings and a report",
+    "replay": "play a recording back through the interface of a live sensor",
+    "convert": "write a recording as a run file, or give back the original inside one",
+    "formats": "list the families of recordings, or say what a file is",
+    "doctor": "check this installation",
+}
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command line."""
+    parser = argparse.ArgumentParser(
+        prog="springmass",
+        description="From a rangefinder's samples to period, spring constant and damping law, "
+        "with uncertainties that hold.",
+        epilog="exit codes: 0 done, 1 some inputs failed, 2 usage, 3 unreadable input, 4 sensor or port, "
+        "5 rejected under --strict, 130 Ctrl-C",
+        formatter_class=_formatter,
+    )
+    parser.add_argument("--version", action="version", version=f"springmass {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    adders = {
+        "demo": _add_demo,
+        "analyse": _add_analyse,
+        "replay": _add_replay,
+        "convert": _add_convert,
+        "formats": _add_formats,
+        "doctor": _add_doctor,
+    }
+    for name, summary in COMMANDS.items():
+        adders[name](
+            commands.add_parser(
+                name,
+                help=summary,
+                description=summary[0].upper() + summary[1:] + ".",
+                formatter_class=_formatter,
+            )
+        )
+    return parser
+
+
+def _formatter(prog: str) -> argparse.HelpFormatter:
+    """Help as wide as the terminal; argparse would import shutil and three compressors to find that out."""
+    try:
+        columns = int(os.environ.get("COLUMNS") or os.get_terminal_size(1).columns)
+    except (OSError, ValueError):
+        columns = 80
+    return argparse.HelpFormatter(prog, width=max(columns, 40) - 2)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line and return its exit code; a user's mistake is one line on stderr."""
+    options = build_parser().parse_args(arguments)
+    from importlib import import_module
+
+    command = import_module(f"springmass.commands.{options.command}")
+    try:
+        return int(command.run(options))
+    except KeyboardInterrupt:
+        print("springmass: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output went away (`| head`): nothing is left to say, not even at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OK
+    except Exception as error:
+        code = _exit_code(error)
+        if code is None:
+            raise
+        print(f"springmass: {error}", file=sys.stderr)
+        return code
+
+
+def _exit_code(error: Exception) -> int | None:
+    """Exit code of an error that is meant for the user; None for a defect, which deserves its traceback."""
+    from springmass.errors import ProgramError
+
+    if isinstance(error, ProgramError):
+        return error.exit_code
+    from acquisition.errors import AcquisitionError
+    from pipeline.errors import PipelineError, SceneError
+    from storage.errors import StorageError
+
+    if isinstance(error, SceneError):
+        return USAGE
+    return UNREADABLE if isinstance(error, AcquisitionError | PipelineError | StorageError) else None
+
+
+def _add_input_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--velocity", metavar="FILE", help="velocity file that belongs to the one position file given")
+    parser.add_argument("--channel", metavar="NAME", help="which quantity of the file to take as distance")
+    parser.add_argument("--rate-hz", type=_positive, metavar="R", help="samples per second, where the file does not say")
+    parser.add_argument("--unit", metavar="U", help="unit of the distance, where the file does not say")
+
+
+def _add_analyse(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="+", metavar="INPUT", help="recordings and run files")
+    parser.add_argument("--scene", metavar="FILE", help="scene file (TOML): masses, disc, air, sensor")
+    parser.add_argument(
+        "--accuracy",
+        choices=("standard",),
+        default="standard",
+        help="how much time to spend for how much accuracy; one tier is measured so far",
+    )
+    parser.add_argument("--method", choices=("classic",), help="the lab report's own method, to compare against")
+    _add_input_options(parser)
+    parser.add_argument("--from", dest="from_s", type=_finite, metavar="S", help="use samples from this second on")
+    parser.add_argument("--to", dest="to_s", type=_finite, metavar="S", help="use samples up to this second")
+    parser.add_argument("--out", metavar="DIR", help="folder for NAME.results (default: here; with --json: none)")
+    parser.add_argument("--no-report", action="store_true", help="print, but write no files")
+    parser.add_argument("--json", action="store_true", help="one JSON object per input on stdout")
+    parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
+
+
+def _add_demo(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--out", metavar="DIR", default="springmass-demo", help="folder for what it makes (%(default)s)")
+
+
+def _add_replay(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", metavar="INPUT", help="recording or run file")
+    parser.add_argument("--speed", type=_speed, default=1.0, metavar="X", help="times real time, or max (default 1)")
+    parser.add_argument("--seek", type=_finite, metavar="S", help="start at this second of the record")
+    parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
+    parser.add_argument("-o", "--output", metavar="RUN.h5", help="write the samples to a run file instead of stdout")
+    _add_input_options(parser)
+
+
+def _add_convert(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", metavar="IN", help="recording, or run file")
+    parser.add_argument(
+        "output", metavar="OUT", help="RUN.h5, or for a run file the name or folder for the original inside it"
+    )
+    parser.add_argument("--scene", metavar="FILE", help="scene file to put into the run file")
+    parser.add_argument("--overwrite", action="store_true", help="replace OUT where it exists")
+    _add_input_options(parser)
+
+
+def _add_formats(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="?", metavar="FILE", help="say what this file is")
+    parser.add_argument("--json", action="store_true", help="as JSON on stdout")
+    _add_input_options(parser)
+
+
+def _add_doctor(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="as JSON on stdout")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if value != value or value in (float("inf"), float("-inf")):
+        raise argparse.ArgumentTypeError(f"must be a finite number, got {text!r}")
+    return value
+
+
+def _positive(text: str) -> float:
+    value = _finite(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"must be positive, got {text!r}")
+    return value
+
+
+def _speed(text: str) -> float:
+    return float("inf") if text == "max" else _positive(text)

@@ -1,0 +1,92 @@
+"""``springmass convert``: a recording into a run file, or the original out of one."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from springmass import __version__
+from springmass.analysing import now_utc
+from springmass.errors import OK, UNREADABLE, USAGE, ProgramError
+from springmass.loading import Loaded, load, read_scene
+from storage.atomic import write_whole
+from storage.run import write_run
+
+__all__ = ["run", "write_loaded"]
+
+RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Convert one input."""
+    scene = None if options.scene is None else read_scene(options.scene).to_mapping()
+    loaded = load(
+        options.input,
+        velocity=options.velocity,
+        channel=options.channel,
+        rate_hz=options.rate_hz,
+        unit=options.unit,
+    )
+    out = Path(options.output)
+    if out.suffix.lower() in RUN_SUFFIXES:
+        written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=scene, overwrite=options.overwrite)
+        print(f"{written}: {len(loaded.samples)} samples from {loaded.path}", file=sys.stderr)
+        return OK
+    if loaded.format != "run":
+        raise ProgramError(
+            f"{out}: a recording converts to a run file, whose name ends in {' or '.join(RUN_SUFFIXES)}; "
+            f"got {out.suffix or 'no suffix'}",
+            USAGE,
+        )
+    for path in _give_back(loaded, out, options.overwrite):
+        print(f"{path}: the original inside {loaded.path}, bit for bit", file=sys.stderr)
+    return OK
+
+
+def write_loaded(
+    path: Path, loaded: Loaded, blocks: Any, *, scene: Any = None, overwrite: bool = False
+) -> Path:
+    """Write a run file of a loaded input's samples, its own bytes inside.
+
+    Parameters
+    ----------
+    path : Path
+    loaded : Loaded
+    blocks : iterable of Block
+        What to write: the samples as they were loaded, or as a replay delivered them.
+    scene : mapping, optional
+    overwrite : bool
+    """
+    return write_run(
+        path,
+        blocks,
+        loaded.info,
+        originals=loaded.originals,
+        scene=scene if scene is not None else loaded.scene,
+        title=loaded.title,
+        channel=loaded.channel,
+        traps=loaded.traps,
+        malformed_rows=loaded.malformed_rows,
+        format=loaded.format,
+        provenance={"software": "springmass", "version": __version__, "created_utc": now_utc()},
+        overwrite=overwrite,
+    )
+
+
+def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
+    if not loaded.originals:
+        raise ProgramError(f"{loaded.path}: no original file travels inside this run; nothing to give back", UNREADABLE)
+    if out.is_dir():
+        # Names came from outside: only their last part may choose a place.
+        targets = [out / Path(original.name).name for original in loaded.originals]
+    elif len(loaded.originals) == 1:
+        targets = [out]
+    else:
+        names = ", ".join(o.name for o in loaded.originals)
+        raise ProgramError(f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder", USAGE)
+    return [
+        write_whole(target, original.data, overwrite=overwrite)
+        for target, original in zip(targets, loaded.originals, strict=True)
+    ]

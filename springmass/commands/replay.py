@@ -1,0 +1,54 @@
+"""``springmass replay``: a recording through the interface of a live sensor."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.clock import Clock, SystemClock, VirtualClock
+from acquisition.replay import Replay
+from springmass.commands.convert import write_loaded
+from springmass.errors import OK, USAGE, ProgramError
+from springmass.loading import load
+
+__all__ = ["run"]
+
+
+def run(options: argparse.Namespace) -> int:
+    """Play the input to stdout, a line per sample, or into a run file."""
+    if options.loop and options.output is not None:
+        raise ProgramError("--loop never ends and a run file is written whole at the end; leave one of them out", USAGE)
+    loaded = load(
+        options.input,
+        velocity=options.velocity,
+        channel=options.channel,
+        rate_hz=options.rate_hz,
+        unit=options.unit,
+    )
+    fast = math.isinf(options.speed)
+    clock: Clock = VirtualClock() if fast else SystemClock()
+    source = Replay(
+        loaded.samples_in_blocks(),
+        clock,
+        info=loaded.info,
+        speed=None if fast else options.speed,
+        loop=options.loop,
+    )
+    with source:
+        if options.seek is not None:
+            source.seek(options.seek)
+        if options.output is not None:
+            path = write_loaded(Path(options.output), loaded, source)
+            print(f"{path}: replayed from {loaded.path}", file=sys.stderr)
+            return OK
+        print("time_s\tdistance_m\tflags")
+        for block in source:
+            for t, distance, flags in zip(block.t, block.distance, block.flags, strict=True):
+                shown = "NaN" if np.isnan(distance) else f"{distance:.6f}"
+                print(f"{t:.6f}\t{shown}\t{flags}")
+            sys.stdout.flush()
+    return OK

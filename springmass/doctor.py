@@ -1,0 +1,119 @@
+"""Checks of an installation: each finds one thing that has broken such programs before."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import platform
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import springmass
+
+__all__ = ["Check", "examine", "foreign_packages"]
+
+PACKAGES = ("acquisition", "pipeline", "storage")
+LIBRARIES = ("numpy", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2")
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One check.
+
+    Parameters
+    ----------
+    name : str
+    ok : bool
+    found : str
+        What was seen.
+    remedy : str
+        What to do where it is not ok.
+    """
+
+    name: str
+    ok: bool
+    found: str
+    remedy: str = ""
+
+
+def examine() -> tuple[Check, ...]:
+    """Run every check."""
+    return (*_interpreter(), *_packages(), *_libraries(), _bundled(), _round_trip())
+
+
+def foreign_packages() -> dict[str, str]:
+    """Return packages that do not lie beside ``springmass``, name to where they were found.
+
+    ``acquisition``, ``pipeline`` and ``storage`` are names that other distributions use too; one found first on the
+    path would be run in place of ours.
+    """
+    home = Path(springmass.__file__).resolve().parent.parent
+    foreign: dict[str, str] = {}
+    for name in PACKAGES:
+        place = Path(importlib.import_module(name).__file__ or "").resolve().parent
+        if place != home / name:
+            foreign[name] = str(place)
+    return foreign
+
+
+def _interpreter() -> Iterator[Check]:
+    version = platform.python_version()
+    yield Check("python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")
+    own = sys.prefix != sys.base_prefix
+    found = sys.prefix if own else "no environment of its own"
+    # Not a failure: an installation without one works until another distribution brings a package of our names.
+    yield Check("environment", True, found)
+
+
+def _packages() -> Iterator[Check]:
+    foreign = foreign_packages()
+    for name in PACKAGES:
+        found = foreign.get(name, f"of springmass {springmass.__version__}")
+        yield Check(
+            f"package {name}",
+            name not in foreign,
+            found,
+            "another distribution brings a package of this name: install springmass into an environment of its own",
+        )
+
+
+def _libraries() -> Iterator[Check]:
+    for name in LIBRARIES:
+        try:
+            importlib.import_module(name)
+            yield Check(f"library {name}", True, importlib.metadata.version(name))
+        except ImportError as error:
+            yield Check(f"library {name}", False, str(error), "install springmass again: pip install --force-reinstall")
+
+
+def _bundled() -> Check:
+    from springmass.errors import ProgramError
+    from springmass.loading import sample_data
+
+    try:
+        return Check("bundled recordings", True, str(sample_data()))
+    except ProgramError as error:
+        return Check("bundled recordings", False, str(error), "install springmass again")
+
+
+def _round_trip() -> Check:
+    """Write a run file and read it back: HDF5, its filters and the temporary folder in one."""
+    import numpy as np
+
+    from acquisition.block import Block
+    from acquisition.source import SourceInfo
+    from storage.errors import StorageError
+    from storage.run import open_run, write_run
+
+    block = Block(0, np.arange(8) / 100.0, np.linspace(0.2, 0.3, 8), np.zeros(8, np.uint8))
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            path = write_run(Path(folder) / "check.h5", [block], SourceInfo("simulated", "doctor", 100.0))
+            with open_run(path) as run:
+                same = bool(np.array_equal(run.samples().distance, block.distance))
+    except (StorageError, OSError) as error:
+        return Check("run file", False, str(error), "free the temporary folder, or install h5py again")
+    return Check("run file", same, "written and read back" if same else "read back other values", "install h5py again")

@@ -1,0 +1,34 @@
+"""Exit codes of the program, and which error leads to which.
+
+====  =====================================================
+0     everything done
+1     some inputs failed, others were done
+2     usage: an option or a scene that cannot be
+3     an input that cannot be read or holds nothing to analyse
+4     sensor or port
+5     rejected under ``--strict``
+130   Ctrl-C, with the file closed cleanly
+====  =====================================================
+"""
+
+from __future__ import annotations
+
+__all__ = ["OK", "REJECTED", "SENSOR", "SOME_FAILED", "UNREADABLE", "USAGE", "ProgramError"]
+
+OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERRUPTED = 0, 1, 2, 3, 4, 5, 130
+
+
+class ProgramError(Exception):
+    """One line for the user, and the exit code that goes with it.
+
+    Parameters
+    ----------
+    message : str
+        What was demanded, what was got, where, what to do.
+    exit_code : int
+        One of the codes above.
+    """
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code

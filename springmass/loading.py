@@ -1,0 +1,224 @@
+"""From a path to a track: old recordings and run files alike, with what was seen on the way."""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.block import Block
+from acquisition.recording import Original, Recording, Trap
+from acquisition.registry import open_recording
+from acquisition.source import SourceInfo
+from pipeline.errors import SceneError
+from pipeline.scene import Scene
+from pipeline.track import Track
+from springmass.errors import UNREADABLE, USAGE, ProgramError
+
+__all__ = ["Loaded", "load", "read_scene", "sample_data", "to_track"]
+
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Loaded:
+    """One input, read.
+
+    Parameters
+    ----------
+    path : Path
+    format : str
+        The family that read it, or "run" for a run file.
+    sha256 : str
+        Of the file's bytes.
+    info : SourceInfo
+    channel : str
+    title : str
+    samples : Block
+    track : Track
+        The samples for the pipeline, cut to the seconds asked for.
+    traps : tuple of Trap
+    malformed_rows : int
+    originals : tuple of Original
+    scene : mapping or None
+        The scene a run file carries.
+    """
+
+    path: Path
+    format: str
+    sha256: str
+    info: SourceInfo
+    channel: str
+    title: str
+    samples: Block
+    track: Track
+    traps: tuple[Trap, ...]
+    malformed_rows: int
+    originals: tuple[Original, ...]
+    scene: Mapping[str, Any] | None
+
+    def samples_in_blocks(self, size: int = 1024) -> Iterator[Block]:
+        """Yield the samples in blocks of at most ``size``."""
+        for start in range(0, len(self.samples), size):
+            yield self.samples[start : start + size]
+
+
+def load(
+    path: str | Path,
+    *,
+    velocity: str | Path | None = None,
+    channel: str | None = None,
+    rate_hz: float | None = None,
+    unit: str | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+) -> Loaded:
+    """Read a recording or a run file.
+
+    Parameters
+    ----------
+    path : path
+    velocity : path, optional
+        The velocity file that belongs to a position file; joined by time.
+    channel, rate_hz, unit : optional
+        What the file leaves out.
+    from_s, to_s : float, optional
+        Use samples of these seconds only; the rest stays in the file.
+
+    Raises
+    ------
+    acquisition.errors.FormatError, storage.errors.StorageError
+        If it cannot be read; one line.
+    ProgramError
+        If no sample lies within the seconds asked for.
+    """
+    where = Path(path)
+    if _is_hdf5(where):
+        if velocity is not None or channel is not None or rate_hz is not None or unit is not None:
+            raise ProgramError(
+                f"{where}: --velocity, --channel, --rate-hz and --unit complete text recordings; "
+                "a run file holds all of them, leave them out",
+                USAGE,
+            )
+        loaded = _load_run(where)
+    else:
+        recording = open_recording(where, channel=channel, rate_hz=rate_hz, unit=unit, velocity_path=velocity)
+        loaded = _from_recording(where, recording)
+    if from_s is None and to_s is None:
+        return loaded
+    return replace(loaded, track=_between(loaded, from_s, to_s))
+
+
+def to_track(samples: Block, info: SourceInfo) -> Track:
+    """Hand samples over to the pipeline.
+
+    The noise stated by a source is passed on; the error column of a file is not noise and travels apart.
+    """
+    return Track(
+        t=samples.t,
+        y=samples.distance,
+        flags=samples.flags,
+        rate_hz=info.rate_hz,
+        sigma_m=info.sigma_m,
+        quantum_m=info.quantum_m,
+        stated_error_m=info.stated_error_m,
+        clock=info.clock,
+        kind=info.kind,
+        velocity=samples.velocity,
+    )
+
+
+def read_scene(path: str | Path) -> Scene:
+    """Read a scene file (TOML).
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if it is absent, no TOML, or says something impossible; the line names file, key and value.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            tables = tomllib.load(file)
+        return Scene.from_mapping(tables, where=str(path))
+    except OSError as error:
+        raise ProgramError(f"{path}: a scene file was demanded, {error.strerror}; check the name", USAGE) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ProgramError(f"{path}: not a TOML file ({error}); see the scene file in the reference", USAGE) from error
+    except SceneError as error:
+        raise ProgramError(str(error), USAGE) from error
+
+
+def sample_data() -> Path:
+    """Return the folder of the bundled recordings: inside an installed package, beside a checkout's."""
+    here = Path(__file__).resolve().parent
+    for folder in (here / "sample_data", here.parent / "sample_data"):
+        if (folder / "undamped_simulated_position.txt").is_file():
+            return folder
+    raise ProgramError(f"{here}: the bundled recordings are missing; install springmass again", UNREADABLE)
+
+
+def _is_hdf5(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
+    except OSError:
+        return False  # the format registry says what is wrong with it
+
+
+def _from_recording(path: Path, recording: Recording) -> Loaded:
+    return Loaded(
+        path,
+        recording.format,
+        recording.originals[0].sha256,
+        recording.info,
+        recording.channel,
+        recording.title,
+        recording.samples,
+        to_track(recording.samples, recording.info),
+        recording.traps,
+        recording.malformed_rows,
+        recording.originals,
+        None,
+    )
+
+
+def _load_run(path: Path) -> Loaded:
+    from storage.run import open_run
+
+    with open_run(path) as run:
+        samples = run.samples()
+        return Loaded(
+            path,
+            "run",
+            hashlib.sha256(path.read_bytes()).hexdigest(),
+            run.info,
+            run.channel,
+            run.title,
+            samples,
+            to_track(samples, run.info),
+            run.traps,
+            run.malformed_rows,
+            run.originals(),
+            run.scene,
+        )
+
+
+def _between(loaded: Loaded, from_s: float | None, to_s: float | None) -> Track:
+    t = loaded.track.t
+    low = -np.inf if from_s is None else from_s
+    high = np.inf if to_s is None else to_s
+    keep = (t >= low) & (t <= high)
+    if not keep.any():
+        raise ProgramError(
+            f"{loaded.path}: no sample lies between {low:g} and {high:g} s; the record spans "
+            f"{np.nanmin(t):g} to {np.nanmax(t):g} s",
+            USAGE,
+        )
+    track = loaded.track
+    velocity = None if track.velocity is None else track.velocity[keep]
+    return replace(track, t=t[keep], y=track.y[keep], flags=track.flags[keep], velocity=velocity)

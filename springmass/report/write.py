@@ -1,0 +1,130 @@
+"""Write a report: the page, its figures and its tables, each file whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pipeline.compare import Comparison
+from springmass.report.figures import NAMES, draw, render
+from springmass.report.html import ReportRun, render_html
+from springmass.report.tables import results_csv, table_tex
+
+__all__ = ["ReportRun", "write_report"]
+
+_KINDS = ("svg", "pdf")
+
+
+def write_report(
+    directory: Path,
+    runs: Sequence[ReportRun],
+    *,
+    comparison: Comparison | None = None,
+    provenance: Mapping[str, Any],
+    results: Sequence[Mapping[str, Any]],
+) -> Path:
+    """Write the report of one run or of several side by side.
+
+    Parameters
+    ----------
+    directory : Path
+        Usually ``NAME.results``; made if it is not there, files of an earlier report are replaced.
+    runs : sequence of ReportRun
+        One at least.
+    comparison : Comparison, optional
+        Of the runs' spring constants.
+    provenance : mapping
+        Version, parameters, command, time: whatever says how to make this report again.
+    results : sequence of mapping
+        One JSON object a run, in the runs' order; their ``quality`` goes into the page.
+
+    Returns
+    -------
+    Path
+        The page, ``report.html``, written last: where it stands, the rest stands.
+
+    Raises
+    ------
+    ValueError
+        If there is no run, or there are not as many results as runs.
+    storage.errors.WriteFailed
+        If a file cannot be written.
+
+    Notes
+    -----
+    Beside the page: ``results.json`` (one object for one run, else a list; what is no number is null),
+    ``results.csv``, ``table.tex``, and ``figures/`` with every figure as SVG and PDF. The same arguments give the
+    same bytes.
+    """
+    from storage.atomic import write_whole
+
+    if not runs or len(runs) != len(results):
+        raise ValueError(
+            f"a report needs one run at least and one result for each, got {len(runs)} and {len(results)}"
+        )
+    directory = Path(directory)
+    (directory / "figures").mkdir(parents=True, exist_ok=True)
+    names, analyses = [run.name for run in runs], [run.analysis for run in runs]
+    pictures = []
+    for stem, run in zip(_stems(names), runs, strict=True):
+        drawn = {
+            name: {kind: render(figure, kind) for kind in _KINDS}
+            for name, figure in draw(run.analysis).items()
+        }
+        _write_figures(directory / "figures", stem, drawn)
+        pictures.append({name: files["svg"] for name, files in drawn.items()})
+    plain = [_plain(result) for result in results]
+    content = plain[0] if len(plain) == 1 else plain
+    write_whole(
+        directory / "results.json", json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    )
+    write_whole(directory / "results.csv", results_csv(names, analyses))
+    write_whole(directory / "table.tex", table_tex(names, analyses))
+    counts = [
+        {**run.analysis.quality, **result.get("quality", {})}
+        for run, result in zip(runs, results, strict=True)
+    ]
+    page = render_html(runs, pictures, comparison=comparison, provenance=provenance, quality=counts)
+    return write_whole(directory / "report.html", page)
+
+
+def _write_figures(folder: Path, stem: str, drawn: Mapping[str, Mapping[str, bytes]]) -> None:
+    from storage.atomic import write_whole
+
+    for name in NAMES:
+        for kind in _KINDS:
+            target = folder / f"{stem}{name}.{kind}"
+            if name in drawn:
+                write_whole(target, drawn[name][kind])
+            else:
+                # Left by an earlier report of a run that did oscillate, it would pass for one of this.
+                target.unlink(missing_ok=True)
+
+
+def _stems(names: Sequence[str]) -> list[str]:
+    """Return what each run's figures begin with: nothing for a single run, else a name safe for any file system."""
+    if len(names) == 1:
+        return [""]
+    stems: list[str] = []
+    for i, name in enumerate(names, 1):
+        safe = re.sub(r"[^A-Za-z0-9.+-]+", "_", name).strip("._")[:60] or f"run{i}"
+        taken = {stem.lower() for stem in stems}
+        stems.append(f"{safe}_" if f"{safe}_".lower() not in taken else f"{safe}_{i}_")
+    return stems
+
+
+def _plain(value: object) -> Any:
+    """Return a value as strict JSON can hold it: numbers that are none become null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if hasattr(value, "tolist"):  # numpy's scalars and arrays
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int | str) else str(value)

@@ -1,0 +1,154 @@
+"""The JSON of a result: one schema for the command line, the report's results.json and scripts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from springmass import __version__
+
+if TYPE_CHECKING:
+    from pipeline.analyse import Analysis
+    from pipeline.classic import Classic
+    from pipeline.damping import LawFit
+    from pipeline.estimate import Estimate
+    from pipeline.judge import Finding
+    from springmass.loading import Loaded
+
+__all__ = ["SCHEMA", "all_findings", "input_of", "result_of"]
+
+SCHEMA = 1
+# What a trap's code means for the result; codes that no finding has stay with the recording.
+_SEVERITY = {
+    "truncated_row": "warning",
+    "duplicate_time": "warning",
+    "non_monotonic_time": "warning",
+    "rate_assumed": "warning",
+    "unit_assumed": "warning",
+    "stale_header": "warning",
+}
+
+
+def result_of(
+    loaded: Loaded,
+    analysis: Analysis,
+    *,
+    time_utc: str,
+    accuracy: str,
+    parameters: Mapping[str, Any],
+    classic: Classic | None = None,
+) -> dict[str, Any]:
+    """Return the result as JSON-able mapping; numbers that are not finite are None.
+
+    Parameters
+    ----------
+    loaded : Loaded
+    analysis : Analysis
+    time_utc : str
+        ISO 8601, of the analysis.
+    accuracy : str
+        Tier, or "classic".
+    parameters : mapping
+        Options as resolved.
+    classic : Classic, optional
+        If given, its estimates stand in place of the analysis's.
+    """
+    estimates = classic.estimates if classic is not None else analysis.estimates
+    return {
+        "schema": SCHEMA,
+        "input": input_of(loaded),
+        "quality": _quality(loaded, analysis),
+        "estimates": {name: _estimate(e) for name, e in estimates.items()},
+        "damping": _damping(analysis) if classic is None else _no_damping(),
+        "effects": [
+            {
+                "name": e.name,
+                "predicted": _finite(e.predicted),
+                "measured": _finite(e.measured),
+                "unit": e.unit,
+                "included": e.included,
+                "why": e.why,
+            }
+            for e in analysis.effects
+        ],
+        "findings": [
+            {"code": f.code, "severity": f.severity, "message": f.message} for f in all_findings(loaded, analysis)
+        ],
+        "provenance": {
+            "version": __version__,
+            "accuracy": accuracy,
+            "parameters": dict(parameters),
+            "time_utc": time_utc,
+        },
+    }
+
+
+def input_of(loaded: Loaded) -> dict[str, Any]:
+    """Return the ``input`` object: what was analysed."""
+    track = loaded.track
+    return {
+        "path": str(loaded.path),
+        "format": loaded.format,
+        "sha256": loaded.sha256,
+        "kind": loaded.info.kind,
+        "channel": loaded.channel,
+        "samples": len(track),
+        "rate_hz": track.rate_hz,
+        "duration_s": _finite(float(track.t[-1] - track.t[0])) if len(track) else 0.0,
+    }
+
+
+def all_findings(loaded: Loaded, analysis: Analysis) -> tuple[Finding, ...]:
+    """Return the analysis's findings and those that reading the file gave, the gravest first."""
+    from pipeline.judge import Finding
+
+    findings = list(analysis.findings)
+    known = {f.code for f in findings}
+    for trap in loaded.traps:
+        if trap.code not in known:
+            severity = _SEVERITY.get(trap.code, "info")
+            findings.append(Finding(trap.code, severity, trap.message))  # type: ignore[arg-type]
+    rank = {"error": 0, "warning": 1, "info": 2}
+    return tuple(sorted(findings, key=lambda f: rank[f.severity]))
+
+
+def _quality(loaded: Loaded, analysis: Analysis) -> dict[str, int]:
+    quality = analysis.quality
+    used = quality.pop("used")
+    return {**quality, "malformed_rows": loaded.malformed_rows, "used": used}
+
+
+def _damping(analysis: Analysis) -> dict[str, Any]:
+    from pipeline.analyse import Motion
+
+    if not isinstance(analysis.motion, Motion):
+        return _no_damping()
+    damping = analysis.motion.damping
+    return {
+        "selected": damping.selected,
+        "admissible": list(damping.admissible),
+        "laws": {name: _law(fit) for name, fit in damping.fits.items()},
+    }
+
+
+def _no_damping() -> dict[str, Any]:
+    return {"selected": None, "admissible": [], "laws": {}}
+
+
+def _law(fit: LawFit) -> dict[str, Any]:
+    return {
+        "parameters": {name: _estimate(e) for name, e in fit.joint.estimates().items()},
+        "reduced_chi2": _finite(fit.reduced_chi2),
+        "dof": _finite(fit.dof),
+        "bic": _finite(fit.bic),
+        "rejected": fit.rejected,
+    }
+
+
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    return {"value": _finite(estimate.value), "u": _finite(estimate.u), "unit": estimate.unit}
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)

@@ -1,0 +1,152 @@
+"""One run file, every reader: xarray with both engines, h5py, netCDF's own library and dump, NeXus."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any, Literal
+
+import h5py
+import numpy as np
+import pytest
+
+from acquisition.block import Block, Flag
+from acquisition.recording import Original, Trap
+from acquisition.source import SourceInfo
+from storage.layout import CHUNK
+from storage.run import open_run, write_run
+
+xr = pytest.importorskip("xarray")
+
+ENGINES: tuple[Literal["h5netcdf", "netcdf4"], ...] = ("h5netcdf", "netcdf4")
+
+
+def write(path: Path, n: int, *, full: bool) -> Path:
+    """Write a run of n samples, with everything or with the least."""
+    rng = np.random.default_rng(n)
+    t = np.arange(n) / 100
+    distance = 0.5 + rng.normal(0, 3e-4, n)
+    distance[::5] = np.nan
+    flags = np.where(np.isnan(distance), Flag.MISSING, 0).astype(np.uint8)
+    if not full:
+        return write_run(path, [Block(0, t, distance, flags)], SourceInfo("replay", "a.txt", 100.0))
+    block = Block(0, t, distance, flags, (t * 1e9).astype(np.int64), rng.normal(size=n))
+    return write_run(
+        path,
+        [block],
+        SourceInfo("simulated", "spring.toml", 100.0, sigma_m=3e-4, quantum_m=1e-4),
+        originals=[Original("lauf position.txt", b"0\t1\n" * 40), Original("empty.txt", b"")],
+        scene={"bob": {"mass_kg": 0.2}},
+        title="Träger ①",
+        traps=[Trap("truncated_row", "One row was cut.")],
+        provenance={"software": "springmass", "version": "0.1.0", "start_time": "2024-05-01T12:00:00Z"},
+    )
+
+
+@pytest.fixture(
+    params=[(300, True), (300, False), (0, True), (0, False), (CHUNK + 1, True)],
+    ids=["full", "least", "empty", "least empty", "growing"],
+)
+def path(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """Return a run file in each of the shapes that the layout allows."""
+    n, full = request.param
+    return write(tmp_path / "run.h5", n, full=full)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_xarray_opens_the_signal(path: Path, engine: Literal["h5netcdf", "netcdf4"]) -> None:
+    """Values, dimension, units and flags are those of the run's own dataset; time stays elapsed seconds."""
+    if engine == "netcdf4":
+        pytest.importorskip("netCDF4")
+    with open_run(path) as run:
+        own = run.dataset()
+    with xr.open_dataset(path, group="entry/signal", engine=engine) as found:
+        assert tuple(found.sizes) == ("time",)
+        assert found.time.dtype == np.float64
+        xr.testing.assert_equal(found, own)
+        assert found.attrs["kind"] == own.attrs["kind"]
+        for name in own.variables:
+            mine, theirs = own[name].attrs, found[name].attrs
+            assert set(mine) == set(theirs)
+            assert all(np.array_equal(mine[key], theirs[key]) for key in mine)
+        assert found.distance.dtype == np.float64
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_xarray_opens_the_whole_tree(path: Path, engine: Literal["h5netcdf", "netcdf4"]) -> None:
+    """Every group opens, and the kind stands at the root."""
+    if engine == "netcdf4":
+        pytest.importorskip("netCDF4")
+    with xr.open_datatree(path, engine=engine) as tree:
+        assert {"/entry/signal", "/entry/instrument", "/entry/provenance", "/raw"} <= set(tree.groups)
+        assert tree.attrs["kind"] in ("replay", "simulated")
+        assert tree["entry/instrument/rate_hz"].item() == 100.0
+        tree.load()
+
+
+def test_h5py_finds_texts_dimensions_and_plain_filters(path: Path) -> None:
+    """A reader without conventions sees texts, a time scale on every column, and filters it always has."""
+    with h5py.File(path) as file:
+        assert file.attrs["Conventions"] == b"CF-1.11"
+        signal = file[file.attrs["default"]][file["entry"].attrs["default"]]
+        assert signal.attrs["signal"] == b"distance"
+        for name, array in signal.items():
+            if name != "time":
+                assert array.dims[0]["time"] == signal["time"]
+            assert (array.compression, array.shuffle, array.fletcher32) == ("gzip", True, True)
+            assert "scale_factor" not in array.attrs
+        flags = dict(
+            zip(
+                signal["quality"].attrs["flag_meanings"].decode().split(),
+                signal["quality"].attrs["flag_masks"],
+                strict=True,
+            )
+        )
+        assert flags == {str(flag.name).lower(): flag.value for flag in Flag}
+
+
+def test_no_external_links(path: Path) -> None:
+    """The file stands alone: every name in it is a hard link."""
+    links: list[Any] = []
+    with h5py.File(path) as file:
+        file.visit_links(lambda name: links.append(file.get(name, getlink=True)))
+    assert links
+    assert {type(link) for link in links} == {h5py.HardLink}
+
+
+def test_netcdf_reads_it(path: Path) -> None:
+    """netCDF's own library sees variables on a dimension, with missing samples masked."""
+    netcdf = pytest.importorskip("netCDF4")
+    with open_run(path) as run:
+        distance = run.samples().distance
+    with netcdf.Dataset(path) as file:
+        found = file["entry/signal/distance"]
+        assert found.dimensions == ("time",)
+        np.testing.assert_array_equal(np.ma.filled(found[:], np.nan), distance)
+        assert file["entry/instrument/kind"][...] == file.kind
+
+
+@pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump is not installed")
+def test_ncdump_lists_it(path: Path) -> None:
+    """The header that ncdump prints names the signal and its unit."""
+    listed = subprocess.run(["ncdump", "-h", str(path)], check=True, capture_output=True, text=True).stdout
+    assert "double distance(time)" in listed
+    assert 'distance:units = "m"' in listed
+
+
+@pytest.mark.parametrize("full", [True, False])
+def test_nexus_finds_the_default_plot(tmp_path: Path, full: bool) -> None:
+    """A NeXus tool plots distance over time unasked, with error bars where sigma is known."""
+    nexus = pytest.importorskip("nexusformat.nexus")
+    path = write(tmp_path / "run.h5", 300, full=full)
+    root = nexus.nxload(path)
+    try:
+        plot = root.plottable_data
+        assert plot.nxpath == "/entry/signal"
+        assert plot.nxsignal.nxname == "distance"
+        assert [axis.nxname for axis in plot.nxaxes] == ["time"]
+        assert plot.nxsignal.attrs["units"] == "m"
+        assert (plot.nxerrors is not None) == full
+    finally:
+        root.nxfile.close()

@@ -1,0 +1,121 @@
+"""The rules that every source keeps; a new one joins by adding a maker to ``SOURCES``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from acquisition.block import Block, Flag, concatenate
+from acquisition.clock import Clock, VirtualClock
+from acquisition.replay import Replay
+from acquisition.source import Source, SourceInfo
+
+SECONDS = 120
+RATE_HZ = 100.0
+
+
+def run() -> Block:
+    """Return two minutes at 100 Hz with a few samples missing."""
+    t = np.arange(SECONDS * int(RATE_HZ)) / RATE_HZ
+    distance = 0.25 + 0.05 * np.sin(7.9 * t) + 1e-4 * np.random.default_rng(1).standard_normal(t.size)
+    flags = np.zeros(t.size, np.uint8)
+    distance[500:510] = np.nan
+    flags[500:510] = Flag.MISSING
+    return Block(0, t, distance, flags, None, np.gradient(distance, t))
+
+
+def replay(speed: float | None) -> Callable[[Clock], Source]:
+    """Return a maker of replays at a speed."""
+    info = SourceInfo("replay", "run", RATE_HZ, quantum_m=1e-5)
+    return lambda clock: Replay([run()[:4000], run()[4000:]], clock, info=info, speed=speed)
+
+
+SOURCES: dict[str, Callable[[Clock], Source]] = {
+    "replay-1x": replay(1.0),
+    "replay-10x": replay(10.0),
+    "replay-max": replay(None),
+}
+"""Makers of sources that deliver :func:`run`."""
+
+PACE = {"replay-1x": 1.0, "replay-10x": 10.0, "replay-max": math.inf}
+
+every_source = pytest.mark.parametrize("name", SOURCES)
+
+
+@every_source
+def test_samples_are_those_of_the_run_bit_for_bit(name: str) -> None:
+    """Whatever the pace, the samples are the same."""
+    with SOURCES[name](VirtualClock()) as source:
+        joined = concatenate(source)
+    for column in ("t", "distance", "flags", "velocity"):
+        assert getattr(joined, column).tobytes() == getattr(run(), column).tobytes()
+    assert joined.host_ns is None
+
+
+@every_source
+def test_blocks_follow_each_other_without_a_hole(name: str) -> None:
+    """Each block begins where the one before ended, and none is empty."""
+    with SOURCES[name](VirtualClock()) as source:
+        expected = 0
+        for block in source:
+            assert isinstance(block, Block)
+            assert block.first == expected
+            assert len(block) > 0
+            expected += len(block)
+    assert expected == len(run())
+
+
+@every_source
+def test_it_takes_the_clock_time_of_its_pace_and_no_real_time(name: str) -> None:
+    """A virtual clock ends at the record's length over the speed."""
+    clock = VirtualClock()
+    with SOURCES[name](clock) as source:
+        for _ in source:
+            pass
+    assert clock.now_ns() == pytest.approx((SECONDS - 1 / RATE_HZ) / PACE[name] * 1e9, abs=1)
+
+
+@every_source
+def test_info_is_known_before_the_first_sample(name: str) -> None:
+    """Kind, name and rate are there, and stay as they are."""
+    source = SOURCES[name](VirtualClock())
+    before = source.info
+    with source:
+        next(iter(source))
+        assert source.info == before
+    assert before.kind in ("live", "replay", "simulated")
+    assert before.rate_hz == RATE_HZ
+    assert before.name
+
+
+@every_source
+def test_leaving_ends_the_iteration(name: str) -> None:
+    """After the ``with``, nothing is delivered any more; leaving twice does no harm."""
+    source = SOURCES[name](VirtualClock())
+    with source:
+        blocks = iter(source)
+        next(blocks)
+    assert list(blocks) == []
+    source.__exit__(None, None, None)
+
+
+@every_source
+def test_entering_again_starts_again(name: str) -> None:
+    """A second ``with`` delivers the run from its first sample."""
+    source = SOURCES[name](VirtualClock())
+    for _ in range(2):
+        with source:
+            assert next(iter(source)).first == 0
+
+
+@every_source
+def test_consumers_cannot_change_what_others_get(name: str) -> None:
+    """The run handed in is as it was after it was delivered."""
+    with SOURCES[name](VirtualClock()) as source:
+        first = concatenate(source)
+    with source:
+        second = concatenate(source)
+    assert first.distance.tobytes() == second.distance.tobytes()

@@ -1,0 +1,71 @@
+"""What every test may ask for: synthetic runs, windows made by hand, and hypothesis that draws the same each time."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from hypothesis import settings
+from numpy.typing import ArrayLike
+
+from pipeline.demodulate import Demodulated
+
+settings.register_profile("springmass", derandomize=True, deadline=None, max_examples=50)
+settings.load_profile("springmass")
+
+
+def _load(name: str) -> ModuleType:
+    """Import a helper that lies beside this file, whatever the working directory is."""
+    path = Path(__file__).with_name(f"{name}.py")
+    spec = importlib.util.spec_from_file_location(f"springmass_tests_{name}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def synthetic() -> ModuleType:
+    """Return the generator of synthetic runs, ``tests/synthetic.py``."""
+    return _load("synthetic")
+
+
+@pytest.fixture(scope="session")
+def windows() -> Callable[..., Demodulated]:
+    """Return a function that makes the demodulated windows of a run from its amplitudes, phases and rests."""
+    return _windows
+
+
+def _windows(
+    t: ArrayLike,
+    amplitude: ArrayLike,
+    *,
+    omega: float = 8.3,
+    phase: ArrayLike | None = None,
+    offset: ArrayLike = 0.2,
+    u: tuple[float, float, float] = (1e-5, 1e-4, 1e-5),
+    noise_m: float = 3e-4,
+) -> Demodulated:
+    """Return windows at t (w,) s with independent uncertainties ``u`` of amplitude, phase and offset."""
+    at = np.asarray(t, np.float64)
+    samples = 76
+    return Demodulated(
+        at,
+        np.broadcast_to(np.asarray(amplitude, np.float64), at.shape).copy(),
+        omega * at if phase is None else np.asarray(phase, np.float64),
+        np.broadcast_to(np.asarray(offset, np.float64), at.shape).copy(),
+        np.full(at.size, noise_m),
+        np.broadcast_to(np.diag(np.square(u)), (at.size, 3, 3)).copy(),
+        np.full(at.size, samples),
+        omega,
+        noise_m * np.tile([-1.0, 1.0], at.size * samples // 2),
+        np.zeros(at.size * samples, np.uint8),
+        0,
+    )

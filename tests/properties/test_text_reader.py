@@ -1,0 +1,171 @@
+"""Whatever happens to a file, its reader refuses it in one line or tells the truth."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acquisition.errors import FormatError
+from acquisition.formats.motion_sensor import FORMAT
+from acquisition.formats.text import decode, parse_number, read_table, split_cells, unify
+from acquisition.recording import Recording
+
+PLAIN_CELL = st.decimals(-9999, 9999, places=3, allow_nan=False).map(lambda d: f"{d:.3f}")
+ODD_CELL = st.sampled_from(
+    [
+        "NaN",
+        "nan",
+        "-0.000",
+        "1e3",
+        "5",
+        "+1.500",
+        "0,250",
+        "",
+        " ",
+        "x",
+        "1.2.3",
+        "inf",
+        ".5",
+        "-",
+        "12.",
+        "1_0",
+    ]
+)
+NUMBER = re.compile(r"[^\t ;\n]+")
+
+
+@st.composite
+def motion_files(draw: st.DrawFn) -> bytes:
+    """Draw a sound file: position or velocity, with or without header, at some rate."""
+    rate = draw(st.sampled_from([60.0, 100.0, 125.0]))
+    count = draw(st.integers(3, 40))
+    start = draw(st.integers(0, 900))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    t = (start + np.arange(count)) / rate
+    x = 20 + 5 * np.sin(8 * t) + 0.01 * rng.standard_normal(count)
+    if draw(st.booleans()):
+        header = ["Motion Sensor Data File Sep 20, 2018 1:40 PM", "Time (s)\tDistance (cm)\tDist Error (cm)"]
+        rows = [f"{a:.3f}\t{b:.3f}\t0.239" for a, b in zip(t, x, strict=True)]
+    else:
+        header = ["velocity Oct 20, 2022 10:08 AM", "Time (s)\tVelocity (cm/s)"]
+        rows = [f"{a:.3f}\t{b:.3f}" for a, b in zip(t, np.diff(x, prepend=x[0]) * rate, strict=True)]
+        rows[0] = f"{t[0]:.3f}\tNaN"
+    lines = [*header[draw(st.integers(0, 2)) :], *rows]
+    newline = draw(st.sampled_from(["\n", "\r\n", "\r"]))
+    text = newline.join(lines) + draw(st.sampled_from(["", newline]))
+    return text.encode(draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "utf-16-le"])))
+
+
+@st.composite
+def mangled(draw: st.DrawFn) -> bytes:
+    """Draw a file and damage it a few times."""
+    data = draw(motion_files())
+    for _ in range(draw(st.integers(0, 4))):
+        at = draw(st.integers(0, max(len(data) - 1, 0)))
+        length = draw(st.integers(0, 60))
+        match draw(st.sampled_from(["cut", "drop", "flip", "splice", "comma", "nul", "column", "insert"])):
+            case "cut":
+                data = data[:at]
+            case "drop":
+                data = data[:at] + data[at + length :]
+            case "flip":
+                data = data[:at] + bytes([draw(st.integers(0, 255))]) + data[at + 1 :]
+            case "splice":
+                other = draw(st.integers(0, max(len(data) - 1, 0)))
+                data = data[:at] + data[other : other + length] + data[at:]
+            case "comma":
+                data = data.replace(b".", b",", draw(st.integers(-1, 40)))
+            case "nul":
+                data = data[:at] + b"\0" * length + data[at + length :]
+            case "column":
+                data = re.sub(rb"\t[^\t\r\n]*", b"", data, count=draw(st.integers(1, 20)))
+            case "insert":
+                data = data[:at] + draw(st.binary(max_size=12)) + data[at:]
+    return data
+
+
+def read(data: bytes) -> Recording | str:
+    """Return the recording, or the message of the refusal."""
+    try:
+        return FORMAT.read("run.txt", data)
+    except FormatError as error:
+        return str(error)
+
+
+def printed_pairs(data: bytes) -> list[tuple[float, float]]:
+    """Return (time, second number) of every line of a file that has both."""
+    pairs = []
+    for line in unify(decode(data)).split("\n"):
+        cells = [parse_number(cell.strip("\0\x1a")) for cell in NUMBER.findall(line)]
+        cells += [parse_number(cell) for cell in split_cells(line, ",")]
+        for t, value in pairwise(cells):
+            if t is not None and value is not None:
+                pairs.append((t, value))
+    return pairs
+
+
+@settings(max_examples=400, deadline=None)
+@given(data=mangled())
+def test_a_mangled_file_is_refused_in_one_line_or_read_truly(data: bytes) -> None:
+    """Every unflagged finite value of a mangled file stands in it beside that time."""
+    recording = read(data)
+    if isinstance(recording, str):
+        assert "\n" not in recording
+        assert recording.startswith("run.txt")
+        return
+    samples = recording.samples
+    stated = samples.distance if recording.channel == "distance" else samples.velocity
+    assert stated is not None
+    sound = (samples.flags & ~np.uint8(64)) == 0
+    pairs = np.array(printed_pairs(data)).reshape(-1, 2)
+    for t, value in zip(samples.t[sound], stated[sound], strict=True):
+        if np.isfinite(value):
+            at = np.abs(pairs[:, 0] - t) <= 0.00051
+            assert (np.abs(pairs[at, 1] / 100 - value) <= 1e-12 * (1 + abs(value))).any()
+    assert (np.diff(samples.t[sound]) > 0).all()
+    assert recording.originals[0].data == data
+
+
+@settings(max_examples=400, deadline=None)
+@given(data=st.one_of(mangled(), st.binary(max_size=200)))
+def test_recognising_never_raises(data: bytes) -> None:
+    """Any bytes are recognised or not."""
+    assert FORMAT.recognises(data) in (True, False)
+
+
+@st.composite
+def bodies(draw: st.DrawFn) -> tuple[str, int]:
+    """Draw rows of one to four columns, mostly regular."""
+    columns = draw(st.integers(1, 4))
+    cell = draw(
+        st.sampled_from([PLAIN_CELL, st.one_of(PLAIN_CELL, st.just("NaN")), st.one_of(PLAIN_CELL, ODD_CELL)])
+    )
+    rows = draw(st.lists(st.lists(cell, min_size=columns, max_size=columns), min_size=1, max_size=12))
+    return "\n".join("\t".join(row) for row in rows) + draw(
+        st.sampled_from(["", "\n", "\n\n", "\t"])
+    ), columns
+
+
+@settings(max_examples=500, deadline=None)
+@given(drawn=bodies())
+def test_fast_and_slow_readers_agree_bit_for_bit(drawn: tuple[str, int]) -> None:
+    """Reading all rows at once gives the same table as reading row by row."""
+    body, columns = drawn
+    fast = read_table(body, columns, "\t")
+    slow = read_table(body, columns, "\t", fast=False)
+    assert fast.values.tobytes() == slow.values.tobytes()
+    np.testing.assert_array_equal(fast.bad, slow.bad)
+    np.testing.assert_array_equal(fast.line, slow.line)
+    assert (fast.decimals, fast.unread) == (slow.decimals, slow.unread)
+
+
+@settings(max_examples=300, deadline=None)
+@given(cell=PLAIN_CELL)
+def test_a_cell_is_read_as_float_reads_it(cell: str) -> None:
+    """Taking digits as an integer over a power of ten loses nothing against ``float()``."""
+    assert read_table(f"{cell}\n", 1, "\t").values[0, 0] == float(cell)
+    assert parse_number(cell.replace(".", ",")) == float(cell)

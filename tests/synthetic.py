@@ -1,0 +1,88 @@
+"""Synthetic runs with known truth, in plain numpy; shares no code with what it judges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Truth", "fisher_bounds", "noisy", "times"]
+
+F8 = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Truth:
+    """A free oscillation: y = offset + A(t) cos(phase(t)), dA/dt = -(gamma A + beta A^2), omega(A) = omega + kappa A^2.
+
+    Lengths in m, times in s, ``phase`` in rad at t = 0.
+    """
+
+    amplitude: float = 0.05
+    omega: float = 8.3
+    phase: float = 0.7
+    offset: float = 0.22
+    gamma: float = 0.0
+    beta: float = 0.0
+    kappa: float = 0.0
+
+    @property
+    def period(self) -> float:
+        """Period of small oscillations, s."""
+        return 2.0 * np.pi / self.omega
+
+    def amplitude_at(self, t: F8) -> F8:
+        """Return A at t (n,), m."""
+        if self.gamma == 0.0:
+            return self.amplitude / (1.0 + self.beta * self.amplitude * t)
+        decay = np.exp(-self.gamma * t)
+        return self.amplitude * decay / (1.0 + self.beta * self.amplitude * (1.0 - decay) / self.gamma)
+
+    def phase_at(self, t: F8) -> F8:
+        """Return the total phase at t (n,), rad."""
+        angle = self.phase + self.omega * t
+        if self.kappa == 0.0:
+            return angle
+        grid = np.linspace(min(0.0, float(t.min())), float(t.max()), 200_001)
+        squared = self.amplitude_at(grid) ** 2
+        area = np.concatenate([[0.0], np.cumsum(0.5 * (squared[1:] + squared[:-1]) * np.diff(grid))])
+        area -= np.interp(0.0, grid, area)
+        return angle + self.kappa * np.interp(t, grid, area)
+
+    def position(self, t: F8) -> F8:
+        """Return y at t (n,), m."""
+        return self.offset + self.amplitude_at(t) * np.cos(self.phase_at(t))
+
+
+def times(seconds: float, rate_hz: float = 100.0) -> F8:
+    """Return the sample times of a record from 0, s."""
+    return np.arange(round(seconds * rate_hz)) / rate_hz
+
+
+def noisy(truth: Truth, t: F8, sigma_m: float, seed: int) -> F8:
+    """Return the motion at t with white normal noise, m."""
+    return truth.position(t) + sigma_m * np.random.default_rng(seed).standard_normal(t.size)
+
+
+def fisher_bounds(truth: Truth, t: F8, sigma_m: float) -> dict[str, float]:
+    """Return the Cramer-Rao bounds of an exponentially damped sine in white noise, all parameters unknown.
+
+    The derivatives are taken of offset + A e^(-gamma t) cos(omega t + phase) by hand; the period's bound follows
+    from the frequency's. ``undamped`` names what holds where gamma is known to be 0.
+    """
+    decay = np.exp(-truth.gamma * t)
+    angle = truth.omega * t + truth.phase
+    cosine, sine = decay * np.cos(angle), decay * np.sin(angle)
+    columns = {
+        "offset": np.ones_like(t),
+        "amplitude": cosine,
+        "phase": -truth.amplitude * sine,
+        "omega": -truth.amplitude * t * sine,
+        "gamma": -truth.amplitude * t * cosine,
+    }
+    jacobian = np.stack(list(columns.values()), axis=1)
+    scale = np.linalg.norm(jacobian, axis=0)
+    inverse = np.linalg.inv((jacobian / scale).T @ (jacobian / scale)) / np.outer(scale, scale)
+    bounds = dict(zip(columns, sigma_m * np.sqrt(np.diag(inverse)), strict=True))
+    return {**bounds, "period": bounds["omega"] * truth.period / truth.omega}

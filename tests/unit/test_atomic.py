@@ -1,0 +1,161 @@
+"""Files are written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import h5py
+import pytest
+
+from storage.atomic import whole_file, whole_h5, write_whole
+from storage.errors import RunExists, WriteFailed
+
+
+def beaten_to(path: Path) -> None:
+    """Write a new file while another writer makes one of the same name."""
+    with whole_file(path, overwrite=False) as temporary:
+        temporary.write_text("mine")
+        path.write_text("another's")
+
+
+@pytest.mark.parametrize(("data", "stored"), [(b"\x00\r\n", b"\x00\r\n"), ("Träger\n", "Träger\n".encode())])
+def test_content_is_written_exactly(tmp_path: Path, data: bytes | str, stored: bytes) -> None:
+    """Bytes stay as they are, text becomes UTF-8 with its own line ends."""
+    path = write_whole(tmp_path / "results.json", data)
+    assert path.read_bytes() == stored
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_standing_file_is_replaced_by_default(tmp_path: Path) -> None:
+    """Results may be made again."""
+    path = write_whole(tmp_path / "a", "old")
+    assert write_whole(path, "new").read_text() == "new"
+
+
+def test_a_standing_file_is_kept_when_asked(tmp_path: Path) -> None:
+    """Without leave to overwrite the old content stands, and the error names the file in one line."""
+    path = write_whole(tmp_path / "a", "old")
+    with pytest.raises(RunExists, match=r"a: a new file .*; choose another name") as caught:
+        write_whole(path, "new", overwrite=False)
+    assert "\n" not in str(caught.value)
+    assert path.read_text() == "old"
+
+
+def test_a_file_that_comes_meanwhile_is_kept(tmp_path: Path) -> None:
+    """Putting in place itself refuses a file that was not there when the work began."""
+    path = tmp_path / "a"
+    with pytest.raises(RunExists):
+        beaten_to(path)
+    assert path.read_text() == "another's"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_without_hard_links_a_rename_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file system without hard links still gets new files, and still keeps standing ones."""
+
+    def no_links(source: object, target: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", no_links)
+    path = write_whole(tmp_path / "a", "first", overwrite=False)
+    with pytest.raises(RunExists):
+        beaten_to(tmp_path / "b")
+    assert path.read_text() == "first"
+    assert (tmp_path / "b").read_text() == "another's"
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("error", [ValueError("in the middle"), KeyboardInterrupt()])
+def test_a_failing_body_leaves_the_old_state(tmp_path: Path, error: BaseException) -> None:
+    """Whatever the body raises passes through, the temporary file goes and the old content stands."""
+    path = write_whole(tmp_path / "a", "old")
+
+    def half() -> None:
+        with whole_file(path) as temporary:
+            temporary.write_text("half")
+            raise error
+
+    with pytest.raises(type(error)):
+        half()
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_missing_folder_is_one_line(tmp_path: Path) -> None:
+    """The error says what to do."""
+    with pytest.raises(WriteFailed, match=r"No such file or directory\); make the folder first"):
+        write_whole(tmp_path / "none" / "a", "x")
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_the_file_is_synced_before_it_is_placed_and_the_folder_after(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overwrite: bool
+) -> None:
+    """Content reaches the disk before the name does: fsync of the file, rename, fsync of the folder."""
+    path = tmp_path / "a"
+    seen: list[tuple[str, bool, bool]] = []
+    real_sync = os.fsync
+    for name in ("replace", "link"):
+
+        def placing(*args: object, name: str = name, real: object = getattr(os, name)) -> None:
+            seen.append(("place", False, path.exists()))
+            real(*args)  # type: ignore[operator]
+
+        monkeypatch.setattr(os, name, placing)
+
+    def sync(descriptor: int) -> None:
+        is_folder = os.path.samestat(os.fstat(descriptor), tmp_path.stat())
+        seen.append(("sync", is_folder, path.exists()))
+        real_sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    write_whole(path, "x", overwrite=overwrite)
+    assert seen == [("sync", False, False), ("place", False, False), ("sync", True, True)]
+
+
+def test_a_failing_sync_fails_the_write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk that cannot keep the content leaves the old one in place."""
+    path = write_whole(tmp_path / "a", "old")
+
+    def broken(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", broken)
+    with pytest.raises(WriteFailed, match="No space left on device"):
+        write_whole(path, "new")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_hdf5_is_written_whole_too(tmp_path: Path) -> None:
+    """The HDF5 file comes into being complete, or not at all."""
+    path = tmp_path / "analysis.h5"
+    with whole_h5(path) as file:
+        file["a"] = 1
+        assert not path.exists()
+    with h5py.File(path) as file:
+        assert file["a"][()] == 1
+    before = path.read_bytes()
+
+    def half() -> None:
+        with whole_h5(path) as file:
+            file["b"] = 1
+            raise RuntimeError("in the middle")
+
+    with pytest.raises(RuntimeError, match="in the middle"):
+        half()
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_name_of_the_longest_length_is_no_obstacle(tmp_path: Path) -> None:
+    """The temporary name stays within what file systems allow."""
+    assert write_whole(tmp_path / ("a" * 255), "x").read_text() == "x"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="permissions are POSIX")
+def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
+    """Others may read what the umask lets them, not only the owner."""
+    (tmp_path / "usual").write_text("x")
+    assert write_whole(tmp_path / "a", "x").stat().st_mode == (tmp_path / "usual").stat().st_mode

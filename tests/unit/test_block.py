@@ -1,0 +1,69 @@
+"""Blocks: slices, joins, and flags that never change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from acquisition import Block, Flag, concatenate
+
+
+def block(first: int = 0, count: int = 4, **more: np.ndarray) -> Block:
+    """Return a small block."""
+    t = (first + np.arange(count)) / 100
+    return Block(first, t, 0.2 + t, np.zeros(count, np.uint8), **more)
+
+
+def test_a_slice_keeps_its_place_in_the_run() -> None:
+    """The first sample of a slice has the index it had."""
+    part = block(first=10)[1:3]
+    assert (part.first, len(part), part.t.tolist()) == (11, 2, [0.11, 0.12])
+
+
+def test_a_slice_takes_every_column_along() -> None:
+    """Host times and velocities are cut like the rest."""
+    part = block(host_ns=np.arange(4), velocity=np.arange(4.0))[2:]
+    assert part.host_ns is not None
+    assert part.velocity is not None
+    assert (part.host_ns.tolist(), part.velocity.tolist()) == ([2, 3], [2.0, 3.0])
+
+
+def test_a_slice_with_a_step_is_refused() -> None:
+    """Samples of a block are consecutive."""
+    with pytest.raises(ValueError, match="step 1, got step 2"):
+        block()[::2]
+
+
+def test_concatenate_gives_back_what_was_cut() -> None:
+    """Slices joined are the block."""
+    whole = block(velocity=np.arange(4.0))
+    joined = concatenate([whole[:1], whole[1:3], whole[3:]])
+    for name in ("t", "distance", "flags", "velocity"):
+        np.testing.assert_array_equal(getattr(joined, name), getattr(whole, name))
+
+
+def test_concatenate_fills_columns_that_some_blocks_lack() -> None:
+    """Velocity is NaN and host time -1 where nobody stated them."""
+    joined = concatenate([block(count=1), block(1, 1, host_ns=np.array([5]), velocity=np.array([2.0]))])
+    assert joined.host_ns is not None
+    assert joined.velocity is not None
+    assert joined.host_ns.tolist() == [-1, 5]
+    np.testing.assert_array_equal(joined.velocity, [np.nan, 2.0])
+
+
+def test_concatenate_of_nothing_is_empty() -> None:
+    """No block at all gives one without samples."""
+    assert len(concatenate([])) == 0
+
+
+def test_flag_values_are_those_of_the_run_file() -> None:
+    """The bits are written to files and may not move."""
+    assert {flag.name: flag.value for flag in Flag} == {
+        "MISSING": 1,
+        "FALSE_ECHO": 2,
+        "CLIPPED": 4,
+        "DUPLICATE_TIME": 8,
+        "NON_MONOTONIC_TIME": 16,
+        "MALFORMED": 32,
+        "GAP_BEFORE": 64,
+    }
