@@ -31,7 +31,10 @@ def main() -> int:
         ratio = mine / other
         verdict = "ok" if ratio <= limit else "OVER"
         bad += ratio > limit
-        print(f"{verdict:4}  {ratio:5.2f} x  (limit {limit:g})  {name}: {mine * 1e3:.1f} ms; {reference}: {other * 1e3:.1f} ms")
+        print(
+            f"{verdict:4}  {ratio:5.2f} x  (limit {limit:g})  {name}: {mine * 1e3:.1f} ms; "
+            f"{reference}: {other * 1e3:.1f} ms"
+        )
     return int(bad > 0)
 
 

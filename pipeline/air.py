@@ -49,7 +49,7 @@ def air_viscosity(temperature_c: float) -> float:
     18.1
     """
     kelvin = temperature_c + ZERO_CELSIUS_K
-    return 1.458e-6 * kelvin**1.5 / (kelvin + 110.4)
+    return float(1.458e-6 * kelvin**1.5 / (kelvin + 110.4))
 
 
 def speed_of_sound(temperature_c: float, pressure_pa: float = 101325.0, relative_humidity: float = 0.0) -> float:
@@ -58,7 +58,7 @@ def speed_of_sound(temperature_c: float, pressure_pa: float = 101325.0, relative
     Examples
     --------
     >>> round(speed_of_sound(20.0), 1), round(speed_of_sound(20.0, relative_humidity=1.0), 1)
-    (343.2, 344.4)
+    (343.2, 344.5)
     """
     fraction = _vapour_fraction(temperature_c, pressure_pa, relative_humidity)
     molar_kg = MOLAR_MASS_DRY_KG - fraction * (MOLAR_MASS_DRY_KG - MOLAR_MASS_WATER_KG)

@@ -119,7 +119,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     >>> rng = np.random.default_rng(1)
     >>> y = 0.2 + 0.05 * np.exp(-0.01 * t) * np.cos(8.3 * t) + 1e-4 * rng.standard_normal(1000)
     >>> print(analyse(Track.from_arrays(t, y)).estimates["period"])  # 2 pi / 8.3 = 0.757010
-    0.757006 +- 0.000023 s
+    0.757010 +- 0.000022 s
     """
     scene, params = scene or Scene(), params or Params()
     conditioned = condition(track, params.condition)
@@ -147,9 +147,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
 
 
-def _still(
-    track: Track, scene: Scene, params: Params, conditioned: Conditioned, why: NoOscillation
-) -> Analysis:
+def _still(track: Track, scene: Scene, params: Params, conditioned: Conditioned, why: NoOscillation) -> Analysis:
     y = track.y[conditioned.used]
     if not y.size:
         raise AnalysisError("no usable sample is left; see the counts of flagged samples")

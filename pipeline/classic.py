@@ -127,10 +127,11 @@ def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:
         If the record is shorter than the window.
     """
     step = float(np.median(np.diff(t)))
-    width = int(round(window_s / step)) + 1
+    width = round(window_s / step) + 1
     if width > y.size:
         raise AnalysisError(
-            f"the classic method slides a window of {window_s:g} s, the record lasts {t[-1] - t[0]:.3g} s; record longer"
+            f"the classic method slides a window of {window_s:g} s, the record lasts {t[-1] - t[0]:.3g} s; "
+            "record longer"
         )
     return t[: y.size - width + 1], 0.5 * (_sliding_maximum(y, width) + _sliding_maximum(-y, width))
 

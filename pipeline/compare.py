@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.derive import Derived
+from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate
 from pipeline.regression import chi2_quantile
 
@@ -25,21 +27,25 @@ class SpringRun:
     angular_frequency : Estimate
         rad/s, from the record's scatter alone: the clock's part is common to all runs and stated apart.
     mass_kg : Estimate
-        Effective mass, kg.
+        What swings in this run alone: bob, disc, air carried along, kg.
     """
 
     name: str
     angular_frequency: Estimate
     mass_kg: Estimate
 
-    def spring_constant(self, mass_kg: Estimate | None = None) -> Estimate:
-        """Return omega^2 m, N/m, without the clock's uncertainty; with another mass where one is given."""
-        mass = mass_kg or self.mass_kg
-        value = self.angular_frequency.value**2 * mass.value
-        relative = math.hypot(
-            2.0 * self.angular_frequency.u / self.angular_frequency.value, mass.u / mass.value
-        )
-        return Estimate(value, value * relative, "N/m")
+    @classmethod
+    def of(cls, name: str, derived: Derived) -> SpringRun:
+        """Take what an analysis derived.
+
+        Raises
+        ------
+        AnalysisError
+            If its scene gave no bob mass.
+        """
+        if derived.own_mass_kg is None:
+            raise AnalysisError(f"{name}: a comparison of springs needs [bob] mass_kg in the scene")
+        return cls(name, derived.statistical["angular_frequency"], derived.own_mass_kg)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,16 +55,16 @@ class Comparison:
     Parameters
     ----------
     spring_constant : Estimate
-        Weighted mean, N/m, the common clock included.
+        Generalised mean, N/m, shared errors included.
     each : tuple of Estimate
-        Of the runs, the common clock left out.
+        Of the runs, shared errors included.
     chi2 : float
         Of the runs about their mean.
     dof : int
     agree : bool
         Whether chi-square lies within its 99.7 % quantile.
     largest_deviation : float
-        Greatest difference of two runs over its standard uncertainty.
+        Greatest difference of two runs over its standard uncertainty, in which shared errors cancel.
     exchanged : tuple of str
         Names of two runs whose masses, or periods, exchanged make all agree where they do not as they stand;
         empty otherwise.
@@ -75,16 +81,23 @@ class Comparison:
     message: str
 
 
-def compare_springs(runs: Sequence[SpringRun], *, u_clock: float = 0.0, probability: float = 0.997) -> Comparison:
+def compare_springs(
+    runs: Sequence[SpringRun],
+    *,
+    shared_mass_kg: Estimate | None = None,
+    u_clock: float = 0.0,
+    probability: float = 0.997,
+) -> Comparison:
     """Test whether runs made with one spring give one spring constant.
 
     Parameters
     ----------
     runs : sequence of SpringRun
         Two at least.
+    shared_mass_kg : Estimate, optional
+        What swings in every run: a third of the spring's mass, kg. Its error is the same in all of them.
     u_clock : float
-        Relative standard uncertainty of the clock that all runs share; it shifts all constants alike, so it enters
-        the mean and not the test.
+        Relative standard uncertainty of the clock that all runs share.
     probability : float
         Of the chi-square quantile that still counts as agreement.
 
@@ -92,6 +105,13 @@ def compare_springs(runs: Sequence[SpringRun], *, u_clock: float = 0.0, probabil
     ------
     ValueError
         If fewer than two runs are given.
+
+    Notes
+    -----
+    Generalised least squares for one constant. Errors that the runs share, of the clock and of the spring's mass, fill
+    the covariance off its diagonal:
+    :math:`V_{ij} = \\delta_{ij} u_i^2 + \\omega_i^2\\omega_j^2 u^2(m_s/3) + 4 u_c^2 k^2`.
+    They move all constants together, so they count in the mean's uncertainty and hardly in the test.
 
     Examples
     --------
@@ -105,34 +125,54 @@ def compare_springs(runs: Sequence[SpringRun], *, u_clock: float = 0.0, probabil
     """
     if len(runs) < 2:
         raise ValueError(f"a comparison needs two runs at least, got {len(runs)}")
-    each = tuple(run.spring_constant() for run in runs)
-    mean, chi2 = _weighted_mean(each)
+    shared = shared_mass_kg or Estimate(0.0, 0.0, "kg")
+    masses = [run.mass_kg for run in runs]
+    fit = _common_constant(runs, masses, shared, u_clock)
     dof = len(runs) - 1
     limit = chi2_quantile(probability, dof)
-    agree = chi2 <= limit
-    pairs = list(itertools.combinations(range(len(runs)), 2))
-    deviations = [abs(each[i].value - each[j].value) / max(math.hypot(each[i].u, each[j].u), 1e-300) for i, j in pairs]
+    agree = fit.chi2 <= limit
     exchanged: tuple[str, ...] = ()
     if not agree:
-        for i, j in pairs:
-            masses = [run.mass_kg for run in runs]
-            masses[i], masses[j] = masses[j], masses[i]
-            swapped = [run.spring_constant(mass) for run, mass in zip(runs, masses, strict=True)]
-            # Exchanged records need not agree to the last digit: they must be a hundred times nearer to it.
-            swapped_chi2 = _weighted_mean(swapped)[1]
-            if swapped_chi2 <= max(limit, 0.01 * chi2):
+        for i, j in itertools.combinations(range(len(runs)), 2):
+            trial = masses.copy()
+            trial[i], trial[j] = trial[j], trial[i]
+            # Exchanged records need not agree to the last digit: they must come a hundred times nearer to it.
+            if _common_constant(runs, trial, shared, u_clock).chi2 <= max(limit, 0.01 * fit.chi2):
                 exchanged = (runs[i].name, runs[j].name)
-    total = Estimate(mean.value, math.hypot(mean.u, 2.0 * u_clock * mean.value), "N/m")
-    return Comparison(
-        total, each, chi2, dof, agree, max(deviations), exchanged, _message(runs, total, agree, max(deviations), exchanged)
-    )
+    message = _message(runs, fit.mean, agree, fit.deviation, exchanged)
+    return Comparison(fit.mean, fit.each, fit.chi2, dof, agree, fit.deviation, exchanged, message)
 
 
-def _weighted_mean(each: Sequence[Estimate]) -> tuple[Estimate, float]:
-    values = np.array([k.value for k in each])
-    weights = np.array([1.0 / max(k.u, 1e-300) ** 2 for k in each])
-    mean = float(np.sum(weights * values) / np.sum(weights))
-    return Estimate(mean, float(np.sum(weights) ** -0.5), "N/m"), float(np.sum(weights * (values - mean) ** 2))
+@dataclass(frozen=True, slots=True)
+class _Common:
+    mean: Estimate
+    each: tuple[Estimate, ...]
+    chi2: float
+    deviation: float
+
+
+def _common_constant(
+    runs: Sequence[SpringRun], masses: Sequence[Estimate], shared: Estimate, u_clock: float
+) -> _Common:
+    squared = np.array([run.angular_frequency.value**2 for run in runs])
+    k = squared * np.array([mass.value + shared.value for mass in masses])
+    of_omega = 2.0 * k * np.array([run.angular_frequency.u / run.angular_frequency.value for run in runs])
+    own = np.hypot(of_omega, squared * np.array([mass.u for mass in masses]))
+    own = np.maximum(own, 1e-15 * k)
+    # Shared relative errors at the common value: taken at each value they would favour the smallest.
+    centre = float(np.mean(k))
+    common = shared.u**2 * np.outer(squared, squared) + (2.0 * u_clock * centre) ** 2
+    covariance = np.diag(own**2) + common
+    inverse = np.linalg.inv(covariance)
+    mean = float(np.sum(inverse @ k) / np.sum(inverse))
+    residual = k - mean
+    deviations = [
+        abs(k[i] - k[j]) / math.sqrt(covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j])
+        for i, j in itertools.combinations(range(len(runs)), 2)
+    ]
+    each = tuple(Estimate(float(x), math.sqrt(v), "N/m") for x, v in zip(k, np.diag(covariance), strict=True))
+    total = Estimate(mean, float(np.sum(inverse)) ** -0.5, "N/m")
+    return _Common(total, each, float(residual @ inverse @ residual), float(max(deviations)))
 
 
 def _message(

@@ -157,14 +157,25 @@ def _spikes(y: F8, noise_m: float, sigmas: float) -> NDArray[np.bool_]:
     """Return which samples stand off the median of five around them by more than noise and curvature do."""
     if y.size < 8:
         return np.zeros(y.size, np.bool_)
+    # What curvature alone does: a generous quantile of the second differences.
+    bound = sigmas * noise_m + 3.0 * float(np.quantile(np.abs(np.diff(y, 2)), 0.75))
+    away = _off_median(y)
+    spikes = away > bound
+    if spikes.any():
+        # On a slope a spike shifts its neighbours' medians by a step: take the worst out and look again.
+        around = np.lib.stride_tricks.sliding_window_view(np.pad(away, 2), 5).max(axis=1)
+        worst = spikes & (away >= around)
+        kept = np.flatnonzero(~worst)
+        smooth = np.interp(np.arange(y.size), kept, y[kept])
+        spikes = worst | (_off_median(smooth) > bound)
+    return spikes
+
+
+def _off_median(y: F8) -> F8:
     # Continued as point reflections, so that a slope at either end looks like a slope.
     padded = np.concatenate([2.0 * y[0] - y[2:0:-1], y, 2.0 * y[-1] - y[-2:-4:-1]])
     a, b, c, d, e = (padded[i : i + y.size] for i in range(5))
-    away = np.abs(y - _median_of_five(a, b, c, d, e))
-    # What curvature alone does to `away`: a generous quantile of the second differences.
-    curvature = float(np.quantile(np.abs(np.diff(y, 2)), 0.75))
-    mask: NDArray[np.bool_] = away > sigmas * noise_m + 3.0 * curvature
-    return mask
+    return np.abs(y - _median_of_five(a, b, c, d, e))
 
 
 def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:

@@ -96,7 +96,9 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     spread = float(np.ptp(y))
     resolution = track.quantum_m or 0.0
     if spread <= max(3.0 * resolution, 1e-12 * float(np.max(np.abs(y)))):
-        return NoOscillation(f"the distance stays within {spread * 1e3:.3g} mm: nothing moves, or the sensor reads one fixed object")
+        return NoOscillation(
+            f"the distance stays within {spread * 1e3:.3g} mm: nothing moves, or the sensor reads one fixed object"
+        )
     found = _spectral_peak(t, y, track.rate_hz, params.false_alarm)
     if isinstance(found, NoOscillation):
         return found
@@ -108,7 +110,7 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
 
 
 def _spectral_peak(t: F8, y: F8, rate_hz: float, false_alarm: float) -> float | NoOscillation:
-    n = max(int(round((t[-1] - t[0]) * rate_hz)) + 1, 8)
+    n = max(round(float(t[-1] - t[0]) * rate_hz) + 1, 8)
     if n > 50 * t.size:
         return NoOscillation(f"{t.size} samples are spread over {n} sample intervals: too thin to find a period")
     grid = t[0] + np.arange(n) / rate_hz

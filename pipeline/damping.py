@@ -16,6 +16,8 @@ from pipeline.track import F8
 
 __all__ = ["Damping", "LawFit", "Params", "fit_damping"]
 
+BARE_MENTION = 2.0  # difference of BIC below which evidence is none
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
@@ -82,7 +84,8 @@ class LawFit:
     def u_amplitude(self, t: F8) -> F8:
         """Return the standard uncertainty of :meth:`amplitude`, (n,) float64, m."""
         jacobian = self.law.jacobian(t, self.joint.values)
-        return np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", jacobian, self.joint.covariance, jacobian), 0.0))
+        variance = np.einsum("ni,ij,nj->n", jacobian, self.joint.covariance, jacobian)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def damping_rate(self) -> Estimate:
         """Logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
@@ -108,7 +111,8 @@ class Damping:
     fits : mapping of str to LawFit
         Every law tried that had points enough.
     selected : str
-        The admissible law of lowest BIC; of all laws where every one is rejected.
+        The admissible law of lowest BIC; of all laws where every one is rejected. Where BIC differs by less than 2
+        ("not worth more than a bare mention") the law with fewer parameters, then the one listed first.
     admissible : tuple of str
         Laws the record does not contradict and whose evidence is within reach of the best, best first.
     scatter : Scatter
@@ -125,6 +129,11 @@ class Damping:
     def best(self) -> LawFit:
         """The selected law's fit."""
         return self.fits[self.selected]
+
+    @property
+    def settled(self) -> bool:
+        """Whether the selected law is the only admissible one, so that its coefficients mean something."""
+        return self.admissible == (self.selected,)
 
     def averaged(self, values: Mapping[str, Estimate]) -> Estimate:
         """Return the selected law's value of a quantity, its uncertainty widened by what admissible laws differ.
@@ -177,12 +186,12 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
         if np.count_nonzero(spread.kept) >= len(law.parameters):
             fits[name] = _fit(law, t, amplitude, spread, params)
     allowed = [name for name in fits if not fits[name].rejected] or list(fits)
-    order = sorted(allowed, key=lambda name: fits[name].bic)
-    best = fits[order[0]]
-    admissible = tuple(
-        name for name in order if not fits[name].rejected and fits[name].bic - best.bic <= params.evidence
-    )
-    return Damping(t0, fits, order[0], admissible, spread)
+    least = min(fits[name].bic for name in allowed)
+    ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
+    selected = min(ties, key=lambda name: (len(fits[name].joint.names), list(fits).index(name)))
+    order = sorted(allowed, key=lambda name: (name != selected, fits[name].bic))
+    admissible = tuple(name for name in order if not fits[name].rejected and fits[name].bic - least <= params.evidence)
+    return Damping(t0, fits, selected, admissible, spread)
 
 
 def _fit(law: Law, t: F8, amplitude: F8, spread: Scatter, params: Params) -> LawFit:

@@ -31,15 +31,15 @@ class Params:
     """
 
     clip_sigmas: float = 4.0
-    rounds: int = 5
+    rounds: int = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Demodulated:
     """The oscillation in windows of one period: what every later stage works on.
 
-    In window j the motion is :math:`o_j + A_j e^{-g\\tau}\\cos(\\omega\\tau + \\varphi_j)`, with :math:`\\tau` counted from the
-    window's centre.
+    In window j the motion is :math:`o_j + A_j e^{-g\\tau}\\cos(\\omega\\tau + \\varphi_j)`, with :math:`\\tau`
+    counted from the window's centre.
 
     Parameters
     ----------
@@ -103,11 +103,12 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     Notes
     -----
     Every window is a linear least-squares problem in :math:`(o, a, b)` of
-    :math:`o + e^{-g\\tau}(a\\cos\\omega\\tau - b\\sin\\omega\\tau)`, all solved at once. False echoes come in clusters that move with the
-    bob, a fifth of a period long and more, so the first fit of a window may be pulled by them: weights of Cauchy's
-    form with a scale that shrinks from round to round let go of them, windows that disagree with their neighbours start
-    again from these, then residuals beyond ``clip_sigmas`` leave the fit for good. Without :math:`g`, which a second pass
-    knows for each window, the conjugate line would bias the amplitude by :math:`g/2\\omega` of itself.
+    :math:`o + e^{-g\\tau}(a\\cos\\omega\\tau - b\\sin\\omega\\tau)`, all solved at once. False echoes come in clusters
+    that move with the bob, a fifth of a period long and more, so the first fit of a window may be pulled by them:
+    weights of Cauchy's form with a scale that shrinks from round to round let go of them, windows that disagree with
+    their neighbours start again from these, then residuals beyond ``clip_sigmas`` leave the fit for good. Without
+    :math:`g`, which a second pass knows for each window, the conjugate line would bias the amplitude by
+    :math:`g/2\\omega` of itself.
     """
     params = params or Params()
     windows = _Windows.cut(conditioned, cycles.bounds)
@@ -116,11 +117,11 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     basis = _basis(windows, omega, decay)
     solution = _robust_start(windows, basis, conditioned.noise_m, params)
     solution = _rescue(windows, basis, solution, omega, params)
-    solution, weights = _clip(windows, basis, solution, 1, params)
+    solution, weights = _clip(windows, basis, solution, params)
     omega, decay = _retune(windows, solution, omega, decay)
     # Once more in a basis that turns and decays as the record does.
     basis = _basis(windows, omega, decay)
-    solution, weights = _clip(windows, basis, _solve(windows, basis, weights), 2, params)
+    solution, weights = _clip(windows, basis, _solve(windows, basis, weights), params)
     return _finish(conditioned, windows, solution, weights, omega)
 
 
@@ -154,7 +155,9 @@ class _Windows:
         middle = 0.5 * (ends[0] + ends[1])
         reach = np.ptp(track.t[conditioned.used])
         centre = np.where(np.abs(middle - centre) <= reach / max(len(lengths), 1), middle, centre)
-        return cls(rows, inside, usable.astype(np.float64), y, np.where(usable, t - centre[:, None], 0.0), centre, level)
+        return cls(
+            rows, inside, usable.astype(np.float64), y, np.where(usable, t - centre[:, None], 0.0), centre, level
+        )
 
     def take(self, some: NDArray[np.int64]) -> _Windows:
         """Return some of the windows."""
@@ -201,9 +204,7 @@ class _Solution:
     def replaced(self, rows: NDArray[np.int64], other: _Solution, which: NDArray[np.bool_]) -> _Solution:
         """Return this solution with some windows taken from another."""
         parts = (self.coefficients.copy(), self.inverse.copy(), self.residual.copy(), self.good.copy())
-        for mine, theirs in zip(
-            parts, (other.coefficients, other.inverse, other.residual, other.good), strict=True
-        ):
+        for mine, theirs in zip(parts, (other.coefficients, other.inverse, other.residual, other.good), strict=True):
             mine[rows] = theirs[which]
         return _Solution(*parts)
 
@@ -239,7 +240,9 @@ def _robust_start(windows: _Windows, basis: F8, noise_m: float, params: Params) 
     """Fit every window, those that scatter more than the rest with weights that let go of clusters of echoes."""
     solution = _solve(windows, basis, windows.usable)
     spread = MAD_TO_SIGMA * _ranked(np.abs(solution.residual), windows.usable, 0.5)
-    odd = np.flatnonzero(spread > 1.3 * max(noise_m, float(np.median(spread[solution.good] if solution.good.any() else 0.0))))
+    odd = np.flatnonzero(
+        spread > 1.3 * max(noise_m, float(np.median(spread[solution.good] if solution.good.any() else 0.0)))
+    )
     if not odd.size:
         return solution
     some, part = windows.take(odd), basis[odd]
@@ -252,9 +255,7 @@ def _robust_start(windows: _Windows, basis: F8, noise_m: float, params: Params) 
     return solution.replaced(odd, trial, np.ones(odd.size, np.bool_))
 
 
-def _rescue(
-    windows: _Windows, basis: F8, solution: _Solution, omega: float, params: Params
-) -> _Solution:
+def _rescue(windows: _Windows, basis: F8, solution: _Solution, omega: float, params: Params) -> _Solution:
     """Fit windows that disagree with their neighbours again, starting from what the neighbours predict.
 
     Where false echoes hold half of a window its own fit may have settled on them; the amplitude, phase and rest
@@ -315,21 +316,15 @@ def _ranked(size: F8, usable: F8, share: float) -> F8:
     return np.where(counts > 0, ordered[np.arange(len(ordered)), rank], 0.0)
 
 
-def _clip(
-    windows: _Windows, basis: F8, solution: _Solution, rounds: int, params: Params
-) -> tuple[_Solution, F8]:
-    """Take residuals beyond the clip out; in a second round also what the first one revealed."""
-    weights = windows.usable
-    for _ in range(rounds):
-        size = np.abs(solution.residual)
-        spread = MAD_TO_SIGMA * _ranked(size, weights, 0.5)
-        level = float(np.median(spread[solution.good])) if solution.good.any() else 0.0
-        level = max(level, 1e-300)
-        # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
-        bound = params.clip_sigmas * np.clip(spread, 0.5 * level, 2.0 * level)
-        weights = np.where(size <= bound[:, None], windows.usable, 0.0)
-        solution = _solve(windows, basis, weights)
-    return solution, weights
+def _clip(windows: _Windows, basis: F8, solution: _Solution, params: Params) -> tuple[_Solution, F8]:
+    """Take residuals beyond the clip out and fit again."""
+    size = np.abs(solution.residual)
+    spread = MAD_TO_SIGMA * _ranked(size, windows.usable, 0.5)
+    level = max(float(np.median(spread[solution.good])) if solution.good.any() else 0.0, 1e-300)
+    # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
+    bound = params.clip_sigmas * np.clip(spread, 0.5 * level, 2.0 * level)
+    weights = np.where(size <= bound[:, None], windows.usable, 0.0)
+    return _solve(windows, basis, weights), weights
 
 
 def _retune(windows: _Windows, solution: _Solution, omega: float, decay: F8) -> tuple[float, F8]:
@@ -359,9 +354,7 @@ def _unwrap(angle: F8, t: F8, omega: float) -> F8:
     return np.asarray(np.unwrap(angle - rotating) + rotating)
 
 
-def _finish(
-    conditioned: Conditioned, windows: _Windows, solution: _Solution, weights: F8, omega: float
-) -> Demodulated:
+def _finish(conditioned: Conditioned, windows: _Windows, solution: _Solution, weights: F8, omega: float) -> Demodulated:
     good = solution.good
     if not good.any():
         raise AnalysisError(

@@ -52,11 +52,15 @@ class Derived:
         From the record's own scatter alone (Type A), where that differs.
     effective_mass_kg : Estimate or None
         Mass that oscillates: bob, a third of the spring, air carried along, as far as the scene requires them.
+    own_mass_kg, spring_share_kg : Estimate or None
+        Its parts: what belongs to this run alone, and the share of the spring, which other runs have too.
     """
 
     estimates: Mapping[str, Estimate]
     statistical: Mapping[str, Estimate]
     effective_mass_kg: Estimate | None
+    own_mass_kg: Estimate | None
+    spring_share_kg: Estimate | None
 
 
 def derive(
@@ -125,7 +129,8 @@ def derive(
     }
     if decay.value > 0:
         found["quality_factor"] = (omega / (2 * lam), "")
-    mass = _effective_mass(scene, effects)
+    own, share = _masses(scene, effects)
+    mass = None if own is None else own + (share or 0.0)
     if mass is not None:
         found["spring_constant"] = (omega**2 * mass, "N/m")
     if scene.disc_diameter_m is not None:
@@ -138,7 +143,7 @@ def derive(
             rho = density(celsius, *(_variable(x) for x in _air(scene)))
             found["reynolds_number"] = (rho * v_rms * diameter / viscosity(celsius), "")
             best = damping.best
-            if "beta" in best.joint.names and mass is not None:
+            if damping.settled and "beta" in best.joint.names and mass is not None:
                 beta = _variable(best.joint["beta"])
                 area = math.pi * diameter**2 / 4
                 found["drag_coefficient"] = (3 * math.pi * mass * beta / (2 * omega * rho * area), "")
@@ -148,9 +153,8 @@ def derive(
         name: Estimate(estimates[name].value, estimates[name].value * relative, estimates[name].unit)
         for name in ("period", "frequency", "angular_frequency")
     }
-    return Derived(
-        estimates, statistical, None if mass is None else _estimate(mass, "kg")
-    )
+    effective, own_mass, spring_share = (None if m is None else _estimate(m, "kg") for m in (mass, own, share))
+    return Derived(estimates, statistical, effective, own_mass, spring_share)
 
 
 def _estimate(x: Any, unit: str) -> Estimate:
@@ -173,18 +177,19 @@ def _variable(estimate: Estimate) -> Any:
     return ufloat(estimate.value, estimate.u) if estimate.u > 0 else estimate.value
 
 
-def _effective_mass(scene: Scene, effects: tuple[Effect, ...]) -> Any:
+def _masses(scene: Scene, effects: tuple[Effect, ...]) -> tuple[Any, Any]:
+    """Bob with the air it carries, and a third of the spring, as far as the effects table includes them."""
     if scene.bob_mass_kg is None:
-        return None
-    mass = _variable(scene.bob_mass_kg)
+        return None, None
+    own = _variable(scene.bob_mass_kg)
     included = {effect.name for effect in effects if effect.included}
-    if "spring_mass" in included and scene.spring_mass_kg is not None:
-        mass = mass + _variable(scene.spring_mass_kg) / 3
-    if "added_mass" in included:
+    if "added_mass" in included and scene.disc_diameter_m is not None:
         from uncertainties import wrap
 
-        mass = mass + wrap(lambda d: added_mass_kg(scene, d))(_variable(scene.disc_diameter_m))
-    return mass
+        own = own + wrap(lambda diameter: added_mass_kg(scene, diameter))(_variable(scene.disc_diameter_m))
+    if "spring_mass" in included and scene.spring_mass_kg is not None:
+        return own, _variable(scene.spring_mass_kg) / 3
+    return own, None
 
 
 def _noise(demodulated: Demodulated) -> Estimate:

@@ -124,19 +124,32 @@ def _masses(scene: Scene, u_k: float) -> Iterator[Effect]:
         return
     mass = scene.bob_mass_kg.value
     if scene.spring_mass_kg is None:
-        yield Effect("spring_mass", None, None, "1", False, "the scene gives no spring mass; a third of it would add to the bob")
+        yield Effect(
+            "spring_mass", None, None, "1", False, "the scene gives no spring mass; a third of it would add to the bob"
+        )
     else:
-        yield _mass_effect("spring_mass", scene.spring_mass_kg.value / 3.0 / mass, u_k, "a third of the spring's mass swings along")
+        yield _mass_effect(
+            "spring_mass", scene.spring_mass_kg.value / 3.0 / mass, u_k, "a third of the spring's mass swings along"
+        )
     if scene.disc_diameter_m is None:
-        yield Effect("added_mass", None, None, "1", False, "the scene names no disc; the bob alone carries a negligible mass of air")
+        yield Effect(
+            "added_mass",
+            None,
+            None,
+            "1",
+            False,
+            "the scene names no disc; the bob alone carries a negligible mass of air",
+        )
     else:
-        yield _mass_effect("added_mass", added_mass_kg(scene) / mass, u_k, "the disc carries (8/3) rho a^3 of air along")
+        yield _mass_effect(
+            "added_mass", added_mass_kg(scene) / mass, u_k, "the disc carries (8/3) rho a^3 of air along"
+        )
 
 
 def _mass_effect(name: str, share: float, u_k: float, what: str) -> Effect:
     included = share > SHARE * u_k
     relation = "more" if included else "less"
-    why = f"{what}: {share:.2g} of the bob's mass, {relation} than a tenth of the spring constant's relative uncertainty {u_k:.2g}"
+    why = f"{what}: {share:.2g} of the bob's mass, {relation} than a tenth of u(k)/k = {u_k:.2g}"
     return Effect(name, share, None, "1", included, why)
 
 

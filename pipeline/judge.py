@@ -125,9 +125,7 @@ def _sample_findings(track: Track, flags: U8, noise_m: float, plateaus_m: tuple[
     if counts["duplicate_time"]:
         yield Finding("duplicate_time", "warning", f"{counts['duplicate_time']} samples repeat an earlier time")
     if counts["non_monotonic_time"]:
-        yield Finding(
-            "non_monotonic_time", "warning", f"{counts['non_monotonic_time']} samples run backward in time"
-        )
+        yield Finding("non_monotonic_time", "warning", f"{counts['non_monotonic_time']} samples run backward in time")
     if track.clock == "nominal":
         yield Finding(
             "nominal_clock",
@@ -138,15 +136,15 @@ def _sample_findings(track: Track, flags: U8, noise_m: float, plateaus_m: tuple[
         yield Finding(
             "stated_error_is_not_noise",
             "info",
-            f"the file states an error of {track.stated_error_m * 1e3:.2f} mm for every distance; the samples scatter by "
-            f"{noise_m * 1e3:.2g} mm, so the stated error was not used as noise",
+            f"the file states an error of {track.stated_error_m * 1e3:.2f} mm for every distance; "
+            f"the samples scatter by {noise_m * 1e3:.2g} mm, so the stated error was not used as noise",
         )
     if track.quantum_m is not None and noise_m > 0 and track.quantum_m > 3.0 * noise_m:
         yield Finding(
             "quantised",
             "warning",
-            f"distances come in steps of {track.quantum_m * 1e3:.3g} mm, more than three times their noise: amplitudes may "
-            "err by several times their stated uncertainty",
+            f"distances come in steps of {track.quantum_m * 1e3:.3g} mm, more than three times their noise: "
+            "amplitudes may err by several times their stated uncertainty",
         )
 
 
@@ -168,9 +166,7 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
     if len(damping.admissible) > 1:
         names = ", ".join(damping.admissible)
         tail = "" if drags == list(damping.admissible) else "; it does not even show for certain that there is any"
-        yield Finding(
-            "laws_not_separable", "info", f"the record cannot tell these damping laws apart: {names}{tail}"
-        )
+        yield Finding("laws_not_separable", "info", f"the record cannot tell these damping laws apart: {names}{tail}")
 
 
 def _reason(damping: Damping, name: str) -> str:
@@ -179,9 +175,7 @@ def _reason(damping: Damping, name: str) -> str:
         return "its fit did not converge"
     best = damping.best
     if fit.reduced_chi2 > best.reduced_chi2:
-        return (
-            f"reduced chi-square {fit.reduced_chi2:.3g} where {damping.selected} leaves {best.reduced_chi2:.2g}"
-        )
+        return f"reduced chi-square {fit.reduced_chi2:.3g} where {damping.selected} leaves {best.reduced_chi2:.2g}"
     return f"a coefficient is negative beyond three standard uncertainties (reduced chi-square {fit.reduced_chi2:.3g})"
 
 
@@ -198,8 +192,8 @@ def _motion_findings(
         yield Finding(
             "missing_samples",
             "warning",
-            f"{demodulated.lost} of {demodulated.lost + demodulated.t.size} periods hold too few usable samples and carry "
-            "no amplitude",
+            f"{demodulated.lost} of {demodulated.lost + demodulated.t.size} periods hold too few usable samples "
+            "and carry no amplitude",
         )
     if phase.backbone is not None:
         start = phase.damping.best.joint["A0"].value
@@ -208,7 +202,8 @@ def _motion_findings(
             "amplitude_dependent_frequency",
             "warning",
             f"the frequency depends on amplitude: it is {abs(shift):.2%} {'higher' if shift > 0 else 'lower'} at "
-            f"{start * 1e3:.0f} mm than at rest; the period given is the record's mean, its uncertainty covers the bend",
+            f"{start * 1e3:.0f} mm than at rest; the period given is the record's mean, "
+            "its uncertainty covers the bend",
         )
     if rest.drifts:
         yield Finding(

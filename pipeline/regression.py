@@ -172,7 +172,8 @@ def correlation_length(residual: F8) -> float:
 def chi2_quantile(probability: float, dof: float) -> float:
     """Quantile of the chi-square distribution by Wilson and Hilferty's cube.
 
-    Within 0.5 % for three degrees of freedom and more, between 0.001 and 0.999 (a test holds it against scipy).
+    Between probabilities 0.95 and 0.999 within 1.8 % from three degrees of freedom on, 3.1 % for one (a test holds it
+    against scipy, whose import would double the time of a cold start).
 
     References
     ----------
@@ -181,7 +182,7 @@ def chi2_quantile(probability: float, dof: float) -> float:
     Examples
     --------
     >>> round(chi2_quantile(0.999, 10), 1)
-    29.6
+    29.8
     """
     z = NormalDist().inv_cdf(probability)
     shrink = 2.0 / (9.0 * dof)

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from pipeline.scene import Scene
     from pipeline.track import Track
     from springmass.loading import Loaded, load, read_scene, sample_data
-    from storage.run import open_run, write_run
+    from storage.run import open_run
+    from storage.write import write_run
 
 __version__ = "0.1.0"
 
@@ -61,7 +62,7 @@ _WHERE = {
     "open_run": "storage.run",
     "read_scene": "springmass.loading",
     "sample_data": "springmass.loading",
-    "write_run": "storage.run",
+    "write_run": "storage.write",
 }
 
 

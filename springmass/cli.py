@@ -111,7 +111,9 @@ def _exit_code(error: Exception) -> int | None:
 def _add_input_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--velocity", metavar="FILE", help="velocity file that belongs to the one position file given")
     parser.add_argument("--channel", metavar="NAME", help="which quantity of the file to take as distance")
-    parser.add_argument("--rate-hz", type=_positive, metavar="R", help="samples per second, where the file does not say")
+    parser.add_argument(
+        "--rate-hz", type=_positive, metavar="R", help="samples per second, where the file does not say"
+    )
     parser.add_argument("--unit", metavar="U", help="unit of the distance, where the file does not say")
 
 
@@ -135,7 +137,9 @@ def _add_analyse(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_demo(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--out", metavar="DIR", default="springmass-demo", help="folder for what it makes (%(default)s)")
+    parser.add_argument(
+        "--out", metavar="DIR", default="springmass-demo", help="folder for what it makes (%(default)s)"
+    )
 
 
 def _add_replay(parser: argparse.ArgumentParser) -> None:

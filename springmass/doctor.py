@@ -106,7 +106,8 @@ def _round_trip() -> Check:
     from acquisition.block import Block
     from acquisition.source import SourceInfo
     from storage.errors import StorageError
-    from storage.run import open_run, write_run
+    from storage.run import open_run
+    from storage.write import write_run
 
     block = Block(0, np.arange(8) / 100.0, np.linspace(0.2, 0.3, 8), np.zeros(8, np.uint8))
     try:

@@ -23,7 +23,8 @@ def run(options: argparse.Namespace) -> int:
     """Analyse every input; one that fails does not keep the others from their results."""
     if options.velocity is not None and len(options.input) > 1:
         raise ProgramError(
-            f"--velocity completes one position file, got {len(options.input)} inputs; analyse the pair by itself", USAGE
+            f"--velocity completes one position file, got {len(options.input)} inputs; analyse the pair by itself",
+            USAGE,
         )
     scene = None if options.scene is None else read_scene(options.scene)
     codes: list[int] = []
@@ -77,11 +78,12 @@ def _deliver(analysed: Analysed, options: argparse.Namespace) -> int:
 
 
 def _print_text(analysed: Analysed) -> None:
-    from springmass.report.tables import findings_text, text_table
-    from springmass.report.write import ReportRun
+    from springmass.printing import classic_text, findings_text
+    from springmass.report.tables import text_table
 
-    run = ReportRun(analysed.loaded.path.name, analysed.analysis, analysed.result["input"], analysed.classic)
-    print(text_table([run]))
+    print(text_table([analysed.loaded.path.name], [analysed.analysis]))
+    if analysed.classic is not None:
+        print(f"\n{classic_text(analysed.classic)}")
     print()
     print(findings_text(analysed.result["findings"]))
 

@@ -12,7 +12,7 @@ from springmass.analysing import now_utc
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError
 from springmass.loading import Loaded, load, read_scene
 from storage.atomic import write_whole
-from storage.run import write_run
+from storage.write import write_run
 
 __all__ = ["run", "write_loaded"]
 
@@ -45,9 +45,7 @@ def run(options: argparse.Namespace) -> int:
     return OK
 
 
-def write_loaded(
-    path: Path, loaded: Loaded, blocks: Any, *, scene: Any = None, overwrite: bool = False
-) -> Path:
+def write_loaded(path: Path, loaded: Loaded, blocks: Any, *, scene: Any = None, overwrite: bool = False) -> Path:
     """Write a run file of a loaded input's samples, its own bytes inside.
 
     Parameters
@@ -85,7 +83,9 @@ def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
         targets = [out]
     else:
         names = ", ".join(o.name for o in loaded.originals)
-        raise ProgramError(f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder", USAGE)
+        raise ProgramError(
+            f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder", USAGE
+        )
     return [
         write_whole(target, original.data, overwrite=overwrite)
         for target, original in zip(targets, loaded.originals, strict=True)

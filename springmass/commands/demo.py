@@ -14,7 +14,8 @@ from springmass.analysing import Analysed, analyse_loaded
 from springmass.commands.convert import write_loaded
 from springmass.errors import OK
 from springmass.loading import load, read_scene, sample_data
-from springmass.report.tables import findings_text, text_table
+from springmass.printing import findings_text
+from springmass.report.tables import text_table
 from springmass.report.write import ReportRun, write_report
 
 __all__ = ["run"]
@@ -27,10 +28,12 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.out)
     out.mkdir(parents=True, exist_ok=True)
     analysed = [_one(name, out) for name in RUNS]
-    reports = [ReportRun(name, a.analysis, a.result["input"], a.classic) for name, a in zip(RUNS, analysed, strict=True)]
+    reports = [
+        ReportRun(name, a.analysis, a.result["input"], a.classic) for name, a in zip(RUNS, analysed, strict=True)
+    ]
     comparison = _compare(analysed)
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")
-    print(text_table(reports))
+    print(text_table(RUNS, [a.analysis for a in analysed]))
     for name, one in zip(RUNS, analysed, strict=True):
         print(f"\n{name.capitalize()}:")
         print(findings_text(one.result["findings"]))
@@ -58,10 +61,12 @@ def _one(name: str, out: Path) -> Analysed:
 
 
 def _compare(analysed: list[Analysed]) -> Comparison:
-    runs = []
-    for name, one in zip(RUNS, analysed, strict=True):
-        motion = one.analysis.motion
-        if not isinstance(motion, Motion) or motion.derived.effective_mass_kg is None:
-            raise AnalysisError(f"{name}: a comparison needs an oscillation and a bob mass; the bundled scene gives both")
-        runs.append(SpringRun(name, motion.derived.statistical["angular_frequency"], motion.derived.effective_mass_kg))
-    return compare_springs(runs, u_clock=analysed[0].analysis.params.derive.u_clock_nominal)
+    """Ask whether both runs hung on one spring; its mass and the clock are common to them."""
+    motions = [a.analysis.motion for a in analysed if isinstance(a.analysis.motion, Motion)]
+    if len(motions) < len(RUNS):
+        raise AnalysisError("the bundled recordings do not oscillate; install springmass again")
+    return compare_springs(
+        [SpringRun.of(name, motion.derived) for name, motion in zip(RUNS, motions, strict=True)],
+        shared_mass_kg=motions[0].derived.spring_share_kg,
+        u_clock=analysed[0].analysis.params.derive.u_clock_nominal,
+    )
