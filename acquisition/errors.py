@@ -6,14 +6,26 @@
     |-- FormatError          a recording cannot be read        springmass exits with 3
     |   |-- UnknownFormat    no family recognises the content
     |   `-- NeedsAnswer      the file leaves something out that must not be guessed (rate, unit, channel)
-    `-- SourceError          a source failed while it was delivering
+    |-- SourceError          a source failed while it was delivering
+    |-- SensorError          a family of rangefinders that is not known, or an option it does not take
+    |-- PortError            a port that cannot be opened: absent, busy, no permission   springmass exits with 4
+    `-- CalibrationError     numbers that calibrate nothing
 
 Every message is one line: what was demanded, what was got, where, and what to do.
 """
 
 from __future__ import annotations
 
-__all__ = ["AcquisitionError", "FormatError", "NeedsAnswer", "SourceError", "UnknownFormat"]
+__all__ = [
+    "AcquisitionError",
+    "CalibrationError",
+    "FormatError",
+    "NeedsAnswer",
+    "PortError",
+    "SensorError",
+    "SourceError",
+    "UnknownFormat",
+]
 
 
 class AcquisitionError(Exception):
@@ -51,3 +63,15 @@ class NeedsAnswer(FormatError):
 
 class SourceError(AcquisitionError):
     """A source failed while it was delivering; what came before it stands."""
+
+
+class SensorError(AcquisitionError):
+    """A family of rangefinders that is not known, or an option that it does not take."""
+
+
+class PortError(AcquisitionError):
+    """A port that cannot be opened, or that does not carry what was expected."""
+
+
+class CalibrationError(AcquisitionError):
+    """Numbers that calibrate nothing: too few distances, a bob that moves, a ruler in the wrong unit."""

@@ -84,6 +84,8 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
     scene = scene or Scene()
     there = np.isfinite(track.y) & np.isfinite(track.t) & ((track.flags & UNUSABLE) == 0)
     t, y = track.t[there], track.y[there]
+    if t.size < 2:
+        raise AnalysisError(f"the classic method needs distances, got {t.size} of {len(track)} samples; record longer")
     estimates: dict[str, Estimate] = {}
     period = _period(t, y)
     estimates["period"] = period

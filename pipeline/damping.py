@@ -178,6 +178,9 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     params = params or Params()
     t, amplitude = demodulated.t - t0, demodulated.amplitude
     noise = np.sqrt(demodulated.covariance[:, 0, 0])
+    if t.size < 3:
+        # One or two points show no law: what the amplitude lost since the start is then its uncertainty.
+        noise = np.hypot(noise, amplitude * demodulated.decay * t)
     # Perfect data still carry rounding: without a floor chi-square would divide by nothing.
     spread = scatter(t, amplitude, np.maximum(noise, 1e-12 * float(np.max(amplitude))))
     fits: dict[str, LawFit] = {}

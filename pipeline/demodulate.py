@@ -55,6 +55,8 @@ class Demodulated:
         Samples that the fit used.
     angular_frequency : float, rad/s
         Of the basis.
+    decay : (w,) float64, 1/s
+        g of the basis.
     residual : (n,) float64, m
         Every sample less its window's fit; NaN outside all windows and where unmeasured.
     flags : (n,) uint8
@@ -71,6 +73,7 @@ class Demodulated:
     covariance: F8
     count: NDArray[np.int64]
     angular_frequency: float
+    decay: F8
     residual: F8
     flags: U8
     lost: int
@@ -122,7 +125,7 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     # Once more in a basis that turns and decays as the record does.
     basis = _basis(windows, omega, decay)
     solution, weights = _clip(windows, basis, _solve(windows, basis, weights), params)
-    return _finish(conditioned, windows, solution, weights, omega)
+    return _finish(conditioned, windows, solution, weights, omega, decay)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -332,7 +335,7 @@ def _retune(windows: _Windows, solution: _Solution, omega: float, decay: F8) -> 
     good = solution.good
     count = int(np.count_nonzero(good))
     if count < 3:
-        return omega, decay
+        return _retune_short(windows, omega, decay)
     z = solution.coefficients[good, 1] + 1j * solution.coefficients[good, 2]
     t, weight = windows.centre[good], np.maximum(np.abs(z), 1e-300)
     phase = _unwrap(np.angle(z), t, omega) - omega * t
@@ -348,13 +351,41 @@ def _retune(windows: _Windows, solution: _Solution, omega: float, decay: F8) -> 
     return omega + float(slope), np.clip(rate, -0.05 * omega, 0.05 * omega)
 
 
+def _retune_short(windows: _Windows, omega: float, decay: F8, rounds: int = 12) -> tuple[float, F8]:
+    """The same for a record of one or two windows: Gauss-Newton on all its samples together.
+
+    The spectrum of so few periods places the frequency to a tenth of itself only, too far off for one window's phase.
+    """
+    inside = windows.usable > 0
+    t = (windows.tau + windows.centre[:, None])[inside]
+    y = windows.y[inside]
+    tau = t - t.mean()
+    rate = 0.0
+    for _ in range(rounds):
+        fall = np.exp(-rate * tau)
+        cosine, sine = fall * np.cos(omega * tau), fall * np.sin(omega * tau)
+        linear = np.stack([np.ones_like(tau), cosine, -sine], axis=1)
+        _, a, b = np.linalg.lstsq(linear, y, rcond=None)[0]
+        by_omega, by_rate = -tau * (a * sine + b * cosine), -tau * (a * cosine - b * sine)
+        full = np.concatenate([linear, by_omega[:, None], by_rate[:, None]], axis=1)
+        step = np.linalg.lstsq(full, y, rcond=None)[0]
+        # A fifth of itself a round at most: the start is off, not wrong.
+        omega += float(np.clip(step[3], -0.2 * omega, 0.2 * omega))
+        rate = float(np.clip(rate + step[4], -0.2 * omega, 0.2 * omega))
+        if abs(step[3]) < 1e-9 * omega:
+            break
+    return omega, np.full_like(decay, rate)
+
+
 def _unwrap(angle: F8, t: F8, omega: float) -> F8:
     """Total phase: the angle plus the turns that ``omega`` says lie between the windows."""
     rotating = omega * (t - t[0])
     return np.asarray(np.unwrap(angle - rotating) + rotating)
 
 
-def _finish(conditioned: Conditioned, windows: _Windows, solution: _Solution, weights: F8, omega: float) -> Demodulated:
+def _finish(
+    conditioned: Conditioned, windows: _Windows, solution: _Solution, weights: F8, omega: float, decay: F8
+) -> Demodulated:
     good = solution.good
     if not good.any():
         raise AnalysisError(
@@ -390,6 +421,7 @@ def _finish(conditioned: Conditioned, windows: _Windows, solution: _Solution, we
         covariance,
         counts[good],
         omega,
+        decay[good],
         residual,
         flags,
         int(np.count_nonzero(~good)),

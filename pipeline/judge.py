@@ -175,8 +175,13 @@ def _reason(damping: Damping, name: str) -> str:
         return "its fit did not converge"
     best = damping.best
     if fit.reduced_chi2 > best.reduced_chi2:
-        return f"reduced chi-square {fit.reduced_chi2:.3g} where {damping.selected} leaves {best.reduced_chi2:.2g}"
-    return f"a coefficient is negative beyond three standard uncertainties (reduced chi-square {fit.reduced_chi2:.3g})"
+        return f"reduced chi-square {_number(fit.reduced_chi2)} where {damping.selected} leaves {best.reduced_chi2:.2g}"
+    return f"a coefficient is negative beyond three standard uncertainties (reduced chi-square {_number(fit.reduced_chi2)})"
+
+
+def _number(value: float) -> str:
+    """Three digits, in full."""
+    return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
 
 
 def _motion_findings(

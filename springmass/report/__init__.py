@@ -1,4 +1,4 @@
-"""Report: one run or several as a page to read, figures to print and tables to paste, all made of analyses alone."""
+"""Report: one run or several as a page to read, figures to print and tables to paste."""
 
 from springmass.report.figures import draw, render
 from springmass.report.html import ReportRun, render_html

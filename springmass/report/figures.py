@@ -1,17 +1,18 @@
 """Figures of a report: position and residuals, amplitude and laws, phase plot, energy.
 
-Every function takes an analysis and returns a matplotlib ``Figure`` that belongs to no window. Colours are those of
-Okabe and Ito, told apart by line style or marker as well. The same analysis gives the same bytes: no dates, no random
-identifiers. Long series are thinned to what the eye can see or drawn as pixels inside the vector file, so that the page
-stays small.
+Every function takes an analysis and returns a matplotlib ``Figure`` that belongs to no window. Colours are
+those of Okabe and Ito, told apart by line style or marker as well. The same analysis gives the same bytes: no
+dates, no random identifiers. Long series are thinned to what the eye can see or drawn as pixels inside the
+vector file, so that the page stays small.
 """
 
 from __future__ import annotations
 
 import io
+import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ __all__ = [
     "amplitude_figure",
     "draw",
     "energy_figure",
+    "has_error_bars",
     "is_long",
     "phase_figure",
     "position_figure",
@@ -55,7 +57,7 @@ _FLAGGED: tuple[tuple[int, str, str, str], ...] = (
     (int(UNUSABLE), "otherwise unusable", "+", GREEN),
 )
 _DASHES = ((0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
-_SETTINGS = {
+_SETTINGS: dict[Any, Any] = {
     "font.family": ["DejaVu Sans"],
     "font.size": 9.0,
     "axes.linewidth": 0.7,
@@ -81,11 +83,12 @@ ZOOM_PERIODS = 8
 LONG_PERIODS = 14  # more than these are drawn whole and as a detail
 DENSE_PERIODS = 40  # more than these are a band to the eye
 DENSE_POINTS = 2500
-TURNS = 24  # drawn in a phase plot
+LEAST_TURNS, MOST_TURNS = 4, 24  # drawn in a phase plot
+VISIBLE_NOISE = 0.005  # of the panel's height; error bars of less vanish in the points
 
 
 def draw(analysis: Analysis) -> dict[str, Figure]:
-    """Return every figure of a run by name, in the report's order; the position alone where nothing oscillates.
+    """Return every figure of a run by name, in the report's order; the position alone of one at rest.
 
     Parameters
     ----------
@@ -121,15 +124,23 @@ def is_long(analysis: Analysis) -> bool:
 
 
 def turn_step(motion: Motion) -> int:
-    """Return that one turn in how many is drawn in the phase plot."""
-    return max(1, int(np.ceil(motion.cycles.count / TURNS)))
+    """Return one turn in how many the phase plot draws: the less the amplitude falls, the fewer turns."""
+    amplitude = motion.demodulated.amplitude
+    wanted = 32.0 * float(np.ptp(amplitude) / np.max(amplitude))
+    return max(1, int(np.ceil(motion.cycles.count / min(max(wanted, LEAST_TURNS), MOST_TURNS))))
+
+
+def has_error_bars(analysis: Analysis) -> bool:
+    """Return whether the samples' error bars are large enough to be seen, and drawn."""
+    y = analysis.track.y[(analysis.flags & UNUSABLE) == 0]
+    return isinstance(analysis.motion, Motion) and bool(analysis.conditioned.noise_m > VISIBLE_NOISE * np.ptp(y))
 
 
 def position_figure(analysis: Analysis) -> Figure:
     """Draw the distance with its fit, and beneath it the residual over the noise of one sample.
 
-    Flagged samples have markers of their own; those beyond the axis stand at its edge. A long record is followed by a
-    detail of its first periods. Where nothing oscillates the distance stands alone.
+    Flagged samples have markers of their own; those off the axis stand at its edge. A long record is followed
+    by a detail of its first periods. Where nothing oscillates the distance stands alone.
 
     Parameters
     ----------
@@ -161,7 +172,7 @@ def position_figure(analysis: Analysis) -> Figure:
 
 
 def amplitude_figure(analysis: Analysis) -> Figure:
-    """Draw the amplitudes with every law, and beneath them the selected law's residuals over their uncertainty.
+    """Draw the amplitudes with every law, and beneath them the selected law's residuals over their u.
 
     Parameters
     ----------
@@ -177,9 +188,7 @@ def amplitude_figure(analysis: Analysis) -> Figure:
         figure, (above, below) = _panels([(2.7, 0.0), (1.0, 0.08)])
         _error_bars(above, t[kept], amplitude[kept], u[kept], "amplitude of one window")
         if not kept.all():
-            above.plot(
-                t[~kept], amplitude[~kept], "o", mfc="none", color=ORANGE, ms=4, label="left out of the fits"
-            )
+            above.plot(t[~kept], amplitude[~kept], "o", mfc="none", color=ORANGE, ms=4, label="left out of the fits")
         shown = [float(np.min(amplitude - u)), float(np.max(amplitude + u))]
         for i, name in enumerate(sorted(damping.fits, key=lambda name: name == damping.selected)):
             status = law_status(damping, name)
@@ -191,17 +200,13 @@ def amplitude_figure(analysis: Analysis) -> Figure:
         margin = 0.12 * max(shown[1] - shown[0], 1e-9)
         above.set_ylim(shown[0] - margin, shown[1] + margin)
         above.set_ylabel("amplitude / mm")
-        handles, labels = above.get_legend_handles_labels()
-        order = sorted(range(len(labels)), key=lambda i: not labels[i].startswith("amplitude"))
-        above.legend(
-            [handles[i] for i in order], [labels[i] for i in order], loc="upper right", handlelength=3.2
-        )
         residual = (amplitude - damping.best.amplitude(t - damping.t0) * 1e3) / np.where(u > 0, u, 1.0)
         below.plot(t[kept], residual[kept], "o", ms=2.6, mew=0, color=BLUE)
         below.plot(t[~kept], residual[~kept], "o", mfc="none", color=ORANGE, ms=4)
         _finish_residual(below, residual[kept], "residual / u")
         below.set_xlabel("time / s")
         _share(above, below, damping.t0, end)
+        _legend_above(above, handle=2.8)
         return figure
 
 
@@ -231,8 +236,17 @@ def phase_figure(analysis: Analysis) -> Figure:
         displacement, velocity, label = _measured_phase(analysis, motion)
         turn = np.floor((track.t - first) / period)
         drawn = np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, turn_step(motion)) == 0)
-        panel.plot(displacement[drawn] * 1e3, velocity[drawn], ".", ms=2.4, mew=0, color="#b5b5b5", label=label,
-                   rasterized=bool(np.count_nonzero(drawn) > DENSE_POINTS // 5))  # fmt: skip
+        dots: dict[str, Any] = {
+            "ms": 2.8,
+            "mew": 0,
+            "color": "#a0a0a0",
+            "rasterized": np.count_nonzero(drawn) > DENSE_POINTS // 5,
+        }
+        fastest = 1.3 * float(np.nanmax(np.abs(motion.waveform.velocity)))
+        beyond = int(np.count_nonzero(np.abs(velocity[drawn]) > fastest))
+        label += f" ({beyond} off the axis)" if beyond else ""
+        panel.plot(displacement[drawn] * 1e3, velocity[drawn], ".", label=label, **dots)
+        panel.set_ylim(-fastest, fastest)
         for i, start in enumerate(starts):
             t = np.linspace(start, min(start + period, end), 73)
             x, v = _model_phase(motion, t)
@@ -263,46 +277,43 @@ def energy_figure(analysis: Analysis) -> Figure:
     mass = motion.derived.effective_mass_kg
     factor = 0.5e3 * (1.0 if mass is None else mass.value) * motion.phase.angular_frequency.value**2  # mJ
     amplitude, u = motion.demodulated.amplitude, damping.scatter.u
-    energy, u_energy = factor * amplitude**2, 2.0 * factor * amplitude * u
+    energy = factor * amplitude**2
     end = float(np.nanmax(analysis.track.t))
     grid = np.linspace(damping.t0, end, 240)
+    fitted = damping.best.amplitude(grid - damping.t0)
+    curve, width = factor * fitted**2, 2.0 * factor * fitted * np.interp(grid, t, u)
     with _style():
         figure, (panel,) = _panels([(2.6, 0.0)])
-        panel.fill_between(
-            t,
-            energy - u_energy,
-            energy + u_energy,
-            color=SKY,
-            alpha=0.45,
-            lw=0,
-            label="± one standard uncertainty",
-        )
-        panel.plot(t, energy, "o", ms=3.0, mew=0, color=BLUE, label="from the amplitude of one window")
-        law = f"from the law {damping.selected}"
-        curve = factor * damping.best.amplitude(grid - damping.t0) ** 2
-        panel.plot(grid, curve, color="#000000", lw=1.1, label=law, zorder=3)
-        if energy.size > 1 and 0 < float(np.min(energy - u_energy)) < float(np.max(energy)) / 20.0:
+        low, high = curve - width, curve + width
+        label = "± one u of a window"
+        panel.fill_between(grid, low, high, color=SKY, alpha=0.45, lw=0, label=label)
+        panel.plot(t, energy, "o", ms=3.0, mew=0, color=BLUE, label="from the amplitudes")
+        panel.plot(grid, curve, color="#000000", lw=1.0, label=f"from the law {damping.selected}", zorder=3)
+        if 0 < min(float(np.min(energy)), float(np.min(low))) < float(np.max(energy)) / 20.0:
             panel.set_yscale("log")
             panel.yaxis.set_major_formatter("{x:g}")
         panel.set_ylabel("energy / mJ" if mass is not None else "energy per mass / (mJ/kg)")
         panel.set_xlabel("time / s")
         panel.set_xlim(damping.t0, end)
-        panel.legend(loc="best")
+        _legend_above(panel)
         return figure
 
 
 @contextmanager
 def _style() -> Iterator[None]:
-    from matplotlib import rc_context
+    from matplotlib import rc_context, rcdefaults, rcParams
 
-    with rc_context(_SETTINGS):
+    with rc_context():
+        # A reader's own matplotlibrc must not change the report.
+        rcdefaults()
+        rcParams.update(_SETTINGS)
         yield
 
 
 def _panels(
     rows: Sequence[tuple[float, float]], *, width: float = WIDTH, right: float = RIGHT, top: float = 0.12
 ) -> tuple[Figure, list[Axes]]:
-    """Make panels under each other, each of a height and a gap above it in inches, their left edges aligned."""
+    """Make panels under each other, each of a height and a gap above it in inches, left edges aligned."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -320,9 +331,7 @@ def _panels(
 
 def _moving(analysis: Analysis) -> Motion:
     if isinstance(analysis.motion, NoOscillation):
-        raise ValueError(
-            f"only the position of this record can be drawn, nothing oscillates: {analysis.motion.why}"
-        )
+        raise ValueError(f"only the position of this record can be drawn, nothing oscillates: {analysis.motion.why}")
     return analysis.motion
 
 
@@ -341,12 +350,12 @@ def _draw_pair(axes: Sequence[Axes], analysis: Analysis, motion: Motion, start: 
         grid = np.linspace(start, end, int(50 * (end - start) * motion.cycles.frequency_hz) + 2)
         position = rest.at(grid) + _model_phase(motion, grid)[0]
         above.plot(grid, position * 1e3, color="#000000", lw=0.8, label="fit", zorder=2.5)
-    noise = motion.demodulated.noise_m or 1.0
+    noise = analysis.estimates["noise"].value or 1.0
     inside = ((analysis.flags & UNUSABLE) == 0) & (t >= start) & (t <= end)
     residual = motion.waveform.residual[inside] / noise
     dense = residual.size > DENSE_POINTS
-    below.plot(t[inside], residual, ".", ms=1.6 if dense else 2.6, mew=0, color=BLUE, alpha=0.5 if dense else 1.0,
-               rasterized=dense)  # fmt: skip
+    size, alpha = (1.6, 0.5) if dense else (2.6, 1.0)
+    below.plot(t[inside], residual, ".", ms=size, mew=0, color=BLUE, alpha=alpha, rasterized=dense)
     _finish_residual(below, residual, "residual / σ")
     _share(above, below, start, end)
 
@@ -361,6 +370,9 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
         panel.plot(*_thinned(track.t[used], y[used], 900), color=SKY, lw=0.5, label="samples used")
     else:
         panel.plot(track.t[used], y[used], ".", ms=4.0, mew=0, color=SKY, label="samples used")
+        if has_error_bars(analysis):
+            u = analysis.conditioned.noise_m * 1e3
+            panel.vlines(track.t[used], y[used] - u, y[used] + u, color=SKY, lw=0.6, alpha=0.6)
     # What was clipped off is part of the motion: the axis holds the fit as well as the samples.
     fit = analysis.motion.waveform.position[inside] * 1e3 if isinstance(analysis.motion, Motion) else y[used]
     shown = np.concatenate([y[used], fit[np.isfinite(fit)]])
@@ -374,29 +386,43 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
         if chosen.any():
             beyond = int(np.count_nonzero((y[chosen] < low) | (y[chosen] > high)))
             label = f"{name} ({np.count_nonzero(chosen)}" + (f"; {beyond} off the axis)" if beyond else ")")
-            hollow = {"mfc": "none"} if marker == "s" else {}
-            panel.plot(track.t[chosen], np.clip(y[chosen], low, high), marker, color=colour, ms=3.2, mew=0.8, ls="",
-                       label=label, clip_on=False, zorder=4, **hollow)  # fmt: skip
+            _mark(panel, track.t[chosen], np.clip(y[chosen], low, high), marker, colour, label)
     missing = rest & ~np.isfinite(y)
     if missing.any():
-        panel.plot(track.t[missing], np.full(np.count_nonzero(missing), low), "|", color=PURPLE, ms=7, mew=0.9, zorder=4,
-                   label=f"missing ({np.count_nonzero(missing)})")  # fmt: skip
+        count = int(np.count_nonzero(missing))
+        _mark(panel, track.t[missing], np.full(count, low), "|", PURPLE, f"missing ({count})")
     panel.set_ylim(low, high)
     panel.set_xlim(start, end)
     panel.set_ylabel("position / mm")
 
 
-def _legend_above(panel: Axes) -> None:
-    """Put the legend above a figure's first panel, in one row or two, and make the paper as much taller."""
+def _mark(panel: Axes, t: F8, y: F8, marker: str, colour: str, label: str) -> None:
+    """Set markers on top of everything, whole also at the edge."""
+    style: dict[str, Any] = {"ms": 7 if marker == "|" else 3.2, "mew": 0.8, "color": colour, "ls": ""}
+    panel.plot(t, y, marker, mfc="none", label=label, clip_on=False, zorder=4, **style)
+
+
+def _legend_above(panel: Axes, *, handle: float = 1.5) -> None:
+    """Put the legend above a figure's first panel, in as few rows as hold it, and make the paper as much taller."""
     figure = panel.get_figure(root=True)
     assert figure is not None
-    count = len(panel.get_legend_handles_labels()[1])
+    # What was measured comes first, though matplotlib lists error bars last.
+    entries = list(zip(*panel.get_legend_handles_labels(), strict=True))
+    entries.sort(key=lambda entry: not entry[1].startswith(("samples", "amplitude")))
+    handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
     rows = 1
-    for rows in (1, 2):
+    for rows in (1, 2, 3):
         legend = panel.legend(
-            loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=-(-count // rows), borderaxespad=0.2, columnspacing=1.4,
-            handletextpad=0.5, handlelength=1.5,
-        )  # fmt: skip
+            handles,
+            labels,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=-(-len(labels) // rows),
+            borderaxespad=0.2,
+            columnspacing=1.4,
+            handletextpad=0.5,
+            handlelength=handle,
+        )
         if legend.get_window_extent().width <= panel.get_window_extent().width:
             break
     before = figure.get_figheight()
@@ -421,8 +447,16 @@ def _share(above: Axes, below: Axes, start: float, end: float) -> None:
 
 
 def _error_bars(panel: Axes, t: F8, y: F8, u: F8, label: str) -> None:
-    panel.errorbar(t, y, yerr=u, fmt="o", ms=3.4, mew=0, color=SKY, ecolor=BLUE, elinewidth=0.9, capsize=1.5, capthick=0.6,
-                   label=label)  # fmt: skip
+    style: dict[str, Any] = {
+        "fmt": "o",
+        "ms": 3.4,
+        "mew": 0,
+        "color": SKY,
+        "ecolor": BLUE,
+        "elinewidth": 0.9,
+        "capsize": 1.5,
+    }
+    panel.errorbar(t, y, yerr=u, label=label, **style)
 
 
 def _model_phase(motion: Motion, t: F8) -> tuple[F8, F8]:
@@ -441,21 +475,21 @@ def _measured_phase(analysis: Analysis, motion: Motion) -> tuple[F8, F8, str]:
     displacement = np.where(used, track.y - motion.rest.at(track.t), np.nan)
     if track.velocity is not None and np.isfinite(track.velocity).any():
         return displacement, np.where(used, track.velocity, np.nan), "samples, velocity as recorded"
+    # Wider differences carry less noise; what they take from a sine is known and put back.
+    omega = motion.phase.angular_frequency.value
+    apart = max(1, round(2.0 * np.pi / omega * track.rate_hz / 16.0))
     velocity = np.full(track.t.size, np.nan)
-    step = track.t[2:] - track.t[:-2]
-    near = used[2:] & used[1:-1] & used[:-2] & (step > 0) & (step < 3.0 / track.rate_hz)
-    velocity[1:-1][near] = (track.y[2:] - track.y[:-2])[near] / step[near]
-    return displacement, velocity, "samples, velocity from their neighbours"
+    if track.t.size > 2 * apart:
+        step = track.t[2 * apart :] - track.t[: -2 * apart]
+        near = used[2 * apart :] & used[: -2 * apart] & (np.abs(step * track.rate_hz - 2 * apart) < 0.5)
+        rise = (track.y[2 * apart :] - track.y[: -2 * apart])[near]
+        velocity[apart:-apart][near] = rise * omega / (2.0 * np.sin(0.5 * omega * step[near]))
+    return displacement, velocity, "samples, velocity from those around"
 
 
 def _thinned(t: F8, y: F8, bins: int) -> tuple[F8, F8]:
     """Keep the least and the greatest of every bin: on paper of that many pixels nothing is lost."""
     edges = np.linspace(0, t.size, bins + 1).astype(np.int64)
-    keep = [
-        at + f(y[at:to])
-        for at, to in zip(edges[:-1], edges[1:], strict=True)
-        if to > at
-        for f in (np.argmin, np.argmax)
-    ]
+    keep = [at + f(y[at:to]) for at, to in itertools.pairwise(edges) if to > at for f in (np.argmin, np.argmax)]
     rows = np.unique(np.array(keep, np.int64))
     return t[rows], y[rows]

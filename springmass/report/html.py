@@ -13,8 +13,8 @@ from pipeline.classic import Classic
 from pipeline.compare import Comparison
 from pipeline.cycles import NoOscillation
 from pipeline.estimate import Estimate
-from springmass.report.figures import ZOOM_PERIODS, is_long, turn_step
-from springmass.report.tables import law_status, pretty, pretty_number, table_rows
+from springmass.report.figures import ZOOM_PERIODS, has_error_bars, is_long, turn_step
+from springmass.report.tables import law_status, page_unit, pretty, pretty_number, table_rows
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -44,8 +44,8 @@ _BIASES = {
     "frequency": "as the period",
     "angular_frequency": "as the period",
     "spring_constant": "as the period, twice over; the spring's mass and the air carried along are left out",
-    "amplitude": "extremes of noisy samples lie outside the motion, and every false echo enters; clipping cuts it short",
-    "damping_rate": "takes a lone exponential, starts it from one point, and counts overlapping windows as independent",
+    "amplitude": "extremes of noisy samples lie outside the motion, false echoes enter, clipping shortens",
+    "damping_rate": "takes a lone exponential, tied to one point; overlapping windows count as independent",
     "velocity_rms": "differences of neighbouring distances carry noise, which adds to the mean square",
     "reynolds_number": "as the velocity; air taken at 20 °C without uncertainty",
 }
@@ -60,8 +60,8 @@ class ReportRun:
     name : str
     analysis : Analysis
     input : mapping
-        What was read, to be shown as it is: path, format, sha256, kind, channel, samples, rate_hz, duration_s, and
-        ``title``, the recording's own first line, if it has one.
+        What was read, to be shown as it is: path, format, sha256, kind, channel, samples, rate_hz,
+        duration_s, and ``title``, the recording's own first line, if it has one.
     classic : Classic or None
         The report's own method on the same run, to be set beside.
     """
@@ -99,9 +99,7 @@ def render_html(
     """
     from jinja2 import Environment, StrictUndefined
 
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"pretty": pretty, "number": pretty_number, "symbol": _symbol}
     source = files("springmass.report").joinpath("templates/report.html.j2").read_text(encoding="utf-8")
     counts = quality or [run.analysis.quality for run in runs]
@@ -156,9 +154,7 @@ def _rounded(tag: re.Match[str]) -> str:
     # Text between tags, such as 0.0025 at an axis, is not touched, nor are pixels.
     if tag[0].startswith("<image"):
         return tag[0]
-    shorter = re.sub(
-        r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0]
-    )
+    shorter = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0])
     return re.sub(r"\s+", " ", shorter)
 
 
@@ -175,9 +171,7 @@ def _shared_styles(text: str) -> str:
     return re.sub(rf"{one}(?:\s*{one})+", grouped, text)
 
 
-def _part(
-    index: int, run: ReportRun, pictures: Mapping[str, bytes], quality: Mapping[str, int]
-) -> dict[str, Any]:
+def _part(index: int, run: ReportRun, pictures: Mapping[str, bytes], quality: Mapping[str, int]) -> dict[str, Any]:
     """Everything that the template says of one run."""
     analysis = run.analysis
     motion = analysis.motion
@@ -193,9 +187,7 @@ def _part(
         ],
         "laws": None if isinstance(motion, NoOscillation) else _laws(motion),
         "effects": analysis.effects,
-        "quality": [
-            (_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in _ordered(quality)
-        ],
+        "quality": [(_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in _ordered(quality)],
         "classic": _classic_rows(run),
         "chi2": None if run.classic is None else run.classic.chi2,
         "input": list(_flattened(run.input)),
@@ -220,12 +212,9 @@ def _subtitle(run: ReportRun) -> str:
 def _findings(analysis: Analysis) -> list[dict[str, str]]:
     """Errors first; among equals what became of the laws before what happened to samples."""
     severities = list(_SEVERITIES)
-    ordered = sorted(
-        analysis.findings, key=lambda x: (severities.index(x.severity), not x.code.startswith("law"))
-    )
+    ordered = sorted(analysis.findings, key=lambda x: (severities.index(x.severity), not x.code.startswith("law")))
     return [
-        {"severity": x.severity, "word": _SEVERITIES[x.severity], "code": x.code, "message": x.message}
-        for x in ordered
+        {"severity": x.severity, "word": _SEVERITIES[x.severity], "code": x.code, "message": x.message} for x in ordered
     ]
 
 
@@ -247,6 +236,8 @@ def _verdict(analysis: Analysis) -> str:
         if name != "A0"
     ]
     text = f"The amplitude is described by {chosen}" + (f": {', '.join(parameters)}." if parameters else ".")
+    if damping.selected == "none":
+        text = "The amplitude does not fall by more than this record can tell."
     rejected = [_IN_WORDS.get(name, name) for name, fit in damping.fits.items() if fit.rejected]
     if rejected:
         text += f" Rejected: {'; '.join(rejected)}."
@@ -263,46 +254,55 @@ def _caption(name: str, analysis: Analysis) -> str:
     if isinstance(motion, NoOscillation):
         return f"Distance from the sensor; nothing oscillates. Samples scatter by {sigma}."
     if name == "position":
-        text = "Distance from the sensor with the fitted motion, and beneath it what the fit leaves, over the noise of one "
-        text += f"sample, σ = {sigma}; error bars of that size would vanish in the line."
-        if is_long(analysis):
-            text += f" Above the whole record, below its first {ZOOM_PERIODS} periods (shaded above)."
-        return text + " Flagged samples were left out of the fit and of the residuals."
+        bars = "shown as error bars" if has_error_bars(analysis) else "too small for error bars to show"
+        detail = f" Above the whole record, below its first {ZOOM_PERIODS} periods (shaded above)."
+        return (
+            "Distance from the sensor with the fitted motion; beneath, what the fit leaves, over the noise of "
+            f"one sample, σ\u00a0=\u00a0{sigma}, {bars}.{detail if is_long(analysis) else ''}"
+            " Flagged samples were left out of the fit and of the residuals."
+        )
     if name == "amplitude":
         return (
-            "Amplitude in windows of one period or a few, with one standard uncertainty, and every law tried; "
-            f"beneath, the residuals of the selected law, {motion.damping.selected}, over their uncertainty."
+            "Amplitude in windows of one period or a few, with one standard uncertainty u, and every law; "
+            f"beneath, the residuals of the selected law, {motion.damping.selected}, over u."
         )
     if name == "phase":
         step = turn_step(motion)
         every = f" One turn in {step} is drawn." if step > 1 else ""
         return f"Velocity against displacement from rest; colour tells the time.{every}"
     mass = motion.derived.effective_mass_kg
-    of = (
-        f"the mass that oscillates, {_kept(mass)}"
-        if mass is not None
-        else "one kilogram, as no mass was given"
-    )
+    of = f"the mass that oscillates, {_kept(mass)}" if mass is not None else "one kilogram, as no mass was given"
     return (
-        f"Energy of the oscillation, m ω² A²/2, for {of}; the band is the amplitudes' uncertainty alone, "
-        "the mass and the frequency would shift all points alike."
+        f"Energy of the oscillation, m ω² A²/2, for {of}; the band is one standard uncertainty u of a window, "
+        "mass and frequency would shift all points alike."
     )
 
 
 def _laws(motion: Motion) -> dict[str, Any]:
     damping = motion.damping
-    names = dict.fromkeys(name for fit in damping.fits.values() for name in fit.joint.names)
+    units = {
+        name: unit for fit in damping.fits.values() for name, unit in zip(fit.joint.names, fit.joint.units, strict=True)
+    }
     rows = [
         {
             "name": law,
-            "cells": [fit.joint[name] if name in fit.joint.names else None for name in names],
+            "cells": [_bare(fit.joint[name]) if name in fit.joint.names else None for name in units],
             "fit": fit,
-            "bic": fit.bic - damping.best.bic,
+            "bic": _difference(fit.bic - damping.best.bic),
             "status": law_status(damping, law),
         }
         for law, fit in damping.fits.items()
     ]
-    return {"names": [_LETTERS.get(name, name) for name in names], "rows": rows}
+    heads = [_LETTERS.get(name, name) + (f" / {page_unit(unit)}" if unit else "") for name, unit in units.items()]
+    return {"heads": heads, "rows": rows}
+
+
+def _bare(estimate: Estimate) -> Estimate:
+    return Estimate(estimate.value, estimate.u)
+
+
+def _difference(bic: float) -> str:
+    return pretty_number(bic) if abs(bic) >= 1000.0 else f"{bic:.1f}".replace("-", "−")
 
 
 def _classic_rows(run: ReportRun) -> list[dict[str, Any]] | None:
@@ -321,7 +321,7 @@ def _classic_rows(run: ReportRun) -> list[dict[str, Any]] | None:
 
 
 def _compared(runs: Sequence[ReportRun], comparison: Comparison | None) -> list[tuple[str, Estimate]]:
-    """Pair the comparison's spring constants with the runs that have one, in order, where their numbers match."""
+    """Pair the comparison's spring constants, in order, with the runs that have one."""
     if comparison is None:
         return []
     names = [run.name for run in runs if "spring_constant" in run.analysis.estimates]
@@ -338,9 +338,7 @@ def _flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]
         if isinstance(value, Mapping):
             leaves += _flattened(value, name)
         elif value is not None:
-            leaves.append(
-                (name, " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value))
-            )
+            leaves.append((name, " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)))
     return leaves
 
 

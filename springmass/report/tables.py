@@ -16,6 +16,7 @@ from pipeline.estimate import Estimate, format_value
 __all__ = [
     "TableRow",
     "law_status",
+    "page_unit",
     "pretty",
     "pretty_number",
     "results_csv",
@@ -105,10 +106,10 @@ def table_rows(analyses: Sequence[Analysis]) -> tuple[TableRow, ...]:
     analyses : sequence of Analysis
     """
     rows = []
-    for name, *words in _QUANTITIES:
+    for name, quantity, symbol, page_symbol, tex_symbol in _QUANTITIES:
         estimates = tuple(_estimate(analysis, name) for analysis in analyses)
         if any(estimate is not None for estimate in estimates):
-            rows.append(TableRow(name, *words, estimates))
+            rows.append(TableRow(name, quantity, symbol, page_symbol, tex_symbol, estimates))
     return tuple(rows)
 
 
@@ -130,8 +131,8 @@ def text_table(names: Sequence[str], analyses: Sequence[Analysis], *, width: int
     >>> from pipeline.track import Track
     >>> t = np.arange(1000) / 100
     >>> y = 0.2 + 0.05 * np.cos(8.3 * t) + 1e-4 * np.random.default_rng(1).standard_normal(1000)
-    >>> print(text_table(["bob"], [analyse(Track.from_arrays(t, y))]).splitlines()[2])
-    period                      T       0.757004 +- 0.000022 s
+    >>> text_table(["bob"], [analyse(Track.from_arrays(t, y))]).splitlines()[2].split()[::4]
+    ['period', '0.000022']
     """
     rows = table_rows(analyses)
     left = max([len("quantity"), *(len(row.quantity) for row in rows)]) + 2
@@ -173,7 +174,7 @@ def results_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
 
 
 def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return Table 1 as a LaTeX table of siunitx quantities; needs the packages booktabs and siunitx (version 3).
+    """Return Table 1 as a LaTeX table of siunitx quantities; it needs booktabs and siunitx, version 3.
 
     Parameters
     ----------
@@ -181,7 +182,9 @@ def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
     analyses : sequence of Analysis
     """
     body = [
-        " & ".join([f"{row.quantity.capitalize()} & ${row.tex_symbol}$", *map(_tex_quantity, row.estimates)])
+        " & ".join(
+            [f"{row.quantity[:1].upper()}{row.quantity[1:]} & ${row.tex_symbol}$", *map(_tex_quantity, row.estimates)]
+        )
         + r" \\"
         for row in table_rows(analyses)
     ]
@@ -191,8 +194,8 @@ def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
             r"% needs \usepackage{booktabs} and \usepackage{siunitx}, version 3",
             r"\begin{table}",
             r"  \centering",
-            r"  \caption{Results of the oscillation experiment; in parentheses the standard uncertainty ($k = 1$)"
-            " of the last digits.}",
+            r"  \caption{Results of the oscillation experiment; in parentheses the standard uncertainty"
+            " ($k = 1$) of the last digits.}",
             r"  \label{tab:springmass}",
             rf"  \begin{{tabular}}{{ll{'l' * len(names)}}}",
             r"    \toprule",
@@ -218,7 +221,7 @@ def pretty(estimate: Estimate | None) -> str:
     if estimate is None:
         return "–"
     number = format_value(estimate.value, estimate.u)
-    return f"{_typeset(number)} {_PAGE_UNITS.get(estimate.unit, estimate.unit)}".rstrip()
+    return f"{_typeset(number)} {page_unit(estimate.unit)}".rstrip()
 
 
 def pretty_number(value: float | None, digits: int = 2) -> str:
@@ -232,6 +235,11 @@ def pretty_number(value: float | None, digits: int = 2) -> str:
     if value is None or value != value:
         return "–"
     return _typeset(f"{value:#.{digits}g}".rstrip("."))
+
+
+def page_unit(unit: str) -> str:
+    """Return a unit as the page writes it."""
+    return _PAGE_UNITS.get(unit, unit)
 
 
 def law_status(damping: Damping, name: str) -> str:
@@ -264,11 +272,7 @@ def _line(quantity: str, symbol: str, cells: Sequence[str], left: int, middle: i
 
 def _shortened(name: str, width: int) -> str:
     # Names of one experiment differ at their ends as often as at their beginnings: keep both.
-    return (
-        name
-        if len(name) <= width
-        else f"{name[: width // 2 - 1]}..{name[len(name) - (width - width // 2 - 1) :]}"
-    )
+    return name if len(name) <= width else f"{name[: width // 2 - 1]}..{name[len(name) - (width - width // 2 - 1) :]}"
 
 
 def _ascii(text: str) -> str:

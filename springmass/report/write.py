@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pipeline.compare import Comparison
 from springmass.report.figures import NAMES, draw, render
@@ -16,7 +16,7 @@ from springmass.report.tables import results_csv, table_tex
 
 __all__ = ["ReportRun", "write_report"]
 
-_KINDS = ("svg", "pdf")
+_KINDS: tuple[Literal["svg"], Literal["pdf"]] = ("svg", "pdf")
 
 
 def write_report(
@@ -57,42 +57,32 @@ def write_report(
     Notes
     -----
     Beside the page: ``results.json`` (one object for one run, else a list; what is no number is null),
-    ``results.csv``, ``table.tex``, and ``figures/`` with every figure as SVG and PDF. The same arguments give the
-    same bytes.
+    ``results.csv``, ``table.tex``, and ``figures/`` with every figure as SVG and PDF. The same arguments give
+    the same bytes.
     """
     from storage.atomic import write_whole
 
     if not runs or len(runs) != len(results):
-        raise ValueError(
-            f"a report needs one run at least and one result for each, got {len(runs)} and {len(results)}"
-        )
+        raise ValueError(f"a report needs one run at least and one result for each, got {len(runs)} and {len(results)}")
     directory = Path(directory)
     (directory / "figures").mkdir(parents=True, exist_ok=True)
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
     pictures = []
     for stem, run in zip(_stems(names), runs, strict=True):
-        drawn = {
-            name: {kind: render(figure, kind) for kind in _KINDS}
-            for name, figure in draw(run.analysis).items()
-        }
+        drawn = {name: {kind: render(figure, kind) for kind in _KINDS} for name, figure in draw(run.analysis).items()}
         _write_figures(directory / "figures", stem, drawn)
         pictures.append({name: files["svg"] for name, files in drawn.items()})
     plain = [_plain(result) for result in results]
     content = plain[0] if len(plain) == 1 else plain
-    write_whole(
-        directory / "results.json", json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    )
+    write_whole(directory / "results.json", json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
     write_whole(directory / "results.csv", results_csv(names, analyses))
     write_whole(directory / "table.tex", table_tex(names, analyses))
-    counts = [
-        {**run.analysis.quality, **result.get("quality", {})}
-        for run, result in zip(runs, results, strict=True)
-    ]
+    counts = [{**run.analysis.quality, **result.get("quality", {})} for run, result in zip(runs, results, strict=True)]
     page = render_html(runs, pictures, comparison=comparison, provenance=provenance, quality=counts)
     return write_whole(directory / "report.html", page)
 
 
-def _write_figures(folder: Path, stem: str, drawn: Mapping[str, Mapping[str, bytes]]) -> None:
+def _write_figures(folder: Path, stem: str, drawn: Mapping[str, Mapping[Literal["svg", "pdf"], bytes]]) -> None:
     from storage.atomic import write_whole
 
     for name in NAMES:
@@ -106,7 +96,7 @@ def _write_figures(folder: Path, stem: str, drawn: Mapping[str, Mapping[str, byt
 
 
 def _stems(names: Sequence[str]) -> list[str]:
-    """Return what each run's figures begin with: nothing for a single run, else a name safe for any file system."""
+    """Return how each run's figures begin: with nothing if it is the only one, else with a safe name."""
     if len(names) == 1:
         return [""]
     stems: list[str] = []

@@ -1,0 +1,163 @@
+"""Calibration: from echo times and stated distances to metres, with what was used kept beside the result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from acquisition.block import F8, Flag
+from acquisition.errors import CalibrationError
+from acquisition.readings import Readings
+
+__all__ = ["Calibration", "StillPoint", "against_ruler", "from_still"]
+
+SPEED_OF_SOUND_M_PER_S = 344.0
+MAD_TO_SIGMA = 1.482602218505602
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """How readings become distances.
+
+    :math:`d = s\\,c\\,\\tau/2 + d_0` of an echo time, :math:`d = s\\,d_r + d_0` of a distance that the device states.
+
+    Parameters
+    ----------
+    speed_of_sound_m_per_s : float
+        Applied to echo times. Echo times are what is recorded, so another speed can be applied later.
+    scale : float
+        Of distances, from a known one.
+    offset_m : float
+        Added, m: the transducer's face is not the scale's zero.
+    u_scale, u_offset_m : float
+        Standard uncertainties.
+    """
+
+    speed_of_sound_m_per_s: float = SPEED_OF_SOUND_M_PER_S
+    scale: float = 1.0
+    offset_m: float = 0.0
+    u_scale: float = 0.0
+    u_offset_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 100.0 < self.speed_of_sound_m_per_s < 2000.0:
+            raise CalibrationError(
+                f"the speed of sound must lie between 100 and 2000 m/s, got {self.speed_of_sound_m_per_s:g}; "
+                "air at room temperature has 344"
+            )
+        if not (math.isfinite(self.scale) and self.scale > 0 and math.isfinite(self.offset_m)):
+            raise CalibrationError(f"scale must be positive and offset finite, got {self.scale:g}, {self.offset_m:g} m")
+
+    def distance(self, readings: Readings) -> F8:
+        """Return distances (n,) in m; NaN where a reading has none."""
+        echo = 0.5e-6 * self.speed_of_sound_m_per_s * readings.echo_us
+        raw = np.where(np.isfinite(readings.echo_us), echo, readings.distance_m)
+        missing = (readings.flags & np.uint8(Flag.MISSING)) != 0
+        return np.where(missing, np.nan, self.scale * raw + self.offset_m)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the numbers by name, for the log and the run file."""
+        return asdict(self)
+
+    @classmethod
+    def from_mapping(cls, numbers: Mapping[str, Any]) -> Calibration:
+        """Return the calibration that :meth:`to_mapping` wrote; unknown names are refused."""
+        try:
+            return cls(**{name: float(value) for name, value in numbers.items()})
+        except TypeError as error:
+            raise CalibrationError(f"a calibration holds {', '.join(cls.__slots__)}; got {sorted(numbers)}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class StillPoint:
+    """A bob at rest, as the sensor sees it.
+
+    Parameters
+    ----------
+    rest_m, u_rest_m : float
+        Rest position and its standard uncertainty, m.
+    noise_m : float
+        Standard deviation of one distance, m.
+    samples : int
+    """
+
+    rest_m: float
+    u_rest_m: float
+    noise_m: float
+    samples: int
+
+
+def from_still(distance: F8) -> StillPoint:
+    """Return rest position and noise from distances (n,) in m taken while the bob hangs still.
+
+    Raises
+    ------
+    CalibrationError
+        If fewer than ten distances are there, or the bob moves: its slow motion exceeds five times the noise.
+    """
+    known = distance[np.isfinite(distance)]
+    if known.size < 10:
+        raise CalibrationError(
+            f"a rest position needs ten distances at least, got {known.size} of {distance.size}; is a target in view?"
+        )
+    rest = float(np.median(known))
+    total = MAD_TO_SIGMA * float(np.median(np.abs(known - rest)))
+    # First differences see noise and hardly any slow motion.
+    steps = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(known)))) / math.sqrt(2.0)
+    floor = max(steps, 1e-6)
+    if total > 5.0 * floor and total > 5e-4:
+        raise CalibrationError(
+            f"the bob moves: positions scatter by {total * 1e3:.2g} mm where the noise is {steps * 1e3:.2g} mm; "
+            "let it hang still"
+        )
+    noise = max(total, steps)
+    return StillPoint(rest, 1.2533 * noise / math.sqrt(known.size), noise, int(known.size))
+
+
+def against_ruler(
+    measured: tuple[StillPoint, ...], known_m: tuple[float, ...], u_known_m: float, base: Calibration | None = None
+) -> Calibration:
+    """Return the calibration that carries measured rest positions to known distances.
+
+    Parameters
+    ----------
+    measured : tuple of StillPoint
+        Taken with ``base``.
+    known_m : tuple of float
+        Distances by the ruler, m. One gives the offset; two or more, apart by a tenth of their size, the scale too.
+    u_known_m : float
+        Standard uncertainty of one ruler reading, m.
+    base : Calibration, optional
+
+    Raises
+    ------
+    CalibrationError
+        If numbers do not pair, or the scale comes out further than a tenth from 1: then a unit is wrong.
+    """
+    base = base or Calibration()
+    if not measured or len(measured) != len(known_m):
+        raise CalibrationError(f"each ruler distance needs its measurement, got {len(known_m)} and {len(measured)}")
+    x = np.array([point.rest_m for point in measured])
+    y = np.array(known_m)
+    u = np.hypot(u_known_m, [point.u_rest_m for point in measured])
+    if len(measured) == 1 or np.ptp(y) < 0.1 * np.max(np.abs(y)):
+        weight = 1.0 / u**2
+        shift = float(np.sum(weight * (y - x)) / np.sum(weight))
+        u_shift = float(np.sum(weight) ** -0.5)
+        return Calibration(base.speed_of_sound_m_per_s, base.scale, base.offset_m + shift, base.u_scale, u_shift)
+    design = np.stack([x, np.ones_like(x)], axis=1) / u[:, None]
+    covariance = np.linalg.inv(design.T @ design)
+    scale, shift = covariance @ design.T @ (y / u)
+    if abs(scale - 1.0) > 0.1:
+        raise CalibrationError(f"the ruler asks for a scale of {scale:.3g}; more than a tenth off means a wrong unit")
+    return Calibration(
+        base.speed_of_sound_m_per_s,
+        base.scale * float(scale),
+        float(scale) * base.offset_m + float(shift),
+        base.scale * math.sqrt(float(covariance[0, 0])),
+        math.sqrt(float(covariance[1, 1])),
+    )

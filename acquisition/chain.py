@@ -1,0 +1,104 @@
+"""From the bytes of one port to blocks: decoder, timebase and calibration in a row.
+
+Live view, recording, recovery and replay from wire bytes all use this one chain, so they cannot differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from acquisition.block import Block
+from acquisition.calibration import Calibration
+from acquisition.decoders.base import Family
+from acquisition.readings import NO_READINGS, Readings
+from acquisition.source import SourceInfo
+from acquisition.timebase import Timebase
+
+__all__ = ["SensorChain"]
+
+
+class SensorChain:
+    """One sensor's way from bytes to samples.
+
+    Parameters
+    ----------
+    family : Family
+    options : mapping, optional
+        Of the family's decoder.
+    rate_hz : float, optional
+        Readings per second that this sensor is set to; left out, the family's.
+    calibration : Calibration, optional
+    """
+
+    def __init__(
+        self,
+        family: Family,
+        *,
+        options: Mapping[str, Any] | None = None,
+        rate_hz: float | None = None,
+        calibration: Calibration | None = None,
+    ) -> None:
+        self.family = family
+        self.calibration = calibration or Calibration()
+        self.decoder = family.decoder(**(options or {}))
+        self.timebase = Timebase(rate_hz or family.rate_hz)
+        self.last = NO_READINGS
+        self._next = 0
+
+    def feed(self, host_ns: int, data: bytes) -> Block:
+        """Take the bytes of one read, return the samples they completed (perhaps none)."""
+        readings = self.decoder.feed(host_ns, data)
+        self.last = readings
+        return self.to_block(readings)
+
+    def to_block(self, readings: Readings) -> Block:
+        """Give readings their sensor time and distance, and the next indices of the run."""
+        t, late = self.timebase.push(readings)
+        block = Block(
+            self._next,
+            t,
+            self.calibration.distance(readings),
+            readings.flags | late,
+            readings.host_ns,
+        )
+        self._next += len(readings)
+        return block
+
+    def lost(self) -> None:
+        """The port went away: a frame cut in half by that is no frame."""
+        self.decoder.flush()
+
+    def info(self, name: str, kind: str = "live") -> SourceInfo:
+        """Return what is known of the source; the clock's kind once a reading came."""
+        if kind not in ("live", "simulated", "replay"):
+            raise ValueError(f"kind must be live, simulated or replay, got {kind!r}")
+        return SourceInfo(
+            kind,  # type: ignore[arg-type]
+            name,
+            self.timebase.rate_hz,
+            quantum_m=self.family.resolution_m,
+            clock=self.timebase.clock,
+        )
+
+    def report(
+        self, t: np.ndarray[Any, np.dtype[np.float64]], host_ns: np.ndarray[Any, np.dtype[np.int64]]
+    ) -> dict[str, Any]:
+        """Return faults, gaps and the clock's rate error as plain numbers, for the run's provenance."""
+        from acquisition.timebase import fit_clock
+
+        clock = fit_clock(t, host_ns)
+        known = np.isfinite(clock.rate_error_ppm)
+        return {
+            "faults": dict(self.decoder.faults),
+            "gaps": [{"index": g.index, "length_s": g.length_s, "lost": g.lost} for g in self.timebase.gaps],
+            "restarts": self.timebase.restarts,
+            "clock": {
+                "kind": self.timebase.clock,
+                "rate_error_ppm": clock.rate_error_ppm if known else None,
+                "u_rate_error_ppm": clock.u_rate_error_ppm if known else None,
+                "host_jitter_s": clock.jitter_s if known else None,
+            },
+        }

@@ -1,0 +1,122 @@
+"""What a family of rangefinders must offer: its decoder, how it is polled, and its limits in numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from acquisition.readings import Readings
+
+__all__ = ["Decoder", "Encoder", "Family", "Poll"]
+
+
+class Decoder(Protocol):
+    """Turns bytes into readings, back in step within two frames after any garbage; never raises on bytes."""
+
+    @property
+    def faults(self) -> Mapping[str, int]:
+        """Counts of what was no reading: "garbage_bytes", "bad_checksum", "bad_frame", ..."""
+        ...
+
+    def feed(self, host_ns: int, data: bytes) -> Readings:
+        """Take the bytes of one read of the port, return the frames they completed (perhaps none)."""
+        ...
+
+    def flush(self) -> None:
+        """Forget a half-received frame: the port was reopened, or a reply timed out."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Poll:
+    """How a sensor that speaks only when asked is asked.
+
+    Parameters
+    ----------
+    request : bytes
+        Sent for each reading.
+    interval_s : float
+        Between requests, s.
+    timeout_s : float
+        A reply later than this is lost: the decoder is flushed and the input discarded.
+    """
+
+    request: bytes
+    interval_s: float
+    timeout_s: float
+
+
+class Encoder(Protocol):
+    """Writes readings in a family's wire form, for the simulated sensor; the decoder's counterpart in no line."""
+
+    def encode(
+        self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
+    ) -> bytes:
+        """Return one frame; NaN distance means no target."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """A family of rangefinders.
+
+    Parameters
+    ----------
+    name : str
+        As ``--sensor`` takes it.
+    title : str
+        One line for people, with the devices it covers.
+    baud : int
+        Default speed of the port (8 data bits, no parity, one stop bit).
+    rate_hz : float
+        Readings per second it can give.
+    resolution_m : float
+        Smallest step of a distance, m.
+    range_m : tuple of float
+        Nearest and farthest distance, m.
+    limits : str
+        What a user must know before relying on it, one sentence.
+    decoder : callable
+        Makes a fresh decoder; keyword options as ``options`` names them.
+    encoder : callable
+        Makes the simulated sensor's encoder, with the same options.
+    poll : Poll or None
+        None for a sensor that sends by itself.
+    options : mapping of str to str
+        Options of the decoder by name, with one line each (column, unit, ...).
+    has_device_time : bool
+        Whether readings carry the device's clock or counter.
+    source : str
+        Datasheet or specification.
+    """
+
+    name: str
+    title: str
+    baud: int
+    rate_hz: float
+    resolution_m: float
+    range_m: tuple[float, float]
+    limits: str
+    decoder: Callable[..., Decoder]
+    encoder: Callable[..., Encoder]
+    poll: Poll | None = None
+    options: Mapping[str, str] = field(default_factory=dict)
+    has_device_time: bool = False
+    source: str = ""
+
+    def describe(self) -> dict[str, Any]:
+        """Return what ``springmass sensors --json`` prints."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "baud": self.baud,
+            "rate_hz": self.rate_hz,
+            "resolution_m": self.resolution_m,
+            "range_m": list(self.range_m),
+            "polled": self.poll is not None,
+            "has_device_time": self.has_device_time,
+            "options": dict(self.options),
+            "limits": self.limits,
+            "source": self.source,
+        }

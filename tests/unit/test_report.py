@@ -1,0 +1,318 @@
+"""The report: what stands in its files, and what must never."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import functools
+import html
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.classic import classic
+from pipeline.compare import SpringRun, compare_springs
+from pipeline.cycles import NoOscillation
+from pipeline.estimate import Estimate
+from pipeline.judge import Finding
+from pipeline.scene import Scene
+from pipeline.track import Track
+from springmass.report import (
+    ReportRun,
+    draw,
+    render,
+    results_csv,
+    table_rows,
+    table_tex,
+    text_table,
+    write_report,
+)
+from springmass.report.html import inline_svg, render_html
+from springmass.report.tables import law_status, pretty, pretty_number
+
+PROVENANCE = {"version": "0.1.0", "parameters": {"cycles": {"false_alarm": 1e-6}}, "command": "analyse <run>"}
+SCENE = Scene(
+    bob_mass_kg=Estimate(0.2176, 5e-5, "kg"),
+    spring_mass_kg=Estimate(0.01, 5e-4, "kg"),
+    disc_diameter_m=Estimate(0.102, 5e-4, "m"),
+    air_temperature_c=Estimate(20.0, 0.5, "degC"),
+)
+
+
+def track_of(
+    seconds: float, *, noise_m: float = 1e-4, gamma: float = 0.0065, beta: float = 0.2, echoes: bool = True
+) -> Track:
+    """Return a damped oscillation at 100 Hz, with false echoes unless told otherwise, a few samples missing."""
+    rng = np.random.default_rng(7)
+    t = np.arange(round(100 * seconds)) / 100
+    decay = np.exp(-gamma * t)
+    amplitude = 0.05 * decay / (1 + beta * 0.05 * (1 - decay) / gamma)
+    y = 0.22 + amplitude * np.cos(7.95 * t - 0.7) + noise_m * rng.standard_normal(t.size)
+    if echoes:
+        y[rng.integers(0, t.size, t.size // 200)] = 1.4
+    y[60:66] = np.nan
+    return Track.from_arrays(t, y, quantum_m=1e-5, kind="simulated")
+
+
+@functools.cache
+def damped() -> Analysis:
+    """Return the analysis of a long damped run in a known scene."""
+    return analyse(track_of(60.0), SCENE)
+
+
+@functools.cache
+def bare() -> Analysis:
+    """Return the analysis of a short run in an unknown scene."""
+    return analyse(track_of(8.0, gamma=0.003, beta=0.0))
+
+
+@functools.cache
+def still() -> Analysis:
+    """Return the analysis of a run in which nothing oscillates."""
+    rng = np.random.default_rng(3)
+    t = np.arange(800) / 100
+    return analyse(Track.from_arrays(t, 0.3 + 1e-4 * rng.standard_normal(800)))
+
+
+def run_of(analysis: Analysis, name: str = "run", **given: Any) -> ReportRun:
+    """Return a run as a caller hands it over."""
+    return ReportRun(name, analysis, {"path": f"{name}.txt", "format": "csv", **given})
+
+
+def written(directory: Path, *runs: ReportRun, **options: Any) -> str:
+    """Write a report and return its page."""
+    options.setdefault("results", [{"quality": run.analysis.quality} for run in runs])
+    page = write_report(directory, runs, provenance=PROVENANCE, **options)
+    assert page == directory / "report.html"
+    return page.read_text("utf-8")
+
+
+def page_of(*runs: ReportRun) -> str:
+    """Return the page without its figures, which take most of the time."""
+    return render_html(runs, [{} for _ in runs], provenance=PROVENANCE)
+
+
+def files_in(directory: Path) -> dict[str, bytes]:
+    """Return the content of every file below a directory."""
+    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+def test_every_file_of_a_report_is_written(tmp_path: Path) -> None:
+    """A report is a page, three tables and four figures in two forms each, and nothing besides."""
+    written(tmp_path / "run.results", run_of(bare()))
+    figures = {
+        f"figures/{name}.{kind}" for name in ("position", "amplitude", "phase", "energy") for kind in ("svg", "pdf")
+    }
+    tables = {"report.html", "results.json", "results.csv", "table.tex"}
+    assert set(files_in(tmp_path / "run.results")) == tables | figures
+
+
+def test_the_page_needs_nothing_from_outside(tmp_path: Path) -> None:
+    """The page holds no script, no link to another file and no address of the network."""
+    page = written(tmp_path, run_of(bare()))
+    assert re.search(r"<script|<link|<iframe|@import|https?://", page) is None
+    references = re.findall(r'(?:src|href|data)="([^"]*)"|url\(([^)]*)\)', page)
+    assert {(a or b)[:5] for a, b in references if not (a or b).startswith("#")} <= {"data:"}
+
+
+def test_no_two_elements_share_an_id_and_every_reference_is_met(tmp_path: Path) -> None:
+    """Inline figures of several runs keep their clip paths and markers to themselves."""
+    page = written(tmp_path, run_of(damped(), "one"), run_of(bare(), "two"))
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids)) > 8
+    assert set(re.findall(r'(?:href="#|url\(#)([^")]+)', page)) <= set(ids)
+
+
+def test_hostile_text_is_escaped_everywhere() -> None:
+    """A name, a title, a finding and a command that look like markup come out as text."""
+    bad = "<script>alert('x')</script>"
+    analysis = dataclasses.replace(damped(), findings=(Finding("clipped", "warning", bad),))
+    page = page_of(run_of(analysis, bad, title=bad))
+    assert "<script" not in page
+    assert page.count("&lt;script&gt;") >= 4
+    assert "analyse &lt;run&gt;" in page
+
+
+@pytest.mark.parametrize("make", [damped, bare, still])
+def test_every_finding_is_told(make: Any) -> None:
+    """Every message stands on the page word for word, errors before warnings before notes."""
+    page = page_of(run_of(make()))
+    assert make().findings
+    for finding in make().findings:
+        assert finding.message in html.unescape(page)
+    order = re.findall(r'<li class="(\w+)">', page)
+    assert order == sorted(order, key=["error", "warning", "info"].index)
+
+
+def test_rejected_laws_are_named_in_words() -> None:
+    """The top of the page says which law describes the amplitude and which ones the record rejects."""
+    top = page_of(run_of(damped())).split("Table 1")[0]
+    assert "linear and quadratic drag together" in top
+    assert re.search(r"Rejected: .*a lone exponential", top)
+
+
+def test_simulated_data_cannot_pass_for_measured() -> None:
+    """A simulated run says so at its head, a replayed one does not."""
+    assert "simulated, not measured" in page_of(run_of(bare()))
+    assert "simulated, not measured" not in page_of(run_of(still()))
+
+
+def test_the_same_arguments_give_the_same_bytes(tmp_path: Path) -> None:
+    """Every file, pictures included, is reproducible byte for byte."""
+    for name in ("a", "b"):
+        written(tmp_path / name, run_of(damped()))
+    assert files_in(tmp_path / "a") == files_in(tmp_path / "b")
+
+
+def test_the_page_of_a_long_record_stays_small(tmp_path: Path) -> None:
+    """Twelve thousand samples make a page of less than 650 kB."""
+    page = written(tmp_path, run_of(analyse(track_of(120.0), SCENE)))
+    assert len(page.encode()) < 650_000
+
+
+def test_csv_holds_every_estimate_and_every_law() -> None:
+    """The CSV gives back each number to its last digit."""
+    rows = list(csv.DictReader(io.StringIO(results_csv(["a, b"], [damped()]))))
+    motion = damped().motion
+    assert isinstance(motion, Motion)
+    expected = dict(damped().estimates)
+    for law, fit in motion.damping.fits.items():
+        expected |= {f"{law}.{name}": x for name, x in fit.joint.estimates().items()}
+    read = {row["name"]: Estimate(float(row["value"]), float(row["u"]), row["unit"]) for row in rows}
+    assert read == expected
+    assert {row["run"] for row in rows} == {"a, b"}
+
+
+def test_tex_is_balanced_and_states_uncertainties_in_parentheses() -> None:
+    """The LaTeX table closes what it opens, escapes names and writes value(u) with the unit's macro."""
+    tex = table_tex(["50%_run#1", "b"], [damped(), bare()])
+    plain = re.sub(r"\\[\\{}%_#&$]", "", tex)
+    assert plain.count("{") == plain.count("}")
+    assert plain.count("$") % 2 == 0
+    assert r"50\%\_run\#1" in tex
+    assert re.search(r"Period & \$T\$ & \\qty\{0\.\d+\(\d\d\)\}\{\\second\} & ", tex)
+    assert {line.count(" & ") for line in tex.splitlines() if line.endswith(r"\\")} == {3}
+
+
+@pytest.mark.parametrize(
+    ("estimate", "tex"),
+    [
+        (Estimate(0.752857, 0.001429, "s"), r"\qty{0.7529(14)}{\second}"),
+        (Estimate(13.94, 1.23, ""), r"\num{13.9(12)}"),
+        (Estimate(1103.0, 148.0, ""), r"\num{1100(150)}"),
+        (Estimate(-8.36e-5, 9.6e-7, "m"), r"\qty{-8.360(96)e-5}{\metre}"),
+        (Estimate(14.0, 0.0, "N/m"), r"\qty{14}{\newton\per\metre}"),
+        (Estimate(float("nan"), 1.0, "m"), "--"),
+    ],
+)
+def test_tex_and_page_show_the_digits_that_u_allows(estimate: Estimate, tex: str) -> None:
+    """Value and uncertainty end at the same digit, small numbers as powers of ten, exact ones without u."""
+    analysis = dataclasses.replace(still(), estimates={"period": estimate})
+    assert tex in table_tex(["run"], [analysis])
+
+
+def test_page_numbers_are_typeset() -> None:
+    """A minus is a minus, a power of ten stands raised, what is no number is a dash."""
+    assert pretty(Estimate(-8.36e-5, 9.6e-7, "1/(m s)")) == "(−8.360 ± 0.096) × 10⁻⁵ m⁻¹ s⁻¹"
+    assert pretty(None) == pretty_number(None) == pretty_number(float("nan")) == "–"
+    assert pretty_number(-0.00077) == "−0.00077"
+
+
+def test_json_is_strict(tmp_path: Path) -> None:
+    """What is no number becomes null, numpy's numbers plain ones; one run gives an object, several a list."""
+    result = {"a": float("nan"), "b": [np.float64("inf"), np.int64(3), np.bool_(True)], "c": Path("x"), "d": None}
+    written(tmp_path / "one", run_of(still()), results=[result])
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    text = (tmp_path / "one/results.json").read_text("utf-8")
+    assert json.loads(text, parse_constant=refuse) == {"a": None, "b": [None, 3, True], "c": "x", "d": None}
+    written(tmp_path / "two", run_of(still(), "a"), run_of(still(), "b"), results=[result, {}])
+    assert len(json.loads((tmp_path / "two/results.json").read_text("utf-8"))) == 2
+
+
+def test_a_run_without_oscillation_gives_a_report_too(tmp_path: Path) -> None:
+    """Its report has the position alone, says why, and takes away figures that an earlier one left."""
+    assert isinstance(still().motion, NoOscillation)
+    written(tmp_path, run_of(bare()))
+    page = written(tmp_path, run_of(still()))
+    assert {name for name in files_in(tmp_path) if "figures" in name} == {
+        "figures/position.svg",
+        "figures/position.pdf",
+    }
+    assert 'class="error"' in page
+    assert "Phase plot" not in page
+
+
+@pytest.mark.parametrize("seconds", [1.6, 3.0])
+def test_a_very_short_record_can_be_drawn(tmp_path: Path, seconds: float) -> None:
+    """Two and four periods give every figure."""
+    analysis = analyse(track_of(seconds, noise_m=2e-3), SCENE)
+    assert "Energy" in written(tmp_path, run_of(analysis))
+
+
+def test_several_runs_stand_side_by_side(tmp_path: Path) -> None:
+    """Table 1 has a column a run, each run its section and its own figures, the comparison its sentence."""
+    runs = [run_of(damped(), "same"), run_of(damped(), "same")]
+    mass = Estimate(0.2176, 5e-5, "kg")
+    springs = [SpringRun(run.name, run.analysis.estimates["angular_frequency"], mass) for run in runs]
+    comparison = compare_springs(springs)
+    page = written(tmp_path, *runs, comparison=comparison)
+    assert page.count("<th>same</th>") >= 2
+    assert page.count("Phase plot") == 2
+    assert html.escape(comparison.message) in page
+    assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 8
+
+
+def test_the_classic_method_is_set_beside_with_its_biases() -> None:
+    """Its numbers stand next to this analysis's own, each with what is wrong with it."""
+    run = dataclasses.replace(run_of(bare()), classic=classic(track_of(8.0, echoes=False)))
+    page = page_of(run)
+    assert "two sampled maxima decide" in page
+    assert "false echoes enter" in page
+
+
+def test_text_table_is_ascii_and_fits_the_terminal() -> None:
+    """Columns that do not fit follow in another block, names of runs are cut, not numbers."""
+    names = ["a run with quite a long name é.txt", "b", "c"]
+    table = text_table(names, [damped(), bare(), still()], width=80)
+    assert table.isascii()
+    assert max(map(len, table.splitlines())) <= 80
+    assert table.count("quantity") > 1
+    for row in table_rows([damped()]):
+        assert row.cells[0] in table
+
+
+def test_a_law_that_fails_is_never_called_selected_alone() -> None:
+    """Where every law is rejected the least bad one is called so."""
+    motion = damped().motion
+    assert isinstance(motion, Motion)
+    name = motion.damping.selected
+    assert law_status(motion.damping, name) == "selected"
+    fits = {law: dataclasses.replace(fit, rejected=True) for law, fit in motion.damping.fits.items()}
+    assert law_status(dataclasses.replace(motion.damping, fits=fits), name).startswith("rejected")
+
+
+def test_inlining_leaves_the_text_of_a_figure_alone() -> None:
+    """Coordinates lose digits, labels do not, and nothing in the element speaks for the whole page."""
+    figure = draw(still())["position"]
+    figure.axes[0].set_title("0.123456 mm")
+    element = str(inline_svg(render(figure, "svg"), "p"))
+    assert element.startswith("<svg")
+    assert ">0.123456 mm</text>" in element
+    assert "<style" not in element
+    assert "<?xml" not in element
+
+
+def test_a_report_needs_a_result_for_each_run(tmp_path: Path) -> None:
+    """Runs and results that do not match are refused before anything is written."""
+    with pytest.raises(ValueError, match="one result for each"):
+        write_report(tmp_path / "x", [run_of(still())], provenance={}, results=[])
+    assert not (tmp_path / "x").exists()
