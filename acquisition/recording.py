@@ -40,7 +40,7 @@ class Trap:
     Parameters
     ----------
     code : str
-        A finding code of the program where one fits ("truncated_row", "nominal_clock", ...), else a plain word.
+        A finding code of the program where one fits ("truncated_row", "nominal_clock", ...), else a word.
     message : str
         One sentence that names what was seen and what was done about it.
     count : int

@@ -127,6 +127,8 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     if isinstance(cycles, NoOscillation):
         return _still(track, scene, params, conditioned, cycles)
     demodulated = demodulate(conditioned, cycles, params.demodulate)
+    if (why := _no_sinusoid(conditioned, demodulated)) is not None:
+        return _still(track, scene, params, conditioned, why)
     start = float(track.t[np.flatnonzero(conditioned.used)[0]])
     damping = fit_damping(demodulated, start, params.damping)
     phase = fit_phase(demodulated, damping, params.phase)
@@ -145,6 +147,17 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     findings = judge(conditioned, cycles, demodulated, damping, phase, rest, waveform)
     motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived)
     return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
+
+
+def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
+    """Why the motion is no oscillation although its spectrum has a peak: a step or a ramp has one too."""
+    size = float(np.median(demodulated.amplitude))
+    left = demodulated.noise_m
+    if left > 0.15 * size and left > 4.0 * conditioned.noise_m:
+        return NoOscillation(
+            f"the distance moves, but not to and fro: a sinusoid of {size * 1e3:.3g} mm leaves {left * 1e3:.3g} mm"
+        )
+    return None
 
 
 def _still(track: Track, scene: Scene, params: Params, conditioned: Conditioned, why: NoOscillation) -> Analysis:

@@ -15,6 +15,7 @@ __all__ = ["Conditioned", "Params", "condition", "fourth_difference_noise"]
 # Variance of y[i-2] - 4 y[i-1] + 6 y[i] - 4 y[i+1] + y[i+2] for unit white noise: 1 + 16 + 36 + 16 + 1.
 FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
 MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4)
+QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,20 +108,24 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
             f"an analysis needs eight usable samples at least, got {np.count_nonzero(clean)} of {len(track)}; "
             "record longer, or see the counts of flagged samples"
         )
-    y = track.y[clean]
-    noise_m = fourth_difference_noise(y)
-    floor_m = max(noise_m, 0.5 * (track.quantum_m or 0.0))
-    spikes = _spikes(y, floor_m, params.spike_sigmas)
-    rows = np.flatnonzero(clean)
+    y, rows = track.y[clean], np.flatnonzero(clean)
+    half_step = 0.5 * (track.quantum_m or 0.0)
+    spikes = _spikes(y, max(_least_noise(y), half_step), params.spike_sigmas)
     flags[rows[spikes]] |= np.uint8(Quality.FALSE_ECHO)
-    plateaus: list[float] = []
     y_kept, rows = y[~spikes], rows[~spikes]
+    noise_m = fourth_difference_noise(y_kept)
+    plateaus: list[float] = []
     ordered = np.sort(y_kept)
-    for sign, increasing in ((1.0, ordered), (-1.0, -ordered[::-1])):
-        level, members = _plateau(sign * y_kept, increasing, floor_m, params.plateau_contrast)
-        if members.size:
-            plateaus.append(sign * level)
-            flags[rows[members]] |= np.uint8(Quality.CLIPPED)
+    found = [
+        (sign, *_plateau(sign * y_kept, increasing, max(noise_m, half_step), params.plateau_contrast))
+        for sign, increasing in ((1.0, ordered), (-1.0, -ordered[::-1]))
+    ]
+    # A record that lies on plateaus for the most part is a step or a still bob, not a clipped motion.
+    if sum(members.size for _, _, members in found) <= 0.6 * y_kept.size:
+        for sign, level, members in found:
+            if members.size:
+                plateaus.append(sign * level)
+                flags[rows[members]] |= np.uint8(Quality.CLIPPED)
     return Conditioned(track, flags, noise_m, tuple(plateaus))
 
 
@@ -153,21 +158,41 @@ def _time_flags(t: F8) -> U8:
     return flags
 
 
+def _least_noise(y: F8) -> float:
+    """Noise that a third of the fourth differences still shows: enough to find spikes by, however many there are.
+
+    A fifth of the samples being spikes leaves a third of the fourth differences clean.
+    """
+    if y.size < 5:
+        return 0.0
+    size = np.abs(np.diff(y, 4))
+    quarter = float(np.partition(size, size.size // 4)[size.size // 4])
+    return quarter / (QUARTER_TO_SIGMA * float(FOURTH_DIFFERENCE_GAIN))
+
+
 def _spikes(y: F8, noise_m: float, sigmas: float) -> NDArray[np.bool_]:
     """Return which samples stand off the median of five around them by more than noise and curvature do."""
+    spikes = np.zeros(y.size, np.bool_)
     if y.size < 8:
-        return np.zeros(y.size, np.bool_)
-    # What curvature alone does: a generous quantile of the second differences.
-    bound = sigmas * noise_m + 3.0 * float(np.quantile(np.abs(np.diff(y, 2)), 0.75))
-    away = _off_median(y)
-    spikes = away > bound
-    if spikes.any():
+        return spikes
+    # What curvature alone does: a quantile of the second differences that spikes on a fifth of the samples spare.
+    second = np.abs(np.diff(y, 2))
+    bound = sigmas * noise_m + 5.0 * float(np.partition(second, int(0.4 * second.size))[int(0.4 * second.size)])
+    smooth = y
+    for _ in range(4):
+        away = _off_median(smooth)
+        found = np.flatnonzero(away > bound)
+        if not found.size:
+            break
         # On a slope a spike shifts its neighbours' medians by a step: take the worst out and look again.
-        around = np.lib.stride_tricks.sliding_window_view(np.pad(away, 2), 5).max(axis=1)
-        worst = spikes & (away >= around)
-        kept = np.flatnonzero(~worst)
-        smooth = np.interp(np.arange(y.size), kept, y[kept])
-        spikes = worst | (_off_median(smooth) > bound)
+        near = np.clip(found[:, None] + np.arange(-2, 3), 0, y.size - 1)
+        worst = found[away[found] >= away[near].max(axis=1)]
+        spikes[worst] = True
+        kept = np.flatnonzero(~spikes)
+        if kept.size < 8:
+            break
+        smooth = y.copy()
+        smooth[spikes] = np.interp(np.flatnonzero(spikes), kept, y[kept])
     return spikes
 
 

@@ -237,8 +237,8 @@ def _levenberg_marquardt(law: Law, t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, 
         gain = chi2 - trial_chi2
         if gain >= 0:
             theta, residual, chi2 = trial, trial_residual, trial_chi2
-            # A thousandth of a standard uncertainty: what is left after this step is its square.
-            if float(step @ step) <= 1e-6 or gain <= 1e-12 * chi2:
+            # A thousandth of a standard uncertainty (which a bad fit has larger): what is left is its square.
+            if float(step @ step) <= 1e-6 * max(1.0, chi2 / y.size) or gain <= 1e-12 * chi2:
                 return theta, True
             damping = max(damping * 0.1, 1e-12)
         else:

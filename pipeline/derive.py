@@ -115,7 +115,7 @@ def derive(
     decay = damping.averaged({n: f.damping_rate() for n, f in damping.fits.items()})
     start = _variable(amplitude)
     lam = _variable(decay) * rate_error
-    v_rms = omega * _variable(_root_mean_square(damping.best, demodulated))
+    v_rms = omega * _variable(_root_mean_square(damping.best, demodulated, damping.t0))
     found = {
         "period": (2 * math.pi / omega, "s"),
         "frequency": (omega / (2 * math.pi), "Hz"),
@@ -209,9 +209,9 @@ def _noise(demodulated: Demodulated) -> Estimate:
     return Estimate(value, math.hypot(*parts), "m")
 
 
-def _root_mean_square(fit: LawFit, demodulated: Demodulated) -> Estimate:
+def _root_mean_square(fit: LawFit, demodulated: Demodulated, t0: float) -> Estimate:
     """Of the displacement over the windows, m, with its standard uncertainty."""
-    t = demodulated.t - demodulated.t[0]
+    t = demodulated.t - t0
     amplitude = fit.amplitude(t)
     value = math.sqrt(float(np.mean(amplitude**2)) / 2.0)
     gradient = np.mean(amplitude[:, None] * fit.law.jacobian(t, fit.joint.values), axis=0) / (2.0 * value)

@@ -176,7 +176,10 @@ def _reason(damping: Damping, name: str) -> str:
     best = damping.best
     if fit.reduced_chi2 > best.reduced_chi2:
         return f"reduced chi-square {_number(fit.reduced_chi2)} where {damping.selected} leaves {best.reduced_chi2:.2g}"
-    return f"a coefficient is negative beyond three standard uncertainties (reduced chi-square {_number(fit.reduced_chi2)})"
+    return (
+        "a coefficient is negative beyond three standard uncertainties "
+        f"(reduced chi-square {_number(fit.reduced_chi2)})"
+    )
 
 
 def _number(value: float) -> str:

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.analyse import Analysis, analyse
 from pipeline.scene import Scene
+from springmass.errors import USAGE, ProgramError
 from springmass.loading import Loaded
 from springmass.results import result_of
 
 if TYPE_CHECKING:
     from pipeline.classic import Classic
 
-__all__ = ["Analysed", "analyse_loaded", "now_utc"]
+__all__ = ["Analysed", "analyse_loaded", "make_folder", "now_utc"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +85,24 @@ def analyse_loaded(
         classic=classic,
     )
     return Analysed(loaded, analysis, classic, result)
+
+
+def make_folder(path: str | Path) -> Path:
+    """Return a folder for results, made where it is not there yet.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if it cannot be.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ProgramError(
+            f"{folder}: a folder for results was demanded, {error.strerror}; name another with --out", USAGE
+        ) from error
+    return folder
 
 
 def now_utc() -> str:

@@ -10,7 +10,7 @@ import os
 import sys
 
 from springmass import __version__
-from springmass.errors import INTERRUPTED, OK, UNREADABLE, USAGE
+from springmass.errors import INTERRUPTED, OK, SOME_FAILED, UNREADABLE, USAGE, complain
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -75,12 +75,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = build_parser().parse_args(arguments)
     from importlib import import_module
 
-    command = import_module(f"springmass.commands.{options.command}")
+    # A title or a name that the terminal's code lacks is shown escaped.
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
     try:
-        return int(command.run(options))
+        return int(import_module(f"springmass.commands.{options.command}").run(options))
     except KeyboardInterrupt:
-        print("springmass: interrupted", file=sys.stderr)
+        complain("interrupted")
         return INTERRUPTED
+    except ImportError as error:
+        complain(f"{error}; this installation is not whole, springmass doctor says what is wrong with it")
+        return SOME_FAILED
     except BrokenPipeError:
         # The reader of our output went away (`| head`): nothing is left to say, not even at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -89,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _exit_code(error)
         if code is None:
             raise
-        print(f"springmass: {error}", file=sys.stderr)
+        complain(error)
         return code
 
 
@@ -101,9 +107,9 @@ def _exit_code(error: Exception) -> int | None:
         return error.exit_code
     from acquisition.errors import AcquisitionError
     from pipeline.errors import PipelineError, SceneError
-    from storage.errors import StorageError
+    from storage.errors import StorageError, WriteFailed
 
-    if isinstance(error, SceneError):
+    if isinstance(error, SceneError | WriteFailed):
         return USAGE
     return UNREADABLE if isinstance(error, AcquisitionError | PipelineError | StorageError) else None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import importlib.util
 import platform
 import sys
 import tempfile
@@ -41,7 +42,10 @@ class Check:
 
 def examine() -> tuple[Check, ...]:
     """Run every check."""
-    return (*_interpreter(), *_packages(), *_libraries(), _bundled(), _round_trip())
+    checks = (*_interpreter(), *_packages(), *_libraries())
+    if not all(check.ok for check in checks):
+        return checks  # what follows runs these packages and libraries
+    return (*checks, _bundled(), _round_trip())
 
 
 def foreign_packages() -> dict[str, str]:
@@ -53,9 +57,10 @@ def foreign_packages() -> dict[str, str]:
     home = Path(springmass.__file__).resolve().parent.parent
     foreign: dict[str, str] = {}
     for name in PACKAGES:
-        place = Path(importlib.import_module(name).__file__ or "").resolve().parent
+        spec = importlib.util.find_spec(name)  # looks for it without running it
+        place = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent
         if place != home / name:
-            foreign[name] = str(place)
+            foreign[name] = "nowhere" if spec is None else str(place or "a folder that is no package")
     return foreign
 
 

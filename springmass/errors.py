@@ -13,7 +13,19 @@
 
 from __future__ import annotations
 
-__all__ = ["OK", "REJECTED", "SENSOR", "SOME_FAILED", "UNREADABLE", "USAGE", "ProgramError"]
+import sys
+
+__all__ = [
+    "INTERRUPTED",
+    "OK",
+    "REJECTED",
+    "SENSOR",
+    "SOME_FAILED",
+    "UNREADABLE",
+    "USAGE",
+    "ProgramError",
+    "complain",
+]
 
 OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERRUPTED = 0, 1, 2, 3, 4, 5, 130
 
@@ -32,3 +44,8 @@ class ProgramError(Exception):
     def __init__(self, message: str, exit_code: int) -> None:
         super().__init__(message)
         self.exit_code = exit_code
+
+
+def complain(message: object) -> None:
+    """Write one line to stderr, also where a file's name or a library's message breaks over several."""
+    print("springmass:", " ".join(str(message).splitlines()), file=sys.stderr)

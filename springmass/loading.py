@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,10 @@ class Loaded:
     originals : tuple of Original
     scene : mapping or None
         The scene a run file carries.
+    provenance : mapping
+        What a run file says of its origin.
+    recorded_format : str
+        The family that read the old recording inside a run file; empty where it holds none.
     """
 
     path: Path
@@ -61,6 +65,8 @@ class Loaded:
     malformed_rows: int
     originals: tuple[Original, ...]
     scene: Mapping[str, Any] | None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    recorded_format: str = ""
 
     def samples_in_blocks(self, size: int = 1024) -> Iterator[Block]:
         """Yield the samples in blocks of at most ``size``."""
@@ -166,7 +172,7 @@ def _is_hdf5(path: Path) -> bool:
     try:
         with path.open("rb") as file:
             return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
-    except OSError:
+    except (OSError, ValueError):
         return False  # the format registry says what is wrong with it
 
 
@@ -184,6 +190,7 @@ def _from_recording(path: Path, recording: Recording) -> Loaded:
         recording.malformed_rows,
         recording.originals,
         None,
+        recorded_format=recording.format,
     )
 
 
@@ -205,6 +212,8 @@ def _load_run(path: Path) -> Loaded:
             run.malformed_rows,
             run.originals(),
             run.scene,
+            run.provenance,
+            run.format,
         )
 
 
@@ -214,11 +223,9 @@ def _between(loaded: Loaded, from_s: float | None, to_s: float | None) -> Track:
     high = np.inf if to_s is None else to_s
     keep = (t >= low) & (t <= high)
     if not keep.any():
-        raise ProgramError(
-            f"{loaded.path}: no sample lies between {low:g} and {high:g} s; the record spans "
-            f"{np.nanmin(t):g} to {np.nanmax(t):g} s",
-            USAGE,
-        )
+        told = t[np.isfinite(t)]
+        span = f"spans {told.min():g} to {told.max():g} s" if told.size else "holds no sample"
+        raise ProgramError(f"{loaded.path}: no sample lies between {low:g} and {high:g} s; the record {span}", USAGE)
     track = loaded.track
     velocity = None if track.velocity is None else track.velocity[keep]
     return replace(track, t=t[keep], y=track.y[keep], flags=track.flags[keep], velocity=velocity)

@@ -19,8 +19,12 @@ if TYPE_CHECKING:
 __all__ = ["SCHEMA", "all_findings", "input_of", "result_of"]
 
 SCHEMA = 1
-# What a trap's code means for the result; codes that no finding has stay with the recording.
+# How grave it is that a reader saw this; what is not named here is for information.
 _SEVERITY = {
+    "malformed_rows": "warning",
+    "offset_unknown_after_gap": "warning",
+    "pair_mismatch": "warning",
+    "zero_filled_tail": "warning",
     "truncated_row": "warning",
     "duplicate_time": "warning",
     "non_monotonic_time": "warning",

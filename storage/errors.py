@@ -14,7 +14,9 @@ Every message is one line: where, what was demanded, what was got, and what to d
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 
 __all__ = [
     "HDF5_ERRORS",
@@ -24,7 +26,9 @@ __all__ = [
     "RunExists",
     "StorageError",
     "WriteFailed",
+    "damaged",
     "one_line",
+    "reading",
 ]
 
 HDF5_ERRORS = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
@@ -82,3 +86,20 @@ class WriteFailed(StorageError):
 
 class RunExists(WriteFailed):
     """A file of that name stands already, and the caller has not said that it may be replaced."""
+
+
+def damaged(path: str | os.PathLike[str], what: str, how: str) -> RunDamaged:
+    """Return the error for a part of a run file that is not what was written."""
+    remedy = "restore the file from a copy, or make it again from the wire log or the old recording"
+    return RunDamaged(path, f"{what} is not what was written: {how}", remedy)
+
+
+@contextlib.contextmanager
+def reading(path: str | os.PathLike[str], what: str) -> Iterator[None]:
+    """Turn what HDF5 raises on damaged bytes into one line."""
+    try:
+        yield
+    except StorageError:
+        raise
+    except HDF5_ERRORS as error:
+        raise damaged(path, what, one_line(error)) from error

@@ -57,15 +57,16 @@ def _windows(
     at = np.asarray(t, np.float64)
     samples = 76
     return Demodulated(
-        at,
-        np.broadcast_to(np.asarray(amplitude, np.float64), at.shape).copy(),
-        omega * at if phase is None else np.asarray(phase, np.float64),
-        np.broadcast_to(np.asarray(offset, np.float64), at.shape).copy(),
-        np.full(at.size, noise_m),
-        np.broadcast_to(np.diag(np.square(u)), (at.size, 3, 3)).copy(),
-        np.full(at.size, samples),
-        omega,
-        noise_m * np.tile([-1.0, 1.0], at.size * samples // 2),
-        np.zeros(at.size * samples, np.uint8),
-        0,
+        t=at,
+        amplitude=np.broadcast_to(np.asarray(amplitude, np.float64), at.shape).copy(),
+        phase=omega * at if phase is None else np.asarray(phase, np.float64),
+        offset=np.broadcast_to(np.asarray(offset, np.float64), at.shape).copy(),
+        noise=np.full(at.size, noise_m),
+        covariance=np.broadcast_to(np.diag(np.square(u)), (at.size, 3, 3)).copy(),
+        count=np.full(at.size, samples),
+        angular_frequency=omega,
+        decay=np.zeros(at.size),
+        residual=noise_m * np.tile([-1.0, 1.0], at.size * samples // 2),
+        flags=np.zeros(at.size * samples, np.uint8),
+        lost=0,
     )

@@ -114,15 +114,11 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
         if stat.S_ISDIR(mode):
             raise FormatError(name, "expected a file, got a directory", "name a recording inside it")
         if not stat.S_ISREG(mode):
-            raise FormatError(
-                name, "expected a regular file, got a device or pipe", "save it to a file first"
-            )
+            raise FormatError(name, "expected a regular file, got a device or pipe", "save it to a file first")
         with Path(name).open("rb") as file:
             data = file.read(_LONGEST_LINE if limit is None else limit)
             if not data:
-                raise FormatError(
-                    name, "expected a recording, got an empty file", "check that the export ended"
-                )
+                raise FormatError(name, "expected a recording, got an empty file", "check that the export ended")
             if limit is None and len(data) == _LONGEST_LINE:
                 data = _read_on(name, data, file.read)
             return data

@@ -61,9 +61,7 @@ def refuse(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
     text = unify(decode(head)) if is_text(head) else ""
     for family in _FAMILIES:
         if family.matches(head, text):
-            return UnknownFormat(
-                path, f"this is a {family.title}, which is not read by this version", family.remedy
-            )
+            return UnknownFormat(path, f"this is a {family.title}, which is not read by this version", family.remedy)
     if not text.strip("\0 \n\t"):
         return UnknownFormat(path, "expected a recording, got binary data or nothing", _TEXT)
     if _bare_numbers(text):

@@ -73,9 +73,7 @@ class MotionSensor:
         """
         a, b = (read_column(path, data, None, rate_hz, None) for path, data in (position, velocity))
         if a.layout.quantity == b.layout.quantity:
-            demand = (
-                f"expected a position and a velocity file, got {a.layout.quantity} in both ({a.name} too)"
-            )
+            demand = f"expected a position and a velocity file, got {a.layout.quantity} in both ({a.name} too)"
             raise FormatError(b.path, demand, "name the other file of the pair")
         return _join(a, b) if a.layout.quantity == "distance" else _join(b, a)
 
@@ -184,9 +182,7 @@ def _join_traps(position: Column, velocity: Column, from_p: I8, from_v: I8) -> I
         message = f"{alone_v} times stand in the velocity file only: no distance there"
         yield Trap("missing_samples", message, alone_v)
     if alone_p:
-        yield Trap(
-            "velocity_missing", f"{alone_p} times stand in the position file only: no velocity there", alone_p
-        )
+        yield Trap("velocity_missing", f"{alone_p} times stand in the position file only: no velocity there", alone_p)
     # Neighbours in the position file whose later one has a velocity: it must be their difference.
     both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
     x, rate_hz = position.value, position.timing.rate_hz
@@ -195,7 +191,5 @@ def _join_traps(position: Column, velocity: Column, from_p: I8, from_v: I8) -> I
     allowed = position.resolution * rate_hz + velocity.resolution
     wrong = int(np.count_nonzero(apart > 1.01 * allowed))
     if wrong > 0.5 * apart.size:
-        message = (
-            f"{wrong} of {apart.size} velocities are no differences of the positions: is it the same run?"
-        )
+        message = f"{wrong} of {apart.size} velocities are no differences of the positions: is it the same run?"
         yield Trap("pair_mismatch", message, wrong)

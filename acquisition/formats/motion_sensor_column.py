@@ -105,9 +105,7 @@ def read_column(
     if not is_text(data):
         raise FormatError(path, "expected rows of text, got binary data", "export the run as text again")
     if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise NeedsAnswer(
-            path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz"
-        )
+        raise NeedsAnswer(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
     whole = unify(decode(data))
     text = whole.rstrip("\0\x1a")
     layout = find_layout(path, text, channel, unit)
@@ -170,9 +168,7 @@ def _flags(t: F8, value: F8, bad: NDArray[np.bool_], layout: Layout, timing: Tim
     return flags
 
 
-def _stated_error(
-    path: str, layout: Layout, table: Table, bad: NDArray[np.bool_]
-) -> tuple[float | None, bool]:
+def _stated_error(path: str, layout: Layout, table: Table, bad: NDArray[np.bool_]) -> tuple[float | None, bool]:
     """Return the usual error of the file, m, and whether it is constant."""
     if layout.columns < 3:
         return None, False
@@ -223,15 +219,11 @@ def _row_traps(
     table: Table, bad: NDArray[np.bool_], told: NDArray[np.bool_], *, ended: bool, zeros: int
 ) -> Iterator[Trap]:
     if zeros:
-        yield Trap(
-            "zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted"
-        )
+        yield Trap("zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted")
     last = bad.size - 1
     cut = bool(bad[last]) and not ended
     if cut:
-        kept = (
-            "kept as a missing sample" if told[last] else "its time is not told, so no sample stands for it"
-        )
+        kept = "kept as a missing sample" if told[last] else "its time is not told, so no sample stands for it"
         yield Trap("truncated_row", f"the last row stops midway; {kept}", 1, int(table.line[last]))
     rows = np.flatnonzero(bad[:-1] if cut else bad)
     if rows.size:
@@ -262,7 +254,5 @@ def _sample_traps(flags: U8, line: NDArray[np.int64], t: F8, timing: Timing) -> 
     if gaps.size:
         reached = np.maximum.accumulate(np.where(flags & IRREGULAR, -np.inf, t))
         lost = int(np.sum(np.rint((t[gaps] - reached[gaps - 1]) * timing.rate_hz) - 1))
-        message = (
-            f"about {lost} samples are missing in {gaps.size} gaps of time; the sample after each is flagged"
-        )
+        message = f"about {lost} samples are missing in {gaps.size} gaps of time; the sample after each is flagged"
         yield Trap("missing_samples", message, lost, int(line[gaps[0]]))

@@ -134,9 +134,7 @@ def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
             if (match := _VELOCITY.fullmatch(cells[1])) and len(cells) == 2:
                 return at, _layout("velocity", 2, match[1])
             error = _ERROR.fullmatch(cells[-1]) if len(cells) == 3 else None
-            if (match := _DISTANCE.fullmatch(cells[1])) and (
-                len(cells) == 2 or (error and error[1] == match[1])
-            ):
+            if (match := _DISTANCE.fullmatch(cells[1])) and (len(cells) == 2 or (error and error[1] == match[1])):
                 return at, _layout("distance", len(cells), match[1])
     return None
 
@@ -181,11 +179,7 @@ def _shape(lines: Sequence[str]) -> Layout | None:
         if usual > 0 and third.count(usual) >= 0.95 * len(third) and _times_run(three):
             return _layout("distance", 3, "cm", "distance and its error, for the third column is constant")
     elif (
-        len(two) >= 3
-        and rows[0] == two[0]
-        and math.isnan(two[0][1])
-        and not math.isnan(two[1][1])
-        and _times_run(two)
+        len(two) >= 3 and rows[0] == two[0] and math.isnan(two[0][1]) and not math.isnan(two[1][1]) and _times_run(two)
     ):
         return _layout("velocity", 2, "cm", "velocity, for the first value is NaN")
     return None

@@ -133,9 +133,7 @@ def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, NDArray[np.bool_]]:
     return np.where(agrees, exact, t), agrees
 
 
-def place_unread(
-    t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dict[int, str], decimals: int
-) -> F8:
+def place_unread(t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dict[int, str], decimals: int) -> F8:
     """Tell the times of rows that could not be read, from the grid and their neighbours.
 
     Parameters

@@ -1,8 +1,8 @@
 """Text that holds columns of numbers: decoding, lines, and a table of cells with what could not be read.
 
-Two readers give the same numbers. The fast one takes fixed-point columns as integers, all rows at once, and
-declines at the first thing out of the ordinary. The slow one goes row by row and says which rows it could
-not read.
+Two readers give the same numbers. The fast one takes fixed-point columns as integers, all rows at once. The
+slow one goes row by row and says which rows it could not read; it also reads what is out of the ordinary in a
+file that is otherwise for the fast one.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ from __future__ import annotations
 import codecs
 import math
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
+from acquisition.formats.fixed_point import read_cells
 
 __all__ = [
     "Table",
@@ -30,10 +32,8 @@ __all__ = [
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?(\d*)|\.(\d+))(?:[eE][+-]?\d{1,3})?", re.ASCII)
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n\r\f\x1a")
-_DOT, _MINUS, _NAN, _TAB, _NEWLINE, _ZERO = (ord(c) for c in ".-N\t\n0")
-_MAX_DIGITS = (
-    15  # integers of 15 digits and powers of ten up to 22 are exact, so their quotient rounds as float() does
-)
+_NEWLINE = ord("\n")
+_SAMPLE = 32  # lines that tell how many decimals a column prints
 _UNIFORM = 0.9  # a column that prints the same number of decimals in this share of its rows always does
 
 
@@ -204,104 +204,120 @@ def read_table(body: str, columns: int, delimiter: str, first_line: int = 1, *, 
     >>> read_table("0.010\\t25.334\\n0.020\\t25.648\\n0.030\\t0.", 2, "\\t").bad.tolist()
     [False, False, True]
     """
-    if fast and delimiter and (found := _fixed_point(body, columns, delimiter)) is not None:
-        values, decimals = found
-        rows = len(values)
-        return Table(values, first_line + np.arange(rows), np.zeros(rows, bool), decimals)
-    return _row_by_row(body, columns, delimiter, first_line)
+    found = _all_at_once(body, columns, delimiter) if fast and delimiter else None
+    rows = found or _row_by_row(body, columns, delimiter, _every_line(body))
+    usual = tuple(_usual(rows.decimals[~rows.bad, column]) for column in range(columns))
+    bad = rows.bad | _cut(rows.decimals, rows.bad, usual, ended=body.endswith("\n"))
+    unread = {
+        row: (split_cells(body[rows.start[row] : rows.stop[row]], delimiter) or [""])[0]
+        for row in np.flatnonzero(bad).tolist()
+    }
+    return Table(rows.values, first_line + rows.line, bad, usual, unread)
 
 
-def _fixed_point(body: str, columns: int, delimiter: str) -> tuple[F8, tuple[int, ...]] | None:
-    """Read columns of fixed point (or NaN) at once; None where anything is out of the ordinary."""
-    body = body.rstrip("\n")
-    if not body or not body.isascii() or (delimiter != "\t" and "\t" in body) or "\n\n" in body:
-        return None
-    if delimiter != "\t":
-        body = body.replace(delimiter, "\t")
-    if "," in body and "." not in body:
-        body = body.replace(",", ".")
-    raw = np.frombuffer(f"{body}\n".encode("ascii"), np.uint8)
-    ends = np.flatnonzero(raw <= _NEWLINE)
-    first_row = body[: body.find("\n") if "\n" in body else None].split("\t")
-    second_row = body[len("\t".join(first_row)) + 1 :].split("\n", 1)[0].split("\t")
-    if ends.size % columns or len(first_row) != columns:
-        return None
-    at_end = raw[ends].reshape(-1, columns)
-    if not ((at_end[:, -1] == _NEWLINE).all() and (at_end[:, :-1] == _TAB).all()):
-        return None
-    # NaN may stand in the first row (a velocity has no first value): the second then tells the decimals.
-    decimals = tuple(
-        max(_decimals(a), _decimals(b))
-        for a, b in zip(first_row, [*second_row, *[""] * columns], strict=False)
-    )
-    if min(decimals) < 1 or len(decimals) != columns:
-        return None
-    values = _cells_to_numbers(raw, ends, np.array(decimals)[np.arange(ends.size) % columns])
-    return None if values is None else (values.reshape(-1, columns), decimals)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """Rows as they stand, before any is found to have been cut.
+
+    Parameters
+    ----------
+    values : (rows, columns) float64
+    decimals : (rows, columns) int64
+        Printed decimals; -1 where a cell has none to compare.
+    bad : (rows,) bool
+    line : (rows,) int64
+        Number of line ends before the row.
+    start, stop : (rows,) int64
+        Where the row stands in the text.
+    """
+
+    values: F8
+    decimals: I8
+    bad: NDArray[np.bool_]
+    line: I8
+    start: I8
+    stop: I8
+
+    def merge(self, keep: NDArray[np.bool_], other: _Rows) -> _Rows:
+        """Return the rows kept and those of another, in the order of their lines."""
+        order = np.argsort(np.concatenate((self.line[keep], other.line)), kind="stable")
+        both = {
+            name: np.concatenate((getattr(self, name)[keep], getattr(other, name)))[order] for name in self.__slots__
+        }
+        return _Rows(**both)
 
 
-def _cells_to_numbers(raw: NDArray[np.uint8], ends: I8, decimals: I8) -> F8 | None:
-    """Turn cells that end before ``ends`` into numbers; None unless each is ``-?digits.decimals`` or NaN."""
-    starts = np.concatenate(([0], ends[:-1] + 1))
-    lead = raw[starts]
-    negative, nan = lead == _MINUS, lead == _NAN
-    digits = ends - starts - 1 - negative
-    fits = (digits > decimals) & (digits <= _MAX_DIGITS) & (raw[ends - decimals - 1] == _DOT)
-    is_digit = (raw - np.uint8(_ZERO)) < 10  # unsigned: what is below "0" wraps to above 9
-    other = raw.size - int(np.count_nonzero(is_digit)) - ends.size
-    # One point, the signs and the letters of NaN account for every byte that is no digit.
-    if other != np.count_nonzero(~nan) + np.count_nonzero(negative) + 3 * np.count_nonzero(nan):
+def _all_at_once(body: str, columns: int, delimiter: str) -> _Rows | None:
+    """Read rows of fixed point (or NaN) together and the odd ones singly; None where fixed point is not usual."""
+    ended = body if body.endswith("\n") else f"{body}\n"
+    # What is not ASCII becomes one byte as well, one that no number has.
+    raw = np.frombuffer(ended.encode("ascii", "replace"), np.uint8)
+    ends = np.flatnonzero((raw == _NEWLINE) | (raw == ord(delimiter)))
+    last = np.flatnonzero(raw[ends] == _NEWLINE)
+    stop = ends[last]
+    start = np.concatenate(([0], stop[:-1] + 1))
+    some = np.flatnonzero(stop > start)
+    sample = some[np.linspace(0, some.size - 1, min(some.size, _SAMPLE)).astype(np.int64)] if some.size else some
+    usual = _usual_decimals([body[start[row] : stop[row]] for row in sample.tolist()], columns, delimiter)
+    if min(usual, default=0) < 1:
         return None
-    if nan.any():
-        where = starts[nan]
-        spelled = (ends[nan] - where == 3) & (raw[where + 1] == ord("a")) & (raw[where + 2] == _NAN)
-        if not spelled.all():
-            return None
-    if not (fits | nan).all():
-        return None
-    # Place by place from the right, for all cells at once; where a cell is shorter, its digit counts as zero.
-    width = int(digits[~nan].max(initial=0))
-    padded = np.concatenate((np.zeros(width + 1, np.uint8), np.where(is_digit, raw - np.uint8(_ZERO), 0)))
-    value = np.zeros(ends.size, np.int64)
-    least_digits, least_decimals = digits[~nan].min(initial=0), decimals.min(initial=0)
-    for place in range(width):
-        at = ends + (width - place)
-        if place >= least_decimals:
-            at -= place >= decimals  # a point is stepped over
-        digit = padded[at].astype(np.int64)
-        if place >= least_digits:
-            digit *= place < digits
-        value += digit * 10**place
-    numbers: F8 = value / 10.0**decimals
-    numbers[negative] *= -1.0
-    numbers[nan] = np.nan
-    return numbers
+    regular = some[np.diff(last, prepend=-1)[some] == columns]
+    cell_ends = ends[last[regular, np.newaxis] + np.arange(1 - columns, 1)]
+    points = b"." if delimiter == "," else b".,"
+    values, decimals = np.empty((regular.size, columns)), np.empty((regular.size, columns), np.int64)
+    plain = np.ones(regular.size, bool)
+    begin = start[regular]
+    for column in range(columns):
+        end = np.ascontiguousarray(cell_ends[:, column])
+        values[:, column], good = read_cells(raw, begin, end, usual[column], points)
+        decimals[:, column] = np.where(np.isnan(values[:, column]), -1, usual[column])
+        plain &= good
+        begin = end + 1
+    read = _Rows(values, decimals, ~plain, regular, start[regular], stop[regular])
+    odd = np.ones(last.size, bool)
+    odd[regular[plain]] = odd[stop == start] = False
+    if not odd.any():
+        return read
+    lines = ((row, int(start[row]), int(stop[row])) for row in np.flatnonzero(odd).tolist())
+    return read.merge(plain, _row_by_row(body, columns, delimiter, lines))
 
 
-def _row_by_row(body: str, columns: int, delimiter: str, first_line: int) -> Table:
+def _usual_decimals(lines: list[str], columns: int, delimiter: str) -> tuple[int, ...]:
+    """Return the decimals that each column prints most often in some lines; 0 where none has any."""
+    rows = [cells for line in lines if len(cells := split_cells(line, delimiter)) == columns]
+    printed = np.array([[_decimals(cell) for cell in cells] for cells in rows], np.int64).reshape(-1, columns)
+    return tuple(_usual(printed[:, column]) for column in range(columns))
+
+
+def _every_line(body: str) -> Iterator[tuple[int, int, int]]:
+    """Yield every line's number, counted from 0, and where it starts and stops."""
+    start = 0
+    for number, text in enumerate(body.split("\n")):
+        yield number, start, start + len(text)
+        start += len(text) + 1
+
+
+def _row_by_row(body: str, columns: int, delimiter: str, lines: Iterable[tuple[int, int, int]]) -> _Rows:
+    """Read the lines given, each by itself; blank ones make no row."""
     values: list[list[float]] = []
     decimals: list[list[int]] = []
-    lines: list[int] = []
+    places: list[tuple[int, int, int]] = []
     bad: list[bool] = []
-    first_cells: list[str] = []
-    for number, text in enumerate(body.split("\n"), first_line):
+    for place in lines:
+        text = body[place[1] : place[2]]
         if not text.strip(" \t"):
             continue
         cells = split_cells(text, delimiter)
         numbers = [parse_number(cell) for cell in cells]
-        lines.append(number)
+        places.append(place)
         bad.append(len(cells) != columns or None in numbers)
-        first_cells.append(cells[0] if cells else "")
         padded = [*(math.nan if x is None else x for x in numbers), *[math.nan] * columns]
         values.append(padded[:columns])
         decimals.append([*(_decimals(cell) for cell in cells), *[-1] * columns][:columns])
+    line, start, stop = np.array(places, np.int64).reshape(-1, 3).T
     table = np.array(values, float).reshape(-1, columns)
     printed = np.array(decimals, np.int64).reshape(-1, columns)
-    is_bad = np.array(bad, bool)
-    usual = tuple(_usual(printed[~is_bad, c]) for c in range(columns))
-    is_bad |= _cut(printed, is_bad, usual, ended=body.endswith("\n"))
-    unread = {int(row): first_cells[row] for row in np.flatnonzero(is_bad)}
-    return Table(table, np.array(lines, np.int64), is_bad, usual, unread)
+    return _Rows(table, printed, np.array(bad, bool), line, start, stop)
 
 
 def _usual(printed: I8) -> int:

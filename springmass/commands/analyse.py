@@ -10,9 +10,9 @@ from typing import Any
 
 from acquisition.errors import AcquisitionError
 from pipeline.analyse import Motion
-from pipeline.errors import AnalysisError, TrackError
-from springmass.analysing import Analysed, analyse_loaded
-from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError
+from pipeline.errors import PipelineError
+from springmass.analysing import Analysed, analyse_loaded, make_folder
+from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain
 from springmass.loading import load, read_scene
 from storage.errors import StorageError
 
@@ -27,8 +27,9 @@ def run(options: argparse.Namespace) -> int:
             USAGE,
         )
     scene = None if options.scene is None else read_scene(options.scene)
+    out = make_folder(options.out or ".") if _wants_report(options) else None
     codes: list[int] = []
-    for path in options.input:
+    for path, name in zip(options.input, _result_names(options.input), strict=True):
         try:
             loaded = load(
                 path,
@@ -46,33 +47,50 @@ def run(options: argparse.Namespace) -> int:
                 accuracy=options.accuracy,
                 with_classic=options.method == "classic",
             )
+        except ProgramError as error:
+            complain(error)
+            codes.append(error.exit_code)
         except (AcquisitionError, StorageError) as error:
-            print(f"springmass: {error}", file=sys.stderr)
+            complain(error)
             codes.append(UNREADABLE)
-            continue
-        except (AnalysisError, TrackError) as error:
-            print(f"springmass: {path}: {error}", file=sys.stderr)
+        except PipelineError as error:
+            complain(f"{path}: {error}")
             codes.append(UNREADABLE)
-            continue
-        codes.append(_deliver(analysed, options))
+        else:
+            codes.append(_deliver(analysed, options, None if out is None else out / name))
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(codes)
 
 
-def _deliver(analysed: Analysed, options: argparse.Namespace) -> int:
+def _wants_report(options: argparse.Namespace) -> bool:
+    return not options.no_report and (options.out is not None or not options.json)
+
+
+def _result_names(paths: list[str]) -> list[str]:
+    """Name each input's results after its file; of several files of one name, the later ones are numbered."""
+    names: list[str] = []
+    for path in paths:
+        stem, count = Path(path).stem, 1
+        while (name := f"{stem}.results" if count == 1 else f"{stem}-{count}.results") in names:
+            count += 1
+        names.append(name)
+    return names
+
+
+def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | None) -> int:
     if options.json:
         print(json.dumps(analysed.result, allow_nan=False), flush=True)
     else:
         _print_text(analysed)
-    if not options.no_report and (options.out is not None or not options.json):
-        _write(analysed, Path(options.out or "."))
+    if results is not None:
+        _write(analysed, results)
     if not isinstance(analysed.analysis.motion, Motion):
-        print(f"springmass: {analysed.loaded.path}: no oscillation: {analysed.analysis.motion.why}", file=sys.stderr)
+        complain(f"{analysed.loaded.path}: no oscillation: {analysed.analysis.motion.why}")
         return UNREADABLE
     wrong = [f["code"] for f in analysed.result["findings"] if f["severity"] == "error"]
     if options.strict and wrong:
-        print(f"springmass: {analysed.loaded.path}: rejected under --strict: {', '.join(wrong)}", file=sys.stderr)
+        complain(f"{analysed.loaded.path}: rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK
 
@@ -88,14 +106,12 @@ def _print_text(analysed: Analysed) -> None:
     print(findings_text(analysed.result["findings"]))
 
 
-def _write(analysed: Analysed, out: Path) -> None:
+def _write(analysed: Analysed, results: Path) -> None:
     from springmass.report.write import ReportRun, write_report
 
-    out.mkdir(parents=True, exist_ok=True)
-    name = analysed.loaded.path.name
-    run = ReportRun(name, analysed.analysis, analysed.result["input"], analysed.classic)
+    run = ReportRun(analysed.loaded.path.name, analysed.analysis, analysed.result["input"], analysed.classic)
     report = write_report(
-        out / f"{Path(name).stem}.results",
+        results,
         [run],
         provenance=analysed.result["provenance"],
         results=[analysed.result],

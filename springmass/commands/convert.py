@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
+from collections.abc import Sequence
+from pathlib import Path, PurePath
 from typing import Any
 
+from acquisition.recording import Original
 from springmass import __version__
 from springmass.analysing import now_utc
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError
@@ -67,8 +69,13 @@ def write_loaded(path: Path, loaded: Loaded, blocks: Any, *, scene: Any = None, 
         channel=loaded.channel,
         traps=loaded.traps,
         malformed_rows=loaded.malformed_rows,
-        format=loaded.format,
-        provenance={"software": "springmass", "version": __version__, "created_utc": now_utc()},
+        format=loaded.recorded_format,
+        provenance={
+            **loaded.provenance,
+            "software": "springmass",
+            "version": __version__,
+            "created_utc": now_utc(),
+        },
         overwrite=overwrite,
     )
 
@@ -77,8 +84,7 @@ def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
     if not loaded.originals:
         raise ProgramError(f"{loaded.path}: no original file travels inside this run; nothing to give back", UNREADABLE)
     if out.is_dir():
-        # Names came from outside: only their last part may choose a place.
-        targets = [out / Path(original.name).name for original in loaded.originals]
+        targets = [out / name for name in _names_apart(loaded.originals)]
     elif len(loaded.originals) == 1:
         targets = [out]
     else:
@@ -86,7 +92,23 @@ def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
         raise ProgramError(
             f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder", USAGE
         )
+    if not overwrite:
+        for target in targets:  # of a pair, both or none
+            if target.exists():
+                raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite", USAGE)
     return [
         write_whole(target, original.data, overwrite=overwrite)
         for target, original in zip(targets, loaded.originals, strict=True)
     ]
+
+
+def _names_apart(originals: Sequence[Original]) -> list[str]:
+    """Name the originals of a pair; where both had one name, in folders of their own, the second is numbered."""
+    names: list[str] = []
+    for original in originals:
+        # Names came from outside: only their last part may choose a place.
+        path, count = PurePath(original.name), 1
+        while (name := path.name if count == 1 else f"{path.stem}-{count}{path.suffix}") in names:
+            count += 1
+        names.append(name)
+    return names

@@ -10,7 +10,7 @@ from acquisition.replay import Replay
 from pipeline.analyse import Motion
 from pipeline.compare import Comparison, SpringRun, compare_springs
 from pipeline.errors import AnalysisError
-from springmass.analysing import Analysed, analyse_loaded
+from springmass.analysing import Analysed, analyse_loaded, make_folder
 from springmass.commands.convert import write_loaded
 from springmass.errors import OK
 from springmass.loading import load, read_scene, sample_data
@@ -25,8 +25,7 @@ RUNS = ("undamped", "damped")
 
 def run(options: argparse.Namespace) -> int:
     """Replay both recordings into run files, analyse and compare them, print Table 1, write the report."""
-    out = Path(options.out)
-    out.mkdir(parents=True, exist_ok=True)
+    out = make_folder(options.out)
     analysed = [_one(name, out) for name in RUNS]
     reports = [
         ReportRun(name, a.analysis, a.result["input"], a.classic) for name, a in zip(RUNS, analysed, strict=True)

@@ -34,11 +34,17 @@ def run(options: argparse.Namespace) -> int:
         return OK
     for name, value in facts.items():
         if name != "traps":
-            print(f"{name:<16} {value if value is not None else 'not stated'}")
+            print(f"{name:<16} {_shown(value)}")
     for trap in facts["traps"]:
         where = f" (line {trap['line']})" if trap["line"] else ""
         print(f"{'trap':<16} {trap['code']}: {trap['message']}{where}")
     return OK
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "not stated"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _list(options: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
         if options.seek is not None:
             source.seek(options.seek)
         if options.output is not None:
-            path = write_loaded(Path(options.output), loaded, source)
+            path = write_loaded(Path(options.output), replace(loaded, info=source.info), source)
             print(f"{path}: replayed from {loaded.path}", file=sys.stderr)
             return OK
         print("time_s\tdistance_m\tflags")

@@ -48,9 +48,7 @@ def test_name_is_key_and_amplitude_comes_first(law: Law) -> None:
 def test_amplitude_solves_its_differential_equation(law: Law, bench: dict[str, float]) -> None:
     """The closed form is what an integrator makes of dA/dt = -rate(A)."""
     theta = theta_of(law, bench)
-    solved = solve_ivp(
-        lambda _, a: -law.rate(a, theta), (0.0, 120.0), theta[:1], "DOP853", T, rtol=1e-12, atol=1e-18
-    )
+    solved = solve_ivp(lambda _, a: -law.rate(a, theta), (0.0, 120.0), theta[:1], "DOP853", T, rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(law.amplitude(T, theta), solved.y[0], rtol=1e-9)
 
 

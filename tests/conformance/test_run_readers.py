@@ -15,7 +15,8 @@ from acquisition.block import Block, Flag
 from acquisition.recording import Original, Trap
 from acquisition.source import SourceInfo
 from storage.layout import CHUNK
-from storage.run import open_run, write_run
+from storage.run import open_run
+from storage.write import write_run
 
 xr = pytest.importorskip("xarray")
 
@@ -60,7 +61,8 @@ def test_xarray_opens_the_signal(path: Path, engine: Literal["h5netcdf", "netcdf
     if engine == "netcdf4":
         pytest.importorskip("netCDF4")
     with open_run(path) as run:
-        own = run.dataset()
+        own = run.load_dataset()
+        xr.testing.assert_identical(run.dataset().load(), own)
     with xr.open_dataset(path, group="entry/signal", engine=engine) as found:
         assert tuple(found.sizes) == ("time",)
         assert found.time.dtype == np.float64

@@ -16,7 +16,8 @@ from acquisition.block import Block, concatenate
 from acquisition.recording import Original, Trap
 from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunDamaged
-from storage.run import Run, open_run, write_run
+from storage.run import Run, open_run
+from storage.write import write_run
 
 # Any bit pattern is a float64: NaN payloads, negative zero and subnormal numbers among them.
 patterns = st.integers(0, 2**64 - 1)
@@ -123,9 +124,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a small run with everything in it."""
     n = 400
     t, rng = np.arange(n) / 100, np.random.default_rng(5)
-    block = Block(
-        0, t, rng.normal(size=n), np.zeros(n, np.uint8), (t * 1e9).astype(np.int64), rng.normal(size=n)
-    )
+    block = Block(0, t, rng.normal(size=n), np.zeros(n, np.uint8), (t * 1e9).astype(np.int64), rng.normal(size=n))
     return write_run(
         tmp_path_factory.mktemp("sound") / "run.h5",
         [block],

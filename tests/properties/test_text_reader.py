@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
+import sys
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition.errors import FormatError
 from acquisition.formats.motion_sensor import FORMAT
-from acquisition.formats.text import decode, parse_number, read_table, split_cells, unify
+from acquisition.formats.text import Table, decode, parse_number, read_table, split_cells, unify
 from acquisition.recording import Recording
 
 PLAIN_CELL = st.decimals(-9999, 9999, places=3, allow_nan=False).map(lambda d: f"{d:.3f}")
@@ -138,29 +140,76 @@ def test_recognising_never_raises(data: bytes) -> None:
 
 
 @st.composite
-def bodies(draw: st.DrawFn) -> tuple[str, int]:
-    """Draw rows of one to four columns, mostly regular."""
+def bodies(draw: st.DrawFn) -> tuple[str, int, str]:
+    """Draw rows of one to four columns, mostly regular, and what separates them."""
     columns = draw(st.integers(1, 4))
-    cell = draw(
-        st.sampled_from([PLAIN_CELL, st.one_of(PLAIN_CELL, st.just("NaN")), st.one_of(PLAIN_CELL, ODD_CELL)])
-    )
+    delimiter = draw(st.sampled_from(["\t", "\t", ";", ",", ""]))
+    cell = draw(st.sampled_from([PLAIN_CELL, st.one_of(PLAIN_CELL, st.just("NaN")), st.one_of(PLAIN_CELL, ODD_CELL)]))
     rows = draw(st.lists(st.lists(cell, min_size=columns, max_size=columns), min_size=1, max_size=12))
-    return "\n".join("\t".join(row) for row in rows) + draw(
-        st.sampled_from(["", "\n", "\n\n", "\t"])
-    ), columns
+    lines = [(delimiter or " ").join(row) for row in rows]
+    for _ in range(draw(st.integers(0, 3))):
+        odd = draw(st.sampled_from(["", " ", "\t", "here 20.5\u00b0C", "0.030\t0.", "1.000;2.000", "NaN", "\0", "-"]))
+        lines.insert(draw(st.integers(0, len(lines))), odd)
+    body = "\n".join(lines)
+    if draw(st.booleans()):
+        body = body.replace(".", ",", draw(st.integers(-1, 30)))
+    return body + draw(st.sampled_from(["", "\n", "\n\n", "\t"])), columns, delimiter
 
 
-@settings(max_examples=500, deadline=None)
-@given(drawn=bodies())
-def test_fast_and_slow_readers_agree_bit_for_bit(drawn: tuple[str, int]) -> None:
-    """Reading all rows at once gives the same table as reading row by row."""
-    body, columns = drawn
-    fast = read_table(body, columns, "\t")
-    slow = read_table(body, columns, "\t", fast=False)
+def assert_readers_agree(body: str, columns: int, delimiter: str) -> Table:
+    """Demand that all rows at once and row by row give the same table, bit for bit; return it."""
+    fast = read_table(body, columns, delimiter, 7)
+    slow = read_table(body, columns, delimiter, 7, fast=False)
     assert fast.values.tobytes() == slow.values.tobytes()
     np.testing.assert_array_equal(fast.bad, slow.bad)
     np.testing.assert_array_equal(fast.line, slow.line)
     assert (fast.decimals, fast.unread) == (slow.decimals, slow.unread)
+    return fast
+
+
+@settings(max_examples=600, deadline=None)
+@given(drawn=bodies())
+def test_fast_and_slow_readers_agree_bit_for_bit(drawn: tuple[str, int, str]) -> None:
+    """Reading all rows at once gives the same table as reading row by row."""
+    assert_readers_agree(*drawn)
+
+
+def regular_lines(count: int = 3000) -> list[str]:
+    """Return rows as the sensor's program prints them."""
+    t = np.arange(count) / 100
+    return [f"{a:.3f}\t{25 + 6 * np.sin(8 * a):.3f}\t0.239" for a in t]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_odd_rows_among_many_regular_ones_are_read_alike(seed: int) -> None:
+    """Comments, cut rows, lost columns, lower-case NaN and blank lines change nothing of the rows between them."""
+    rng = np.random.default_rng(seed)
+    lines = regular_lines()
+    odd = ["here I touched it", "", "  ", "0.5\t25.1", "1.000\tnan\t0.239", "1.000\t25,100\t0.239", "1.0\t2.000\t0.239"]
+    for at in np.sort(rng.integers(0, len(lines), 40))[::-1]:
+        lines.insert(int(at), odd[rng.integers(len(odd))])
+    body = "\n".join(lines)
+    for cut in (0, 1, 4, 9, 17):
+        assert_readers_agree(body[: len(body) - cut], 3, "\t")
+
+
+def test_a_few_bad_rows_do_not_send_the_others_down_the_slow_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only the odd rows are split into cells one by one; a regular file has none."""
+    split: list[str] = []
+
+    def counting(line: str, delimiter: str) -> list[str]:
+        split.append(line)
+        return split_cells(line, delimiter)
+
+    monkeypatch.setattr(sys.modules[read_table.__module__], "split_cells", counting)
+    lines = regular_lines()
+    read_table("\n".join(lines), 3, "\t")
+    sampled = len(split)
+    assert sampled < 50
+    lines[700:700] = ["text in the middle"]
+    table = read_table("\n".join(lines)[:-3], 3, "\t")
+    assert table.bad.nonzero()[0].tolist() == [700, 3000]
+    assert len(split) - sampled < sampled + 10
 
 
 @settings(max_examples=300, deadline=None)

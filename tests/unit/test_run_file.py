@@ -13,6 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import xarray as xr
 
 from acquisition.block import Block, concatenate
 from acquisition.errors import SourceError
@@ -20,7 +21,8 @@ from acquisition.recording import Original, Trap
 from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunClosed, RunDamaged, RunExists, WriteFailed
 from storage.layout import CHUNK, HEADER
-from storage.run import is_run, open_run, write_run
+from storage.run import is_run, open_run
+from storage.write import write_run
 
 INFO = SourceInfo("live", "COM3", 100.0, sigma_m=3e-4, quantum_m=1e-4, clock="device", stated_error_m=0.001)
 SCENE = {"bob": {"mass_kg": {"value": 0.2176, "u": 0.00005}}, "sensor": {"position": "below"}}
@@ -101,7 +103,7 @@ def test_no_samples_are_a_run_too(tmp_path: Path) -> None:
     """A recording stopped before its first sample is a file that opens."""
     with open_run(write_run(tmp_path / "a.h5", [], INFO)) as run:
         assert (len(run), list(run.blocks()), len(run.samples())) == (0, [], 0)
-        assert run.dataset().sizes == {"time": 0}
+        assert run.load_dataset().sizes == run.dataset().sizes == {"time": 0}
         run.verify()
 
 
@@ -156,15 +158,15 @@ def test_a_closed_run_says_so(path: Path) -> None:
         next(blocks)
     run.close()
     assert run.title == "Träger 3"
-    for read in (run.samples, run.originals, run.verify, run.dataset):
+    for read in (run.samples, run.originals, run.verify, run.dataset, run.load_dataset):
         with pytest.raises(RunClosed, match="read inside its with"):
             read()
 
 
-def test_the_dataset_leaves_no_handle_open(path: Path) -> None:
+def test_the_loaded_dataset_leaves_no_handle_open(path: Path) -> None:
     """Others may open the file for writing while the dataset lives, and its values stay."""
     with open_run(path) as run:
-        dataset = run.dataset()
+        dataset = run.load_dataset()
         distance = run.samples().distance
     edit(path, lambda file: file.attrs.create("x", 1))
     np.testing.assert_array_equal(dataset.distance.values, distance)
@@ -177,6 +179,55 @@ def test_the_dataset_leaves_no_handle_open(path: Path) -> None:
     )
 
 
+def test_the_lazy_dataset_is_the_checked_one(path: Path) -> None:
+    """Values, attributes of every variable and those of the instrument are the same, read lazily or at once."""
+    with open_run(path) as run, run.dataset() as lazy:
+        assert {name: lazy[name]._in_memory for name in lazy.data_vars} == dict.fromkeys(lazy.data_vars, False)
+        assert (lazy.attrs["kind"], lazy.attrs["rate_hz"], lazy.attrs["sigma_m"]) == ("live", 100.0, 3e-4)
+        assert lazy.time.dtype == np.float64
+        xr.testing.assert_identical(lazy.load(), run.load_dataset())
+
+
+def test_the_lazy_dataset_reads_only_what_is_asked_for(tmp_path: Path) -> None:
+    """A damaged chunk elsewhere keeps nobody from a slice, and reading it is an error, not a value."""
+    n = 3 * CHUNK
+    noise = np.random.default_rng(2).normal(size=n)
+    path = write_run(tmp_path / "a.h5", [Block(0, np.arange(n) / 100, noise, np.zeros(n, np.uint8))], INFO)
+    with h5py.File(path) as file:
+        chunk = file["entry/signal/distance"].id.get_chunk_info(2)
+    content = bytearray(path.read_bytes())
+    content[chunk.byte_offset + chunk.size // 2] ^= 0x40
+    path.write_bytes(content)
+    with open_run(path) as run:
+        lazy = run.dataset()
+        np.testing.assert_array_equal(lazy.distance[1000:1010].values, noise[1000:1010])
+        with pytest.raises(OSError, match="Can't"):
+            _ = lazy.distance[-5:].values
+        with pytest.raises(RunDamaged, match="the column 'distance' from sample"):
+            run.load_dataset()
+
+
+def test_the_lazy_dataset_closes_without_the_run_and_dies_with_it(path: Path) -> None:
+    """Closing the dataset leaves the run open; after the run only what was read is there."""
+    with open_run(path) as run:
+        with run.dataset() as lazy:
+            first = float(lazy.distance[1])
+        assert run.samples().distance[1] == first
+        late = run.dataset()
+        seen = late.quality.values
+    np.testing.assert_array_equal(late.quality.values, seen)
+    with pytest.raises(KeyError, match="invalid"):
+        _ = late.distance.values
+
+
+def test_the_lazy_dataset_stays_with_its_run(path: Path) -> None:
+    """A run written over the same name does not mix into a dataset of the one that is open."""
+    with open_run(path) as run:
+        before = run.samples().distance
+        write_run(path, [block(300, 7)], INFO, overwrite=True)
+        np.testing.assert_array_equal(run.dataset().distance.values, before)
+
+
 @pytest.mark.parametrize("kind", ["live", "replay", "simulated"])
 def test_the_kind_travels_with_the_data(tmp_path: Path, kind: Any) -> None:
     """Simulated data cannot pass for measured, whichever part of the file is looked at."""
@@ -185,13 +236,13 @@ def test_the_kind_travels_with_the_data(tmp_path: Path, kind: Any) -> None:
         assert file.attrs["kind"] == file["entry/signal"].attrs["kind"] == kind.encode()
         assert file["entry/instrument/kind"].asstr()[()] == kind
     with open_run(path) as run:
-        assert run.info.kind == run.dataset().attrs["kind"] == kind
+        assert run.info.kind == run.load_dataset().attrs["kind"] == kind
 
 
 def test_errors_of_missing_samples_are_missing(path: Path) -> None:
     """The standard deviation stands beside measured samples only."""
     with open_run(path) as run:
-        dataset = run.dataset()
+        dataset = run.load_dataset()
     missing = np.isnan(dataset.distance.values)
     np.testing.assert_array_equal(np.isnan(dataset.distance_errors.values), missing)
     assert set(dataset.distance_errors.values[~missing]) == {np.float32(3e-4)}
@@ -201,8 +252,8 @@ def test_without_sigma_there_is_no_error_column(tmp_path: Path) -> None:
     """What the source does not know is not stated."""
     path = write_run(tmp_path / "a.h5", [block(5)], SourceInfo("live", "x", 100.0))
     with open_run(path) as run:
-        assert "distance_errors" not in run.dataset()
-        assert run.dataset().distance.attrs["ancillary_variables"] == "quality"
+        assert "distance_errors" not in run.load_dataset()
+        assert run.load_dataset().distance.attrs["ancillary_variables"] == "quality"
 
 
 def test_a_standing_run_is_not_overwritten_unasked(path: Path) -> None:
@@ -280,7 +331,7 @@ import numpy as np
 from acquisition.block import Block
 from acquisition.source import SourceInfo
 from storage.errors import WriteFailed
-from storage.run import write_run
+from storage.write import write_run
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
 noise = np.random.default_rng(0).normal(size={CHUNK})
@@ -356,7 +407,7 @@ def test_an_edited_sample_is_found(path: Path, name: str) -> None:
 
     edit(path, bump)
     with open_run(path) as run:
-        for read in (run.samples, run.dataset, run.verify, lambda: list(run.blocks(64))):
+        for read in (run.samples, run.load_dataset, run.verify, lambda: list(run.blocks(64))):
             with pytest.raises(RunDamaged, match=f"the column '{name}' is not what was written"):
                 read()
 
@@ -415,6 +466,6 @@ def test_importing_is_cheap() -> None:
     """The package imports no h5py, its reader no xarray."""
     code = (
         "import sys, storage, storage.atomic, storage.errors; assert 'h5py' not in sys.modules;"
-        "import storage.run; assert 'xarray' not in sys.modules"
+        "import storage.run, storage.write; assert 'xarray' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[2])

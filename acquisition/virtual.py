@@ -1,0 +1,202 @@
+"""The simulated rangefinder: a position function in, readings, blocks or wire bytes out, with a real one's faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from acquisition.block import Block, Flag
+from acquisition.clock import Clock
+from acquisition.errors import SensorError
+from acquisition.source import SourceInfo
+
+__all__ = ["Shot", "VirtualRangefinder", "VirtualSensor", "VirtualSource"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VirtualSensor:
+    """How good the simulated rangefinder is.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Nominal readings per second of its own clock, Hz.
+    tick_s : float
+        Resolution of an echo time, s; 0.25 us is 43 um.
+    noise_m : float
+        Standard deviation of a distance, m.
+    false_echo_rate_hz : float
+        Clusters of false echoes per second, at the turning points nearest to the sensor.
+    false_echo_m : float
+        How far beyond the bob they read, m.
+    far_limit_m : float
+        A fixed object there returns every echo that should come from beyond it, m.
+    dead_time_s : float
+        Echoes sooner than this are not heard: no target.
+    jitter_s : float
+        Standard deviation of the moment a reading is taken, s; the time stamped is the one intended.
+    crystal_ppm : float
+        How much faster its clock runs than true time.
+    speed_of_sound_m_per_s : float
+        In the simulated air.
+    temperature_c : float
+        As its thermometer reads.
+    """
+
+    rate_hz: float = 100.0
+    tick_s: float = 0.25e-6
+    noise_m: float = 80e-6
+    false_echo_rate_hz: float = 0.1
+    false_echo_m: float = 5e-3
+    far_limit_m: float = math.inf
+    dead_time_s: float = 0.85e-3
+    jitter_s: float = 0.0
+    crystal_ppm: float = 0.0
+    speed_of_sound_m_per_s: float = 344.0
+    temperature_c: float = 21.3
+
+    def __post_init__(self) -> None:
+        for name in ("rate_hz", "tick_s", "speed_of_sound_m_per_s"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise SensorError(f"a simulated sensor's {name} must be positive and finite, got {getattr(self, name)}")
+        for name in ("noise_m", "false_echo_rate_hz", "jitter_s"):
+            if not getattr(self, name) >= 0:
+                raise SensorError(f"a simulated sensor's {name} must not be negative, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One reading of the simulated sensor.
+
+    Parameters
+    ----------
+    true_s : float
+        When it is taken, s of true time since the start.
+    sequence : int
+    device_us : int
+        By its own clock, wrapping at 2^32.
+    echo_us : float
+        Time of flight on its tick lattice, NaN for no target.
+    distance_m : float
+        The same as it would state it, NaN for no target.
+    temperature_c : float
+    """
+
+    true_s: float
+    sequence: int
+    device_us: int
+    echo_us: float
+    distance_m: float
+    temperature_c: float
+
+
+class VirtualRangefinder:
+    """Takes readings of a moving bob.
+
+    Parameters
+    ----------
+    position : callable
+        Distance of the bob from the sensor, m, at a time, s.
+    sensor : VirtualSensor
+    rng : numpy.random.Generator
+        All its chance comes from here.
+    """
+
+    def __init__(self, position: Callable[[float], float], sensor: VirtualSensor, rng: np.random.Generator) -> None:
+        self.sensor = sensor
+        self._position = position
+        self._rng = rng
+        self._cluster_left = 0
+        self._cluster_m = 0.0
+
+    def shots(self) -> Iterator[Shot]:
+        """Yield readings without end."""
+        sequence = 0
+        while True:
+            yield self.shot(sequence)
+            sequence += 1
+
+    def shot(self, sequence: int) -> Shot:
+        """Take one reading; call with consecutive numbers."""
+        sensor = self.sensor
+        intended_s = sequence / sensor.rate_hz / (1.0 + sensor.crystal_ppm * 1e-6)
+        moment = intended_s + (self._rng.normal(0.0, sensor.jitter_s) if sensor.jitter_s else 0.0)
+        away = self._position(moment) + self._false_echo(moment) + self._rng.normal(0.0, sensor.noise_m)
+        away = min(away, sensor.far_limit_m)
+        flight_s = 2.0 * away / sensor.speed_of_sound_m_per_s
+        device_us = round(sequence / sensor.rate_hz * 1e6) % (1 << 32)
+        if flight_s < sensor.dead_time_s:
+            return Shot(intended_s, sequence, device_us, math.nan, math.nan, sensor.temperature_c)
+        echo_us = round(flight_s / sensor.tick_s) * sensor.tick_s * 1e6
+        distance = 0.5e-6 * echo_us * sensor.speed_of_sound_m_per_s
+        return Shot(intended_s, sequence, device_us, echo_us, distance, sensor.temperature_c)
+
+    def _false_echo(self, t: float) -> float:
+        """Displacement of this reading; clusters begin where the bob turns nearest to the sensor."""
+        if self._cluster_left > 0:
+            self._cluster_left -= 1
+            return self._cluster_m
+        step = 1.0 / self.sensor.rate_hz
+        before, now, after = (self._position(t + k * step) for k in (-1, 0, 1))
+        # About one nearest turning point a second: the chance at each makes the rate asked for.
+        if now <= before and now < after and self._rng.random() < self.sensor.false_echo_rate_hz:
+            self._cluster_left = int(self._rng.integers(3, 18))
+            self._cluster_m = self.sensor.false_echo_m * float(self._rng.uniform(0.5, 1.5))
+        return 0.0
+
+
+class VirtualSource:
+    """The simulated rangefinder as a source of blocks.
+
+    Parameters
+    ----------
+    rangefinder : VirtualRangefinder
+    clock : Clock
+        A virtual one delivers as fast as possible.
+    seconds : float
+        Of true time; it ends there.
+    name : str
+    block_samples : int
+        Samples a block.
+    """
+
+    def __init__(
+        self, rangefinder: VirtualRangefinder, clock: Clock, *, seconds: float, name: str, block_samples: int = 1
+    ) -> None:
+        self._rangefinder = rangefinder
+        self._clock = clock
+        self._count = math.ceil(seconds * rangefinder.sensor.rate_hz)
+        self._size = block_samples
+        sensor = rangefinder.sensor
+        self.info = SourceInfo(
+            "simulated",
+            name,
+            sensor.rate_hz,
+            quantum_m=0.5 * sensor.tick_s * sensor.speed_of_sound_m_per_s,
+            clock="device",
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """There is nothing to close."""
+
+    def __iter__(self) -> Iterator[Block]:
+        start_ns = self._clock.now_ns()
+        for first in range(0, self._count, self._size):
+            shots = [self._rangefinder.shot(i) for i in range(first, min(first + self._size, self._count))]
+            due_ns = start_ns + round(shots[-1].true_s * 1e9)
+            self._clock.sleep_until_ns(due_ns)
+            distance = np.array([shot.distance_m for shot in shots])
+            flags = np.where(np.isnan(distance), np.uint8(Flag.MISSING), np.uint8(0)).astype(np.uint8)
+            t = np.array([shot.sequence for shot in shots]) / self._rangefinder.sensor.rate_hz
+            host = np.array([start_ns + round(shot.true_s * 1e9) for shot in shots], np.int64)
+            yield Block(first, t, distance, flags, host)

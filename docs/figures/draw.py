@@ -1,0 +1,25 @@
+"""Draw the figures of the documentation from the sample data, through the report's own figures: `make docs-figures`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from springmass import analyse, load, read_scene, sample_data
+from springmass.report.figures import amplitude_figure, render
+
+HERE = Path(__file__).resolve().parent
+
+
+def main(folder: Path = HERE) -> list[Path]:
+    """Draw every figure into a folder and return the files."""
+    data = sample_data()
+    loaded = load(data / "damped_simulated_position.txt", velocity=data / "damped_simulated_velocity.txt")
+    analysis = analyse(loaded.track, read_scene(data / "damped.scene.toml"))
+    target = folder / "amplitude.svg"
+    target.write_bytes(render(amplitude_figure(analysis), "svg"))
+    return [target]
+
+
+if __name__ == "__main__":
+    for written in main():
+        print(f"{written.name}: {written.stat().st_size} bytes")

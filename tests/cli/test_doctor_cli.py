@@ -1,0 +1,90 @@
+"""``springmass doctor``: an installation that is whole passes, and a package of another distribution is found."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.metadata import distribution
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import springmass
+from springmass.doctor import PACKAGES, examine, foreign_packages
+
+Cli = Callable[..., Any]
+
+
+def test_this_installation_is_whole(cli: Cli) -> None:
+    """Every check passes, and both ways to print them say so."""
+    done = cli("doctor")
+    assert (done.code, done.err) == (0, "")
+    assert {line[:4] for line in done.out.splitlines()} == {"ok  "}
+    (checks,) = cli("doctor", "--json").results
+    assert [check["name"] for check in checks] == [check.name for check in examine()]
+    assert all(check["ok"] for check in checks)
+
+
+def test_the_packages_are_those_of_this_distribution() -> None:
+    """What is imported under our names lies beside the program, and the distribution says it brings them."""
+    assert foreign_packages() == {}
+    home = Path(springmass.__file__).resolve().parent.parent
+    for name in PACKAGES:
+        __import__(name)
+        assert Path(str(sys.modules[name].__file__)).resolve().parent == home / name
+    assert distribution("springmass").version == springmass.__version__
+
+
+def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the program with a folder first on the path."""
+    code = f"import sys; sys.path.insert(0, {str(folder)!r}); from springmass.cli import main; sys.exit(main())"
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Path:
+    """Return a folder with a package called storage that is not ours and must not be run."""
+    package = tmp_path / "storage"
+    package.mkdir()
+    (package / "__init__.py").write_text("raise RuntimeError('the storage of someone else')\n")
+    return tmp_path
+
+
+def test_a_foreign_package_is_found(foreign: Path) -> None:
+    """The check fails by name, says where it lies and what to do, and nothing of it is run."""
+    done = python(foreign, "doctor")
+    assert (done.returncode, done.stderr) == (1, "")
+    (line,) = (line for line in done.stdout.splitlines() if line.startswith("FAIL"))
+    assert line.split()[:3] == ["FAIL", "package", "storage"]
+    assert str((foreign / "storage").resolve()) in line
+    assert "install springmass into an environment of its own" in done.stdout
+
+
+def test_a_foreign_package_breaks_other_commands_in_one_line(tmp_path: Path) -> None:
+    """Whoever has not asked the doctor is sent there."""
+    (tmp_path / "storage").mkdir()
+    (tmp_path / "storage" / "__init__.py").write_text("")
+    done = python(tmp_path, "analyse", "--json", "run.txt")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "springmass doctor says what is wrong with it" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_missing_library_is_found(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is named with the way to get it back, and no check runs that needs it."""
+    monkeypatch.setattr("springmass.doctor.LIBRARIES", ("numpy", "no_such_library_at_all"))
+    done = cli("doctor")
+    assert (done.code, done.err) == (1, "")
+    assert "FAIL  library no_such_library_at_all" in done.out
+    assert "install springmass again" in done.out
+
+
+def test_missing_recordings_are_found(cli: Cli, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """An installation without its bundled files says so."""
+    monkeypatch.setattr("springmass.loading.__file__", str(tmp_path / "springmass" / "loading.py"))
+    done = cli("doctor")
+    assert done.code == 1
+    assert "FAIL  bundled recordings" in done.out

@@ -1,0 +1,137 @@
+"""Real recordings, where they are at hand, give what was found of them by other means."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.track import Track
+
+RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
+BARE = "AyushPandhi__Pandhi_Ayush_PHY224/position data.txt"
+DISC = "AyushPandhi__Pandhi_Ayush_PHY224/damped position.txt"
+OTHERS = (
+    "pankaj9um__PHY224/undamped_point_data.txt",
+    "pankaj9um__PHY224/undamped_point_data_set2.txt",
+    "kamjha__PHY224/position_osc.txt",
+)
+TICK_M = 4.3e-5
+
+pytestmark = pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs ../shared/recordings")
+
+
+@lru_cache
+def analysed(name: str) -> Analysis:
+    """Read a MotionSensor.vi position file in plain Python, at its row numbers over 100 Hz, and analyse it."""
+    lines = (RECORDINGS / name).read_text("utf-8").splitlines()
+    rows = [line.split("\t") for line in lines if line[:1].isdigit()]
+    t = float(rows[0][0]) + np.arange(len(rows)) / 100.0
+    y = np.array([float(row[1]) / 100.0 for row in rows])
+    track = Track(t, y, np.zeros(t.size, np.uint8), 100.0, quantum_m=TICK_M, stated_error_m=0.00239)
+    return analyse(track)
+
+
+def motion_of(result: Analysis) -> Motion:
+    """Return the motion of a record that has one."""
+    assert isinstance(result.motion, Motion)
+    return result.motion
+
+
+def codes(result: Analysis) -> set[str]:
+    """Return the codes of all findings."""
+    return {finding.code for finding in result.findings}
+
+
+def test_bare_bob() -> None:
+    """A bob without a disc, 7 s: T = 0.7226 s, A = 51.4 mm, noise under 0.25 mm, where the file states 2.39 mm."""
+    result = analysed(BARE)
+    found = result.estimates
+    assert found["period"].value == pytest.approx(0.7226, abs=5e-4)
+    assert found["amplitude"].value == pytest.approx(0.0514, abs=3e-4)
+    assert found["noise"].value < 2.5e-4
+    assert found["period"].u < 2e-4
+    assert result.quality["used"] > 700
+    assert "stated_error_is_not_noise" in codes(result)
+
+
+def test_short_bare_run_does_not_tell_laws_apart() -> None:
+    """Ten periods admit linear and quadratic drag together."""
+    result = analysed(BARE)
+    assert {"linear", "quadratic"} <= set(motion_of(result).damping.admissible)
+    assert "laws_not_separable" in codes(result)
+
+
+def test_bob_with_disc() -> None:
+    """Two minutes with a disc: T = 0.7526 s, slower than without, as a heavier bob must be."""
+    result = analysed(DISC)
+    assert result.estimates["period"].value == pytest.approx(0.7526, abs=5e-4)
+    assert result.estimates["period"].value > analysed(BARE).estimates["period"].value
+    assert result.quality["used"] > 0.9 * len(result.track)
+    assert result.quality["clipped"] == 0
+
+
+def test_disc_drags_both_ways() -> None:
+    """A lone exponential is rejected; both drags together are admissible, gamma near 0.0065 and beta near 0.2."""
+    damping = motion_of(analysed(DISC)).damping
+    assert damping.fits["linear"].rejected
+    assert damping.fits["none"].rejected
+    assert "linear+quadratic" in damping.admissible
+    joint = damping.fits["linear+quadratic"].joint
+    assert 0.0055 <= joint["gamma"].value <= 0.0075
+    assert 0.17 <= joint["beta"].value <= 0.23
+    assert "law_rejected" in codes(analysed(DISC))
+
+
+def test_disc_shows_what_simulations_lack() -> None:
+    """Its frequency rises as the amplitude falls, residuals are not white, and both are said."""
+    result = analysed(DISC)
+    assert {"amplitude_dependent_frequency", "correlated_residuals"} <= codes(result)
+    backbone = motion_of(result).phase.backbone
+    assert backbone is not None
+    assert backbone.value < 0
+    # The interval of the mean covers the bend: tens of times what white residuals would give.
+    assert motion_of(result).derived.statistical["period"].u > 1e-5
+
+
+@pytest.mark.parametrize(
+    ("name", "period_s", "amplitude_m"),
+    [
+        ("pankaj9um__PHY224/undamped_point_data.txt", 0.6933, 0.0310),
+        ("pankaj9um__PHY224/undamped_point_data_set2.txt", 0.6931, 0.0072),
+        ("kamjha__PHY224/position_osc.txt", 0.6891, 0.0412),
+    ],
+)
+def test_other_bare_bobs(name: str, period_s: float, amplitude_m: float) -> None:
+    """Other benches of the same laboratory give periods near 0.69 s, quiet noise and weak damping."""
+    result = analysed(name)
+    found = result.estimates
+    assert found["period"].value == pytest.approx(period_s, abs=5e-4)
+    assert found["amplitude"].value == pytest.approx(amplitude_m, abs=3e-4)
+    assert found["noise"].value < 2.5e-4
+    assert 0.0 < found["damping_rate"].value < 0.01
+    assert found["quality_factor"].value > 500
+    assert result.quality["used"] > 0.9 * len(result.track)
+    assert not any(finding.severity == "error" for finding in result.findings)
+
+
+def test_same_bench_same_period() -> None:
+    """The two runs of one bench, 31 and 7 mm of amplitude, agree on the period to a quarter of a part in a thousand."""
+    large, small = (analysed(name).estimates["period"].value for name in OTHERS[:2])
+    assert large == pytest.approx(small, rel=2.5e-4)
+
+
+@pytest.mark.parametrize("name", [BARE, DISC, *OTHERS])
+def test_halves_of_a_run_agree_with_the_whole(name: str) -> None:
+    """The period of either half lies within five uncertainties of the whole run's, real life included."""
+    track = analysed(name).track
+    whole = analysed(name).estimates["period"]
+    middle = len(track) // 2
+    for part in (slice(None, middle), slice(middle, None)):
+        half = analyse(Track(track.t[part], track.y[part], track.flags[part], 100.0, quantum_m=TICK_M)).estimates[
+            "period"
+        ]
+        assert abs(half.value - whole.value) <= 5.0 * np.hypot(half.u, whole.u)

@@ -1,0 +1,110 @@
+"""A track is made of anything array-like, or refused in one line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.block import Flag
+from pipeline.errors import PipelineError, TrackError
+from pipeline.track import UNUSABLE, Quality, Track
+
+
+def test_quality_is_the_run_files_flags() -> None:
+    """The pipeline's bits and the acquisition's are one table."""
+    assert {bit.name: bit.value for bit in Quality} == {bit.name: bit.value for bit in Flag}
+
+
+def test_only_a_gap_before_leaves_a_sample_usable() -> None:
+    """Every bit but GAP_BEFORE keeps a sample out of fits."""
+    assert [bit for bit in Quality if not int(UNUSABLE) & bit] == [Quality.GAP_BEFORE]
+
+
+def test_lists_become_float_arrays() -> None:
+    """Lists of whole numbers become float64 seconds and metres, flags become bytes."""
+    track = Track.from_arrays([0, 1, 2], [1, 2, 3], flags=[0, 1, 64])
+    assert (track.t.dtype, track.y.dtype, track.flags.dtype) == (np.float64, np.float64, np.uint8)
+    assert len(track) == 3
+    assert track.rate_hz == 1.0
+    assert (track.clock, track.kind) == ("nominal", "replay")
+
+
+def test_arrays_are_copied() -> None:
+    """What happens to the caller's array afterwards does not reach the track."""
+    y = np.array([0.1, 0.2, 0.3])
+    track = Track.from_arrays([0.0, 0.01, 0.02], y)
+    y[:] = 9.0
+    assert track.y.tolist() == [0.1, 0.2, 0.3]
+
+
+def test_views_and_read_only_arrays_do() -> None:
+    """A reversed view and an array without write permission are as good as any."""
+    t = np.arange(10.0)[::-1][::-1] / 100
+    t.flags.writeable = False
+    assert Track.from_arrays(t, np.arange(20.0)[::2]).rate_hz == 100.0
+
+
+@pytest.mark.parametrize("rate", [60.0, 99.9, 100.0, 1000.0, 0.1])
+def test_rate_is_the_reciprocal_of_the_median_step(rate: float) -> None:
+    """The rate is told from times even where one of them is missing, repeated or late."""
+    t = np.arange(101) / rate
+    t[20], t[30], t[40] = np.nan, t[29], t[40] + 0.4 / rate
+    assert Track.from_arrays(t, np.zeros(101)).rate_hz == pytest.approx(rate, rel=1e-6)
+
+
+def test_stated_rate_stands() -> None:
+    """A rate that is given is not estimated."""
+    assert Track.from_arrays([0.0, 0.017, 0.033], [0.0, 0.0, 0.0], rate_hz=60).rate_hz == 60.0
+
+
+def test_stated_uncertainty_and_kind_are_kept() -> None:
+    """Noise, resolution and kind travel with the arrays."""
+    track = Track.from_arrays([0, 1], [0, 1], sigma_m=1e-3, quantum_m=1e-4, kind="simulated")
+    assert (track.sigma_m, track.quantum_m, track.kind) == (1e-3, 1e-4, "simulated")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"t": [0.0, 1.0], "y": [0.0]}, ("one length", "(2,)", "(1,)")),
+        ({"t": [[0.0, 1.0]], "y": [[0.0, 1.0]]}, ("one-dimensional", "(1, 2)")),
+        ({"t": 0.0, "y": 0.0}, ("one-dimensional", "()")),
+        ({"t": [0.0], "y": [0.0]}, ("two samples", "1")),
+        ({"t": [], "y": []}, ("two samples", "0")),
+        ({"t": [0.0, 1.0], "y": [0.0, 1.0], "flags": [0]}, ("flags", "(2,)", "(1,)")),
+        ({"t": [1.0, 1.0], "y": [0.0, 1.0]}, ("never increases", "rate_hz")),
+        ({"t": [1.0, 0.0], "y": [0.0, 1.0]}, ("never increases", "rate_hz")),
+        ({"t": [np.nan, np.nan], "y": [0.0, 1.0]}, ("never increases", "rate_hz")),
+        ({"t": [0.0, 1.0], "y": [0.0, 1.0], "rate_hz": 0.0}, ("rate_hz", "positive", "0.0")),
+        ({"t": [0.0, 1.0], "y": [0.0, 1.0], "rate_hz": -100.0}, ("rate_hz", "positive", "-100")),
+        ({"t": [0.0, 1.0], "y": [0.0, 1.0], "rate_hz": np.nan}, ("rate_hz", "finite", "nan")),
+        ({"t": [0.0, 1.0], "y": [0.0, 1.0], "rate_hz": np.inf}, ("rate_hz", "finite", "inf")),
+    ],
+)
+def test_refusals_say_what_was_wanted_and_got(arguments: dict[str, Any], words: tuple[str, ...]) -> None:
+    """Arrays that make no track raise one line with the demand and the value."""
+    with pytest.raises(TrackError) as raised:
+        Track.from_arrays(**arguments)
+    message = str(raised.value)
+    assert all(word in message for word in words), message
+    assert "\n" not in message
+
+
+ANY_FLOATS = st.lists(st.floats(width=64), max_size=12)
+
+
+@given(ANY_FLOATS, ANY_FLOATS, st.one_of(st.none(), st.floats()))
+def test_any_numbers_make_a_track_or_a_track_error(t: list[float], y: list[float], rate: float | None) -> None:
+    """Whatever the numbers, there is a track of them unchanged or a PipelineError, and never a warning."""
+    try:
+        track = Track.from_arrays(t, y, rate_hz=rate)
+    except PipelineError:
+        return
+    np.testing.assert_array_equal(track.t, t)
+    np.testing.assert_array_equal(track.y, y)
+    assert track.rate_hz > 0
+    assert np.isfinite(track.rate_hz)
