@@ -153,6 +153,8 @@ def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscill
     """Why the motion is no oscillation although its spectrum has a peak: a step or a ramp has one too."""
     size = float(np.median(demodulated.amplitude))
     left = demodulated.noise_m
+    if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
+        return NoOscillation("the distance does not follow the period that its spectrum shows")
     if left > 0.15 * size and left > 4.0 * conditioned.noise_m:
         return NoOscillation(
             f"the distance moves, but not to and fro: a sinusoid of {size * 1e3:.3g} mm leaves {left * 1e3:.3g} mm"
@@ -171,6 +173,6 @@ def _still(track: Track, scene: Scene, params: Params, conditioned: Conditioned,
     }
     findings = (
         Finding("no_oscillation", "error", why.why),
-        *judge_samples(track, conditioned.flags, conditioned.noise_m, conditioned.plateaus_m),
+        *judge_samples(conditioned, conditioned.flags, conditioned.noise_m),
     )
     return Analysis(track, scene, params, conditioned, why, (), findings, estimates)

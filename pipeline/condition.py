@@ -50,12 +50,15 @@ class Conditioned:
         Standard deviation of white noise from fourth differences, m; independent of any model of the motion.
     plateaus_m : tuple of float
         Distances at which the record is clipped, m.
+    quantum_m : float or None
+        Step in which the distances come: the track's, or a coarser one that the distances themselves show.
     """
 
     track: Track
     flags: U8
     noise_m: float
     plateaus_m: tuple[float, ...]
+    quantum_m: float | None
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -101,7 +104,9 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
     flags = track.flags.copy()
     finite = np.isfinite(track.y)
     flags[~finite] |= np.uint8(Quality.MISSING)
-    flags |= _time_flags(track.t)
+    # A reader that already said which of two exchanged rows is wrong is believed.
+    judged = (flags & np.uint8(Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME)) != 0
+    flags |= _time_flags(np.where(judged, np.nan, track.t), judged)
     clean = (flags & UNUSABLE) == 0
     if np.count_nonzero(clean) < 8:
         raise AnalysisError(
@@ -126,7 +131,17 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
             if members.size:
                 plateaus.append(sign * level)
                 flags[rows[members]] |= np.uint8(Quality.CLIPPED)
-    return Conditioned(track, flags, noise_m, tuple(plateaus))
+    return Conditioned(track, flags, noise_m, tuple(plateaus), _coarsest(ordered, track.quantum_m))
+
+
+def _coarsest(ordered: F8, stated_m: float | None) -> float | None:
+    """The step between neighbouring values where values repeat; files print more digits than sensors have."""
+    steps = np.diff(ordered)
+    apart = steps[steps > 1e-9]
+    if not apart.size or apart.size > 0.5 * ordered.size:
+        return stated_m
+    least = float(apart.min())
+    return least if stated_m is None or least > 1.5 * stated_m else stated_m
 
 
 def fourth_difference_noise(y: F8) -> float:
@@ -147,14 +162,14 @@ def fourth_difference_noise(y: F8) -> float:
     return float(MAD_TO_SIGMA * np.median(np.abs(differences)) / FOURTH_DIFFERENCE_GAIN)
 
 
-def _time_flags(t: F8) -> U8:
-    """Flag times that repeat or run behind the latest time seen so far."""
+def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
+    """Flag times that repeat or run behind the latest time seen so far; those judged before stay as they are."""
     flags = np.zeros(t.size, np.uint8)
     finite = np.isfinite(t)
     latest = np.maximum.accumulate(np.where(finite, t, -np.inf))
     before = np.concatenate([[-np.inf], latest[:-1]])
     flags[finite & (t == before)] = Quality.DUPLICATE_TIME
-    flags[~finite | (t < before)] = Quality.NON_MONOTONIC_TIME
+    flags[(~finite & ~judged) | (t < before)] = Quality.NON_MONOTONIC_TIME
     return flags
 
 
@@ -193,6 +208,11 @@ def _spikes(y: F8, noise_m: float, sigmas: float) -> NDArray[np.bool_]:
             break
         smooth = y.copy()
         smooth[spikes] = np.interp(np.flatnonzero(spikes), kept, y[kept])
+    if np.count_nonzero(spikes) > 0.05 * y.size:
+        # So many come in runs too, which a median of five believes; but hardly any lie within the motion.
+        middle = float(np.median(y[~spikes]))
+        reach = 3.0 * MAD_TO_SIGMA * float(np.median(np.abs(y[~spikes] - middle)))
+        spikes |= np.abs(y - middle) > reach
     return spikes
 
 
@@ -208,6 +228,13 @@ def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))
     high = np.minimum(np.maximum(a, b), np.maximum(c, d))
     return np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e))
+
+
+def _visits(y: F8, band: NDArray[np.bool_], low: float) -> int:
+    """How often the motion comes to the band from below ``low``; a bob that settles there comes once."""
+    state = np.where(band, 1, np.where(y < low, -1, 0))
+    known = state[state != 0]
+    return int(np.count_nonzero((known[1:] > 0) & (known[:-1] < 0))) + int(known[0] > 0)
 
 
 def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float, NDArray[np.int64]]:
@@ -234,7 +261,7 @@ def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float
     band = (y >= bottom) & (y <= bottom + width)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], band.astype(np.int8), [0]])))
     starts, stops = edges[::2], edges[1::2]
-    if np.median(stops - starts) < 3:
+    if np.median(stops - starts) < 3 or _visits(y, band, bottom - 3.0 * width) < 2:
         return 0.0, none
     # Heavy tails of the noise stand above the band and belong to the plateau all the same.
     members = np.flatnonzero(y >= bottom)

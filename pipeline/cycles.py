@@ -94,7 +94,7 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     track, used = conditioned.track, conditioned.used
     t, y = track.t[used], track.y[used]
     spread = float(np.ptp(y))
-    resolution = track.quantum_m or 0.0
+    resolution = conditioned.quantum_m or 0.0
     if spread <= max(3.0 * resolution, 1e-12 * float(np.max(np.abs(y)))):
         return NoOscillation(
             f"the distance stays within {spread * 1e3:.3g} mm: nothing moves, or the sensor reads one fixed object"

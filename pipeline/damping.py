@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from pipeline.demodulate import Demodulated
+from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
 from pipeline.laws import LAWS, Law
 from pipeline.regression import Scatter, chi2_quantile, covariance_of, scatter
@@ -16,6 +18,7 @@ from pipeline.track import F8
 
 __all__ = ["Damping", "LawFit", "Params", "fit_damping"]
 
+TINY = 1e-100  # stands for zero where something is divided by an uncertainty
 BARE_MENTION = 2.0  # difference of BIC below which evidence is none
 
 
@@ -59,9 +62,9 @@ class LawFit:
     bic : float
         Bayesian information criterion, up to a constant that all laws share.
     converged : bool
-    rejected : bool
-        Chi-square is improbable, or a coefficient is negative beyond three standard uncertainties, or the fit did
-        not converge.
+    rejection : {"", "misfit", "negative", "not converged"}
+        Why the law is rejected, if it is: chi-square is improbable, a coefficient is negative beyond three standard
+        uncertainties, or the fit did not converge.
     """
 
     law: Law
@@ -70,7 +73,12 @@ class LawFit:
     dof: float
     bic: float
     converged: bool
-    rejected: bool
+    rejection: Literal["", "misfit", "negative", "not converged"]
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the record contradicts the law."""
+        return self.rejection != ""
 
     @property
     def name(self) -> str:
@@ -168,6 +176,11 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     -------
     Damping
 
+    Raises
+    ------
+    AnalysisError
+        If no law can be fitted at all.
+
     Notes
     -----
     Real amplitudes scatter more than their noise says (beats with a sideways mode, clusters of false echoes).
@@ -182,12 +195,16 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
         # One or two points show no law: what the amplitude lost since the start is then its uncertainty.
         noise = np.hypot(noise, amplitude * demodulated.decay * t)
     # Perfect data still carry rounding: without a floor chi-square would divide by nothing.
-    spread = scatter(t, amplitude, np.maximum(noise, 1e-12 * float(np.max(amplitude))))
+    spread = scatter(t, amplitude, np.maximum(noise, 1e-12 * float(np.max(amplitude)) + TINY))
     fits: dict[str, LawFit] = {}
     for name in params.laws:
         law = LAWS[name]
         if np.count_nonzero(spread.kept) >= len(law.parameters):
-            fits[name] = _fit(law, t, amplitude, spread, params)
+            fit = _fit(law, t, amplitude, spread, params)
+            if fit is not None:
+                fits[name] = fit
+    if not fits:
+        raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
     allowed = [name for name in fits if not fits[name].rejected] or list(fits)
     least = min(fits[name].bic for name in allowed)
     ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
@@ -197,12 +214,23 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     return Damping(t0, fits, selected, admissible, spread)
 
 
-def _fit(law: Law, t: F8, amplitude: F8, spread: Scatter, params: Params) -> LawFit:
+def _fit(law: Law, t: F8, amplitude: F8, spread: Scatter, params: Params) -> LawFit | None:
+    """Fit one law; None where its numbers run out of range, which no law with a chance does."""
     t, y, u = t[spread.kept], amplitude[spread.kept], spread.u[spread.kept]
     theta, converged = _levenberg_marquardt(law, t, y, u, law.guess(t, y))
-    residual = (y - law.amplitude(t, theta)) / u
-    jacobian = law.jacobian(t, theta) / u[:, None]
-    covariance = spread.correlation * covariance_of(jacobian)[0]
+    with np.errstate(all="ignore"):
+        residual = (y - law.amplitude(t, theta)) / u
+        jacobian = law.jacobian(t, theta) / u[:, None]
+    top = float(np.max(y))
+    # A growth that outruns the record by e^20 is a fit gone astray.
+    growing = np.any(-law.rate(y, theta) * (t[-1] - t[0]) > 20.0 * top)
+    absurd = growing or not 1e-3 * top <= theta[0] <= 1e3 * top
+    if absurd or not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
+        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        covariance = spread.correlation * covariance_of(jacobian)[0]
+    if not np.all(np.isfinite(covariance)):
+        return None
     chi2 = float(residual @ residual)
     count = len(law.parameters)
     free = y.size - count
@@ -210,9 +238,14 @@ def _fit(law: Law, t: F8, amplitude: F8, spread: Scatter, params: Params) -> Law
     reduced = chi2 / free if free > 0 else math.nan
     bic = chi2 / spread.correlation + count * math.log(max(y.size / spread.correlation, 2.0))
     joint = Joint(law.parameters, theta, covariance, law.units)
-    improbable = dof > 0 and reduced * dof > chi2_quantile(1.0 - params.rejection, dof)
-    negative = bool(np.any(theta < -3.0 * np.sqrt(np.diag(covariance))))
-    return LawFit(law, joint, reduced, dof, bic, converged, bool(improbable or negative or not converged))
+    rejection: Literal["", "misfit", "negative", "not converged"] = ""
+    if dof > 0 and reduced * dof > chi2_quantile(1.0 - params.rejection, dof):
+        rejection = "misfit"
+    elif np.any(theta < -3.0 * np.sqrt(np.diag(covariance))):
+        rejection = "negative"
+    elif not converged:
+        rejection = "not converged"
+    return LawFit(law, joint, reduced, dof, bic, converged, rejection)
 
 
 def _levenberg_marquardt(law: Law, t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, bool]:
@@ -227,11 +260,17 @@ def _levenberg_marquardt(law: Law, t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, 
     residual, chi2 = cost(theta)
     damping = 1e-5
     for _ in range(50):
-        jacobian = law.jacobian(t, theta) / u[:, None]
+        with np.errstate(all="ignore"):
+            jacobian = law.jacobian(t, theta) / u[:, None]
+        if not np.all(np.isfinite(jacobian)):
+            break
         scale = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
         scaled = jacobian / scale
         normal, right = scaled.T @ scaled, scaled.T @ residual
-        step = np.linalg.solve(normal + damping * np.eye(theta.size), right)
+        try:
+            step = np.linalg.solve(normal + damping * np.eye(theta.size), right)
+        except np.linalg.LinAlgError:
+            break
         trial = theta + step / scale
         trial_residual, trial_chi2 = cost(trial)
         gain = chi2 - trial_chi2

@@ -141,7 +141,7 @@ def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> Solu
     some, part = windows.take(odd), basis[odd]
     size, spread = np.abs(solution.residual[odd]), spread[odd]
     for _ in range(params.rounds):
-        ratio = size / np.maximum(spread, noise_m + 1e-300)[:, None]
+        ratio = size / np.maximum(spread, noise_m + windows.tiny)[:, None]
         trial = solve(some, part, some.usable / (1.0 + ratio**2) ** 2)
         size = np.abs(trial.residual)
         spread = MAD_TO_SIGMA * ranked(size, some.usable, 0.5)
@@ -198,14 +198,14 @@ def _neighbours(n: int) -> NDArray[np.int64]:
 def _level(windows: Windows, solution: Solution) -> float:
     """Spread of the samples about their windows' fits, typical of the record."""
     spread = MAD_TO_SIGMA * ranked(np.abs(solution.residual), windows.usable, 0.5)
-    return max(float(np.median(spread[solution.good])), 1e-300) if solution.good.any() else 1e-300
+    return max(float(np.median(spread[solution.good])), windows.tiny) if solution.good.any() else windows.tiny
 
 
 def _clip(windows: Windows, basis: F8, solution: Solution, params: Params) -> tuple[Solution, F8]:
     """Take residuals beyond the clip out and fit again."""
     size = np.abs(solution.residual)
     spread = MAD_TO_SIGMA * ranked(size, windows.usable, 0.5)
-    level = max(float(np.median(spread[solution.good])) if solution.good.any() else 0.0, 1e-300)
+    level = max(float(np.median(spread[solution.good])) if solution.good.any() else 0.0, windows.tiny)
     # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
     bound = params.clip_sigmas * np.clip(spread, 0.5 * level, 2.0 * level)
     weights = np.where(size <= bound[:, None], windows.usable, 0.0)
@@ -227,7 +227,7 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, weig
     shrunk = (prior * pooled**2 + counts * noise**2) / (prior + counts)
     offset, a, b = solution.coefficients[good].T
     amplitude = np.hypot(a, b)
-    safe = np.maximum(amplitude, 1e-300)
+    safe = np.maximum(amplitude, windows.tiny)
     jacobian = np.zeros((amplitude.size, 3, 3))
     jacobian[:, 0, 1], jacobian[:, 0, 2] = a / safe, b / safe
     jacobian[:, 1, 1], jacobian[:, 1, 2] = -b / safe**2, a / safe**2

@@ -129,12 +129,13 @@ def derive(
     }
     if decay.value > 0:
         found["quality_factor"] = (omega / (2 * lam), "")
-    own, share = _masses(scene, effects)
+    # One variable for the diameter, wherever it enters: what it shares must cancel or add up.
+    diameter = None if scene.disc_diameter_m is None else _variable(scene.disc_diameter_m)
+    own, share = _masses(scene, effects, diameter)
     mass = None if own is None else own + (share or 0.0)
     if mass is not None:
         found["spring_constant"] = (omega**2 * mass, "N/m")
-    if scene.disc_diameter_m is not None:
-        diameter = _variable(scene.disc_diameter_m)
+    if diameter is not None:
         found["keulegan_carpenter_number"] = (2 * math.pi * start / diameter, "")
         if scene.air_temperature_c is not None:
             density, viscosity = wrap(air_density), wrap(air_viscosity)
@@ -177,16 +178,16 @@ def _variable(estimate: Estimate) -> Any:
     return ufloat(estimate.value, estimate.u) if estimate.u > 0 else estimate.value
 
 
-def _masses(scene: Scene, effects: tuple[Effect, ...]) -> tuple[Any, Any]:
+def _masses(scene: Scene, effects: tuple[Effect, ...], diameter: Any) -> tuple[Any, Any]:
     """Bob with the air it carries, and a third of the spring, as far as the effects table includes them."""
     if scene.bob_mass_kg is None:
         return None, None
     own = _variable(scene.bob_mass_kg)
     included = {effect.name for effect in effects if effect.included}
-    if "added_mass" in included and scene.disc_diameter_m is not None:
+    if "added_mass" in included and diameter is not None:
         from uncertainties import wrap
 
-        own = own + wrap(lambda diameter: added_mass_kg(scene, diameter))(_variable(scene.disc_diameter_m))
+        own = own + wrap(lambda d: added_mass_kg(scene, d))(diameter)
     if "spring_mass" in included and scene.spring_mass_kg is not None:
         return own, _variable(scene.spring_mass_kg) / 3
     return own, None
@@ -214,5 +215,7 @@ def _root_mean_square(fit: LawFit, demodulated: Demodulated, t0: float) -> Estim
     t = demodulated.t - t0
     amplitude = fit.amplitude(t)
     value = math.sqrt(float(np.mean(amplitude**2)) / 2.0)
+    if value == 0.0:
+        return Estimate(0.0, 0.0, "m")
     gradient = np.mean(amplitude[:, None] * fit.law.jacobian(t, fit.joint.values), axis=0) / (2.0 * value)
     return Estimate(value, math.sqrt(max(float(gradient @ fit.joint.covariance @ gradient), 0.0)), "m")

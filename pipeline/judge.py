@@ -14,19 +14,12 @@ from pipeline.damping import Damping
 from pipeline.demodulate import Demodulated
 from pipeline.phase import PhaseFit
 from pipeline.rest import Rest
-from pipeline.track import U8, UNUSABLE, Quality, Track
+from pipeline.track import U8, UNUSABLE, Quality
 from pipeline.waveform import Waveform
 
 __all__ = ["Finding", "Severity", "count_quality", "judge", "judge_samples"]
 
 Severity = Literal["info", "warning", "error"]
-
-LAW_IN_WORDS = {
-    "none": "no damping at all",
-    "linear": "a lone exponential (linear drag)",
-    "quadratic": "a lone hyperbola (quadratic drag)",
-    "linear+quadratic": "linear and quadratic drag together",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,19 +56,18 @@ def count_quality(flags: U8) -> dict[str, int]:
     return {**counts, "used": int(np.count_nonzero((flags & UNUSABLE) == 0))}
 
 
-def judge_samples(track: Track, flags: U8, noise_m: float, plateaus_m: tuple[float, ...]) -> tuple[Finding, ...]:
+def judge_samples(conditioned: Conditioned, flags: U8, noise_m: float) -> tuple[Finding, ...]:
     """Return what the samples alone say, whether they oscillate or not.
 
     Parameters
     ----------
-    track : Track
+    conditioned : Conditioned
     flags : (n,) uint8
+        Final ones.
     noise_m : float
         Standard deviation of one sample, m.
-    plateaus_m : tuple of float
-        Distances at which the record is clipped, m.
     """
-    return tuple(_sample_findings(track, flags, noise_m, plateaus_m))
+    return tuple(_sample_findings(conditioned, flags, noise_m))
 
 
 def judge(
@@ -97,13 +89,14 @@ def judge(
     findings = [
         *_damping_findings(damping),
         *_motion_findings(cycles, demodulated, phase, rest, waveform),
-        *judge_samples(conditioned.track, demodulated.flags, demodulated.noise_m, conditioned.plateaus_m),
+        *judge_samples(conditioned, demodulated.flags, demodulated.noise_m),
     ]
     rank = {"error": 0, "warning": 1, "info": 2}
     return tuple(sorted(findings, key=lambda finding: rank[finding.severity]))
 
 
-def _sample_findings(track: Track, flags: U8, noise_m: float, plateaus_m: tuple[float, ...]) -> Iterator[Finding]:
+def _sample_findings(conditioned: Conditioned, flags: U8, noise_m: float) -> Iterator[Finding]:
+    track, plateaus_m, quantum_m = conditioned.track, conditioned.plateaus_m, conditioned.quantum_m
     counts, n = count_quality(flags), len(track)
     if counts["clipped"]:
         levels = " and ".join(f"{level * 1e3:.1f} mm" for level in plateaus_m) or "a level flagged in the record"
@@ -139,11 +132,11 @@ def _sample_findings(track: Track, flags: U8, noise_m: float, plateaus_m: tuple[
             f"the file states an error of {track.stated_error_m * 1e3:.2f} mm for every distance; "
             f"the samples scatter by {noise_m * 1e3:.2g} mm, so the stated error was not used as noise",
         )
-    if track.quantum_m is not None and noise_m > 0 and track.quantum_m > 3.0 * noise_m:
+    if quantum_m is not None and noise_m > 0 and quantum_m > 3.0 * noise_m:
         yield Finding(
             "quantised",
             "warning",
-            f"distances come in steps of {track.quantum_m * 1e3:.3g} mm, more than three times their noise: "
+            f"distances come in steps of {quantum_m * 1e3:.3g} mm, more than three times their noise: "
             "amplitudes may err by several times their stated uncertainty",
         )
 
@@ -159,7 +152,7 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
         yield Finding(
             "law_rejected",
             "info",
-            f"{LAW_IN_WORDS[name]} is rejected as the damping law: {_reason(damping, name)} "
+            f"{fit.law.words} is rejected as the damping law: {_reason(damping, name)} "
             f"({fit.dof:.0f} degrees of freedom)",
         )
     drags = [name for name in damping.admissible if name != "none"]
@@ -171,15 +164,12 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
 
 def _reason(damping: Damping, name: str) -> str:
     fit = damping.fits[name]
-    if not fit.converged:
-        return "its fit did not converge"
-    best = damping.best
-    if fit.reduced_chi2 > best.reduced_chi2:
-        return f"reduced chi-square {_number(fit.reduced_chi2)} where {damping.selected} leaves {best.reduced_chi2:.2g}"
-    return (
-        "a coefficient is negative beyond three standard uncertainties "
-        f"(reduced chi-square {_number(fit.reduced_chi2)})"
-    )
+    left = f"reduced chi-square {_number(fit.reduced_chi2)}"
+    if fit.rejection == "misfit":
+        return f"{left} where {damping.selected} leaves {damping.best.reduced_chi2:.2g}"
+    if fit.rejection == "negative":
+        return f"a coefficient is negative beyond three standard uncertainties, {left}"
+    return f"its fit did not converge, {left}"
 
 
 def _number(value: float) -> str:

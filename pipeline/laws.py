@@ -22,9 +22,14 @@ __all__ = ["LAWS", "Law"]
 
 
 class Law(Protocol):
-    """A damping law; ``theta`` lists its parameters in the order of ``parameters``, the amplitude at t = 0 first."""
+    """A damping law.
+
+    ``words`` name it in a sentence; ``theta`` lists its parameters in the order of ``parameters``, the amplitude at
+    t = 0 first.
+    """
 
     name: str
+    words: str
     parameters: tuple[str, ...]
     units: tuple[str, ...]
 
@@ -69,6 +74,7 @@ class Constant:
     """No damping that the record could show: :math:`A = A_0`."""
 
     name = "none"
+    words = "no damping at all"
     parameters: tuple[str, ...] = ("A0",)
     units: tuple[str, ...] = ("m",)
 
@@ -93,6 +99,7 @@ class Linear:
     """Viscous drag: :math:`A = A_0 e^{-\\gamma t}`."""
 
     name = "linear"
+    words = "a lone exponential (linear drag)"
     parameters: tuple[str, ...] = ("A0", "gamma")
     units: tuple[str, ...] = ("m", "1/s")
 
@@ -119,6 +126,7 @@ class Quadratic:
     """Drag that goes as speed squared: :math:`A = A_0 / (1 + \\beta A_0 t)`."""
 
     name = "quadratic"
+    words = "a lone hyperbola (quadratic drag)"
     parameters: tuple[str, ...] = ("A0", "beta")
     units: tuple[str, ...] = ("m", "1/(m s)")
 
@@ -146,6 +154,7 @@ class LinearQuadratic:
     """Both: :math:`A = A_0 e^{-\\gamma t} / (1 + \\beta A_0 (1 - e^{-\\gamma t})/\\gamma)`."""
 
     name = "linear+quadratic"
+    words = "linear and quadratic drag together"
     parameters: tuple[str, ...] = ("A0", "gamma", "beta")
     units: tuple[str, ...] = ("m", "1/s", "1/(m s)")
 

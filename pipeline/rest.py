@@ -56,7 +56,7 @@ def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.
         By how much the polynomial must lower the BIC.
     """
     t, offset = demodulated.t, demodulated.offset
-    u = np.maximum(np.sqrt(demodulated.covariance[:, 2, 2]), 1e-15)
+    u = np.maximum(np.sqrt(demodulated.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
     spread = scatter(t, offset, u, degree=degree)
     kept = spread.kept
     constant = solve_weighted(np.ones((int(kept.sum()), 1)), offset[kept], spread.u[kept])

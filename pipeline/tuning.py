@@ -68,8 +68,8 @@ def retune(windows: Windows, solution: Solution, tuning: Tuning, *, degree: int 
     if count < 3:
         return _retune_short(windows, tuning)
     z = solution.coefficients[good, 1] + 1j * solution.coefficients[good, 2]
-    t, weight = windows.centre[good], np.maximum(np.abs(z), 1e-300)
-    phase = unwrap(np.angle(z), t, omega) - omega * t
+    t, weight = windows.centre[good], np.maximum(np.abs(z), 1e-6 * np.max(np.abs(z)) + windows.tiny)
+    phase = unwrap(np.angle(z), t, omega) - omega * (t - t[0])
     span = float(np.ptp(t))
     x = 2.0 * (t - t[0]) / span - 1.0
     degree = min(degree, max(1, count // 6))

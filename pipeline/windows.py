@@ -32,6 +32,8 @@ class Windows:
     centre : (w,) float64, s
     level : float, m
         Taken off all distances, so that sums do not cancel.
+    tiny : float, m
+        What is nothing beside the motion: stands for zero where something is divided by a spread or an amplitude.
     """
 
     rows: NDArray[np.int64]
@@ -41,6 +43,7 @@ class Windows:
     tau: F8
     centre: F8
     level: float
+    tiny: float
 
     @classmethod
     def cut(cls, conditioned: Conditioned, bounds: NDArray[np.int64]) -> Windows:
@@ -53,6 +56,7 @@ class Windows:
         usable = conditioned.used[rows] & inside
         level = float(np.median(track.y[conditioned.used]))
         y = np.where(usable, track.y[rows] - level, 0.0)
+        tiny = 1e-12 * float(np.max(np.abs(y))) + 1e-150
         t = np.where(usable, track.t[rows], 0.0)
         counts = np.maximum(usable.sum(axis=1), 1)
         centre = t.sum(axis=1) / counts
@@ -62,7 +66,7 @@ class Windows:
         reach = np.ptp(track.t[conditioned.used])
         centre = np.where(np.abs(middle - centre) <= reach / max(len(lengths), 1), middle, centre)
         return cls(
-            rows, inside, usable.astype(np.float64), y, np.where(usable, t - centre[:, None], 0.0), centre, level
+            rows, inside, usable.astype(np.float64), y, np.where(usable, t - centre[:, None], 0.0), centre, level, tiny
         )
 
     def take(self, some: NDArray[np.int64]) -> Windows:
@@ -75,6 +79,7 @@ class Windows:
             self.tau[some],
             self.centre[some],
             self.level,
+            self.tiny,
         )
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from acquisition.replay import Replay
     from pipeline.analyse import Analysis, analyse
     from pipeline.classic import classic
-    from pipeline.compare import compare_springs
+    from pipeline.compare import SpringRun, compare_springs
     from pipeline.estimate import Estimate
     from pipeline.scene import Scene
     from pipeline.track import Track
@@ -35,6 +35,7 @@ __all__ = [
     "Loaded",
     "Replay",
     "Scene",
+    "SpringRun",
     "Track",
     "__version__",
     "analyse",
@@ -54,6 +55,7 @@ _WHERE = {
     "Loaded": "springmass.loading",
     "Replay": "acquisition.replay",
     "Scene": "pipeline.scene",
+    "SpringRun": "pipeline.compare",
     "Track": "pipeline.track",
     "analyse": "pipeline.analyse",
     "classic": "pipeline.classic",

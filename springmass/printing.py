@@ -37,4 +37,6 @@ def classic_text(classic: Classic) -> str:
 
 def _entry(severity: str, code: str, message: str) -> str:
     width = min(shutil.get_terminal_size((100, 24)).columns, 100)
-    return textwrap.fill(f"{_MARKS[severity]} {code}: {message}", width, subsequent_indent=" " * 8)
+    return textwrap.fill(
+        f"{_MARKS[severity]} {code}: {message}", width, subsequent_indent=" " * 8, break_on_hyphens=False
+    )

@@ -22,12 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["ReportRun", "inline_svg", "render_html"]
 
 _SEVERITIES = {"error": "Error", "warning": "Warning", "info": "Note"}
-_IN_WORDS = {
-    "none": "no damping at all",
-    "linear": "a lone exponential (linear drag)",
-    "quadratic": "a lone hyperbola (quadratic drag)",
-    "linear+quadratic": "linear and quadratic drag together",
-}
 _LETTERS = {"A0": "A₀", "gamma": "γ", "beta": "β", "mu": "μ"}
 _QUALITY = {
     "used": "used",
@@ -227,7 +221,7 @@ def _verdict(analysis: Analysis) -> str:
     if isinstance(analysis.motion, NoOscillation):
         return "Nothing oscillates in this record; rest position and noise are all that it gives."
     damping = analysis.motion.damping
-    chosen = _IN_WORDS.get(damping.selected, damping.selected)
+    chosen = damping.best.law.words
     if damping.best.rejected:
         return f"No damping law holds; the least bad is {chosen}, and its parameters must not be used."
     parameters = [
@@ -238,10 +232,10 @@ def _verdict(analysis: Analysis) -> str:
     text = f"The amplitude is described by {chosen}" + (f": {', '.join(parameters)}." if parameters else ".")
     if damping.selected == "none":
         text = "The amplitude does not fall by more than this record can tell."
-    rejected = [_IN_WORDS.get(name, name) for name, fit in damping.fits.items() if fit.rejected]
+    rejected = [fit.law.words for fit in damping.fits.values() if fit.rejected]
     if rejected:
         text += f" Rejected: {'; '.join(rejected)}."
-    others = [_IN_WORDS.get(name, name) for name in damping.admissible if name != damping.selected]
+    others = [damping.fits[name].law.words for name in damping.admissible if name != damping.selected]
     if others:
         text += f" As good, as far as this record can tell: {'; '.join(others)}."
     return text

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import Analysis, analyse
+from pipeline.condition import condition
 from pipeline.judge import Finding, count_quality, judge_samples
 from pipeline.track import Quality, Track
 
@@ -157,7 +158,7 @@ def test_plateau_flagged_by_the_recording_is_told_without_a_level(synthetic: Mod
     track = record(synthetic)
     flags = np.zeros(len(track), np.uint8)
     flags[10] = Quality.CLIPPED
-    (finding, *_) = judge_samples(track, flags, 1e-4, ())
+    (finding, *_) = judge_samples(condition(track), flags, 1e-4)
     assert finding.code == "clipped"
     assert "flagged in the record" in finding.message
 

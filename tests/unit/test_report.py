@@ -296,7 +296,7 @@ def test_a_law_that_fails_is_never_called_selected_alone() -> None:
     assert isinstance(motion, Motion)
     name = motion.damping.selected
     assert law_status(motion.damping, name) == "selected"
-    fits = {law: dataclasses.replace(fit, rejected=True) for law, fit in motion.damping.fits.items()}
+    fits = {law: dataclasses.replace(fit, rejection="misfit") for law, fit in motion.damping.fits.items()}
     assert law_status(dataclasses.replace(motion.damping, fits=fits), name).startswith("rejected")
 
 
