@@ -33,7 +33,7 @@ class Params:
     """
 
     clip_sigmas: float = 4.0
-    rounds: int = 4
+    rounds: int = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -54,12 +54,13 @@ def reconstruct(track: Track, demodulated: Demodulated, phase: PhaseFit, rest: R
         Its residual holds noise and everything that the model leaves out; compare ``rms_m`` with the noise.
     """
     law = phase.damping.best
-    elapsed = track.t - phase.t0
+    used = (demodulated.flags & UNUSABLE) == 0
+    # A law holds where it was fitted: before and after the samples used its last values stand.
+    elapsed = np.clip(track.t, phase.t0, float(np.max(track.t[used]))) - phase.t0
     amplitude = law.amplitude(elapsed)
     angle = phase.total(track.t)
     cosine, sine = np.cos(angle), np.sin(angle)
     position = rest.at(track.t) + amplitude * cosine
     velocity = -law.law.rate(amplitude, law.joint.values) * cosine - amplitude * phase.rate(track.t) * sine
     residual = track.y - position
-    used = (demodulated.flags & UNUSABLE) == 0
     return Waveform(position, velocity, residual, float(np.sqrt(np.mean(residual[used] ** 2))))
