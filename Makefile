@@ -35,7 +35,7 @@ test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest
 
 trials: $(VENV)/.installed-dev
-	SPRINGMASS_TRIALS=2000 $(BIN)/python -m pytest -m trials -s
+	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=200 $(BIN)/python -m pytest -m trials -s
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ratios.py

@@ -91,9 +91,7 @@ def concatenate(blocks: Iterable[Block]) -> Block:
     if any(b.host_ns is not None for b in parts):
         host = np.concatenate([b.host_ns if b.host_ns is not None else np.full(len(b), -1) for b in parts])
     if any(b.velocity is not None for b in parts):
-        velocity = np.concatenate(
-            [b.velocity if b.velocity is not None else np.full(len(b), np.nan) for b in parts]
-        )
+        velocity = np.concatenate([b.velocity if b.velocity is not None else np.full(len(b), np.nan) for b in parts])
     return Block(
         parts[0].first,
         np.concatenate([b.t for b in parts]),

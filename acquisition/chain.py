@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, Flag
 from acquisition.calibration import Calibration
 from acquisition.decoders.base import Family
 from acquisition.readings import NO_READINGS, Readings
@@ -47,6 +47,7 @@ class SensorChain:
         self.timebase = Timebase(rate_hz or family.rate_hz)
         self.last = NO_READINGS
         self._next = 0
+        self._broken = False
 
     def feed(self, host_ns: int, data: bytes) -> Block:
         """Take the bytes of one read, return the samples they completed (perhaps none)."""
@@ -57,6 +58,9 @@ class SensorChain:
     def to_block(self, readings: Readings) -> Block:
         """Give readings their sensor time and distance, and the next indices of the run."""
         t, late = self.timebase.push(readings)
+        if self._broken and len(readings):
+            late[0] |= np.uint8(Flag.GAP_BEFORE)
+            self._broken = False
         block = Block(
             self._next,
             t,
@@ -68,8 +72,9 @@ class SensorChain:
         return block
 
     def lost(self) -> None:
-        """The port went away: a frame cut in half by that is no frame."""
+        """The port went away: a frame cut in half by that is no frame, and the next sample is flagged."""
         self.decoder.flush()
+        self._broken = True
 
     def info(self, name: str, kind: str = "live") -> SourceInfo:
         """Return what is known of the source; the clock's kind once a reading came."""

@@ -172,9 +172,7 @@ class Replay:
         """
         with self._changed:
             if n < 1 or not self._paused:
-                raise ValueError(
-                    f"step needs n of at least 1 and a paused replay, got n={n}, paused={self._paused}"
-                )
+                raise ValueError(f"step needs n of at least 1 and a paused replay, got n={n}, paused={self._paused}")
             self._steps += n
             self._touch()
 

@@ -60,10 +60,13 @@ class SerialPort:
         self._baud = baud
         self._port: Any = None
         self._descriptor = -1
-        self.reopen()
+        try:
+            self.reopen()
+        except PortError as error:
+            raise PortError(_explain(address, error.__cause__ or error)) from error.__cause__
 
     def reopen(self) -> None:
-        """Open, again after a loss."""
+        """Open, again after a loss; what stands in the way is not looked into, for a reader may try twice a second."""
         import serial
 
         self.close()
@@ -71,18 +74,16 @@ class SerialPort:
             options: dict[str, Any] = {} if "://" in self.name else {"exclusive": True}
             port = serial.serial_for_url(self.name, baudrate=self._baud, timeout=0, write_timeout=1.0, **options)
         except (serial.SerialException, OSError, ValueError) as error:
-            raise PortError(_explain(self.name, error)) from error
+            raise PortError(f"{self.name}: cannot be opened ({error})") from error
         self._port = port
         self._descriptor = _descriptor(port)
-        if self._descriptor < 0:
-            port.timeout = WAIT_S
 
     def fileno(self) -> int:
         """Return the descriptor to wait on, -1 where the address has none (RFC 2217, Windows)."""
         return self._descriptor
 
-    def read(self) -> bytes:
-        """Return what has come."""
+    def read(self, wait_s: float = WAIT_S) -> bytes:
+        """Return what has come; without a descriptor, wait so long for it."""
         import serial
 
         try:
@@ -91,6 +92,7 @@ class SerialPort:
                 if not data:
                     raise PortError(f"{self.name}: the port has gone (end of file)")
                 return data
+            self._port.timeout = wait_s
             data = self._port.read(1)
             return bytes(data + self._port.read(min(self._port.in_waiting, READ_BYTES))) if data else b""
         except BlockingIOError:

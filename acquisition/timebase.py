@@ -18,6 +18,7 @@ from acquisition.source import ClockKind
 __all__ = ["ClockFit", "Gap", "Timebase", "fit_clock"]
 
 WRAP_US = 1 << 32
+WRAP_S = WRAP_US * 1e-6
 NANO = 1e-9
 
 
@@ -76,8 +77,8 @@ class Timebase:
     -----
     With a device clock, time is the device's microseconds since the first reading, unwrapped at 2^32. With a counter
     alone it is the counter over the nominal rate. With neither it is the host's stamp. A device that restarts (its
-    clock runs backward by more than a wrap explains, or falls silent and starts near zero) is joined by the host
-    clock, and the first reading after it is flagged.
+    clock runs backward by more than a wrap explains, or shows less than the silence before it lasted) is joined by
+    the host clock, and the first reading after it is flagged.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -88,8 +89,11 @@ class Timebase:
         self.restarts = 0
         self._count = 0
         self._last_raw: int | None = None
-        self._last_t = 0.0
         self._last_host_ns = 0
+        # Time is counted in whole ticks from an anchor, so that it does not depend on how the bytes were cut into reads.
+        self._anchor_s = 0.0
+        self._ticks = 0
+        self._latest_s = 0.0
         self._clock: ClockKind | None = None
 
     @property
@@ -117,13 +121,14 @@ class Timebase:
         """Times of readings that follow each other as they should; None where one does not."""
         if self._last_raw is None:
             return None
-        ticks = np.cumsum(np.diff(raw, prepend=self._last_raw))
-        steps = np.diff(ticks, prepend=0) * unit_s
-        if np.any(steps <= 0.0) or np.any(steps > 1.5 / self.rate_hz):
+        ticks = self._ticks + np.cumsum(np.diff(raw, prepend=self._last_raw))
+        steps = np.diff(ticks, prepend=self._ticks) * unit_s
+        behind = self._anchor_s + self._ticks * unit_s < self._latest_s
+        if behind or np.any(steps <= 0.0) or np.any(steps > 1.5 / self.rate_hz):
             return None
-        t = self._last_t + ticks * unit_s
+        t = self._anchor_s + ticks * unit_s
         self._last_raw, self._last_host_ns = int(raw[-1]), int(host_ns[-1])
-        self._last_t = float(t[-1])
+        self._ticks, self._latest_s = int(ticks[-1]), float(t[-1])
         self._count += int(t.size)
         return np.asarray(t)
 
@@ -135,21 +140,20 @@ class Timebase:
         return readings.host_ns, NANO
 
     def _step(self, raw: int, unit_s: float, host_ns: int) -> tuple[float, int]:
-        flag = 0
-        if self._last_raw is None:
-            t = 0.0
-        else:
-            step = self._difference(raw, unit_s, host_ns)
-            t = self._last_t + step
-            if step == 0.0:
-                flag = int(Flag.DUPLICATE_TIME)
-            elif step < 0.0:
-                flag = int(Flag.NON_MONOTONIC_TIME)
-            elif step > 1.5 / self.rate_hz and not self._only_jitter(unit_s, step):
-                flag = int(Flag.GAP_BEFORE)
-                self.gaps.append(Gap(self._count, step, round(step * self.rate_hz) - 1))
+        restarted = self._advance(raw, unit_s, host_ns)
+        first = self._last_raw is None
         self._last_raw, self._last_host_ns = raw, host_ns
-        self._last_t = max(t, self._last_t)
+        t = self._anchor_s + self._ticks * unit_s
+        step = t - self._latest_s
+        flag = 0
+        if not first and step == 0.0:
+            flag = int(Flag.DUPLICATE_TIME)
+        elif step < 0.0:
+            flag = int(Flag.NON_MONOTONIC_TIME)
+        elif restarted or (step > 1.5 / self.rate_hz and not self._only_jitter(unit_s, step)):
+            flag = int(Flag.GAP_BEFORE)
+            self.gaps.append(Gap(self._count, step, max(round(step * self.rate_hz) - 1, 0)))
+        self._latest_s = max(t, self._latest_s)
         self._count += 1
         return t, flag
 
@@ -157,22 +161,24 @@ class Timebase:
         """Host stamps come late in bunches; only silence longer than any jitter counts as a gap there."""
         return unit_s == NANO and step < max(0.25, 3.0 / self.rate_hz)
 
-    def _difference(self, raw: int, unit_s: float, host_ns: int) -> float:
-        assert self._last_raw is not None
+    def _advance(self, raw: int, unit_s: float, host_ns: int) -> bool:
+        """Count on to a reading; True where the device started again and the host clock had to join it."""
+        if self._last_raw is None:
+            return False
         difference = raw - self._last_raw
-        if unit_s == NANO:
-            return difference * NANO
-        elapsed = (host_ns - self._last_host_ns) * NANO
-        if unit_s == 1e-6 and difference < 0:
-            unwrapped = difference + WRAP_US
-            # A wrap continues smoothly; anything else is a device that started again.
-            if abs(unwrapped * unit_s - elapsed) < 2.0 + 0.01 * elapsed:
-                return unwrapped * unit_s
         step = difference * unit_s
-        if difference < 0 and -step > 1.0:
-            self.restarts += 1
-            return max(elapsed, 1.0 / self.rate_hz)
-        return step
+        if unit_s != NANO and not 0.0 <= step <= 1.5 / self.rate_hz:
+            elapsed = (host_ns - self._last_host_ns) * NANO
+            wraps = round((elapsed - step) / WRAP_S) if unit_s == 1e-6 else 0
+            # A wrap continues smoothly; anything else is a device that started again.
+            if wraps > 0 and abs(step + wraps * WRAP_S - elapsed) < 2.0 + 0.01 * elapsed:
+                difference += wraps * WRAP_US
+            elif step < -1.0 or (step > 0.0 and raw * unit_s < elapsed - 2.0):
+                self.restarts += 1
+                self._anchor_s, self._ticks = self._latest_s + max(elapsed, 1.0 / self.rate_hz), 0
+                return True
+        self._ticks += difference
+        return False
 
 
 def fit_clock(t: F8, host_ns: I8) -> ClockFit:
@@ -222,6 +228,8 @@ def _through_minima(x: F8, delay: F8, stretches: int = 12) -> tuple[float, float
         edges = np.linspace(x[0], x[-1], stretches + 1)
         parts = np.split(np.arange(x.size), np.searchsorted(x, edges[1:-1]))
         lowest = np.array([part[np.argmin(rest[part])] for part in parts if part.size])
+        if lowest.size < stretches // 2:  # a few points always lie near some line
+            return 0.0, math.inf
         slope, line_u = _line(x[lowest], delay[lowest])
     return slope, line_u
 

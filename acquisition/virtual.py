@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -114,6 +115,12 @@ class VirtualRangefinder:
         self._cluster_left = 0
         self._cluster_m = 0.0
 
+    def again(self) -> VirtualRangefinder:
+        """Return one that takes the readings which this one would take next."""
+        other = VirtualRangefinder(self._position, self.sensor, copy.deepcopy(self._rng))
+        other._cluster_left, other._cluster_m = self._cluster_left, self._cluster_m
+        return other
+
     def shots(self) -> Iterator[Shot]:
         """Yield readings without end."""
         sequence = 0
@@ -151,7 +158,7 @@ class VirtualRangefinder:
 
 
 class VirtualSource:
-    """The simulated rangefinder as a source of blocks.
+    """The simulated rangefinder as a source of blocks; each iteration takes the same readings.
 
     Parameters
     ----------
@@ -170,8 +177,11 @@ class VirtualSource:
     ) -> None:
         self._rangefinder = rangefinder
         self._clock = clock
-        self._count = math.ceil(seconds * rangefinder.sensor.rate_hz)
+        true_rate_hz = rangefinder.sensor.rate_hz * (1.0 + rangefinder.sensor.crystal_ppm * 1e-6)
+        # Rounded: 0.07 s at 100 Hz are seven samples and not the eight of 7.000000000000001.
+        self._count = math.ceil(round(seconds * true_rate_hz, 6))
         self._size = block_samples
+        self._open = False
         sensor = rangefinder.sensor
         self.info = SourceInfo(
             "simulated",
@@ -182,21 +192,25 @@ class VirtualSource:
         )
 
     def __enter__(self) -> Self:
+        self._open = True
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """There is nothing to close."""
+        self._open = False
 
     def __iter__(self) -> Iterator[Block]:
         start_ns = self._clock.now_ns()
+        rangefinder = self._rangefinder.again()
         for first in range(0, self._count, self._size):
-            shots = [self._rangefinder.shot(i) for i in range(first, min(first + self._size, self._count))]
+            if not self._open:
+                return
+            shots = [rangefinder.shot(i) for i in range(first, min(first + self._size, self._count))]
             due_ns = start_ns + round(shots[-1].true_s * 1e9)
             self._clock.sleep_until_ns(due_ns)
             distance = np.array([shot.distance_m for shot in shots])
             flags = np.where(np.isnan(distance), np.uint8(Flag.MISSING), np.uint8(0)).astype(np.uint8)
-            t = np.array([shot.sequence for shot in shots]) / self._rangefinder.sensor.rate_hz
+            t = np.array([shot.sequence for shot in shots]) / rangefinder.sensor.rate_hz
             host = np.array([start_ns + round(shot.true_s * 1e9) for shot in shots], np.int64)
             yield Block(first, t, distance, flags, host)

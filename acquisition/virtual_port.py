@@ -134,17 +134,18 @@ class VirtualPort:
     def _run(self) -> None:
         start_ns = self._clock.now_ns()
         frames = self._answers(start_ns) if self._family.poll is not None else self._stream(start_ns)
+        try:
+            self._speak(frames)
+        finally:
+            self.done.set()
+
+    def _speak(self, frames: Iterator[tuple[Shot, bytes]]) -> None:
         held: list[bytes] = []
-        unplugged = flooded = False
+        flooded = False
         for shot, frame in frames:
-            if self._within(self._faults.unplug, shot.true_s):
-                if not unplugged:
-                    self._pull()
-                    unplugged = True
+            if not self._plugged(shot.true_s):
                 self.unsent += 1
                 continue
-            if unplugged and self._master < 0:
-                self._plug()
             if self._faults.flood is not None and not flooded and shot.true_s >= self._faults.flood[0]:
                 flooded = True
                 self._send(self._rng.bytes(int(self._faults.flood[1])))
@@ -153,9 +154,19 @@ class VirtualPort:
                 held.append(spoiled)
                 continue
             self._send(b"".join([*held, spoiled]))
+            self.sent += len(held) + 1
             held.clear()
-            self.sent += 1
-        self.done.set()
+        self._send(b"".join(held))
+        self.sent += len(held)
+
+    def _plugged(self, t: float) -> bool:
+        """Pull or plug as the faults say for this second of the run; True where the cable is in."""
+        out = self._within(self._faults.unplug, t)
+        if out and self._master >= 0:
+            self._pull()
+        elif not out and self._master < 0:
+            self._plug()
+        return not out
 
     def _stream(self, start_ns: int) -> Iterator[tuple[Shot, bytes]]:
         for shot in self._rangefinder.shots():
@@ -173,15 +184,14 @@ class VirtualPort:
             now_s = (self._clock.now_ns() - start_ns) * 1e-9
             if now_s >= self._seconds:
                 return
-            waiting += self._received()
+            waiting = waiting + self._received() if self._plugged(now_s) else b""
             if not waiting:
                 self._clock.sleep_until_ns(self._clock.now_ns() + 500_000)
                 continue
             request, waiting = waiting[: len(self._family.poll.request)], waiting[len(self._family.poll.request) :]
-            if request:
-                sequence = int(now_s * self._rangefinder.sensor.rate_hz)
-                shot = self._rangefinder.shot(sequence)
-                yield shot, self._frame(shot)
+            sequence = int(now_s * self._rangefinder.sensor.rate_hz)
+            shot = self._rangefinder.shot(sequence)
+            yield shot, self._answer(request, shot)
 
     def _received(self) -> bytes:
         if self._master < 0:
@@ -194,6 +204,13 @@ class VirtualPort:
             if error.errno == errno.EIO:  # nobody has the other end open
                 return b""
             raise
+
+    def _answer(self, request: bytes, shot: Shot) -> bytes:
+        # Asked for something else than the distance, the encoder answers that; one without such requests has no reply().
+        reply = getattr(self._encoder, "reply", None)
+        if reply is None:
+            return self._frame(shot)
+        return bytes(reply(request, distance_m=shot.distance_m, temperature_c=shot.temperature_c))
 
     def _frame(self, shot: Shot) -> bytes:
         return self._encoder.encode(

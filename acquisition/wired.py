@@ -14,13 +14,14 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from acquisition.clock import Clock
-from acquisition.decoders.base import Poll
+from acquisition.decoders.base import Poll, Polled
 from acquisition.errors import PortError
 
 __all__ = ["Line", "PortReader", "Sink", "Transport"]
 
 REOPEN_EVERY_NS = 500_000_000
 IDLE_WAIT_S = 0.5
+BLOCKING_WAIT_S = 0.25
 
 
 class Transport(Protocol):
@@ -35,8 +36,8 @@ class Transport(Protocol):
         """Return a descriptor that a selector can wait on, or -1 where there is none."""
         ...
 
-    def read(self) -> bytes:
-        """Return what is there, at most 64 KiB; without a descriptor: wait up to a quarter of a second for it.
+    def read(self, wait_s: float = 0.25) -> bytes:
+        """Return what is there, at most 64 KiB; without a descriptor: wait so long for it.
 
         Raises
         ------
@@ -96,11 +97,15 @@ class Line:
     channel : int
         Number of the sensor within the run.
     poll : Poll or None
+    decoder : Polled or None
+        A polled sensor's decoder, where the sink feeds it within ``data`` and flushes it at "timeout": then it says
+        what to ask next, and a reply that came short counts as timed out before the next request.
     """
 
     transport: Transport
     channel: int = 0
     poll: Poll | None = None
+    decoder: Polled | None = None
     _lost_ns: int | None = field(default=None, init=False)
     _retry_ns: int = field(default=0, init=False)
     _ask_ns: int = field(default=0, init=False)
@@ -145,7 +150,9 @@ class PortReader:
             thread.start()
 
     def stop(self) -> None:
-        """End reading and close the ports; raises what ended a thread, if anything did."""
+        """End reading and close the ports; raises what ended a thread, if anything did. Again does no harm."""
+        if self._stop.is_set():
+            return
         self._stop.set()
         os.write(self._wake_write, b"x")
         for thread in self._threads:
@@ -197,7 +204,9 @@ class PortReader:
             if line.poll is not None and not self._ask(line, line.poll):
                 line.transport.close()
                 continue
-            if not self._take(line, None):
+            # A reply is waited for no longer than until the next request is due.
+            wait_s = BLOCKING_WAIT_S if line.poll is None else min(self._wait_s(lines), BLOCKING_WAIT_S)
+            if not self._take(line, None, wait_s):
                 line.transport.close()
 
     def _wait_s(self, lines: list[Line]) -> float:
@@ -211,10 +220,10 @@ class PortReader:
                 wait = min(wait, (line._ask_ns - now) * 1e-9)
         return max(wait, 0.0)
 
-    def _take(self, line: Line, now_ns: int | None) -> bool:
+    def _take(self, line: Line, now_ns: int | None, wait_s: float = 0.0) -> bool:
         """Hand on what one port has; False where it is gone."""
         try:
-            data = line.transport.read()
+            data = line.transport.read(wait_s)
         except PortError as error:
             self._gone(line, str(error))
             return False
@@ -229,13 +238,14 @@ class PortReader:
         if now < line._ask_ns:
             return True
         try:
-            if line._answer_by_ns is not None and now >= line._answer_by_ns:
+            short = line.decoder is not None and line._answer_by_ns is None and line.decoder.pending > 0
+            if short or (line._answer_by_ns is not None and now >= line._answer_by_ns):
                 # Without header and checksum the rest of a late reply would be read as the next one.
                 line.transport.discard_input()
                 self._sink.event(line.channel, now, "timeout", {"after_s": poll.timeout_s})
                 line._answer_by_ns = None
             if line._answer_by_ns is None:
-                line.transport.write(poll.request)
+                line.transport.write(poll.request if line.decoder is None else line.decoder.request)
                 line._answer_by_ns = now + int(poll.timeout_s * 1e9)
         except PortError as error:
             self._gone(line, str(error))

@@ -415,9 +415,7 @@ def json_lines(content: Mapping[str, object], indent: str = "") -> str:
     """Return a JSON object with one line a key, objects opened to one further level."""
     lines = []
     for key, value in content.items():
-        inner = (
-            json_lines(value, indent + "  ") if isinstance(value, dict) and not indent else json.dumps(value)
-        )
+        inner = json_lines(value, indent + "  ") if isinstance(value, dict) and not indent else json.dumps(value)
         lines.append(f"{indent}  {json.dumps(key)}: {inner}")
     return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
 
@@ -489,12 +487,8 @@ def write(folder: Path, files: Mapping[str, bytes]) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write or check the files; return the exit code, 3 where the folder cannot be used."""
     parser = argparse.ArgumentParser(description="Write the simulated recordings and their truth.")
-    parser.add_argument(
-        "folder", nargs="?", type=Path, default=HERE, metavar="DIR", help="where (default: here)"
-    )
-    parser.add_argument(
-        "--check", action="store_true", help="compare instead of writing; exit 1 where files differ"
-    )
+    parser.add_argument("folder", nargs="?", type=Path, default=HERE, metavar="DIR", help="where (default: here)")
+    parser.add_argument("--check", action="store_true", help="compare instead of writing; exit 1 where files differ")
     options = parser.parse_args(arguments)
     action: Callable[[Path, Mapping[str, bytes]], int] = check if options.check else write
     try:

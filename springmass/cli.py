@@ -10,7 +10,7 @@ import os
 import sys
 
 from springmass import __version__
-from springmass.errors import INTERRUPTED, OK, SOME_FAILED, UNREADABLE, USAGE, complain
+from springmass.errors import INTERRUPTED, OK, SENSOR, SOME_FAILED, UNREADABLE, USAGE, complain
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -22,9 +22,13 @@ __all__ = ["build_parser", "main"]
 COMMANDS = {
     "demo": "replay, analyse and compare the bundled recordings: Table 1 in one command",
     "analyse": "turn recordings into Table 1, findings and a report",
+    "record": "record a run from the bench, so that nothing is lost",
+    "recover": "build a run file from a wire log, however torn",
     "replay": "play a recording back through the interface of a live sensor",
     "convert": "write a recording as a run file, or give back the original inside one",
     "formats": "list the families of recordings, or say what a file is",
+    "sensors": "list the families of rangefinders with their rate, resolution, range and limits",
+    "ports": "list the serial ports and what speaks on them",
     "doctor": "check this installation",
 }
 
@@ -44,9 +48,13 @@ def build_parser() -> argparse.ArgumentParser:
     adders = {
         "demo": _add_demo,
         "analyse": _add_analyse,
+        "record": _add_record,
+        "recover": _add_recover,
         "replay": _add_replay,
         "convert": _add_convert,
         "formats": _add_formats,
+        "sensors": _add_sensors,
+        "ports": _add_ports,
         "doctor": _add_doctor,
     }
     for name, summary in COMMANDS.items():
@@ -105,12 +113,14 @@ def _exit_code(error: Exception) -> int | None:
 
     if isinstance(error, ProgramError):
         return error.exit_code
-    from acquisition.errors import AcquisitionError
+    from acquisition.errors import AcquisitionError, CalibrationError, PortError, SensorError
     from pipeline.errors import PipelineError, SceneError
     from storage.errors import StorageError, WriteFailed
 
-    if isinstance(error, SceneError | WriteFailed):
+    if isinstance(error, SceneError | WriteFailed | SensorError):
         return USAGE
+    if isinstance(error, PortError | CalibrationError):
+        return SENSOR
     return UNREADABLE if isinstance(error, AcquisitionError | PipelineError | StorageError) else None
 
 
@@ -171,6 +181,50 @@ def _add_formats(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", nargs="?", metavar="FILE", help="say what this file is")
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
     _add_input_options(parser)
+
+
+def _add_record(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--port", action="append", default=[], metavar="P", help="port of a sensor; again for another")
+    parser.add_argument("--sensor", action="append", default=[], metavar="NAME", help="its family, see `sensors`")
+    parser.add_argument("--simulate", metavar="SCENE.toml", help="a simulated bench behind a pseudo-terminal instead")
+    parser.add_argument("-o", "--output", required=True, metavar="RUN.h5", help="run file to make; never replaced")
+    parser.add_argument("--seconds", type=_positive, metavar="N", help="how long (default: until Ctrl-C)")
+    parser.add_argument(
+        "--scene", metavar="FILE", help="scene file stored with the run; its air sets the speed of sound"
+    )
+    parser.add_argument("--title", default="", metavar="TEXT", help="title of the run")
+    parser.add_argument("--baud", type=int, metavar="B", help="speed of the port (default: the family's)")
+    parser.add_argument("--rate-hz", type=_positive, metavar="R", help="readings per second that the sensor is set to")
+    parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="option of the decoder")
+    parser.add_argument("--still", type=_positive, metavar="S", help="measure rest position and noise first, so long")
+    parser.add_argument(
+        "--ruler", type=_positive, metavar="M", help="the still distance by the ruler, m; needs --still"
+    )
+    parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="applied to echo times, m/s")
+    parser.add_argument("--trigger", type=_positive, metavar="M", help="start when the bob leaves its rest by this, m")
+    parser.add_argument(
+        "--pre", type=_positive, default=2.0, metavar="S", help="seconds to keep from before (default 2)"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated bench")
+    parser.add_argument(
+        "--crystal-ppm", type=_finite, default=0.0, metavar="PPM", help="of the simulated sensor's clock"
+    )
+
+
+def _add_recover(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", metavar="RUN.wire", help="wire log")
+    parser.add_argument("-o", "--output", metavar="RUN.h5", help="run file to make (default: beside the log)")
+    parser.add_argument("--overwrite", action="store_true", help="replace a run file that is there")
+
+
+def _add_sensors(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="as JSON on stdout")
+
+
+def _add_ports(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--probe", action="store_true", help="listen to each port for two seconds")
+    parser.add_argument("--port", action="append", default=[], metavar="P", help="listen to this address too")
+    parser.add_argument("--json", action="store_true", help="as JSON on stdout")
 
 
 def _add_doctor(parser: argparse.ArgumentParser) -> None:

@@ -6,8 +6,10 @@
     |-- NotARun        nothing there, not HDF5, or HDF5 of another layout     springmass exits with 3
     |-- RunDamaged     a run file whose content is not what was written       springmass exits with 3
     |-- RunClosed      a run used outside its ``with``
+    |-- NotALog        nothing there, or no wire log                          springmass exits with 3
     `-- WriteFailed    a file could not be written; what stood there before stands
-        `-- RunExists  a file of that name stands already and may not be replaced
+        |-- RunExists  a file of that name stands already and may not be replaced
+        `-- DiskNearlyFull   too little room for the run, known before it starts
 
 Every message is one line: where, what was demanded, what was got, and what to do.
 """

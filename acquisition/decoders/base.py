@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from acquisition.readings import Readings
 
-__all__ = ["Decoder", "Encoder", "Family", "Poll"]
+__all__ = ["Decoder", "Encoder", "Family", "Poll", "Polled"]
 
 
 class Decoder(Protocol):
@@ -16,7 +16,15 @@ class Decoder(Protocol):
 
     @property
     def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading: "garbage_bytes", "bad_checksum", "bad_frame", ..."""
+        """Counts of what was no reading: "garbage_bytes", "bad_checksum", "bad_frame", ...
+
+        "garbage_bytes" are those that were part of no frame: what tells whether a stream is of this family at all.
+        """
+        ...
+
+    @property
+    def pending(self) -> int:
+        """Bytes held until the frame they began is whole; bounded, whatever comes."""
         ...
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
@@ -25,6 +33,19 @@ class Decoder(Protocol):
 
     def flush(self) -> None:
         """Forget a half-received frame: the port was reopened, or a reply timed out."""
+        ...
+
+
+class Polled(Decoder, Protocol):
+    """The decoder of a sensor that speaks only when asked.
+
+    Replies and flushes alone decide what comes next, so replayed bytes decode as they did live. Before a request is
+    sent with ``pending`` bytes left over, ``flush`` is due: a late or a surplus byte would shift every reply.
+    """
+
+    @property
+    def request(self) -> bytes:
+        """What to send next: mostly ``Poll.request``, at times the request for a temperature."""
         ...
 
 
@@ -87,6 +108,8 @@ class Family:
         Options of the decoder by name, with one line each (column, unit, ...).
     has_device_time : bool
         Whether readings carry the device's clock or counter.
+    self_framing : bool
+        Whether a mark or checksum tells a frame from noise; without one, bytes alone never show the family.
     source : str
         Datasheet or specification.
     """
@@ -103,6 +126,7 @@ class Family:
     poll: Poll | None = None
     options: Mapping[str, str] = field(default_factory=dict)
     has_device_time: bool = False
+    self_framing: bool = True
     source: str = ""
 
     def describe(self) -> dict[str, Any]:
@@ -116,6 +140,7 @@ class Family:
             "range_m": list(self.range_m),
             "polled": self.poll is not None,
             "has_device_time": self.has_device_time,
+            "self_framing": self.self_framing,
             "options": dict(self.options),
             "limits": self.limits,
             "source": self.source,

@@ -49,9 +49,7 @@ def motion_position(newline: str = "\r\n", header: int = 2, error: bool = True) 
     columns = "Time (s)\tDistance (cm)" + ("\tDist Error (cm)" if error else "")
     lines = ["Motion Sensor Data File Sep 20, 2018 1:40 PM", columns][2 - header :]
     tail = "\t0.239" if error else ""
-    return newline.join(
-        [*lines, *(f"{t:.3f}\t{x * 100:.3f}{tail}" for t, x in zip(T, DISTANCE, strict=True))]
-    ).encode()
+    return newline.join([*lines, *(f"{t:.3f}\t{x * 100:.3f}{tail}" for t, x in zip(T, DISTANCE, strict=True))]).encode()
 
 
 def motion_velocity() -> bytes:
@@ -91,9 +89,7 @@ def test_it_is_recognised_by_its_own_format_alone(case: Case) -> None:
 
 
 @pytest.mark.parametrize("each", formats(), ids=lambda each: each.name)
-@pytest.mark.parametrize(
-    "head", [b"", b"\0", b"\xff\xfe", bytes(range(256)) * 8, b"hello\nworld\n", b"\n" * 99]
-)
+@pytest.mark.parametrize("head", [b"", b"\0", b"\xff\xfe", bytes(range(256)) * 8, b"hello\nworld\n", b"\n" * 99])
 def test_what_is_no_recording_is_not_recognised(each: Format, head: bytes) -> None:
     """Recognising never raises and never claims noise."""
     assert each.recognises(head) is False

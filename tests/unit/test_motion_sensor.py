@@ -295,9 +295,7 @@ def test_two_columns_under_a_title_are_not_guessed() -> None:
 # Velocity alone ---------------------------------------------------------------------------------------------
 
 
-def velocity_run(
-    count: int = 400, rate: float = 100.0, quantum_cm: float = 0.0043
-) -> tuple[np.ndarray, list[str]]:
+def velocity_run(count: int = 400, rate: float = 100.0, quantum_cm: float = 0.0043) -> tuple[np.ndarray, list[str]]:
     """Return a position on its lattice, m, and the velocity file's rows."""
     ticks = np.rint((20 + 5 * np.sin(8 * np.arange(count) / rate)) / quantum_cm)
     velocity = np.diff(ticks, prepend=ticks[0]) * quantum_cm * rate
@@ -385,9 +383,7 @@ def test_a_pair_is_told_apart_by_content() -> None:
     position, velocity = velocity_run(60)
     p = (
         "p.txt",
-        "\n".join(
-            [POSITION, *(f"{i / 100:.3f}\t{x * 100:.3f}\t0.239" for i, x in enumerate(position))]
-        ).encode(),
+        "\n".join([POSITION, *(f"{i / 100:.3f}\t{x * 100:.3f}\t0.239" for i, x in enumerate(position))]).encode(),
     )
     v = ("v.txt", "\n".join([VELOCITY, *velocity]).encode())
     one, other = FORMAT.read_pair(p, v), FORMAT.read_pair(v, p)

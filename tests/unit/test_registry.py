@@ -145,16 +145,12 @@ def test_a_file_without_read_permission_is_refused(run: Path, monkeypatch: pytes
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(
-        FormatError, match=r"cannot be opened \(Permission denied\); check its name and permissions"
-    ):
+    with pytest.raises(FormatError, match=r"cannot be opened \(Permission denied\); check its name and permissions"):
         open_recording(run)
 
 
 @pytest.mark.parametrize("start", [b"", HEADER.encode()])
-def test_a_gigabyte_of_one_line_is_not_read(
-    tmp_path: Path, start: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_gigabyte_of_one_line_is_not_read(tmp_path: Path, start: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     """A line of more than a MiB ends the reading, wherever it begins."""
     path = tmp_path / "run.txt"
     path.write_bytes(start + b"0.010\t25.6")
@@ -209,7 +205,5 @@ def test_a_broken_entry_point_is_named_and_only_when_needed(
     """A package that cannot be imported spoils nothing that the table can read."""
     install(monkeypatch, "no_such_module_at_all:FORMAT")
     assert sniff(run) == "motion-sensor"
-    with pytest.raises(
-        AcquisitionError, match=r'format "extra" \(no_such_module_at_all:FORMAT\): cannot be loaded'
-    ):
+    with pytest.raises(AcquisitionError, match=r'format "extra" \(no_such_module_at_all:FORMAT\): cannot be loaded'):
         formats()

@@ -1,0 +1,143 @@
+"""The project's own line protocol, for a microcontroller that times a transducer at 100 Hz.
+
+``$R1,sequence,device_us,echo_us,temperature,status*CRC`` and a line feed: see docs/reference/line-protocol.md, and
+firmware/springmass_rangefinder for a device that speaks it. The echo's time is sent, not a distance: the speed of
+sound is the host's affair and can be applied again later.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from binascii import crc_hqx
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from acquisition.decoders.base import Family
+from acquisition.decoders.lines import LineSplitter
+from acquisition.decoders.rows import NAN, rows
+from acquisition.readings import Readings
+
+__all__ = ["FAMILY", "LineProtocolDecoder", "LineProtocolEncoder", "checksum", "frame"]
+
+LONGEST = 96
+"""Longest line without its line feed, bytes."""
+
+_Record = tuple[int, int, float, float]
+_WRAP = 1 << 32
+_RECORD = re.compile(rb"R1,([0-9]{1,10}),([0-9]{1,10}),([0-9]{1,6}\.[0-9]{2})?,(-?[0-9]{1,5})?,([A-Z])")
+_ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable, neither $ nor * within
+
+
+def checksum(body: bytes) -> int:
+    """Return the CRC-16/CCITT-FALSE (polynomial 1021, initial value FFFF) of what stands between ``$`` and ``*``.
+
+    Examples
+    --------
+    >>> f"{checksum(b'123456789'):04X}"
+    '29B1'
+    """
+    return crc_hqx(body, 0xFFFF)
+
+
+def frame(body: bytes) -> bytes:
+    """Return the line that carries a body."""
+    return b"$%s*%04X\n" % (body, checksum(body))
+
+
+class LineProtocolDecoder:
+    """Decodes the line protocol.
+
+    Notes
+    -----
+    The CRC finds every change of one or two bits and every burst of up to 16 within the body, and all but one in
+    65536 of the rest. Comment lines (``#``) are counted as ``comment``, and sound lines of a later version as
+    ``unknown_record``.
+    """
+
+    def __init__(self) -> None:
+        self._faults = {"garbage_bytes": 0, "bad_checksum": 0, "bad_frame": 0, "unknown_record": 0, "comment": 0}
+        self._lines = LineSplitter(b"\n", LONGEST, self._faults)
+
+    @property
+    def faults(self) -> Mapping[str, int]:
+        """Counts of what was no reading."""
+        return MappingProxyType(self._faults)
+
+    @property
+    def pending(self) -> int:
+        """Bytes held until the line they began is whole."""
+        return self._lines.pending
+
+    def feed(self, host_ns: int, data: bytes) -> Readings:
+        """Return the readings whose lines these bytes end."""
+        found = [record for line in self._lines.split(data) if (record := self._record(line)) is not None]
+        if not found:
+            return rows(host_ns, echo_us=[])
+        sequence, device_us, echo_us, temperature_c = zip(*found, strict=True)
+        return rows(host_ns, sequence=sequence, device_us=device_us, echo_us=echo_us, temperature_c=temperature_c)
+
+    def flush(self) -> None:
+        """Forget a half-received line."""
+        self._lines.flush()
+
+    def _record(self, line: bytes) -> _Record | None:
+        """Return what a line carries, or count why it carries nothing."""
+        # What stands before the last $ is noise, or a line whose end was lost; the rest may be whole.
+        start = max(line.rfind(b"$"), 0)
+        record = _parse(line, start)
+        if isinstance(record, str):
+            self._faults[record] += 1
+            self._faults["garbage_bytes"] += len(line) + 1
+            return None
+        if start:
+            self._faults["bad_frame"] += 1
+            self._faults["garbage_bytes"] += start
+        return record
+
+
+def _parse(line: bytes, start: int) -> _Record | str:
+    """Return sequence, device us, echo us and degC, or the name of the fault."""
+    sealed = _ENVELOPE.fullmatch(line, start)
+    if sealed is None:
+        return "comment" if line.startswith(b"#") else "bad_frame"
+    if crc_hqx(sealed[1], 0xFFFF) != int(sealed[2], 16):
+        return "bad_checksum"
+    found = _RECORD.fullmatch(sealed[1])
+    if found is None:
+        return "unknown_record"
+    sequence, device_us, echo, temperature, status = found.groups()
+    if int(sequence) >= _WRAP or int(device_us) >= _WRAP:
+        return "unknown_record"
+    # Only status E vouches for an echo; with any other letter nothing was measured. No echo takes no time.
+    echo_us = float(echo) if status == b"E" and echo else 0.0
+    return int(sequence), int(device_us), echo_us or NAN, int(temperature) / 100 if temperature else NAN
+
+
+class LineProtocolEncoder:
+    """Writes the line protocol, echo times in steps of 0.25 us as the firmware's."""
+
+    def encode(
+        self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
+    ) -> bytes:
+        """Return one line; a NaN distance or echo means no target."""
+        silent = math.isnan(echo_us) or math.isnan(distance_m)
+        echo = b"" if silent else b"%.2f" % (round(echo_us * 4) / 4)
+        temperature = b"" if math.isnan(temperature_c) else b"%d" % round(temperature_c * 100)
+        status = b"N" if silent else b"E"
+        return frame(b"R1,%d,%d,%s,%s,%s" % (sequence % _WRAP, device_us % _WRAP, echo, temperature, status))
+
+
+FAMILY = Family(
+    name="line-protocol",
+    title="springmass line protocol ($R1 lines of a microcontroller that times the echo)",
+    baud=115200,
+    rate_hz=100.0,
+    resolution_m=43e-6,
+    range_m=(0.02, 1.7),
+    limits="At 100 Hz an echo from beyond 1.7 m arrives after the next ping.",
+    decoder=LineProtocolDecoder,
+    encoder=LineProtocolEncoder,
+    has_device_time=True,
+    source="docs/reference/line-protocol.md",
+)

@@ -1,0 +1,67 @@
+"""Cuts a stream into lines with bounded memory, the same lines however the stream was cut into reads."""
+
+from __future__ import annotations
+
+__all__ = ["LineSplitter"]
+
+
+class LineSplitter:
+    """Holds the line that has begun and hands out those that have ended.
+
+    Parameters
+    ----------
+    end : bytes
+        The byte that ends a line.
+    limit : int
+        Longest line, bytes without its end. A longer one is dropped and counted as ``bad_frame``.
+    faults : dict of str to int
+        Where to count; its ``garbage_bytes`` are the bytes that were part of no frame.
+    skip_first : bool
+        Whether the first line after the start or a flush is dropped and counted as ``partial_line``: reading may
+        have begun midway, and half a number looks like a number.
+    """
+
+    def __init__(self, end: bytes, limit: int, faults: dict[str, int], *, skip_first: bool = False) -> None:
+        self._end = end
+        self._limit = limit
+        self._faults = faults
+        self._skip_first = skip_first
+        self._skip = skip_first
+        self._overlong = False
+        self._held = b""
+
+    @property
+    def pending(self) -> int:
+        """Bytes of the line that has begun."""
+        return len(self._held)
+
+    def split(self, data: bytes) -> list[bytes]:
+        """Return the lines that these bytes end, without their ends."""
+        lines = (self._held + data).split(self._end)
+        self._held = lines.pop()
+        if lines and (self._skip or self._overlong):
+            self._drop(lines.pop(0), "partial_line" if self._skip else "bad_frame")
+            self._skip = self._overlong = False
+        if self._overlong or len(self._held) > self._limit:
+            self._faults["garbage_bytes"] += len(self._held)
+            self._held = b""
+            self._overlong = True
+        if lines and max(map(len, lines)) > self._limit:
+            for line in lines:
+                if len(line) > self._limit:
+                    self._drop(line, "bad_frame")
+            lines = [line for line in lines if len(line) <= self._limit]
+        return lines
+
+    def flush(self) -> None:
+        """Forget the line that has begun."""
+        if self._held or self._overlong:
+            self._faults["garbage_bytes"] += len(self._held)
+            self._faults["bad_frame"] += 1
+        self._held = b""
+        self._overlong = False
+        self._skip = self._skip_first
+
+    def _drop(self, line: bytes, why: str) -> None:
+        self._faults["garbage_bytes"] += len(line) + 1
+        self._faults[why] += 1

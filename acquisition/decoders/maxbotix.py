@@ -1,0 +1,195 @@
+"""MaxBotix ASCII: ``R``, a fixed number of digits, carriage return, sent by the sensor itself.
+
+The digits mean inches, centimetres or millimetres by the model, and nothing in the bytes says which: the unit is
+chosen with the family's name. LV models may add ``Pn`` (proximity), HRUSB models put a space before the return.
+RS-232 polarity at 0 to Vcc: a TTL adapter without an inverter reads noise.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+
+from acquisition.decoders.base import Family
+from acquisition.decoders.lines import LineSplitter
+from acquisition.decoders.rows import NAN, rows
+from acquisition.readings import Readings
+
+__all__ = ["FAMILIES", "MaxbotixDecoder", "MaxbotixEncoder", "Variant"]
+
+_LONGEST = 64  # bytes; the start-up banner's lines are shorter, and are faults like any other text
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One model line's way of writing a distance.
+
+    Parameters
+    ----------
+    digits : int
+        Always so many, with leading zeros: a lost digit shows.
+    unit_m : float
+        What the last digit counts, m.
+    no_target : tuple of int
+        Numbers that mean nothing was there; the last of them is what the encoder writes. 0 is one always.
+    tail : str
+        What the encoder writes between digits and carriage return.
+    """
+
+    digits: int
+    unit_m: float
+    no_target: tuple[int, ...]
+    tail: str = ""
+
+
+class MaxbotixDecoder:
+    """Decodes ``R`` lines.
+
+    Parameters
+    ----------
+    variant : Variant
+
+    Notes
+    -----
+    There is no checksum. A reading is a whole ``R`` line of the right length; a flipped bit that makes another digit
+    cannot be seen.
+    """
+
+    def __init__(self, variant: Variant) -> None:
+        self._unit_m = variant.unit_m
+        self._no_target = frozenset((0, *variant.no_target))
+        self._form = re.compile(rb"R([0-9]{%d})(?: P[0-9]| )?" % variant.digits)
+        self._faults = {"garbage_bytes": 0, "bad_frame": 0}
+        self._lines = LineSplitter(b"\r", _LONGEST, self._faults)
+
+    @property
+    def faults(self) -> Mapping[str, int]:
+        """Counts of what was no reading."""
+        return MappingProxyType(self._faults)
+
+    @property
+    def pending(self) -> int:
+        """Bytes held until the line they began is whole."""
+        return self._lines.pending
+
+    def feed(self, host_ns: int, data: bytes) -> Readings:
+        """Return the distances whose lines these bytes end."""
+        distance_m = []
+        for line in self._lines.split(data):
+            # What stands before the last R is noise, or a line whose return was lost; the rest may be whole.
+            start = max(line.rfind(b"R"), 0)
+            found = self._form.fullmatch(line, start)
+            if start or found is None:
+                self._spoiled(line, start if found else len(line) + 1)
+            if found is not None:
+                number = int(found[1])
+                distance_m.append(NAN if number in self._no_target else number * self._unit_m)
+        return rows(host_ns, distance_m=distance_m)
+
+    def flush(self) -> None:
+        """Forget a half-received line."""
+        self._lines.flush()
+
+    def _spoiled(self, line: bytes, garbage: int) -> None:
+        self._faults["garbage_bytes"] += garbage
+        self._faults["bad_frame"] += line[:garbage] != b"\n"  # adapters that end lines with CR LF
+
+
+class MaxbotixEncoder:
+    """Writes ``R`` lines.
+
+    Parameters
+    ----------
+    variant : Variant
+    """
+
+    def __init__(self, variant: Variant) -> None:
+        self._variant = variant
+
+    def encode(self, *, distance_m: float, **_: float) -> bytes:
+        """Return one line; it carries the distance alone."""
+        form = self._variant
+        number = 0 if math.isnan(distance_m) else round(distance_m / form.unit_m)
+        if not 0 < number < form.no_target[-1]:
+            number = form.no_target[-1]
+        return f"R{number:0{form.digits}d}{form.tail}\r".encode()
+
+
+def _family(
+    name: str, title: str, variant: Variant, *, rate_hz: float, range_m: tuple[float, float], limits: str, source: str
+) -> Family:
+    return Family(
+        name=name,
+        title=title,
+        baud=9600,
+        rate_hz=rate_hz,
+        resolution_m=variant.unit_m,
+        range_m=range_m,
+        limits=limits,
+        decoder=partial(MaxbotixDecoder, variant),
+        encoder=partial(MaxbotixEncoder, variant),
+        source=source,
+    )
+
+
+FAMILIES = {
+    "maxbotix-lv": _family(
+        "maxbotix-lv",
+        "MaxBotix LV-MaxSonar-EZ (Rddd, inches)",
+        Variant(3, 0.0254, (255,)),
+        rate_hz=20.0,
+        range_m=(0.1524, 6.45),
+        limits="Steps of one inch, and everything nearer than 6 inches reads 6.",
+        source="MaxBotix LV-MaxSonar-EZ data sheet",
+    ),
+    "maxbotix-lv-p": _family(
+        "maxbotix-lv-p",
+        "MaxBotix LV-ProxSonar-EZ (Rddd Pn, inches)",
+        Variant(3, 0.0254, (255,), " P0"),
+        rate_hz=20.0,
+        range_m=(0.1524, 6.45),
+        limits="Steps of one inch, and everything nearer than 6 inches reads 6.",
+        source="MaxBotix LV-ProxSonar-EZ data sheet",
+    ),
+    "maxbotix-xl": _family(
+        "maxbotix-xl",
+        "MaxBotix XL-MaxSonar, 7.6 m models (Rddd, cm)",
+        Variant(3, 0.01, (765,)),
+        rate_hz=10.0,
+        range_m=(0.2, 7.65),
+        limits="Steps of 1 cm at 10 Hz.",
+        source="MaxBotix XL-MaxSonar-EZ and -WR data sheets",
+    ),
+    "maxbotix-xl-long": _family(
+        "maxbotix-xl-long",
+        "MaxBotix XL-MaxSonar, 10 m models (Rdddd, cm)",
+        Variant(4, 0.01, (1068,)),
+        rate_hz=10.0,
+        range_m=(0.2, 10.68),
+        limits="Steps of 1 cm at 10 Hz.",
+        source="MaxBotix XL-MaxSonar-EZL and -WRL data sheets",
+    ),
+    "maxbotix-hr": _family(
+        "maxbotix-hr",
+        "MaxBotix HRLV- and HRUSB-MaxSonar (Rdddd, mm)",
+        Variant(4, 0.001, (5000,)),
+        rate_hz=10.0,
+        range_m=(0.3, 5.0),
+        limits="10 Hz, and everything nearer than 300 mm reads 300.",
+        source="MaxBotix HRLV-MaxSonar-EZ and HRUSB-MaxSonar-EZ data sheets",
+    ),
+    "maxbotix-wr": _family(
+        "maxbotix-wr",
+        "MaxBotix HRXL-MaxSonar-WR (Rdddd, mm)",
+        Variant(4, 0.001, (4999, 9999)),
+        rate_hz=7.5,
+        range_m=(0.3, 9.998),
+        limits="The free-running output is filtered to 1.2 to 1.5 Hz, useless for oscillations: trigger each reading.",
+        source="MaxBotix HRXL-MaxSonar-WR data sheet",
+    ),
+}
+"""By name."""

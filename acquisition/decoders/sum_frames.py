@@ -1,0 +1,80 @@
+"""Finds frames of one size that begin with a known byte and end in the sum of the bytes before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+__all__ = ["SumFrames", "with_sum"]
+
+
+def with_sum(body: bytes) -> bytes:
+    """Return a frame: the body and the low eight bits of its sum.
+
+    Examples
+    --------
+    >>> with_sum(b"\\xff\\x07\\xa1").hex(" ")
+    'ff 07 a1 a7'
+    """
+    return body + bytes([sum(body) & 0xFF])
+
+
+class SumFrames:
+    """Cuts a stream into frames, byte by byte from the left, so that the cuts of the reads do not matter.
+
+    Parameters
+    ----------
+    size : int
+        Bytes of a frame.
+    starts : bytes
+        What its first byte may be.
+    plausible : callable
+        Whether a frame with the right sum can be one. An eight-bit sum passes one wrong frame in 256, and a steady
+        distance can repeat one for ever; what no sensor sends must not hold the decoder out of step.
+
+    Notes
+    -----
+    After a frame that fails, the search goes on at its second byte: a frame that was cut costs itself and at most
+    the one that it was run into.
+    """
+
+    def __init__(self, size: int, starts: bytes, plausible: Callable[[bytes], bool]) -> None:
+        self._size = size
+        self._starts = starts
+        self._plausible = plausible
+        self._held = b""
+        self.faults = {"garbage_bytes": 0, "bad_checksum": 0, "bad_frame": 0}
+
+    @property
+    def pending(self) -> int:
+        """Bytes of the frame that has begun."""
+        return len(self._held)
+
+    def split(self, data: bytes) -> list[bytes]:
+        """Return the whole frames."""
+        data = self._held + data
+        size, starts, plausible = self._size, self._starts, self._plausible
+        frames: list[bytes] = []
+        at, last, bad_sum, bad_frame = 0, len(data) - size, 0, 0
+        while at <= last:
+            if data[at] in starts:
+                frame = data[at : at + size]
+                if (sum(frame) - frame[-1]) & 0xFF != frame[-1]:
+                    bad_sum += 1
+                elif not plausible(frame):
+                    bad_frame += 1
+                else:
+                    frames.append(frame)
+                    at += size
+                    continue
+            at += 1
+        self._held = data[at:]
+        faults = self.faults
+        faults["garbage_bytes"] += at - size * len(frames)
+        faults["bad_checksum"] += bad_sum
+        faults["bad_frame"] += bad_frame
+        return frames
+
+    def flush(self) -> None:
+        """Forget the frame that has begun."""
+        self.faults["garbage_bytes"] += len(self._held)
+        self._held = b""

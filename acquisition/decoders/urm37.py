@@ -1,0 +1,87 @@
+"""DFRobot URM37 (SEN0001): polled, frames of command, two data bytes, sum.
+
+``22 00 00 22`` asks for the distance (reply ``22 H L SUM``, cm), ``11 00 00 11`` for the temperature (reply
+``11 H L SUM``, 0.1 degC: twelve bits, the upper four all 1 below zero). FF FF is invalid in either.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+from acquisition.decoders.base import Family, Poll
+from acquisition.decoders.cycle import OPTIONS
+from acquisition.decoders.replies import ReplyDecoder, ReplyEncoder, ReplyForm
+from acquisition.decoders.rows import NAN
+
+__all__ = ["FAMILY"]
+
+_DISTANCE, _TEMPERATURE = 0x22, 0x11
+_INVALID = 0xFFFF
+_FARTHEST_CM = 1000
+_HOTTEST_DC = 1000  # 0.1 degC
+
+
+def _plausible(frame: bytes) -> bool:
+    value = frame[1] << 8 | frame[2]
+    if value == _INVALID:
+        return True
+    return value <= _FARTHEST_CM if frame[0] == _DISTANCE else not math.isnan(_celsius(value))
+
+
+def _metres(value: int) -> float:
+    # 0 is nearer than the transducer can hear: no target, as FF FF.
+    return NAN if value in (0, _INVALID) else value / 100
+
+
+def _celsius(value: int) -> float:
+    """Return degC; below zero, sign and magnitude as the manual says, or two's complement as some firmware sends.
+
+    The two never claim the same code: the range of either is an impossible temperature in the other.
+    """
+    if value == _INVALID:
+        return NAN
+    if value >> 12 not in (0x0, 0xF):
+        return NAN
+    candidates = (-(value & 0x0FFF), value - 0x10000) if value & 0x8000 else (value,)
+    return next((dc / 10 for dc in candidates if abs(dc) <= _HOTTEST_DC), NAN)
+
+
+def _distance_code(distance_m: float) -> int:
+    cm = 0 if math.isnan(distance_m) else round(distance_m * 100)
+    return cm if 0 < cm <= _FARTHEST_CM else _INVALID
+
+
+def _temperature_code(temperature_c: float) -> int:
+    if math.isnan(temperature_c) or abs(temperature_c) * 10 > _HOTTEST_DC:
+        return _INVALID
+    dc = round(temperature_c * 10)
+    return 0xF000 | -dc if dc < 0 else dc
+
+
+_FORM = ReplyForm(
+    distance_head=bytes([_DISTANCE]),
+    temperature_head=bytes([_TEMPERATURE]),
+    ask_distance=bytes([_DISTANCE, 0, 0, _DISTANCE]),
+    ask_temperature=bytes([_TEMPERATURE, 0, 0, _TEMPERATURE]),
+    plausible=_plausible,
+    metres=_metres,
+    celsius=_celsius,
+    distance_code=_distance_code,
+    temperature_code=_temperature_code,
+)
+
+FAMILY = Family(
+    name="urm37",
+    title="URM37 (SEN0001) replies of command, two bytes, sum",
+    baud=9600,
+    rate_hz=10.0,
+    resolution_m=1e-2,
+    range_m=(0.02, 8.0),
+    limits="Steps of 1 cm and 10 Hz: enough to see a swing of a decimetre, not to weigh its damping.",
+    decoder=partial(ReplyDecoder, _FORM),
+    encoder=partial(ReplyEncoder, _FORM),
+    poll=Poll(request=_FORM.ask_distance, interval_s=0.1, timeout_s=0.25),
+    options=OPTIONS,
+    source="DFRobot SEN0001 (URM37): communication protocol",
+)

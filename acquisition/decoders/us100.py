@@ -1,0 +1,161 @@
+"""US-100: polled, replies without header and checksum.
+
+0x55 asks for the distance (reply H L, mm), 0x50 for the temperature (reply one byte, T + 45 degC). What the bytes
+are is known only from what was asked, so a byte too many or too few shifts every reply after it: a temperature of
+-44 degC was seen that way. Three things keep it in step:
+
+- The reader flushes after a time-out, and before a request if ``pending`` bytes of no whole reply are left over.
+- A distance outside 20 to 4500 mm is a missing sample. Out of step, the low byte stands where the high byte belongs,
+  which takes 14 of 15 readings out of that range.
+- Two such readings in a row that make a distance in range when read one byte later are proof enough: one byte is
+  skipped and counted as ``resynchronised``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from acquisition.decoders.base import Family, Poll
+from acquisition.decoders.cycle import OPTIONS, Cycle
+from acquisition.decoders.rows import NAN, rows
+from acquisition.readings import Readings
+
+__all__ = ["FAMILY", "Us100Decoder", "Us100Encoder"]
+
+_ASK_DISTANCE, _ASK_TEMPERATURE = b"\x55", b"\x50"
+_NEAREST_MM, _FARTHEST_MM = 20, 4500
+_COLDEST_C, _HOTTEST_C = -20, 70
+
+
+def _in_range(high: int, low: int) -> bool:
+    return _NEAREST_MM <= (high << 8 | low) <= _FARTHEST_MM
+
+
+class Us100Decoder:
+    """Decodes US-100 replies; a temperature goes with the next distance.
+
+    Parameters
+    ----------
+    temperature_every : int
+        Ask for the temperature after so many distances; 0 never does. It needs a reader that sends ``request``.
+    """
+
+    def __init__(self, temperature_every: int = 0) -> None:
+        self._cycle = Cycle(temperature_every)
+        self._faults = {"garbage_bytes": 0, "bad_temperature": 0, "resynchronised": 0}
+        self._held = b""
+        self._celsius = NAN
+        self._odd_low: int | None = None  # low byte of the reply before, if that was a distance out of range
+
+    @property
+    def faults(self) -> Mapping[str, int]:
+        """Counts of what was no reading; a distance out of range is a missing sample instead."""
+        return MappingProxyType(self._faults)
+
+    @property
+    def pending(self) -> int:
+        """Bytes held until the reply they began is whole; should be 0 when a request is due."""
+        return len(self._held)
+
+    @property
+    def request(self) -> bytes:
+        """What to send next."""
+        return _ASK_TEMPERATURE if self._cycle.wants_temperature else _ASK_DISTANCE
+
+    def feed(self, host_ns: int, data: bytes) -> Readings:
+        """Return the distances whose replies these bytes complete."""
+        data = self._held + data
+        distance_m: list[float] = []
+        temperature_c: list[float] = []
+        at, size = 0, len(data)
+        while at < size:
+            if self._cycle.wants_temperature:
+                self._take_temperature(data[at])
+                at += 1
+            elif at + 1 < size:
+                distance_m.append(self._distance(data[at], data[at + 1]))
+                temperature_c.append(self._celsius)
+                self._celsius = NAN
+                at += 2 - self._slips(data[at], data[at + 1])
+            else:
+                break
+        self._held = data[at:]
+        return rows(host_ns, distance_m=distance_m, temperature_c=temperature_c)
+
+    def flush(self) -> None:
+        """Forget a half-received reply; the next request is for a distance."""
+        self._faults["garbage_bytes"] += len(self._held)
+        self._held = b""
+        self._odd_low = None
+        self._cycle.restart()
+
+    def _take_temperature(self, byte: int) -> None:
+        self._cycle.answered(temperature=True)
+        self._odd_low = None
+        celsius = byte - 45
+        if _COLDEST_C <= celsius <= _HOTTEST_C:
+            self._celsius = float(celsius)
+        else:
+            self._faults["bad_temperature"] += 1
+
+    def _distance(self, high: int, low: int) -> float:
+        self._cycle.answered(temperature=False)
+        return (high << 8 | low) / 1000 if _in_range(high, low) else NAN
+
+    def _slips(self, high: int, low: int) -> int:
+        """Return 1 where the low byte just read must be the next reply's high byte, else 0."""
+        before = self._odd_low
+        self._odd_low = None if _in_range(high, low) else low
+        if before is None or self._odd_low is None or not _in_range(before, high):
+            return 0
+        self._odd_low = None
+        self._faults["resynchronised"] += 1
+        return 1
+
+
+class Us100Encoder:
+    """Writes US-100 replies.
+
+    Parameters
+    ----------
+    temperature_every : int
+        As the decoder's.
+    """
+
+    def __init__(self, temperature_every: int = 0) -> None:
+        self._cycle = Cycle(temperature_every)
+
+    def encode(self, *, distance_m: float, temperature_c: float, **_: float) -> bytes:
+        """Return the reply to the request whose turn it is."""
+        request = _ASK_TEMPERATURE if self._cycle.wants_temperature else _ASK_DISTANCE
+        self._cycle.answered(temperature=request == _ASK_TEMPERATURE)
+        return self.reply(request, distance_m=distance_m, temperature_c=temperature_c)
+
+    def reply(self, request: bytes, *, distance_m: float, temperature_c: float) -> bytes:
+        """Return the reply to a request, nothing to what is none."""
+        if request == _ASK_DISTANCE:
+            mm = 0 if math.isnan(distance_m) else round(distance_m * 1000)
+            return (mm if _in_range(0, mm) else 0).to_bytes(2, "big")
+        if request == _ASK_TEMPERATURE:
+            celsius = 0.0 if math.isnan(temperature_c) else temperature_c
+            return bytes([min(max(round(celsius) + 45, 0), 255)])
+        return b""
+
+
+FAMILY = Family(
+    name="us100",
+    title="US-100 in serial mode (two bytes a distance, no header, no checksum)",
+    baud=9600,
+    rate_hz=20.0,
+    resolution_m=1e-3,
+    range_m=(_NEAREST_MM / 1000, _FARTHEST_MM / 1000),
+    limits="No checksum: a byte that was changed or lost may give a wrong reading before it is noticed.",
+    decoder=Us100Decoder,
+    encoder=Us100Encoder,
+    poll=Poll(request=_ASK_DISTANCE, interval_s=0.05, timeout_s=0.15),
+    options=OPTIONS,
+    self_framing=False,
+    source="US-100 data sheet (serial mode); Adafruit 4019",
+)

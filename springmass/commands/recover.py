@@ -1,0 +1,27 @@
+"""``springmass recover``: a run file from any wire log, however torn."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from springmass import __version__
+from springmass.analysing import now_utc
+from springmass.errors import OK
+from storage.recover import recover
+
+__all__ = ["run"]
+
+
+def run(options: argparse.Namespace) -> int:
+    """Rebuild the run; the log stays."""
+    report = recover(
+        options.input,
+        None if options.output is None else Path(options.output),
+        overwrite=options.overwrite,
+        provenance={"software": "springmass", "version": __version__, "created_utc": now_utc()},
+    )
+    for line in report.describe():
+        print(line, file=sys.stderr)
+    return OK

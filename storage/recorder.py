@@ -1,0 +1,298 @@
+"""The recorder: takes what the reading thread brings, and sees that it reaches the disk.
+
+Three threads share the work. The reading thread only puts records into a queue. A second takes them out and appends
+them to the wire log at once, so that a killed process loses no more than the read in flight. A third calls fdatasync
+once a second: that may take as long as the disk likes, and neither of the others waits for it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from acquisition.clock import Clock
+from storage.disk import DiskNearlyFull, check_disk
+from storage.errors import WriteFailed, one_line
+from storage.wire_layout import HEAD_BYTES, event_payload
+from storage.wire_log import Kind, LogFile, LogHeader, WireLogWriter, open_log_file
+
+__all__ = ["DiskNearlyFull", "Recorder", "RecorderStatus", "check_disk"]
+
+QUEUE_BYTES = 16 << 20
+"""Three quarters of an hour of one sensor at 100 Hz, four seconds of 200 ports in a flood at 115200 baud."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderStatus:
+    """Where a recording stands; counts of records hold marks, events and the header too.
+
+    Parameters
+    ----------
+    records, bytes : int
+        In the log: a killed process does not lose them.
+    synced_records, synced_bytes : int
+        On the disk: a power cut does not lose them. Record numbers below ``synced_records`` are safe.
+    queued_records, queued_bytes : int
+        Put and not yet taken out of the queue.
+    dropped_records, dropped_bytes : int
+        Put and not recorded, because the queue was full or the recording had stopped.
+    error : str
+        Why the recording stopped, one line; empty while all is well.
+    closed : bool
+    """
+
+    records: int
+    bytes: int
+    synced_records: int
+    synced_bytes: int
+    queued_records: int
+    queued_bytes: int
+    dropped_records: int
+    dropped_bytes: int
+    error: str
+    closed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    kind: Kind
+    channel: int
+    mono_ns: int
+    payload: bytes
+
+    @property
+    def size(self) -> int:
+        return HEAD_BYTES + len(self.payload)
+
+
+@dataclass(slots=True)
+class _Overflow:
+    """What one channel lost since the queue became full."""
+
+    first_ns: int
+    last_ns: int
+    records: int = 0
+    bytes: int = 0
+
+    def event(self, channel: int) -> _Item:
+        facts = {"records": self.records, "bytes": self.bytes, "first_ns": self.first_ns}
+        return _Item(Kind.EVENT, channel, self.last_ns, event_payload("overflow", facts))
+
+
+class Recorder:
+    """Records to a new wire log. It is a :class:`acquisition.wired.Sink`.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        The log to be made; its folder must exist.
+    header : LogHeader
+    clock : Clock
+        Says when a sync is due, and stamps marks and events that come without a time.
+    sync_every_s : float
+        Between syncs, s.
+    queue_bytes : int
+        Bound of the queue. What comes while it is full is counted, and told by an event in the log.
+    open_file : callable
+        Makes the log's file: the seam for tests.
+
+    Raises
+    ------
+    RunExists, WriteFailed
+        If the log cannot be begun.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        header: LogHeader,
+        clock: Clock,
+        *,
+        sync_every_s: float = 1.0,
+        queue_bytes: int = QUEUE_BYTES,
+        open_file: Callable[[Path], LogFile] = open_log_file,
+    ) -> None:
+        self._log = WireLogWriter(path, header, open_file=open_file)
+        self.path = self._log.path
+        self._clock = clock
+        self._sync_every_ns = int(sync_every_s * 1e9)
+        self._limit = queue_bytes
+        self._lock = threading.Lock()
+        self._more = threading.Condition(self._lock)
+        self._done = threading.Condition(self._lock)
+        self._queue: deque[_Item] = deque()
+        self._queued_bytes = 0
+        self._appending = False
+        self._overflows: dict[int, _Overflow] = {}
+        self._dropped_records = self._dropped_bytes = 0
+        self._error: WriteFailed | None = None
+        self._closing = self._closed = False
+        self._stop_sync = threading.Event()
+        self._appender = threading.Thread(target=self._append_all, name="springmass-log", daemon=True)
+        self._syncer = threading.Thread(target=self._sync_often, name="springmass-sync", daemon=True)
+        self._appender.start()
+        self._syncer.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def status(self) -> RecorderStatus:
+        """Where the recording stands; any thread may ask."""
+        with self._lock:
+            written, synced = self._log.written, self._log.synced
+            log = (written.records, written.bytes, synced.records, synced.bytes)
+            queue = (len(self._queue), self._queued_bytes, self._dropped_records, self._dropped_bytes)
+            return RecorderStatus(*log, *queue, str(self._error or ""), self._closed)
+
+    def put(self, channel: int, host_ns: int, data: bytes) -> None:
+        """Take the bytes of one read of a port; never waits for the disk, never raises for its sake."""
+        self._offer(_Item(Kind.DATA, channel, host_ns, data))
+
+    data = put  # as a sink calls it
+
+    def mark(self, text: str, *, host_ns: int | None = None, channel: int = 0) -> None:
+        """Take a mark."""
+        now = self._clock.now_ns() if host_ns is None else host_ns
+        self._offer(_Item(Kind.MARK, channel, now, text.encode("utf-8", "replace")))
+
+    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
+        """Take "lost", "reopened", "timeout", "trigger", "calibration" or another event, with facts about it."""
+        self._offer(_Item(Kind.EVENT, channel, host_ns, event_payload(kind, facts)))
+
+    def drain(self, *, sync: bool = False) -> RecorderStatus:
+        """Return when all that was put before is in the log, with ``sync`` on the disk; or the recording stopped."""
+        with self._done:
+            self._done.wait_for(lambda: self._error or not (self._queue or self._appending))
+        if sync:
+            self._sync()
+        return self.status
+
+    def close(self) -> None:
+        """Write what is queued, the end record, sync and close; again does no harm.
+
+        Raises
+        ------
+        WriteFailed
+            If the disk refused anything since the beginning. What had been written before stands.
+        """
+        with self._lock:
+            if self._closing:
+                return
+            self._closing = True
+            self._more.notify()
+        self._appender.join()
+        self._stop_sync.set()
+        self._syncer.join()
+        if self._error is None:
+            self._guarded(self._append_end)
+        self._sync()
+        self._guarded(self._log.close)
+        with self._lock:
+            self._closed = True
+        if self._error is not None:
+            raise self._error
+
+    def _offer(self, item: _Item) -> None:
+        if not 0 <= item.channel <= 255:
+            raise ValueError(f"a channel must lie in 0 to 255, got {item.channel}")
+        with self._lock:
+            open_ = self._error is None and not self._closing
+            # After an overflow nothing is taken before its event: records around a loss must not look like neighbours.
+            if open_ and not self._overflows and self._queued_bytes + item.size <= self._limit:
+                self._queue.append(item)
+                self._queued_bytes += item.size
+                self._more.notify()
+                return
+            self._dropped_records += 1
+            self._dropped_bytes += len(item.payload)
+            if open_:
+                lost = self._overflows.setdefault(item.channel, _Overflow(item.mono_ns, item.mono_ns))
+                lost.last_ns = item.mono_ns
+                lost.records += 1
+                lost.bytes += len(item.payload)
+                self._more.notify()
+
+    def _take(self) -> list[_Item]:
+        """Wait for records and take all of them; none when the recording closes.
+
+        What overflowed came after everything queued and before everything to come: its events stand in its place.
+        """
+        with self._lock:
+            self._appending = False
+            if not self._queue:
+                self._done.notify_all()
+            self._more.wait_for(lambda: self._queue or self._overflows or self._closing)
+            taken = [*self._queue, *(lost.event(channel) for channel, lost in self._overflows.items())]
+            self._queue.clear()
+            self._overflows.clear()
+            self._queued_bytes = 0
+            self._appending = bool(taken)
+            return taken
+
+    def _append_all(self) -> None:
+        while taken := self._take():
+            for number, item in enumerate(taken):
+                try:
+                    self._log.append(item.kind, item.payload, mono_ns=item.mono_ns, channel=item.channel)
+                except Exception as error:  # a defect, too, must stop the recording and not look like one
+                    self._stop(self._one_line(error), taken[number:])
+                    return
+
+    def _one_line(self, error: Exception) -> WriteFailed:
+        if isinstance(error, WriteFailed):
+            return error
+        return WriteFailed(self.path, f"a record could not be appended ({one_line(error)})", "report this defect")
+
+    def _stop(self, error: WriteFailed, left: list[_Item]) -> None:
+        """Keep what there is: what was appended can still be synced, though no more can be appended."""
+        with self._lock:
+            self._error = self._error or error
+            left += self._queue
+            self._queue.clear()
+            self._queued_bytes = 0
+            self._dropped_records += len(left)
+            self._dropped_bytes += sum(len(item.payload) for item in left)
+            self._appending = False
+            self._done.notify_all()
+        self._sync()
+
+    def _sync_often(self) -> None:
+        due = self._clock.now_ns() + self._sync_every_ns
+        # An event's wait and not the clock's: closing must not wait for the next sync.
+        while not self._stop_sync.wait(max(0, due - self._clock.now_ns()) * 1e-9):
+            due = max(due, self._clock.now_ns()) + self._sync_every_ns
+            if self._log.synced != self._log.written:
+                self._sync()
+
+    def _sync(self) -> None:
+        self._guarded(self._log.sync)
+
+    def _append_end(self) -> None:
+        counts = {"records": self._log.written.records, "dropped_records": self._dropped_records}
+        payload = json.dumps(counts | {"dropped_bytes": self._dropped_bytes}).encode("ascii")
+        self._log.append(Kind.END, payload, mono_ns=self._clock.now_ns())
+
+    def _guarded(self, step: Callable[[], object]) -> None:
+        """Do a step; the first thing that the disk refuses is kept for :meth:`close` to raise."""
+        try:
+            step()
+        except WriteFailed as error:
+            with self._lock:
+                self._error = self._error or error
+                self._done.notify_all()

@@ -1,0 +1,266 @@
+"""From a wire log, however torn, to a run file: at the end of every recording, and after a crash.
+
+The bytes go through the very chain that showed them live, so both give the same samples. The log itself travels
+inside the run file, bit for bit: nothing that decoding leaves out is lost.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.block import Block
+from acquisition.recording import Original, Trap
+from storage.errors import RunDamaged, RunExists, one_line
+from storage.wire_decode import Chain, Decoded, chain_of, decode_log
+from storage.wire_layout import Kind, LogHeader, Record, SensorEntry
+from storage.wire_read import Damage, LogContents, NotALog, parse_log
+
+__all__ = ["RecoverReport", "RecoveredRun", "recover"]
+
+
+@dataclass(frozen=True, slots=True)
+class RecoveredRun:
+    """One sensor's run file.
+
+    Parameters
+    ----------
+    sensor : SensorEntry
+    path : Path
+        The file, verified.
+    samples : int
+    faults : mapping of str to int
+        What the decoder counted.
+    """
+
+    sensor: SensorEntry
+    path: Path
+    samples: int
+    faults: Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class RecoverReport:
+    """What became of a log.
+
+    Parameters
+    ----------
+    log : Path
+    runs : tuple of RecoveredRun
+        One for each sensor.
+    damage : Damage
+        Of the log.
+    marks, events : int
+        Kept in the provenance of every run file.
+    log_removed : bool
+    """
+
+    log: Path
+    runs: tuple[RecoveredRun, ...]
+    damage: Damage
+    marks: int
+    events: int
+    log_removed: bool
+
+    def describe(self) -> Iterator[str]:
+        """Yield lines for people: one a run file, and one about the log."""
+        for run in self.runs:
+            faults = "".join(f", {count} {name.replace('_', ' ')}" for name, count in run.faults.items() if count)
+            yield f"{run.path}: {run.samples} samples from {self.log}{faults}"
+        yield f"{self.log}: {self.damage.describe()}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Log:
+    """A log as it was read, once, so that what is decoded and what is kept are the same bytes."""
+
+    original: Original
+    contents: LogContents
+    header: LogHeader
+    marks: tuple[Record, ...]
+    events: tuple[Record, ...]
+
+
+def recover(
+    log_path: str | os.PathLike[str],
+    out_path: str | os.PathLike[str] | None = None,
+    *,
+    overwrite: bool = False,
+    remove_log: bool = False,
+    header: LogHeader | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    chain_for: Callable[[SensorEntry], Chain] = chain_of,
+) -> RecoverReport:
+    """Build the run file of a log, or one for each sensor where several were recorded.
+
+    Parameters
+    ----------
+    log_path : str or PathLike
+        The log; finished, torn or damaged.
+    out_path : str or PathLike, optional
+        The run file; left out, the log's name with ``.h5``. With several sensors their channels come before the
+        suffix: ``run.0.h5``, ``run.1.h5``.
+    overwrite : bool
+        Whether run files that stand there may be replaced.
+    remove_log : bool
+        Whether the log goes once every run file holds it and verifies. Else it stays.
+    header : LogHeader, optional
+        Stands in where every copy in the log is lost.
+    provenance : mapping, optional
+        Goes into the run file besides what the log says: software, version, ...
+    chain_for : callable
+        Makes the chain of a sensor.
+
+    Raises
+    ------
+    NotALog
+        If there is no log, or nothing in it can be read.
+    RunExists, WriteFailed
+        If a run file stands there already or cannot be written. What stood there stands, and so does the log.
+    RunDamaged
+        If a run file just written does not read back as it should. The log stands.
+    """
+    log_path = Path(log_path)
+    log = _read(log_path, header)
+    sensors = _calibrated(log)
+    paths = _targets(log_path if out_path is None else Path(out_path), sensors)
+    if not overwrite:
+        _demand_free(paths)
+    decoded = decode_log(log.contents, sensors, chain_for)
+    runs = [_write(path, log, part, provenance or {}, overwrite) for path, part in zip(paths, decoded, strict=True)]
+    removed = remove_log and _remove(log_path, len(log.original.data))
+    return RecoverReport(log_path, tuple(runs), log.contents.damage, len(log.marks), len(log.events), removed)
+
+
+def _read(path: Path, stand_in: LogHeader | None) -> _Log:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        demand = f"a wire log was demanded, got no file that can be read ({error.strerror or one_line(error)})"
+        raise NotALog(path, demand, "name a file that springmass record left behind") from error
+    contents = parse_log(data, path)
+    header = contents.header or stand_in
+    if header is None:
+        if not contents.damage.records:
+            raise NotALog(path, f"a wire log was demanded, got {len(data)} bytes without one record", "name another")
+        demand = f"the log's header is lost in all its copies ({contents.damage.describe()})"
+        raise NotALog(path, demand, "say which sensors were recorded")
+    told = [record for record in contents if record.kind in (Kind.MARK, Kind.EVENT)]
+    marks, events = (tuple(r for r in told if r.kind is kind) for kind in (Kind.MARK, Kind.EVENT))
+    return _Log(Original(path.name, data), contents, header, marks, events)
+
+
+def _calibrated(log: _Log) -> tuple[SensorEntry, ...]:
+    """Return the sensors, each with the last calibration that the log tells of."""
+    told = {}
+    for event in log.events:
+        content = event.json()
+        if content.get("kind") == "calibration":
+            told[event.channel] = content.get("facts", {})
+    return tuple(
+        dataclasses.replace(sensor, calibration=told.get(sensor.channel, sensor.calibration))
+        for sensor in log.header.sensors
+    )
+
+
+def _targets(path: Path, sensors: Sequence[SensorEntry]) -> list[Path]:
+    path = path if path.suffix == ".h5" else path.with_suffix(".h5")
+    if len(sensors) == 1:
+        return [path]
+    return [path.with_name(f"{path.stem}.{sensor.channel}{path.suffix}") for sensor in sensors]
+
+
+def _demand_free(paths: Sequence[Path]) -> None:
+    """Look before the work; the writing itself refuses what comes meanwhile."""
+    for path in paths:
+        if os.path.lexists(path):
+            demand = "a new run file was to be written, but a file stands there"
+            raise RunExists(path, demand, "choose another name or allow overwriting")
+
+
+def _write(path: Path, log: _Log, decoded: Decoded, provenance: Mapping[str, Any], overwrite: bool) -> RecoveredRun:
+    # h5py takes longer to import than a short log to read.
+    from storage.run import open_run
+    from storage.write import write_run
+
+    samples, header = decoded.samples, log.header
+    told = dict(decoded.chain.report(samples.t, _host_ns(samples)))
+    faults = {str(name): int(count) for name, count in told.get("faults", {}).items()}
+    write_run(
+        path,
+        [samples],
+        decoded.chain.info(decoded.sensor.port, header.kind),
+        originals=[log.original],
+        scene=header.scene,
+        title=header.title,
+        traps=_traps(log.contents.damage),
+        malformed_rows=sum(count for name, count in faults.items() if not name.endswith("bytes")),
+        format="wire",
+        provenance={**_provenance(log, decoded), "decoding": told, **provenance},
+        overwrite=overwrite,
+    )
+    with open_run(path) as run:
+        run.verify()
+        if run.originals() != (log.original,):
+            raise RunDamaged(path, "the log inside is not the log that was read", "keep the log and recover it again")
+    return RecoveredRun(decoded.sensor, path, len(samples), faults)
+
+
+def _host_ns(samples: Block) -> Any:
+    return np.empty(0, np.int64) if samples.host_ns is None else samples.host_ns
+
+
+def _provenance(log: _Log, decoded: Decoded) -> dict[str, Any]:
+    header, damage = log.header, log.contents.damage
+    origin = _origin_ns(decoded.samples, header)
+
+    def at(record: Record) -> dict[str, Any]:
+        return {"mono_ns": record.mono_ns, "t_s": (record.mono_ns - origin) * 1e-9, "channel": record.channel}
+
+    return {
+        "start_time": header.utc(origin),
+        "clock_map": {"mono_ns": header.mono_ns, "unix_ns": header.unix_ns, "t0_mono_ns": origin},
+        "recorded_with": header.version,
+        "sensor": dataclasses.asdict(decoded.sensor),
+        "reads": decoded.reads,
+        "log": {"name": log.original.name, "sha256": log.original.sha256, **dataclasses.asdict(damage)},
+        "marks": [{**at(mark), "text": mark.text()} for mark in log.marks],
+        "events": [{**at(event), **event.json()} for event in log.events],
+    }
+
+
+def _origin_ns(samples: Block, header: LogHeader) -> int:
+    """Return the host's clock at t = 0: a stamp may come late, never early, so of the first ones the earliest.
+
+    Those after the first thousand would bring in the difference of the two clocks' rates.
+    """
+    if samples.host_ns is None or not len(samples):
+        return header.mono_ns
+    first = slice(0, 1000)
+    late_ns = samples.host_ns[first] - np.rint(samples.t[first] * 1e9).astype(np.int64)
+    return int(late_ns.min())
+
+
+def _traps(damage: Damage) -> list[Trap]:
+    found = []
+    if not damage.intact:
+        found.append(Trap("damaged_log", f"The wire log is damaged: {damage.describe()}.", max(1, damage.lost)))
+    if not damage.ended:
+        found.append(Trap("cut_short", "The recording did not end by itself; what the log holds is here."))
+    return found
+
+
+def _remove(path: Path, size: int) -> bool:
+    """Remove a log whose every byte is in a run file that verifies; one that grew meanwhile stays."""
+    with contextlib.suppress(OSError):
+        if path.stat().st_size == size:
+            path.unlink()
+            return True
+    return False

@@ -1,0 +1,253 @@
+"""``springmass record`` and ``recover`` over a pseudo-terminal: the real serial code, a simulated sensor."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import tty
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.clock import SystemClock
+from acquisition.decoders.registry import families, get_family
+from acquisition.virtual import VirtualRangefinder, VirtualSensor
+from acquisition.virtual_port import VirtualPort
+from pipeline.analyse import Motion, analyse
+from springmass import load
+from storage.run import open_run
+
+SCENE = """
+[bob]
+mass_kg = 0.05
+[spring]
+constant_n_per_m = 14.0
+[start]
+displacement_m = 0.05
+[damping]
+gamma_per_s = 0.01
+"""
+OMEGA = (14.0 / 0.05) ** 0.5
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    """Return the scene of a bob that swings 2.7 times a second."""
+    path = tmp_path / "bench.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture
+def silent_port() -> Iterator[str]:
+    """Return a port on which nobody speaks."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    yield os.ttyname(slave)
+    os.close(slave)
+    os.close(master)
+
+
+def speaking(family: str, seconds: float = 30.0, rate_hz: float = 100.0) -> VirtualPort:
+    """Return a simulated sensor of a bob that swings, not started."""
+    finder = VirtualRangefinder(
+        lambda t: 0.4 + 0.05 * np.cos(OMEGA * t), VirtualSensor(rate_hz=rate_hz), np.random.default_rng(5)
+    )
+    return VirtualPort(get_family(family), finder, SystemClock(), seconds=seconds)
+
+
+def test_a_simulated_run_becomes_a_run_file_with_its_truth(cli: Callable, tmp_path: Path, scene: Path) -> None:
+    """Three seconds at 100 Hz give at least 300 samples, none lost, labelled simulated, with the scene's frequency."""
+    done = cli("record", "--simulate", scene, "--seconds", "3", "-o", tmp_path / "run.h5")
+    assert done.code == 0, done.err
+    loaded = load(tmp_path / "run.h5")
+    assert loaded.info.kind == "simulated"
+    assert loaded.info.clock == "device"
+    assert 295 <= len(loaded.samples) <= 310
+    np.testing.assert_allclose(np.diff(loaded.samples.t), 0.01, atol=1e-9)
+    motion = analyse(loaded.track).motion
+    assert isinstance(motion, Motion)
+    omega = motion.derived.statistical["angular_frequency"]
+    assert abs(omega.value - OMEGA) < 4.0 * omega.u
+    assert not (tmp_path / "run.wire").exists()
+
+
+def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Callable, tmp_path: Path, scene: Path) -> None:
+    """The log that travels inside a run gives the same samples through the same decoders."""
+    assert cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / "run.h5").code == 0
+    with open_run(tmp_path / "run.h5") as run:
+        (log,) = run.originals()
+        first = run.samples()
+    (tmp_path / "again.wire").write_bytes(log.data)
+    assert cli("recover", tmp_path / "again.wire").code == 0
+    with open_run(tmp_path / "again.h5") as run:
+        second = run.samples()
+    for name in ("t", "distance", "flags", "host_ns"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+@pytest.mark.parametrize("name", ["run.h5", "run.wire"])
+def test_nothing_is_ever_recorded_over(cli: Callable, tmp_path: Path, scene: Path, name: str) -> None:
+    """Where the run file or its log exists the command ends before it opens anything."""
+    (tmp_path / name).write_bytes(b"precious")
+    done = cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / "run.h5")
+    assert done.code == 2
+    assert "never replaces" in done.complaint
+    assert (tmp_path / name).read_bytes() == b"precious"
+
+
+def test_an_absent_port_is_named_with_those_that_are_there(cli: Callable, tmp_path: Path) -> None:
+    """A port that does not exist: one line, exit code 4, no file."""
+    done = cli("record", "--port", "/dev/ttyNONE7", "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
+    assert done.code == 4
+    assert "no such port" in done.complaint
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_busy_port_is_called_busy(cli: Callable, tmp_path: Path) -> None:
+    """A port that another program holds: one line, exit code 4."""
+    with speaking("line-protocol") as sensor:
+        from acquisition.serial_port import SerialPort
+
+        holder = SerialPort(sensor.path, 115200)
+        done = cli("record", "--port", sensor.path, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
+        holder.close()
+    assert done.code == 4
+    assert "busy" in done.complaint
+
+
+def test_silence_is_told_before_a_run_starts(cli: Callable, tmp_path: Path, silent_port: str) -> None:
+    """A port on which nothing comes: one line, exit code 4, and no log is left behind."""
+    done = cli("record", "--port", silent_port, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
+    assert done.code == 4
+    assert "not a byte came" in done.complaint
+    assert not list(tmp_path.iterdir())
+
+
+def test_another_sensor_is_recognised_by_its_bytes(cli: Callable, tmp_path: Path) -> None:
+    """Bytes of another family: the line says what they look like, exit code 4."""
+    with speaking("ffhls") as sensor:
+        sensor.start()
+        done = cli("record", "--port", sensor.path, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
+    assert done.code == 4
+    assert "looks like" in done.complaint
+    assert "FF" in done.complaint
+
+
+def test_an_unknown_sensor_is_refused_with_the_known_ones(cli: Callable, tmp_path: Path) -> None:
+    """A family that does not exist: one line that lists all, exit code 2."""
+    done = cli("record", "--port", "/dev/null", "--sensor", "sonar", "-o", tmp_path / "run.h5")
+    assert done.code == 2
+    assert all(family.name in done.complaint for family in families())
+
+
+def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
+    """Several sensors in one run: one log, a run file each, both complete."""
+    with speaking("line-protocol") as one, speaking("ffhls") as other:
+        one.start()
+        other.start()
+        done = cli(
+            *("record", "--port", one.path, "--sensor", "line-protocol", "--port", other.path, "--sensor", "ffhls"),
+            *("--rate-hz", "100", "--seconds", "1", "-o", tmp_path / "run.h5"),
+        )
+    assert done.code == 0, done.err
+    for channel, family in enumerate(("line-protocol", "ffhls")):
+        loaded = load(tmp_path / f"run.{channel}.h5")
+        assert len(loaded.samples) >= 95, family
+        assert np.nanmin(loaded.samples.distance) > 0.3
+
+
+def test_a_trigger_keeps_the_seconds_before_it(cli: Callable, tmp_path: Path, scene: Path) -> None:
+    """A run that starts when the bob moves holds samples from before that, and says so in its provenance."""
+    done = cli(
+        *("record", "--simulate", scene, "--trigger", "0.09", "--pre", "0.3", "--seconds", "1"),
+        *("-o", tmp_path / "run.h5"),
+    )
+    assert done.code == 0, done.err
+    with open_run(tmp_path / "run.h5") as run:
+        assert len(run) >= 115
+        assert "trigger" in json.dumps(dict(run.provenance))
+
+
+def test_a_moving_bob_is_no_rest_position(cli: Callable, tmp_path: Path, scene: Path) -> None:
+    """--still on a bob that swings: one line that says so, exit code 4, no run."""
+    done = cli("record", "--simulate", scene, "--still", "1", "--seconds", "1", "-o", tmp_path / "run.h5")
+    assert done.code == 4
+    assert "the bob moves" in done.err.splitlines()[-1]
+    assert not (tmp_path / "run.h5").exists()
+
+
+def test_a_scene_without_a_spring_simulates_nothing(cli: Callable, tmp_path: Path) -> None:
+    """The line names what the scene lacks, exit code 2."""
+    path = tmp_path / "poor.toml"
+    path.write_text("[bob]\nmass_kg = 0.2\n")
+    done = cli("record", "--simulate", path, "-o", tmp_path / "run.h5")
+    assert done.code == 2
+    assert "constant_n_per_m" in done.complaint
+
+
+def start(scene: Path, out: Path) -> subprocess.Popen[str]:
+    """Start a recording that would not end by itself, and return when it has kept its first second."""
+    child = subprocess.Popen(
+        [sys.executable, "-m", "springmass", "record", "--simulate", str(scene), "-o", str(out)],
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        text=True,
+    )
+    assert child.stderr is not None
+    assert " s | " in child.stderr.readline()
+    return child
+
+
+def test_ctrl_c_closes_the_run_cleanly(tmp_path: Path, scene: Path) -> None:
+    """SIGINT: the run file is complete up to there, exit code 130."""
+    child = start(scene, tmp_path / "run.h5")
+    child.send_signal(signal.SIGINT)
+    _, told = child.communicate(timeout=30)
+    assert child.returncode == 130, told
+    assert "Traceback" not in told
+    with open_run(tmp_path / "run.h5") as run:
+        run.verify()
+        assert len(run) >= 95
+
+
+def test_a_killed_recording_is_recovered_from_its_log(cli: Callable, tmp_path: Path, scene: Path) -> None:
+    """After kill -9 the log gives a run file with the first second whole."""
+    child = start(scene, tmp_path / "run.h5")
+    child.kill()
+    child.communicate(timeout=30)
+    assert not (tmp_path / "run.h5").exists()
+    done = cli("recover", tmp_path / "run.wire")
+    assert done.code == 0, done.err
+    with open_run(tmp_path / "run.h5") as run:
+        samples = run.samples()
+    assert len(samples) >= 95
+    np.testing.assert_allclose(np.diff(samples.t), 0.01, atol=1e-9)
+    assert (tmp_path / "run.wire").exists()
+
+
+def test_sensors_are_listed_with_their_limits(cli: Callable) -> None:
+    """Every family stands in the list and in its JSON, with rate, resolution, range and limits."""
+    text = cli("sensors").out
+    (table,) = cli("sensors", "--json").results
+    assert {row["name"] for row in table} == {family.name for family in families()}
+    for row in table:
+        assert row["name"] in text
+        assert row["rate_hz"] > 0
+        assert row["range_m"][0] < row["range_m"][1]
+        assert row["limits"]
+
+
+def test_a_port_is_probed(cli: Callable) -> None:
+    """Listening to a port says which family speaks on it."""
+    with speaking("line-protocol") as sensor:
+        sensor.start()
+        (rows,) = cli("ports", "--port", sensor.path, "--json").results
+    (row,) = [row for row in rows if row["device"] == sensor.path]
+    assert row["families"][0] == "line-protocol"

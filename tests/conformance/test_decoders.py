@@ -1,0 +1,461 @@
+"""The rules that every family of rangefinders keeps; a new one joins by adding its cases to ``CASES``.
+
+Where a frame carries a checksum, no flipped bit may make a reading. Where it carries none, what is guaranteed is less
+and held here as well: one flip spoils at most two readings, and the ones after are as sent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, cast
+
+import numpy as np
+import pytest
+
+from acquisition.block import Flag
+from acquisition.decoders.base import Decoder, Family, Polled
+from acquisition.decoders.example import FAMILY as EXAMPLE
+from acquisition.decoders.registry import families, get_family
+from acquisition.readings import Readings, join
+
+N = 24
+_I = np.arange(N)
+DISTANCE = np.where(_I % 7 == 5, np.nan, 0.8 + 0.4 * np.sin(1.3 * _I))
+ECHO_US = 2e6 * DISTANCE / 343.0
+TEMPERATURE_C = 18.0 + 0.25 * _I
+SEQUENCE = 4_294_967_290 + _I  # wraps midway where the device's counter has 32 bits
+DEVICE_US = 10_000 * _I + 7
+MOST_PENDING = 512
+
+
+@dataclass(frozen=True)
+class Case:
+    """A family, options of it, and what it promises.
+
+    Parameters
+    ----------
+    family : str
+        Name in the registry.
+    step_m : float
+        Rounding of a distance on the wire, m (or of an echo time, as a distance).
+    changes : str
+        "detected" by a checksum, or "unseen".
+    options : mapping
+        Of decoder and encoder.
+    lead : int
+        Readings lost at the start, because nothing shows that the first was received from its beginning.
+    known : mapping of bytes to float
+        Frames of a data sheet with their distance, m.
+    no_target : tuple of bytes
+        Frames that say that nothing was there.
+    """
+
+    family: str
+    step_m: float
+    changes: Literal["detected", "unseen"]
+    options: Mapping[str, Any] = field(default_factory=dict)
+    lead: int = 0
+    known: Mapping[bytes, float] = field(default_factory=dict)
+    no_target: tuple[bytes, ...] = ()
+
+    @property
+    def member(self) -> Family:
+        """The family; the template's is in no registry."""
+        return EXAMPLE if self.family == "example" else get_family(self.family)
+
+    def decoder(self) -> Decoder:
+        """Return a fresh decoder."""
+        return self.member.decoder(**self.options)
+
+    def frames(self, distance: np.ndarray[Any, np.dtype[np.float64]] = DISTANCE) -> list[bytes]:
+        """Return the bytes of each reading; a polled temperature stands before the distance that it goes with."""
+        encoder = self.member.encoder(**self.options)
+        every = int(self.options.get("temperature_every", 0))
+
+        def encode(i: int) -> bytes:
+            return encoder.encode(
+                sequence=int(SEQUENCE[i]),
+                device_us=int(DEVICE_US[i]),
+                echo_us=2e6 * float(distance[i]) / 343.0,
+                distance_m=float(distance[i]),
+                temperature_c=float(TEMPERATURE_C[i]),
+            )
+
+        return [(encode(i) if every and i and i % every == 0 else b"") + encode(i) for i in range(len(distance))]
+
+
+def hexed(text: str) -> bytes:
+    """Return bytes written in hex."""
+    return bytes.fromhex(text)
+
+
+CASES = [
+    Case("line-protocol", 343 * 0.25e-6 / 2, "detected", no_target=(b"$R1,2,1020001,,2130,N*AAE6\n",)),
+    Case("maxbotix-lv", 0.0254, "unseen", known={b"R012\r": 12 * 0.0254}, no_target=(b"R255\r", b"R000\r")),
+    Case("maxbotix-lv-p", 0.0254, "unseen", known={b"R012 P1\r": 12 * 0.0254, b"R006\r": 6 * 0.0254}),
+    Case("maxbotix-xl", 0.01, "unseen", known={b"R123\r": 1.23}, no_target=(b"R765\r",)),
+    Case("maxbotix-xl-long", 0.01, "unseen", known={b"R0123\r": 1.23}, no_target=(b"R1068\r",)),
+    Case("maxbotix-hr", 0.001, "unseen", known={b"R1234 \r": 1.234, b"R0300\r": 0.3}, no_target=(b"R5000\r",)),
+    Case("maxbotix-wr", 0.001, "unseen", known={b"R1234\r": 1.234}, no_target=(b"R4999\r", b"R9999\r")),
+    Case(
+        "ffhls",
+        0.001,
+        "detected",
+        known={hexed("ff07a1a7"): 1.953},
+        no_target=(hexed("ff0000ff"), hexed("fffffdfb"), hexed("fffffefc")),
+    ),
+    Case("us100", 0.001, "unseen", known={hexed("07a1"): 1.953}, no_target=(hexed("0000"), hexed("ffff"))),
+    Case("us100", 0.001, "unseen", {"temperature_every": 3}),
+    Case("urm37", 0.01, "detected", known={hexed("220123 46"): 2.91}, no_target=(hexed("22ffff20"),)),
+    Case("urm37", 0.01, "detected", {"temperature_every": 4}),
+    Case(
+        "sen0149", 0.001, "detected", known={hexed("55aa110202 1234 5a"): 4.66}, no_target=(hexed("55aa110202ffff12"),)
+    ),
+    Case("sen0149", 0.001, "detected", {"temperature_every": 4}),
+    Case("text-lines", 1e-6, "unseen", lead=1, known={b"123.4\n": 1.234}, no_target=(b"0\r\n", b"-1\n")),
+    Case("text-lines", 1e-6, "unseen", {"unit": "us"}, lead=1, no_target=(b"0\n", b"38000\n")),
+    Case(
+        "text-lines",
+        1e-6,
+        "unseen",
+        {"unit": "mm", "column": 2, "separator": ";", "sequence": 0, "time": 1, "temperature": 3},
+        lead=1,
+        known={b"7;70000;253;21.5\r\n": 0.253},
+    ),
+    Case(
+        "text-lines",
+        1e-6,
+        "unseen",
+        {"unit": "in", "column": "d", "time": "t", "time_unit": "ms"},
+        lead=1,
+        known={b"t=70 d=10\n": 0.254, b"t: 70, d: 10 in\n": 0.254},
+    ),
+    Case("example", 0.001, "detected", known={b":0253,CA\n": 0.253}, no_target=(b":0000,C0\n",)),
+]
+
+every_case = pytest.mark.parametrize(
+    "case", CASES, ids=lambda case: "-".join([case.family, *map(str, case.options.values())])
+)
+
+
+def run(case: Case, *reads: bytes) -> tuple[Readings, Decoder]:
+    """Feed reads to a fresh decoder, return all it gave and the decoder."""
+    decoder = case.decoder()
+    return join([decoder.feed(1_000 + i, data) for i, data in enumerate(reads)]), decoder
+
+
+def columns(readings: Readings, rows: slice = slice(None)) -> dict[str, bytes]:
+    """Return every column but the host's time, as bytes."""
+    names = [f.name for f in fields(Readings) if f.name != "host_ns"]
+    return {name: getattr(readings, name)[rows].tobytes() for name in names}
+
+
+def in_metres(readings: Readings) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return distances, echo times turned into them as the encoder's were made."""
+    return np.where(np.isnan(readings.echo_us), readings.distance_m, readings.echo_us * 343.0 / 2e6)
+
+
+def flushes(case: Case) -> bool:
+    """Tell whether the reader must flush after garbage, because bytes alone do not show where a frame begins."""
+    return not case.member.self_framing
+
+
+def test_every_family_of_the_registry_has_a_case() -> None:
+    """A family without a case is not held to the rules."""
+    assert {family.name for family in families()} | {"example"} == {case.family for case in CASES}
+
+
+@every_case
+def test_what_was_encoded_is_decoded(case: Case) -> None:
+    """Distances come back to the rounding of the wire, and no target as NaN with its flag."""
+    readings, decoder = run(case, b"".join(case.frames()))
+    assert len(readings) == N - case.lead
+    np.testing.assert_allclose(in_metres(readings), DISTANCE[case.lead :], atol=case.step_m / 2 + 1e-9)
+    np.testing.assert_array_equal(readings.flags, np.where(np.isnan(DISTANCE[case.lead :]), Flag.MISSING, 0))
+    assert decoder.pending == 0
+    assert sum(decoder.faults.values()) == 0 or case.lead
+
+
+@every_case
+def test_device_time_and_counter_come_back(case: Case) -> None:
+    """Where the family has them; -1 where it has none."""
+    readings, _ = run(case, b"".join(case.frames()))
+    own = case.member.has_device_time
+    if own or "sequence" in case.options:
+        np.testing.assert_array_equal(readings.sequence, SEQUENCE[case.lead :] % (1 << 32 if own else 1 << 62))
+    else:
+        assert (readings.sequence == -1).all()
+    if own or "time" in case.options:
+        np.testing.assert_array_equal(readings.device_us, DEVICE_US[case.lead :])
+    else:
+        assert (readings.device_us == -1).all()
+
+
+@every_case
+def test_temperatures_come_back(case: Case) -> None:
+    """With each reading where the wire carries them so, with the next distance where they are asked for apart."""
+    readings, _ = run(case, b"".join(case.frames()))
+    every = int(case.options.get("temperature_every", 0))
+    expected = np.full(N, np.nan)
+    if case.family == "line-protocol" or "temperature" in case.options:
+        expected = TEMPERATURE_C
+    elif every:
+        expected = np.where((_I > 0) & (_I % every == 0), TEMPERATURE_C, np.nan)
+    step = 1.0 if case.family == "us100" else 0.1
+    np.testing.assert_allclose(readings.temperature_c, expected[case.lead :], atol=step / 2 + 1e-9)
+
+
+@every_case
+def test_columns_have_their_types(case: Case) -> None:
+    """Arrays of one length, of the types that Readings says, also for one frame and for none."""
+    frames = case.frames()
+    for size in (0, 1 + case.lead, N):
+        readings, _ = run(case, b"".join(frames[:size]))
+        types = [getattr(readings, f.name).dtype for f in fields(Readings)]
+        assert types == [np.int64] * 3 + [np.float64] * 3 + [np.uint8]
+        assert {getattr(readings, f.name).size for f in fields(Readings)} == {max(size - case.lead, 0)}
+
+
+@every_case
+def test_frames_carry_the_time_of_the_read_that_completed_them(case: Case) -> None:
+    """All of one read the same; a frame cut in two the later."""
+    frames = case.frames()
+    half = len(frames[3]) // 2
+    decoder = case.decoder()
+    first = decoder.feed(111, b"".join(frames[:3]) + frames[3][:half])
+    second = decoder.feed(222, frames[3][half:] + frames[4])
+    assert first.host_ns.tolist() == [111] * (3 - case.lead)
+    assert second.host_ns.tolist() == [222] * 2
+
+
+@every_case
+def test_frames_of_the_data_sheet_are_read(case: Case) -> None:
+    """Distances as the maker's examples say."""
+    lead = b"\n" if case.lead else b""
+    for frame, distance in case.known.items():
+        readings, _ = run(case, lead + frame)
+        np.testing.assert_allclose(in_metres(readings), [distance], rtol=1e-12)
+
+
+@every_case
+def test_no_target_is_a_missing_sample_and_never_a_distance(case: Case) -> None:
+    """Codes of the data sheet, and what the encoder writes."""
+    lead = b"\n" if case.lead else b""
+    for frame in [*case.no_target, *case.frames(np.full(4, np.nan))]:
+        readings, _ = run(case, lead + frame)
+        if len(frame) == 1:  # a temperature
+            continue
+        assert readings.flags.tolist() == [Flag.MISSING], frame
+        assert np.isnan(readings.distance_m).all()
+        assert np.isnan(readings.echo_us).all()
+
+
+def dirty(case: Case, seed: int) -> bytes:
+    """Return a stream with garbage, lost bytes and flips in it."""
+    rng = np.random.default_rng(seed)
+    data = bytearray(b"".join(case.frames()))
+    for _ in range(6):
+        at = int(rng.integers(len(data)))
+        kind = rng.integers(3)
+        if kind == 0:
+            data[at:at] = rng.bytes(int(rng.integers(1, 12)))
+        elif kind == 1:
+            del data[at]
+        else:
+            data[at] ^= 1 << int(rng.integers(8))
+    return bytes(data)
+
+
+@every_case
+@pytest.mark.parametrize("state", ["clean", "dirty", "long"])
+def test_readings_do_not_depend_on_how_the_stream_was_cut(case: Case, state: str) -> None:
+    """Cut at every place, into single bytes, and at random: the same readings and the same faults."""
+    frames = case.frames()
+    long = [*frames[:3], b"x" * 300, *frames[3:6], b"x" * 300]  # more than any line may have, before a frame
+    data = {"clean": b"".join(frames), "dirty": dirty(case, 5), "long": b"".join(long)}[state]
+    whole, decoder = run(case, data)
+    expected = (columns(whole), dict(decoder.faults), decoder.pending)
+    rng = np.random.default_rng(6)
+    cuts = [[at] for at in range(len(data) + 1)]
+    cuts += [list(range(1, len(data)))]
+    cuts += [sorted(rng.integers(0, len(data), 9).tolist()) for _ in range(30)]
+    for cut in cuts:
+        reads = [data[a:b] for a, b in zip([0, *cut], [*cut, len(data)], strict=True)]
+        readings, decoder = run(case, *reads)
+        assert (columns(readings), dict(decoder.faults), decoder.pending) == expected, cut
+
+
+def garbage(seed: int) -> bytes:
+    """Return noise as a wrong baud rate, a cable or a start-up banner makes it."""
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(1, 40))
+    kinds = [rng.bytes(size), b"\xff" * size, b"\0" * size, b"MaxSonar-WR PN:7\rv"[:size], b"R$FF:\x22\x55"[:size]]
+    return kinds[seed % len(kinds)]
+
+
+@every_case
+@pytest.mark.parametrize("at", [0, 9, N], ids=["before", "between", "after"])
+def test_back_in_step_within_two_frames_of_garbage(case: Case, at: int) -> None:
+    """What came before the garbage stands, and from the third frame after it on every one is read as sent."""
+    frames = case.frames()
+    clean, _ = run(case, b"".join(frames))
+    for seed in range(100):
+        decoder = case.decoder()
+        before = decoder.feed(0, b"".join(frames[:at]))
+        decoder.feed(1, garbage(seed))
+        if flushes(case):
+            decoder.flush()
+            # A flush begins the cycle of requests anew, as the poller does.
+            clean, _ = run(case, b"".join(frames[:at]))
+            after = decoder.feed(2, b"".join(case.frames()[: N - at]))
+            sent, _ = run(case, b"".join(case.frames()[: N - at]))
+            assert columns(before) == columns(clean)
+        else:
+            after = decoder.feed(2, b"".join(frames[at:]))
+            assert columns(before) == columns(clean, slice(0, max(at - case.lead, 0)))
+            sent = clean
+        left = min(N - at, len(sent)) - 2
+        if left > 0:
+            assert columns(after, slice(-left, None)) == columns(sent, slice(-left, None)), garbage(seed)
+
+
+@every_case
+def test_back_in_step_within_two_frames_of_a_lost_byte(case: Case) -> None:
+    """Whichever byte is lost, at most two readings are; without marks, once the late reply is flushed."""
+    frames = case.frames()
+    clean, _ = run(case, b"".join(frames))
+    start = sum(map(len, frames[:8]))
+    for at in range(start, start + len(frames[8])):
+        data = b"".join(frames)
+        if flushes(case):
+            decoder = case.decoder()
+            decoder.feed(0, data[start:at] + data[at + 1 : start + len(frames[8])])
+            decoder.flush()
+            assert columns(decoder.feed(0, b"".join(frames))) == columns(clean)
+            continue
+        readings, _ = run(case, data[:at] + data[at + 1 :])
+        left = N - 8 - 2
+        assert len(readings) >= len(clean) - 2
+        assert columns(readings, slice(-left, None)) == columns(clean, slice(-left, None)), at
+
+
+@every_case
+def test_a_flipped_bit_makes_no_reading_or_costs_no_more_than_two(case: Case) -> None:
+    """With a checksum nothing that was not sent is read; without, one flip changes at most two readings."""
+    frames = case.frames()[:10]
+    data = b"".join(frames)
+    clean, _ = run(case, data)
+    sent = set(zip(clean.sequence.tolist(), in_metres(clean).tolist(), strict=True))
+    for bit in range(len(data) * 8):
+        flipped = bytearray(data)
+        flipped[bit // 8] ^= 1 << bit % 8
+        readings, decoder = run(case, bytes(flipped))
+        rows = zip(readings.sequence.tolist(), in_metres(readings).tolist(), strict=True)
+        strange = [row for row in rows if row not in sent and not math.isnan(row[1])]
+        assert len(strange) <= (0 if case.changes == "detected" else 2), (bit, strange)
+        assert abs(len(clean) - len(readings)) <= (2 if case.member.self_framing else 3)
+        if case.changes == "detected":
+            assert sum(decoder.faults.values()) or decoder.pending
+
+
+@every_case
+def test_every_byte_of_noise_is_accounted_for(case: Case) -> None:
+    """What is no frame is counted, and what is held is known."""
+    if not case.member.self_framing:
+        pytest.skip("any two bytes are a reply")
+    noise = np.random.default_rng(3).bytes(5000)
+    readings, decoder = run(case, noise)
+    assert len(readings) == 0
+    blank = decoder.faults.get("blank_line", 0)
+    assert decoder.faults["garbage_bytes"] + decoder.pending + blank == len(noise)
+
+
+@every_case
+def test_a_flush_forgets_the_frame_that_has_begun(case: Case) -> None:
+    """Its rest is no frame, what comes after is read, and a flush of nothing counts nothing."""
+    frames = case.frames()
+    decoder = case.decoder()
+    decoder.flush()
+    assert sum(decoder.faults.values()) == 0
+    decoder.feed(0, b"".join(frames[:2]) + frames[2][:1])
+    assert decoder.pending == 1
+    faults = sum(decoder.faults.values())
+    decoder.flush()
+    assert decoder.pending == 0
+    assert sum(decoder.faults.values()) > faults
+    fresh, _ = run(case, b"".join(frames))
+    assert columns(decoder.feed(0, b"".join(frames))) == columns(fresh)
+
+
+@every_case
+@pytest.mark.parametrize("filler", [b"\xff", b"\0", b"1", b"R", b"$", b"\x55\xaa", b"noise"], ids=repr)
+def test_memory_is_bounded_on_a_stream_without_frame_ends(case: Case, filler: bytes) -> None:
+    """A quarter of a mebibyte of anything leaves a few hundred bytes behind, in small reads or large."""
+    decoder = case.decoder()
+    for size in [1] * 600 + [4096] * 64:
+        decoder.feed(0, (filler * size)[:size])
+        assert decoder.pending <= MOST_PENDING
+
+
+@every_case
+def test_what_it_gave_does_not_change_when_it_goes_on(case: Case) -> None:
+    """Readings handed out are no views of what the decoder still uses."""
+    frames = case.frames()
+    decoder = case.decoder()
+    first = decoder.feed(0, b"".join(frames[:5]))
+    kept = columns(first)
+    second = decoder.feed(0, b"".join(frames[5:]))
+    second.distance_m[:] = 7
+    second.temperature_c[:] = 7
+    assert columns(first) == kept
+    assert not (decoder.feed(0, b"".join(frames)).distance_m == 7).any()
+
+
+POLLED = [case for case in CASES if case.member.poll is not None]
+
+
+def conversation(case: Case, lost: frozenset[int]) -> Iterator[tuple[bytes, Readings]]:
+    """Ask forty times as the reader does; replies of the numbers in ``lost`` never come."""
+    decoder = cast(Polled, case.decoder())
+    encoder = cast(Any, case.member.encoder(**case.options))
+    for i in range(40):
+        request = decoder.request
+        reply = encoder.reply(request, distance_m=0.5 + 0.01 * i, temperature_c=float(i))
+        if i in lost:
+            decoder.feed(i, reply[:-1])
+            decoder.flush()
+            continue
+        assert decoder.pending == 0
+        yield request, decoder.feed(i, reply)
+
+
+@pytest.mark.parametrize("case", POLLED, ids=lambda case: f"{case.family}-{len(case.options)}")
+def test_a_polled_sensor_is_asked_in_turn(case: Case) -> None:
+    """Distances, and after as many as asked for a temperature; a lost reply of either kind shifts nothing."""
+    poll = case.member.poll
+    assert poll is not None
+    every = int(case.options.get("temperature_every", 0))
+    for lost in (frozenset[int](), frozenset({0, 7, 8, 15, 21}), frozenset(range(0, 40, 3))):
+        talk = list(conversation(case, lost))
+        readings = join([given for _, given in talk])
+        asked = [request for request, _ in talk]
+        assert len(readings) == asked.count(poll.request)
+        assert not readings.flags.any()
+        assert (np.abs(in_metres(readings) - 0.7) < 0.21).all()
+        assert bool(np.isfinite(readings.temperature_c).any()) is (every > 0 and asked.count(poll.request) < len(asked))
+
+
+def test_out_of_step_the_us100_gives_no_distance_and_finds_back() -> None:
+    """A surplus byte shifts every reply; two impossible distances in a row give it away."""
+    distances = 0.300 + 0.001 * np.arange(20)
+    encoder = get_family("us100").encoder()
+    data = b"".join(
+        encoder.encode(sequence=0, device_us=0, echo_us=math.nan, distance_m=d, temperature_c=20.0) for d in distances
+    )
+    decoder = get_family("us100").decoder()
+    readings = decoder.feed(0, b"\x99" + data)
+    assert decoder.faults["resynchronised"] == 1
+    assert np.isnan(readings.distance_m[:2]).all()
+    np.testing.assert_allclose(readings.distance_m[2:], distances[1:], atol=1e-9)

@@ -1,0 +1,139 @@
+"""A disk that fills up, a file-size limit, short writes: one clear line, and nothing committed is lost."""
+
+from __future__ import annotations
+
+import errno
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.clock import SystemClock, VirtualClock
+from storage.errors import WriteFailed
+from storage.recorder import Recorder
+from storage.wire_log import Kind, LogFile, LogHeader, SensorEntry, open_log_file, read_log
+
+HEADER = LogHeader(sensors=(SensorEntry(0, "line"),), mono_ns=0, unix_ns=0)
+LIMIT = 20_000
+
+
+def record_under_a_limit(log: str) -> None:
+    """Record under a file-size limit until the recorder says that it stopped; print what it says."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, LIMIT))
+    recorder = Recorder(log, HEADER, SystemClock(), sync_every_s=0.003)
+    number = 0
+    while not recorder.status.error:
+        recorder.put(0, number, b"R%04d\r" % number)
+        number += 1
+        recorder.drain()
+    status = recorder.status
+    print(status.records, number)
+    try:
+        recorder.close()
+    except WriteFailed as error:
+        print(error)
+
+
+class Faulty:
+    """A real file whose writes are cut short or refused, as a seeded plan says."""
+
+    def __init__(self, path: Path, rng: np.random.Generator, refuse_after: int | None) -> None:
+        self._file: LogFile = open_log_file(path)
+        self._rng = rng
+        self._room = refuse_after
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Take a part, or none."""
+        taken = int(self._rng.integers(1, len(data) + 1)) if self._rng.random() < 0.3 else len(data)
+        if self._room is not None:
+            taken = min(taken, self._room)
+            self._room -= taken
+        if not taken:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return self._file.write(data[:taken])
+
+    def sync(self) -> None:
+        """Sync."""
+        self._file.sync()
+
+    def close(self) -> None:
+        """Close."""
+        self._file.close()
+
+
+def reads_of(log: Path) -> list[bytes]:
+    """Return the data records' payloads."""
+    return [record.payload for record in read_log(log) if record.kind is Kind.DATA]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the system has no file-size limit")
+def test_a_file_size_limit_is_one_line_and_loses_nothing(tmp_path: Path) -> None:
+    """A real process at a real limit: it lives, says why it stopped, and every record that it counted is there."""
+    log = tmp_path / "run.wire"
+    command = [sys.executable, "-B", __file__, str(log)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    counts, message = done.stdout.splitlines()
+    records, put = map(int, counts.split())
+    assert done.stderr == ""
+    assert message.startswith(f"{log}: the wire log could not be written further (File too large); check the disk's")
+    assert message.endswith(f"{records} records up to byte {read_log(log).damage.skipped_bytes + whole(log)} are kept")
+    assert reads_of(log) == [b"R%04d\r" % number for number in range(put - 1)]
+    assert read_log(log).damage.records == records
+    assert log.stat().st_size == LIMIT
+
+
+def whole(log: Path) -> int:
+    """Return the byte at which the last sound record ends."""
+    return log.stat().st_size - read_log(log).damage.tail_bytes
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_short_writes_and_a_full_disk_keep_what_was_committed(seed: int, tmp_path: Path) -> None:
+    """Writes cut at random, then none: every record counted as written reads back, and the error is one line."""
+    rng = np.random.default_rng(seed)
+    log = tmp_path / "run.wire"
+    room = int(rng.integers(1000, 12_000))
+    recorder = Recorder(log, HEADER, VirtualClock(), open_file=lambda path: Faulty(path, rng, room), sync_every_s=0.001)
+    for number in range(500):
+        recorder.put(0, number, b"R%04d\r" % number)
+    status = recorder.drain()
+    with pytest.raises(WriteFailed) as caught:
+        recorder.close()
+    assert status.error == str(caught.value)
+    assert "\n" not in status.error
+    assert "(No space left on device)" in status.error
+    reads = reads_of(log)
+    assert reads == [b"R%04d\r" % number for number in range(len(reads))]
+    final = recorder.status
+    assert read_log(log).damage.records == final.records == final.synced_records
+    assert len(reads) + final.dropped_records == 500
+    assert final.closed
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_short_writes_alone_lose_nothing(seed: int, tmp_path: Path) -> None:
+    """A disk that takes every third write in parts still takes all of it."""
+    rng = np.random.default_rng(seed)
+    log = tmp_path / "run.wire"
+    with Recorder(log, HEADER, VirtualClock(), open_file=lambda path: Faulty(path, rng, None)) as recorder:
+        for number in range(300):
+            recorder.put(0, number, b"R%04d\r" % number)
+    assert reads_of(log) == [b"R%04d\r" % number for number in range(300)]
+    assert read_log(log).damage.intact
+
+
+def test_a_disk_full_from_the_start_leaves_nothing_behind(tmp_path: Path) -> None:
+    """The run does not begin, and the name is free for another attempt."""
+    log = tmp_path / "run.wire"
+    rng = np.random.default_rng(0)
+    with pytest.raises(WriteFailed, match="No space left on device"):
+        Recorder(log, HEADER, VirtualClock(), open_file=lambda path: Faulty(path, rng, 50))
+    assert not log.exists()
+
+
+if __name__ == "__main__":
+    record_under_a_limit(sys.argv[1])

@@ -1,0 +1,134 @@
+"""kill -9 while a run file is built: the old file or the new one stands there, never anything between.
+
+The child counts the calls that building makes and stops at one of them; there the parent kills it. So the moments
+spread over the whole of the work, the last syscalls included. ``SPRINGMASS_KILLS`` raises the number of trials.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition.block import F8, I8, Block
+from acquisition.source import SourceInfo
+from storage.recover import recover
+from storage.run import open_run
+from storage.wire_log import Kind, LogHeader, SensorEntry, WireLogWriter
+
+TRIALS = max(10, int(os.environ.get("SPRINGMASS_KILLS", "12")) // 2)
+HEADER = LogHeader(sensors=(SensorEntry(0, "bytes"),), mono_ns=0, unix_ns=0, kind="simulated")
+
+
+class Bytes:
+    """A chain in which every byte is a sample."""
+
+    def __init__(self, sensor: SensorEntry) -> None:
+        self._next = 0
+
+    def feed(self, host_ns: int, data: bytes) -> Block:
+        """Return a sample a byte."""
+        n = len(data)
+        t = np.arange(self._next, self._next + n) / 100
+        distance = np.frombuffer(data, np.uint8) * 1e-3
+        block = Block(self._next, t, distance, np.zeros(n, np.uint8), np.full(n, host_ns))
+        self._next += n
+        return block
+
+    def lost(self) -> None:
+        """Nothing is half received."""
+
+    def info(self, name: str, kind: str = "live") -> SourceInfo:
+        """Return what is known."""
+        return SourceInfo("simulated", name, 100.0)
+
+    def report(self, t: F8, host_ns: I8) -> Mapping[str, Any]:
+        """Return nothing of note."""
+        return {}
+
+
+def log_of(path: Path, reads: int) -> None:
+    """Write a log."""
+    log = WireLogWriter(path, HEADER)
+    for number in range(reads):
+        log.append(Kind.DATA, bytes([number % 256]) * 5, mono_ns=number)
+    log.append(Kind.END, b"{}", mono_ns=reads)
+    log.close()
+
+
+def build(log: str, out: str, stop_at: int) -> None:
+    """Build a run file; at a call of the given number say so and wait for the end. Print how many calls there were."""
+    calls = 0
+
+    def count(*_: Any) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == stop_at:
+            os.write(1, b"here\n")
+            threading.Event().wait()
+
+    sys.setprofile(count)
+    recover(log, out, overwrite=True, remove_log=True, chain_for=Bytes)
+    sys.setprofile(None)
+    print(calls)
+
+
+def command(log: Path, out: Path, stop_at: int) -> list[str]:
+    """Return the child's command line."""
+    return [sys.executable, "-B", __file__, str(log), str(out), str(stop_at)]
+
+
+def samples_in(out: Path) -> int:
+    """Return the number of samples of a run file that holds what was written."""
+    with open_run(out) as run:
+        run.verify()
+        return len(run)
+
+
+@pytest.mark.trials
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no kill -9")
+def test_killed_while_the_run_file_is_built_old_or_new_stands(tmp_path: Path) -> None:
+    """Whenever it dies, the run file is the old one or the new one, or none where none was; and no byte is lost."""
+    old, new = tmp_path / "old.wire", tmp_path / "new.wire"
+    log_of(old, 100)
+    log_of(new, 160)
+    recover(old, tmp_path / "old.h5", chain_for=Bytes)
+    before, bytes_of_log = (tmp_path / "old.h5").read_bytes(), new.read_bytes()
+    out, log = tmp_path / "run.h5", tmp_path / "run.wire"
+    log.write_bytes(bytes_of_log)
+    first = subprocess.run(command(log, out, 0), capture_output=True, text=True, check=True)
+    calls = int(first.stdout)
+    assert (samples_in(out), log.exists()) == (800, False)
+    rng = np.random.default_rng(TRIALS)
+    states = []
+    for trial in range(TRIALS):
+        # Stratified over the whole work; the last stretch holds the sync, the rename and the removal of the log.
+        stop_at = 1 + int(calls * (trial + rng.random()) / TRIALS)
+        log.write_bytes(bytes_of_log)
+        out.unlink(missing_ok=True)
+        if trial % 2:
+            out.write_bytes(before)
+        with subprocess.Popen(command(log, out, stop_at), stdout=subprocess.PIPE) as child:
+            assert child.stdout is not None
+            child.stdout.readline()
+            child.kill()
+        found = samples_in(out) if out.exists() else 0
+        assert found in ((500, 800) if trial % 2 else (0, 800)), f"killed at call {stop_at} of {calls}"
+        assert found == 800 or log.read_bytes() == bytes_of_log
+        if log.exists():
+            assert recover(log, out, overwrite=True, chain_for=Bytes).runs[0].samples == 800
+        states.append(found == 800)
+    assert {False, True} <= set(states), "the kills hit only one side"
+    print(f"kill -9 while building: {TRIALS} trials, {states.count(False)} old, {states.count(True)} new")
+
+
+if __name__ == "__main__":
+    build(sys.argv[1], sys.argv[2], int(sys.argv[3]))

@@ -1,0 +1,286 @@
+"""Decoders under random bytes: never an exception, never a distance that no frame in the bytes vouches for.
+
+What vouches is told by :data:`ORACLES`, which look for frames anywhere in the bytes, slowly and with none of the
+decoders' code. Three hunters use the same check: hypothesis, a mutator of the family's own stream that always runs,
+and a coverage-guided fuzzer where one is installed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import random
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acquisition.decoders.base import Family
+from acquisition.decoders.registry import describe_bytes, families, probe
+from acquisition.readings import Readings, join
+
+FAMILIES = {family.name: family for family in families()}
+MOST_PENDING = 512
+MUTANTS = 250
+COVERAGE_RUNS = 12_000
+
+every_family = pytest.mark.parametrize("name", FAMILIES)
+
+
+def windows(data: bytes, size: int) -> Iterable[bytes]:
+    """Yield every run of so many bytes."""
+    return (data[i : i + size] for i in range(len(data) - size + 1))
+
+
+def summed(data: bytes, size: int, value: int, unit_m: float) -> set[float]:
+    """Return the distances of every window whose last byte is the sum of the others."""
+    sound = (w for w in windows(data, size) if sum(w[:-1]) % 256 == w[-1])
+    return {int.from_bytes(w[value : value + 2], "big") * unit_m for w in sound}
+
+
+def r_lines(digits: int, unit_m: float) -> Callable[[bytes], set[float]]:
+    """Return the oracle of MaxBotix lines."""
+    form = re.compile(rb"(?=R(\d{%d})( P\d| )?\r)" % digits)
+    return lambda data: {int(found[1]) * unit_m for found in form.finditer(data)}
+
+
+def ccitt(data: bytes) -> int:
+    """Return the CRC-16/CCITT-FALSE, bit by bit."""
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte << 8
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
+    return crc
+
+
+def sealed_lines(data: bytes) -> set[float]:
+    """Return the echo times of every line whose CRC holds."""
+    found = re.finditer(rb"\$([^$*\n]*)\*([0-9A-F]{4})\r?\n", data)
+    bodies = [each[1].split(b",") for each in found if ccitt(each[1]) == int(each[2], 16)]
+    return {float(body[3]) for body in bodies if len(body) == 6 and body[3] and body[5] == b"E"}
+
+
+def whole_lines(data: bytes) -> set[float]:
+    """Return the first number, in m, of every line that is ended and was begun after another."""
+    numbers = set()
+    for line in data.split(b"\n")[1:-1]:
+        found = re.match(rb"[\r ]*[,;]?([-+.\deE]+)(cm| cm)?[\s,;]", line + b" ")
+        try:
+            numbers.add(float(found[1]) / 100 if found else math.nan)
+        except ValueError:
+            continue
+    return numbers
+
+
+ORACLES: dict[str, Callable[[bytes], set[float]]] = {
+    "line-protocol": sealed_lines,
+    "maxbotix-lv": r_lines(3, 0.0254),
+    "maxbotix-lv-p": r_lines(3, 0.0254),
+    "maxbotix-xl": r_lines(3, 0.01),
+    "maxbotix-xl-long": r_lines(4, 0.01),
+    "maxbotix-hr": r_lines(4, 0.001),
+    "maxbotix-wr": r_lines(4, 0.001),
+    "ffhls": lambda data: summed(data, 4, 1, 0.001),
+    "us100": lambda data: {int.from_bytes(w, "big") * 0.001 for w in windows(data, 2)},
+    "urm37": lambda data: summed(data, 4, 1, 0.01),
+    "sen0149": lambda data: summed(data, 8, 5, 0.001),
+    "text-lines": whole_lines,
+}
+
+
+def own_stream(family: Family, seed: int, n: int = 12) -> list[bytes]:
+    """Return frames as the simulated sensor sends them."""
+    rng = random.Random(seed)
+    encoder = family.encoder()
+    frames = []
+    for i in range(n):
+        distance = math.nan if rng.random() < 0.2 else rng.uniform(0.3, 1.6)
+        frames.append(
+            encoder.encode(
+                sequence=i, device_us=i * 10_000, echo_us=distance / 171.5e-6, distance_m=distance, temperature_c=21.0
+            )
+        )
+    return frames
+
+
+def decode(family: Family, data: bytes, cuts: Iterable[int] = ()) -> Readings:
+    """Feed bytes cut at places; hold the decoder to its bounds."""
+    decoder = family.decoder()
+    edges = [0, *sorted(cuts), len(data)]
+    parts = [decoder.feed(i, data[a:b]) for i, (a, b) in enumerate(pairwise(edges))]
+    assert decoder.pending <= MOST_PENDING
+    assert 0 <= decoder.faults.get("garbage_bytes", 0) <= len(data)
+    assert all(count >= 0 for count in decoder.faults.values())
+    decoder.flush()
+    assert decoder.pending == 0
+    return join(parts)
+
+
+def same(one: Readings, other: Readings) -> bool:
+    """Tell whether readings are the same but for the host's time."""
+    names = [name for name in Readings.__slots__ if name != "host_ns"]
+    return all(getattr(one, name).tobytes() == getattr(other, name).tobytes() for name in names)
+
+
+def check(name: str, data: bytes, cuts: Iterable[int] = ()) -> Readings:
+    """Decode and hold the readings to what the bytes vouch for."""
+    readings = decode(FAMILIES[name], data, cuts)
+    measured = np.where(np.isnan(readings.echo_us), readings.distance_m, readings.echo_us)
+    np.testing.assert_array_equal(readings.flags, np.isnan(measured))
+    given_m = measured[~np.isnan(measured)].tolist()
+    assert all(value > 0 for value in given_m)
+    vouched = sorted(ORACLES[name](data)) if given_m else []
+    for value in given_m:
+        assert any(math.isclose(value, other, rel_tol=1e-9) for other in vouched), (value, data)
+    return readings
+
+
+def test_every_family_has_an_oracle() -> None:
+    """A family without one is not hunted."""
+    assert set(ORACLES) == set(FAMILIES)
+
+
+@every_family
+@given(data=st.binary(max_size=300), cuts=st.lists(st.integers(0, 300), max_size=6))
+def test_random_bytes_give_no_distance_without_a_frame(name: str, data: bytes, cuts: list[int]) -> None:
+    """Whatever comes: no exception, nothing made up, and the cuts do not matter."""
+    cuts = [min(cut, len(data)) for cut in cuts]
+    assert same(check(name, data), check(name, data, cuts))
+
+
+ALPHABET = st.sampled_from(
+    [b"R", b"$", b"*", b"\r", b"\n", b"0", b"12", b"3.4", b",", b"\xff", b"\x22", b"\x11", b"U\xaa"]
+)
+
+
+@every_family
+@given(parts=st.lists(ALPHABET | st.binary(max_size=4), max_size=60))
+def test_bytes_that_frames_are_made_of_give_no_distance_without_a_frame(name: str, parts: list[bytes]) -> None:
+    """Headers, ends and digits in any order."""
+    data = b"".join(parts)
+    assert same(check(name, data), check(name, data, range(1, len(data))))
+
+
+@st.composite
+def spoils(draw: st.DrawFn) -> list[tuple[str, float, bytes]]:
+    """Draw faults of the line: what is done, where (as a share of the stream), and with what."""
+    kinds = st.sampled_from(["flip", "drop", "insert", "repeat", "cut"])
+    return draw(
+        st.lists(st.tuples(kinds, st.floats(0, 1, exclude_max=True), st.binary(min_size=1, max_size=9)), max_size=8)
+    )
+
+
+def spoil(stream: bytes, faults: Iterable[tuple[str, float, bytes]]) -> bytes:
+    """Do the faults to the stream."""
+    data = bytearray(stream)
+    for kind, where, what in faults:
+        at = int(where * len(data))
+        if kind == "insert" or not data:
+            data[at:at] = what
+        elif kind == "flip":
+            data[at] ^= 1 << what[0] % 8
+        elif kind == "drop":
+            del data[at]
+        elif kind == "repeat":
+            data[at:at] = data[at : at + len(what) * 3]
+        else:
+            del data[at : at + len(what) * 3]
+    return bytes(data)
+
+
+@every_family
+@given(seed=st.integers(0, 99), faults=spoils(), cuts=st.lists(st.floats(0, 1), max_size=6))
+@settings(max_examples=40)
+def test_its_own_stream_spoiled_is_back_in_step_within_two_frames(
+    name: str, seed: int, faults: list[tuple[str, float, bytes]], cuts: list[float]
+) -> None:
+    """Cuts, splits and flips cost no sound frame after the second; nothing is made up in between."""
+    family = FAMILIES[name]
+    spoiled = spoil(b"".join(own_stream(family, seed)), faults)
+    after = own_stream(family, seed + 1)
+    check(name, spoiled, [int(cut * len(spoiled)) for cut in cuts])
+    decoder = family.decoder()
+    decoder.feed(0, spoiled)
+    if not family.self_framing:
+        decoder.flush()
+    begin = b"\n" if family.self_framing else b""  # ends the piece of a line that text may have begun with
+    clean = decode(family, begin + b"".join(after))
+    tail = decoder.feed(1, b"".join(after))
+    wanted = len(after) - 2
+    assert len(tail) >= wanted
+    for column in ("distance_m", "echo_us", "flags"):
+        assert getattr(tail, column)[-wanted:].tobytes() == getattr(clean, column)[-wanted:].tobytes()
+
+
+@every_family
+def test_mutants_of_its_own_stream_give_no_distance_without_a_frame(name: str) -> None:
+    """Seeded mutants, each of the last that was of use: a fuzzer that needs nothing installed."""
+    rng = random.Random(f"springmass {name}")
+    pool = [b"".join(own_stream(FAMILIES[name], seed)) for seed in range(4)]
+    kinds = ["flip", "drop", "insert", "repeat", "cut"]
+    outcomes = set()
+    for _ in range(MUTANTS):
+        faults = [(rng.choice(kinds), rng.random(), rng.randbytes(rng.randint(1, 9))) for _ in range(rng.randint(1, 4))]
+        mutant = spoil(rng.choice(pool), faults)[:600]
+        readings = check(name, mutant, [rng.randint(0, len(mutant)) for _ in range(rng.randint(0, 5))])
+        outcome = (len(readings), int(readings.flags.sum()))
+        if outcome not in outcomes:  # something new happened in the decoder: breed from it
+            outcomes.add(outcome)
+            pool.append(mutant)
+    assert len(outcomes) > 5
+
+
+@given(data=st.binary(max_size=400))
+def test_describing_bytes_never_fails_and_takes_one_line(data: bytes) -> None:
+    """Whatever a port has to offer; bytes without structure are no family's."""
+    line = describe_bytes(data)
+    assert line
+    assert "\n" not in line
+    assert line.isprintable()
+    assert all(name in FAMILIES for name in probe(data))
+
+
+HUNT = """
+import importlib.util, sys
+import atheris
+with atheris.instrument_imports(include=["acquisition"]):
+    import acquisition.decoders.registry as registry
+    registry.families()
+spec = importlib.util.spec_from_file_location("hunt", sys.argv[1])
+hunt = importlib.util.module_from_spec(spec)
+sys.modules["hunt"] = hunt
+spec.loader.exec_module(hunt)
+NAMES = sorted(hunt.FAMILIES)
+
+def target(data):
+    if len(data) > 2:
+        body = data[2:]
+        hunt.check(NAMES[data[0] % len(NAMES)], body, [min(data[1], len(body))])
+
+atheris.Setup([sys.argv[0], *sys.argv[2:]], target)
+atheris.Fuzz()
+"""
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
+)
+def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
+    """Some thousand inputs, grown from sound streams towards code not yet reached; bounded in number and seconds."""
+    for i, name in enumerate(sorted(FAMILIES)):
+        (tmp_path / name).write_bytes(bytes([i, 40]) + b"".join(own_stream(FAMILIES[name], 0, 3)))
+    bounds = [f"-runs={COVERAGE_RUNS}", "-max_total_time=6", "-seed=1", "-max_len=300"]
+    options = [*bounds, f"-artifact_prefix={tmp_path}/"]
+    done = subprocess.run(
+        [sys.executable, "-c", HUNT, __file__, *options, str(tmp_path)], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert re.search(r"Done \d{3,} runs", done.stderr), done.stderr[-3000:]
