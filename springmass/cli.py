@@ -215,6 +215,7 @@ def _add_recover(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", metavar="RUN.wire", help="wire log")
     parser.add_argument("-o", "--output", metavar="RUN.h5", help="run file to make (default: beside the log)")
     parser.add_argument("--overwrite", action="store_true", help="replace a run file that is there")
+    parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="apply this to echo times instead, m/s")
 
 
 def _add_sensors(parser: argparse.ArgumentParser) -> None:

@@ -7,6 +7,7 @@ thread decodes them for the progress line. What the session shows is what the re
 from __future__ import annotations
 
 import queue
+import shutil
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -92,6 +93,8 @@ class Progress:
     motion : LiveMotion or NotYet
         Of the first sensor.
     status : RecorderStatus
+    disk_free_bytes : int or None
+        Left on the disk that the log lies on; None before there is a log.
     waiting : bool
         Whether the trigger has not come yet.
     """
@@ -103,6 +106,7 @@ class Progress:
     rate_hz: float
     motion: LiveMotion | NotYet
     status: RecorderStatus | None
+    disk_free_bytes: int | None
     waiting: bool
 
 
@@ -297,7 +301,8 @@ class Session:
             now = self._clock.now_ns()
             if now >= next_ns:
                 next_ns += 1_000_000_000
-                progress(self._progress((now - start_ns) * 1e-9, recorder.status, waiting=False))
+                free = shutil.disk_usage(recorder.path.parent).free
+                progress(self._progress((now - start_ns) * 1e-9, recorder.status, free))
 
     def _wait_for(self, trigger: Trigger, rest: StillPoint | None, progress: Callable[[Progress], None]) -> list[_Item]:
         """Wait until the bob moves; return the reads of the seconds before that."""
@@ -319,7 +324,7 @@ class Session:
             now = self._clock.now_ns()
             if now >= next_ns:
                 next_ns += 1_000_000_000
-                progress(self._progress((now - start_ns) * 1e-9, None, waiting=True))
+                progress(self._progress((now - start_ns) * 1e-9, None, None))
 
     def _items(self, wait_s: float) -> list[_Item]:
         items: list[_Item] = []
@@ -346,11 +351,12 @@ class Session:
             self._recent.extend([item.host_ns] * len(block))
         return block
 
-    def _progress(self, seconds: float, status: RecorderStatus | None, *, waiting: bool) -> Progress:
+    def _progress(self, seconds: float, status: RecorderStatus | None, free: int | None) -> Progress:
         now = self._clock.now_ns()
         rate = sum(1 for stamp in self._recent if now - stamp <= 1_000_000_000)
         gaps = sum(len(chain.timebase.gaps) for chain in self._chains)
-        return Progress(seconds, self._samples, self._missing, gaps, rate, self._live.value(), status, waiting)
+        motion = self._live.value()
+        return Progress(seconds, self._samples, self._missing, gaps, rate, motion, status, free, status is None)
 
     def _chain(self, sensor: Sensor) -> SensorChain:
         return SensorChain(

@@ -38,12 +38,15 @@ class RecoveredRun:
     samples : int
     faults : mapping of str to int
         What the decoder counted.
+    decoding : mapping
+        What the chain reports besides: gaps, restarts, the clock's rate error.
     """
 
     sensor: SensorEntry
     path: Path
     samples: int
     faults: Mapping[str, int]
+    decoding: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +77,15 @@ class RecoverReport:
         for run in self.runs:
             faults = "".join(f", {count} {name.replace('_', ' ')}" for name, count in run.faults.items() if count)
             yield f"{run.path}: {run.samples} samples from {self.log}{faults}"
+            gaps = run.decoding.get("gaps", [])
+            if gaps:
+                longest = max(gap["length_s"] for gap in gaps)
+                lost = sum(gap["lost"] for gap in gaps)
+                yield f"{run.path}: {len(gaps)} gaps, {lost} readings lost in them, the longest {longest:.3g} s"
+            clock = run.decoding.get("clock", {})
+            if clock.get("rate_error_ppm") is not None:
+                rate = f"{clock['rate_error_ppm']:+.1f} +- {clock['u_rate_error_ppm']:.1f} ppm"
+                yield f"{run.path}: sensor clock {rate} against this host's, jitter {clock['host_jitter_s'] * 1e3:.2g} ms"
         yield f"{self.log}: {self.damage.describe()}"
 
 
@@ -95,6 +107,7 @@ def recover(
     overwrite: bool = False,
     remove_log: bool = False,
     header: LogHeader | None = None,
+    speed_of_sound_m_per_s: float | None = None,
     provenance: Mapping[str, Any] | None = None,
     chain_for: Callable[[SensorEntry], Chain] = chain_of,
 ) -> RecoverReport:
@@ -113,6 +126,8 @@ def recover(
         Whether the log goes once every run file holds it and verifies. Else it stays.
     header : LogHeader, optional
         Stands in where every copy in the log is lost.
+    speed_of_sound_m_per_s : float, optional
+        Applied to echo times in place of the one that the log notes, m/s.
     provenance : mapping, optional
         Goes into the run file besides what the log says: software, version, ...
     chain_for : callable
@@ -129,7 +144,7 @@ def recover(
     """
     log_path = Path(log_path)
     log = _read(log_path, header)
-    sensors = _calibrated(log)
+    sensors = _calibrated(log, speed_of_sound_m_per_s)
     paths = _targets(log_path if out_path is None else Path(out_path), sensors)
     if not overwrite:
         _demand_free(paths)
@@ -157,15 +172,16 @@ def _read(path: Path, stand_in: LogHeader | None) -> _Log:
     return _Log(Original(path.name, data), contents, header, marks, events)
 
 
-def _calibrated(log: _Log) -> tuple[SensorEntry, ...]:
-    """Return the sensors, each with the last calibration that the log tells of."""
+def _calibrated(log: _Log, speed_of_sound_m_per_s: float | None) -> tuple[SensorEntry, ...]:
+    """Return the sensors, each with the last calibration that the log tells of, and another speed of sound in it."""
+    other = {} if speed_of_sound_m_per_s is None else {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
     told = {}
     for event in log.events:
         content = event.json()
         if content.get("kind") == "calibration":
             told[event.channel] = content.get("facts", {})
     return tuple(
-        dataclasses.replace(sensor, calibration=told.get(sensor.channel, sensor.calibration))
+        dataclasses.replace(sensor, calibration={**told.get(sensor.channel, sensor.calibration), **other})
         for sensor in log.header.sensors
     )
 
@@ -210,7 +226,7 @@ def _write(path: Path, log: _Log, decoded: Decoded, provenance: Mapping[str, Any
         run.verify()
         if run.originals() != (log.original,):
             raise RunDamaged(path, "the log inside is not the log that was read", "keep the log and recover it again")
-    return RecoveredRun(decoded.sensor, path, len(samples), faults)
+    return RecoveredRun(decoded.sensor, path, len(samples), faults, told)
 
 
 def _host_ns(samples: Block) -> Any:

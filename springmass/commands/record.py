@@ -132,6 +132,8 @@ def line_of(progress: Progress) -> str:
     parts = [state, motion, f"{progress.rate_hz:.0f} Hz", f"{progress.missing} missing, {progress.gaps} gaps"]
     if progress.status is not None:
         parts.append(f"{progress.status.synced_bytes / 1e3:.0f} kB safe")
+        if progress.disk_free_bytes is not None:
+            parts.append(f"{progress.disk_free_bytes / 1e9:.1f} GB left")
         if progress.status.error:
             parts.append(progress.status.error)
     return " | ".join(parts)

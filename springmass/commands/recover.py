@@ -20,6 +20,7 @@ def run(options: argparse.Namespace) -> int:
         options.input,
         None if options.output is None else Path(options.output),
         overwrite=options.overwrite,
+        speed_of_sound_m_per_s=options.speed_of_sound,
         provenance={"software": "springmass", "version": __version__, "created_utc": now_utc()},
     )
     for line in report.describe():

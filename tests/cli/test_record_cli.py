@@ -92,6 +92,16 @@ def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Callable, tmp_
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
+def test_another_speed_of_sound_is_applied_to_the_same_echoes(cli: Callable, tmp_path: Path, scene: Path) -> None:
+    """A run recorded with 344 m/s comes out of its log with any other speed, every distance in proportion."""
+    assert cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / "run.h5").code == 0
+    assert cli("convert", tmp_path / "run.h5", tmp_path / "run.wire").code == 0
+    done = cli("recover", tmp_path / "run.wire", "-o", tmp_path / "warm.h5", "--speed-of-sound", "350")
+    assert done.code == 0, done.err
+    first, second = load(tmp_path / "run.h5").samples, load(tmp_path / "warm.h5").samples
+    np.testing.assert_allclose(second.distance, first.distance * 350 / 344, rtol=1e-12)
+
+
 @pytest.mark.parametrize("name", ["run.h5", "run.wire"])
 def test_nothing_is_ever_recorded_over(cli: Callable, tmp_path: Path, scene: Path, name: str) -> None:
     """Where the run file or its log exists the command ends before it opens anything."""

@@ -84,10 +84,11 @@ def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
     live = SensorChain(get_family(FAMILY), rate_hz=100.0)
     shown = concatenate(live.feed(host_ns, data) for host_ns, data in wire(200))
     report = recover(log, provenance={"software": "springmass"})
-    assert list(report.describe()) == [
-        f"{tmp_path / 'run.h5'}: 200 samples from {log}",
-        f"{log}: {report.damage.records} records",
-    ]
+    first, clock, last = report.describe()
+    assert first == f"{tmp_path / 'run.h5'}: 200 samples from {log}"
+    assert clock.startswith(f"{tmp_path / 'run.h5'}: sensor clock ")
+    assert " ppm against this host's" in clock
+    assert last == f"{log}: {report.damage.records} records"
     with open_run(tmp_path / "run.h5") as run:
         run.verify()
         assert columns(run.samples()) == columns(shown)
