@@ -85,7 +85,8 @@ class RecoverReport:
             clock = run.decoding.get("clock", {})
             if clock.get("rate_error_ppm") is not None:
                 rate = f"{clock['rate_error_ppm']:+.1f} +- {clock['u_rate_error_ppm']:.1f} ppm"
-                yield f"{run.path}: sensor clock {rate} against this host's, jitter {clock['host_jitter_s'] * 1e3:.2g} ms"
+                jitter = f"{clock['host_jitter_s'] * 1e3:.2g} ms"
+                yield f"{run.path}: sensor clock {rate} against this host's, jitter {jitter}"
         yield f"{self.log}: {self.damage.describe()}"
 
 
