@@ -68,8 +68,10 @@ class Calibration:
         """Return the calibration that :meth:`to_mapping` wrote; unknown names are refused."""
         try:
             return cls(**{name: float(value) for name, value in numbers.items()})
-        except TypeError as error:
-            raise CalibrationError(f"a calibration holds {', '.join(cls.__slots__)}; got {sorted(numbers)}") from error
+        except (TypeError, ValueError) as error:
+            raise CalibrationError(
+                f"a calibration holds numbers by name ({', '.join(cls.__slots__)}), got {dict(numbers)}"
+            ) from error
 
 
 @dataclass(frozen=True, slots=True)

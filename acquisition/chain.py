@@ -41,6 +41,7 @@ class SensorChain:
         rate_hz: float | None = None,
         calibration: Calibration | None = None,
     ) -> None:
+        family.demand_options(options or {})
         self.family = family
         self.calibration = calibration or Calibration()
         self.decoder = family.decoder(**(options or {}))

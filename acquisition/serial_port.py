@@ -92,7 +92,8 @@ class SerialPort:
                 if not data:
                     raise PortError(f"{self.name}: the port has gone (end of file)")
                 return data
-            self._port.timeout = wait_s
+            if self._port.timeout != wait_s:  # RFC 2217 negotiates the whole port anew when it is set
+                self._port.timeout = wait_s
             data = self._port.read(1)
             return bytes(data + self._port.read(min(self._port.in_waiting, READ_BYTES))) if data else b""
         except BlockingIOError:

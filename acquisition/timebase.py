@@ -20,6 +20,8 @@ __all__ = ["ClockFit", "Gap", "Timebase", "fit_clock"]
 WRAP_US = 1 << 32
 WRAP_S = WRAP_US * 1e-6
 NANO = 1e-9
+FEW = 16
+"""So many readings are sooner stepped through one by one than taken as arrays; live, a read brings one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +92,7 @@ class Timebase:
         self._count = 0
         self._last_raw: int | None = None
         self._last_host_ns = 0
-        # Time is counted in whole ticks from an anchor, so that it does not depend on how the bytes were cut into reads.
+        # Time is whole ticks from an anchor, so that it does not depend on how the bytes were cut into reads.
         self._anchor_s = 0.0
         self._ticks = 0
         self._latest_s = 0.0
@@ -109,7 +111,7 @@ class Timebase:
         if self._clock is None:
             self._clock = "device" if readings.device_us[0] >= 0 or readings.sequence[0] >= 0 else "host"
         raw, unit_s = self._raw(readings)
-        if (regular := self._regular(raw, unit_s, readings.host_ns)) is not None:
+        if n > FEW and (regular := self._regular(raw, unit_s, readings.host_ns)) is not None:
             return regular, np.zeros(n, np.uint8)
         t = np.empty(n)
         flags = np.zeros(n, np.uint8)

@@ -206,7 +206,7 @@ class VirtualPort:
             raise
 
     def _answer(self, request: bytes, shot: Shot) -> bytes:
-        # Asked for something else than the distance, the encoder answers that; one without such requests has no reply().
+        # A request for the temperature gets that, where the encoder knows such requests.
         reply = getattr(self._encoder, "reply", None)
         if reply is None:
             return self._frame(shot)

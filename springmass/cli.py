@@ -115,12 +115,13 @@ def _exit_code(error: Exception) -> int | None:
         return error.exit_code
     from acquisition.errors import AcquisitionError, CalibrationError, PortError, SensorError
     from pipeline.errors import PipelineError, SceneError
+    from storage.disk import DiskNearlyFull
     from storage.errors import StorageError, WriteFailed
 
+    if isinstance(error, PortError | CalibrationError | DiskNearlyFull):
+        return SENSOR
     if isinstance(error, SceneError | WriteFailed | SensorError):
         return USAGE
-    if isinstance(error, PortError | CalibrationError):
-        return SENSOR
     return UNREADABLE if isinstance(error, AcquisitionError | PipelineError | StorageError) else None
 
 
@@ -202,9 +203,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="applied to echo times, m/s")
     parser.add_argument("--trigger", type=_positive, metavar="M", help="start when the bob leaves its rest by this, m")
-    parser.add_argument(
-        "--pre", type=_positive, default=2.0, metavar="S", help="seconds to keep from before (default 2)"
-    )
+    parser.add_argument("--pre", type=_positive, metavar="S", help="seconds to keep from before (default 2)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated bench")
     parser.add_argument(
         "--crystal-ppm", type=_finite, default=0.0, metavar="PPM", help="of the simulated sensor's clock"
@@ -223,7 +222,7 @@ def _add_sensors(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_ports(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--probe", action="store_true", help="listen to each port for two seconds")
+    parser.add_argument("--probe", action="store_true", help="listen to each port, a second at each of two speeds")
     parser.add_argument("--port", action="append", default=[], metavar="P", help="listen to this address too")
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
 

@@ -6,14 +6,16 @@ thread decodes them for the progress line. What the session shows is what the re
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import shutil
+import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -21,7 +23,7 @@ from acquisition.block import Block, Flag
 from acquisition.calibration import Calibration, StillPoint, against_ruler, from_still
 from acquisition.chain import SensorChain
 from acquisition.clock import Clock
-from acquisition.decoders.base import Family
+from acquisition.decoders.base import Family, Polled
 from acquisition.decoders.registry import describe_bytes
 from acquisition.errors import PortError
 from acquisition.wired import Line, PortReader, Transport
@@ -90,8 +92,8 @@ class Progress:
         Of all sensors.
     rate_hz : float
         Samples per second over the last second, of the first sensor.
-    motion : LiveMotion or NotYet
-        Of the first sensor.
+    motion : callable
+        Returns the first sensor's motion, LiveMotion or NotYet; costs milliseconds, so it is asked only to be shown.
     status : RecorderStatus
     disk_free_bytes : int or None
         Left on the disk that the log lies on; None before there is a log.
@@ -104,7 +106,7 @@ class Progress:
     missing: int
     gaps: int
     rate_hz: float
-    motion: LiveMotion | NotYet
+    motion: Callable[[], LiveMotion | NotYet]
     status: RecorderStatus | None
     disk_free_bytes: int | None
     waiting: bool
@@ -122,19 +124,70 @@ class _Item:
 class _Tee:
     """Hands every read to the recorder, once there is one, and to the session's queue."""
 
-    def __init__(self) -> None:
-        self.recorder: Recorder | None = None
+    def __init__(self, askers: Mapping[int, Polled]) -> None:
+        # On the reading thread, beside the session's own decoders: they say what a polled sensor is asked next.
+        self._askers = askers
+        self._lock = threading.Lock()
+        self._recorder: Recorder | None = None
         self.items: queue.SimpleQueue[_Item] = queue.SimpleQueue()
 
+    def start(self, recorder: Recorder, before: Sequence[_Item] | None) -> list[_Item]:
+        """Record from here on, no read twice and none left out; return the reads from before that belong to the run.
+
+        What a polled sensor is asked begins anew, as the recorded bytes do.
+        """
+        with self._lock:
+            waiting = _drained(self.items)
+            kept = [] if before is None else [item for item in (*before, *waiting) if item.data]
+            for item in kept:
+                recorder.data(item.channel, item.host_ns, item.data)
+            self._recorder = recorder
+            for asker in self._askers.values():
+                asker.flush()
+        return kept
+
+    def stop(self) -> None:
+        """Record no more."""
+        with self._lock:
+            self._recorder = None
+
     def data(self, channel: int, host_ns: int, data: bytes) -> None:
-        if self.recorder is not None:
-            self.recorder.data(channel, host_ns, data)
-        self.items.put(_Item(channel, host_ns, data))
+        with self._lock:
+            if self._recorder is not None:
+                self._recorder.data(channel, host_ns, data)
+            if channel in self._askers:
+                self._askers[channel].feed(host_ns, data)
+            self.items.put(_Item(channel, host_ns, data))
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        if self.recorder is not None:
-            self.recorder.event(channel, host_ns, kind, facts)
-        self.items.put(_Item(channel, host_ns, b"", kind, facts))
+        with self._lock:
+            if self._recorder is not None:
+                self._recorder.event(channel, host_ns, kind, facts)
+            if channel in self._askers:
+                self._askers[channel].flush()
+            self.items.put(_Item(channel, host_ns, b"", kind, facts))
+
+
+def _drained(items: queue.SimpleQueue[_Item]) -> list[_Item]:
+    """Return what waits in a queue."""
+    found: list[_Item] = []
+    with contextlib.suppress(queue.Empty):
+        while True:
+            found.append(items.get_nowait())
+    return found
+
+
+def _joined(items: list[_Item], has_device_time: Sequence[bool]) -> list[_Item]:
+    """Return items with neighbouring reads of one sensor as one, where its times do not come from the host's stamps."""
+    joined: list[_Item] = []
+    for item in items:
+        last = joined[-1] if joined else None
+        mergeable = last is not None and last.channel == item.channel and last.data and item.data
+        if last is not None and mergeable and has_device_time[item.channel]:
+            joined[-1] = _Item(item.channel, item.host_ns, last.data + item.data)
+        else:
+            joined.append(item)
+    return joined
 
 
 class Session:
@@ -165,10 +218,16 @@ class Session:
         self._kind = kind
         self._scene = scene
         self._title = title
-        self._tee = _Tee()
+        self._askers = {
+            i: cast(Polled, sensor.family.decoder(**sensor.options))
+            for i, sensor in enumerate(self.sensors)
+            if sensor.family.poll is not None
+        }
+        self._tee = _Tee(self._askers)
         self._chains = [self._chain(sensor) for sensor in self.sensors]
         self._reader: PortReader | None = None
         self._heard = [bytearray() for _ in self.sensors]
+        self._gone: dict[int, str] = {}
         self._samples = self._missing = 0
         self._recent: deque[int] = deque(maxlen=4096)
         first = self._chains[0]
@@ -182,7 +241,9 @@ class Session:
         ProgramError
             With exit code 4 after three seconds: silence, or bytes of another kind (it says what they look like).
         """
-        lines = [Line(sensor.transport, i, sensor.family.poll) for i, sensor in enumerate(self.sensors)]
+        lines = [
+            Line(sensor.transport, i, sensor.family.poll, self._askers.get(i)) for i, sensor in enumerate(self.sensors)
+        ]
         self._reader = PortReader(lines, self._tee, self._clock)
         self._reader.start()
         heard = [0] * len(self.sensors)
@@ -243,7 +304,13 @@ class Session:
         storage.errors.WriteFailed
             If the disk refused; the log holds what came before.
         """
-        before = self._wait_for(trigger, rest, progress) if trigger is not None else []
+        if trigger is not None and any(sensor.options.get("temperature_every") for sensor in self.sensors):
+            raise ProgramError(
+                "--trigger keeps replies from before, which cannot be told from temperatures; "
+                "leave --option temperature_every out",
+                USAGE,
+            )
+        before = None if trigger is None else self._wait_for(trigger, rest, progress)
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
         self._chains = [self._chain(sensor) for sensor in self.sensors]
         self._samples = self._missing = 0
@@ -251,22 +318,20 @@ class Session:
         recorder = Recorder(log, self._header(), self._clock)
         start_ns = self._clock.now_ns()
         try:
-            for item in before:
-                recorder.data(item.channel, item.host_ns, item.data)
+            for item in self._tee.start(recorder, before):
                 self._decode(item)
             if rest is not None:
                 recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
             if trigger is not None:
                 recorder.event(0, start_ns, "trigger", {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s})
-            self._tee.recorder = recorder
             self._loop(recorder, start_ns, seconds, progress, marks)
         finally:
-            self._tee.recorder = None
+            self._tee.stop()
             recorder.close()
         return recorder.status
 
     def poll(self, wait_s: float) -> list[tuple[int, Block]]:
-        """Return the blocks that came since the last call, waiting at most so long for the first."""
+        """Wait so long, then return the blocks that came since the last call."""
         if self._reader is not None and self._reader.failure is not None:
             raise self._reader.failure
         blocks: list[tuple[int, Block]] = []
@@ -310,7 +375,9 @@ class Session:
         middle = rest.rest_m if rest is not None else None
         start_ns = next_ns = self._clock.now_ns()
         while True:
-            for item in self._items(0.05):
+            self._clock.sleep_until_ns(self._clock.now_ns() + 50_000_000)
+            items = _drained(self._tee.items)
+            for number, item in enumerate(items):
                 if item.data:
                     kept.append(item)
                 while kept and item.host_ns - kept[0].host_ns > trigger.keep_s * 1e9:
@@ -320,25 +387,23 @@ class Session:
                 for distance in known:
                     middle = float(distance) if middle is None else middle
                     if abs(distance - middle) > trigger.threshold_m:
-                        return list(kept)
+                        return [*kept, *items[number + 1 :]]
             now = self._clock.now_ns()
             if now >= next_ns:
                 next_ns += 1_000_000_000
                 progress(self._progress((now - start_ns) * 1e-9, None, None))
 
     def _items(self, wait_s: float) -> list[_Item]:
-        items: list[_Item] = []
-        try:
-            items.append(self._tee.items.get(timeout=wait_s))
-            while True:
-                items.append(self._tee.items.get_nowait())
-        except queue.Empty:
-            return items
+        # Not woken by every read: a hundred wake-ups a second would cost more than all the rest.
+        self._clock.sleep_until_ns(self._clock.now_ns() + int(wait_s * 1e9))
+        return _joined(_drained(self._tee.items), [chain.family.has_device_time for chain in self._chains])
 
     def _decode(self, item: _Item) -> Block | None:
         chain = self._chains[item.channel]
         if item.event:
             chain.lost()
+            if item.event == "lost":
+                self._gone[item.channel] = str(item.facts.get("why", ""))
             return None
         heard = self._heard[item.channel]
         if len(heard) < 4096:
@@ -355,7 +420,7 @@ class Session:
         now = self._clock.now_ns()
         rate = sum(1 for stamp in self._recent if now - stamp <= 1_000_000_000)
         gaps = sum(len(chain.timebase.gaps) for chain in self._chains)
-        motion = self._live.value()
+        motion = self._live.value
         return Progress(seconds, self._samples, self._missing, gaps, rate, motion, status, free, status is None)
 
     def _chain(self, sensor: Sensor) -> SensorChain:
@@ -387,6 +452,8 @@ class Session:
         )
 
     def _not_heard(self, channel: int) -> str:
+        if channel in self._gone:
+            return f"{self._gone[channel]}; is a sensor connected, and is this its port?"
         sensor, heard = self.sensors[channel], bytes(self._heard[channel])
         what = describe_bytes(heard) if heard else "not a byte came; is the sensor powered, its line on the right pin?"
         return (
@@ -395,15 +462,16 @@ class Session:
         )
 
 
-def demand_new(path: Path) -> None:
-    """Refuse to record over anything.
+def demand_new(path: Path, sensors: int) -> None:
+    """Refuse to record over anything: the log, and the run file or those of several sensors.
 
     Raises
     ------
     ProgramError
         With exit code 2 if the run file or its log exists.
     """
-    for there in (path, path.with_suffix(".wire")):
+    several = [path.with_name(f"{path.stem}.{i}{path.suffix}") for i in range(sensors)] if sensors > 1 else []
+    for there in (path, path.with_suffix(".wire"), *several):
         if there.exists():
             raise ProgramError(
                 f"{there}: exists already, and a recording never replaces one; choose another name", USAGE

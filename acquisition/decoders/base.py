@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from acquisition.errors import SensorError
 from acquisition.readings import Readings
 
 __all__ = ["Decoder", "Encoder", "Family", "Poll", "Polled"]
@@ -128,6 +129,19 @@ class Family:
     has_device_time: bool = False
     self_framing: bool = True
     source: str = ""
+
+    def demand_options(self, options: Mapping[str, Any]) -> None:
+        """Refuse options that this family does not take.
+
+        Raises
+        ------
+        SensorError
+            Naming them and those it takes.
+        """
+        unknown = sorted(set(options) - set(self.options))
+        if unknown:
+            known = ", ".join(self.options) or "none"
+            raise SensorError(f"sensor {self.name} takes these options: {known}; got {', '.join(unknown)}")
 
     def describe(self) -> dict[str, Any]:
         """Return what ``springmass sensors --json`` prints."""

@@ -39,8 +39,10 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.output)
     if out.suffix.lower() != ".h5":
         raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5", USAGE)
-    demand_new(out)
-    scene = None if options.scene is None else read_scene(options.scene)
+    demand_new(out, len(options.port))
+    _demand_sense(options)
+    told = options.scene or options.simulate
+    scene = None if told is None else read_scene(told)
     with _sensors(options, scene) as (sensors, kind):
         rate = sum(sensor.rate_hz or sensor.family.rate_hz for sensor in sensors)
         check_disk(out, int(BYTES_PER_READ * rate * (options.seconds or UNLIMITED_S)) + 1_000_000)
@@ -69,6 +71,13 @@ def run(options: argparse.Namespace) -> int:
     return 130 if stopped else OK
 
 
+def _demand_sense(options: argparse.Namespace) -> None:
+    """Refuse options that would do nothing without another."""
+    for name, needed in (("ruler", "still"), ("pre", "trigger")):
+        if getattr(options, name) is not None and getattr(options, needed) is None:
+            raise ProgramError(f"--{name} does nothing without --{needed}; name both or neither", USAGE)
+
+
 def _record(session: Session, options: argparse.Namespace, log: Path) -> bool:
     """Run the session; True where Ctrl-C ended it."""
     session.listen()
@@ -82,7 +91,7 @@ def _record(session: Session, options: argparse.Namespace, log: Path) -> bool:
                 session.calibrate(rest, options.ruler, 0.5e-3)
     except CalibrationError as error:
         raise ProgramError(str(error), SENSOR) from error
-    trigger = None if options.trigger is None else Trigger(options.trigger, options.pre)
+    trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
     show = _Line()
     try:
         session.record(
@@ -125,10 +134,8 @@ class _Line:
 def line_of(progress: Progress) -> str:
     """Return a progress line: time, period, amplitude, rate, drop-outs, what is safe on the disk."""
     state = "waiting for the bob" if progress.waiting else f"{progress.seconds:6.0f} s"
-    if isinstance(progress.motion, LiveMotion):
-        motion = f"T {progress.motion.period}, A {progress.motion.amplitude}"
-    else:
-        motion = progress.motion.why
+    found = progress.motion()
+    motion = f"T {found.period}, A {found.amplitude}" if isinstance(found, LiveMotion) else found.why
     parts = [state, motion, f"{progress.rate_hz:.0f} Hz", f"{progress.missing} missing, {progress.gaps} gaps"]
     if progress.status is not None:
         parts.append(f"{progress.status.synced_bytes / 1e3:.0f} kB safe")
@@ -157,6 +164,8 @@ def _typed_marks() -> queue.SimpleQueue[str] | None:
 def _sensors(options: argparse.Namespace, scene: Scene | None) -> Iterator[tuple[list[Sensor], str]]:
     """Open what is to be recorded: the ports named, or a simulated bench behind a port of its own."""
     family_options = dict(_option(text) for text in options.option)
+    for name in options.sensor:
+        get_family(name).demand_options(family_options)
     calibration = _calibration(options, scene)
     if options.simulate is not None:
         with _simulated(options, family_options, calibration) as sensor:

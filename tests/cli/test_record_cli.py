@@ -11,6 +11,7 @@ import sys
 import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -173,16 +174,74 @@ def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
         assert np.nanmin(loaded.samples.distance) > 0.3
 
 
+@pytest.mark.parametrize("option", ["temperature_every=0", "temperature_every=5"])
+def test_a_polled_sensor_is_asked_and_recorded(cli: Callable, tmp_path: Path, option: str) -> None:
+    """A US-100 answers requests, for temperatures in between too; its run replays from its log as it was seen."""
+    with speaking("us100") as sensor:
+        sensor.start()
+        done = cli(
+            *("record", "--port", sensor.path, "--sensor", "us100", "--option", option),
+            *("--seconds", "2", "-o", tmp_path / "run.h5"),
+        )
+    assert done.code == 0, done.err
+    samples = load(tmp_path / "run.h5").samples
+    assert len(samples) >= 25
+    known = samples.distance[np.isfinite(samples.distance)]
+    assert known.size >= 25
+    assert known.min() > 0.3
+    assert known.max() < 0.5
+
+
 def test_a_trigger_keeps_the_seconds_before_it(cli: Callable, tmp_path: Path, scene: Path) -> None:
     """A run that starts when the bob moves holds samples from before that, and says so in its provenance."""
     done = cli(
-        *("record", "--simulate", scene, "--trigger", "0.09", "--pre", "0.3", "--seconds", "1"),
+        *("record", "--simulate", scene, "--trigger", "0.04", "--pre", "0.3", "--seconds", "1"),
         *("-o", tmp_path / "run.h5"),
     )
     assert done.code == 0, done.err
     with open_run(tmp_path / "run.h5") as run:
         assert len(run) >= 115
         assert "trigger" in json.dumps(dict(run.provenance))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--option", "colour=red"), "takes these options"),
+        (("--ruler", "0.4"), "--still"),
+        (("--pre", "1"), "--trigger"),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(
+    cli: Callable, tmp_path: Path, scene: Path, options: tuple[str, str], said: str
+) -> None:
+    """An option that no sensor takes, or that needs another: one line, exit code 2, nothing recorded."""
+    done = cli("record", "--simulate", scene, "--sensor", "line-protocol", *options, "-o", tmp_path / "run.h5")
+    assert done.code == 2
+    assert said in done.complaint
+    assert not (tmp_path / "run.h5").exists()
+
+
+def test_run_files_of_several_sensors_are_looked_for_before(cli: Callable, tmp_path: Path) -> None:
+    """One of the run files to come exists: refused before a port is opened."""
+    (tmp_path / "run.1.h5").write_bytes(b"precious")
+    done = cli(
+        *("record", "--port", "/dev/ttyNONE1", "--port", "/dev/ttyNONE2", "--sensor", "ffhls"),
+        *("-o", tmp_path / "run.h5"),
+    )
+    assert done.code == 2
+    assert "run.1.h5" in done.complaint
+
+
+def test_a_disk_nearly_full_is_told_before_a_run_starts(
+    cli: Callable, tmp_path: Path, scene: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Less room than the run needs: one line, exit code 4, no port opened, no log."""
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=1000))
+    done = cli("record", "--simulate", scene, "--seconds", "60", "-o", tmp_path / "run.h5")
+    assert done.code == 4
+    assert "make room" in done.complaint
+    assert not (tmp_path / "run.wire").exists()
 
 
 def test_a_moving_bob_is_no_rest_position(cli: Callable, tmp_path: Path, scene: Path) -> None:

@@ -12,6 +12,7 @@ from acquisition.block import Block, Flag, concatenate
 from acquisition.clock import Clock, VirtualClock
 from acquisition.replay import Replay
 from acquisition.source import Source, SourceInfo
+from acquisition.virtual import VirtualRangefinder, VirtualSensor, VirtualSource
 
 SECONDS = 120
 RATE_HZ = 100.0
@@ -33,19 +34,38 @@ def replay(speed: float | None) -> Callable[[Clock], Source]:
     return lambda clock: Replay([run()[:4000], run()[4000:]], clock, info=info, speed=speed)
 
 
-SOURCES: dict[str, Callable[[Clock], Source]] = {
+def simulated(block_samples: int) -> Callable[[Clock], Source]:
+    """Return a maker of simulated sources with noise, false echoes and readings without a target."""
+    sensor = VirtualSensor(rate_hz=RATE_HZ, false_echo_rate_hz=0.5, dead_time_s=1.17e-3)
+
+    def make(clock: Clock) -> Source:
+        bob = VirtualRangefinder(lambda t: 0.25 + 0.05 * math.sin(7.9 * t), sensor, np.random.default_rng(1))
+        return VirtualSource(bob, clock, seconds=SECONDS, name="run", block_samples=block_samples)
+
+    return make
+
+
+REPLAYS: dict[str, Callable[[Clock], Source]] = {
     "replay-1x": replay(1.0),
     "replay-10x": replay(10.0),
     "replay-max": replay(None),
 }
 """Makers of sources that deliver :func:`run`."""
 
-PACE = {"replay-1x": 1.0, "replay-10x": 10.0, "replay-max": math.inf}
+SOURCES: dict[str, Callable[[Clock], Source]] = {
+    **REPLAYS,
+    "simulated": simulated(1),
+    "simulated-in-blocks": simulated(64),
+}
+"""Makers of sources that deliver two minutes at 100 Hz."""
+
+PACE = {"replay-1x": 1.0, "replay-10x": 10.0, "replay-max": math.inf, "simulated": 1.0, "simulated-in-blocks": 1.0}
 
 every_source = pytest.mark.parametrize("name", SOURCES)
+every_replay = pytest.mark.parametrize("name", REPLAYS)
 
 
-@every_source
+@every_replay
 def test_samples_are_those_of_the_run_bit_for_bit(name: str) -> None:
     """Whatever the pace, the samples are the same."""
     with SOURCES[name](VirtualClock()) as source:
@@ -119,3 +139,15 @@ def test_consumers_cannot_change_what_others_get(name: str) -> None:
     with source:
         second = concatenate(source)
     assert first.distance.tobytes() == second.distance.tobytes()
+
+
+@every_source
+def test_missing_samples_are_flagged_and_no_others_lack_a_distance(name: str) -> None:
+    """A distance is NaN exactly where the flag says so, and times never step back."""
+    with SOURCES[name](VirtualClock()) as source:
+        joined = concatenate(source)
+    missing = (joined.flags & Flag.MISSING) != 0
+    assert missing.any()
+    np.testing.assert_array_equal(np.isnan(joined.distance), missing)
+    assert np.all(np.diff(joined.t) > 0)
+    assert len(joined) == SECONDS * RATE_HZ

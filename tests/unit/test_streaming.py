@@ -1,0 +1,192 @@
+"""Live period and amplitude: the batch analysis of the samples held, at a memory that does not grow."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from pipeline.analyse import analyse
+from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
+from pipeline.track import Quality, Track
+
+RATE_HZ = 100.0
+
+
+def motion(seconds: float, seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times, distances and flags of a damped swing with noise."""
+    t = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    y = 0.25 + 0.05 * np.exp(-0.01 * t) * np.cos(8.3 * t + 0.4)
+    return t, y + 1e-4 * np.random.default_rng(seed).standard_normal(t.size), np.zeros(t.size, np.uint8)
+
+
+def push(held: MotionAccumulator, columns: Iterable[np.ndarray], sizes: Iterable[int]) -> None:
+    """Push columns in parts of those sizes, then the rest."""
+    t, y, flags = columns
+    start = 0
+    for size in [*sizes, t.size]:
+        held.push(t[start : start + size], y[start : start + size], flags[start : start + size])
+        start += size
+
+
+def batch(t: np.ndarray, y: np.ndarray, flags: np.ndarray) -> LiveMotion:
+    """Return what the batch analysis says of those samples."""
+    found = analyse(Track(t, y, flags, RATE_HZ, clock="device")).estimates
+    names = ("period", "amplitude", "offset", "noise")
+    return LiveMotion(*(found[name] for name in names), float(t[-1] - t[0]))
+
+
+@pytest.mark.parametrize("size", [1, 7, 100, 999, 1000, 1001, 2500])
+def test_value_is_the_batch_analysis_of_the_same_samples(size: int) -> None:
+    """However the samples were cut into pushes, the value is the batch result of the last ten seconds, bit for bit."""
+    columns = motion(25.0)
+    held = MotionAccumulator(RATE_HZ, 10.0)
+    push(held, columns, [size] * (2500 // size))
+    assert len(held) == 1000
+    assert held.value() == batch(*(column[-1000:] for column in columns))
+
+
+def test_value_before_the_window_is_full() -> None:
+    """Six seconds of a ten-second window are analysed as they are."""
+    columns = motion(6.0)
+    held = MotionAccumulator(RATE_HZ, 10.0)
+    push(held, columns, [13] * 20)
+    live = held.value()
+    assert live == batch(*columns)
+    assert isinstance(live, LiveMotion)
+    assert live.period.value == pytest.approx(2 * np.pi / 8.3, rel=1e-3)
+    assert live.amplitude.value == pytest.approx(0.05, rel=0.02)
+    assert live.seconds == pytest.approx(5.99)
+
+
+def test_value_can_be_asked_for_again_and_changes_nothing() -> None:
+    """Asking twice gives the same, and pushing goes on from there."""
+    columns = motion(12.0)
+    held, other = MotionAccumulator(RATE_HZ), MotionAccumulator(RATE_HZ)
+    push(held, [column[:800] for column in columns], [])
+    assert held.value() == held.value()
+    push(held, [column[800:] for column in columns], [])
+    push(other, columns, [])
+    assert held.value() == other.value()
+
+
+def test_what_was_pushed_may_be_overwritten() -> None:
+    """The samples held are copies, and a track handed out is one too."""
+    columns = motion(8.0)
+    held = MotionAccumulator(RATE_HZ)
+    push(held, columns, [])
+    before = held.value()
+    columns[1][:] = 0.0
+    held.track().y[:] = 0.0
+    assert held.value() == before
+
+
+def test_clear_forgets_everything() -> None:
+    """After a clear the next samples alone count."""
+    held, fresh = MotionAccumulator(RATE_HZ), MotionAccumulator(RATE_HZ)
+    push(held, motion(10.0, seed=2), [50] * 20)
+    held.clear()
+    assert len(held) == 0
+    assert isinstance(held.value(), NotYet)
+    for one in (held, fresh):
+        push(one, motion(7.0, seed=3), [70] * 10)
+    assert held.value() == fresh.value()
+
+
+def test_memory_is_flat_over_a_day() -> None:
+    """8,640,000 samples pushed leave the buffers as large as they were, and the last window in them."""
+    held = MotionAccumulator(RATE_HZ, 10.0)
+    t, y, flags = motion(60.0)
+    sizes = {name: value.nbytes for name, value in vars(held).items() if isinstance(value, np.ndarray)}
+    assert sum(sizes.values()) == 2 * 1000 * 17
+    for minute in range(24 * 60):
+        for start in range(0, 6000, 500):
+            rows = slice(start, start + 500)
+            held.push(60.0 * minute + t[rows], y[rows], flags[rows])
+    assert {name: value.nbytes for name, value in vars(held).items() if isinstance(value, np.ndarray)} == sizes
+    track = held.track()
+    np.testing.assert_array_equal(track.t, 60.0 * (24 * 60 - 1) + t[-1000:])
+    np.testing.assert_array_equal(track.y, y[-1000:])
+    assert isinstance(held.value(), LiveMotion)
+
+
+def test_drop_outs_are_left_out_as_in_the_batch() -> None:
+    """Missing samples, rows that never came and false echoes do not keep the value from agreeing with the batch."""
+    t, y, flags = motion(14.0)
+    missing = np.random.default_rng(4).random(t.size) < 0.05
+    y[missing], flags[missing] = np.nan, Quality.MISSING
+    y[1000:1006] += 0.005
+    came = np.ones(t.size, bool)
+    came[900:960] = False
+    flags[960] |= Quality.GAP_BEFORE
+    columns = t[came], y[came], flags[came]
+    held = MotionAccumulator(RATE_HZ, 10.0)
+    push(held, columns, [11] * 100)
+    live = held.value()
+    assert live == batch(*(column[-1000:] for column in columns))
+    assert isinstance(live, LiveMotion)
+    assert live.period.value == pytest.approx(2 * np.pi / 8.3, rel=1e-3)
+
+
+NOTHING = np.full(1000, np.nan)
+QUIET = 0.25 + 1e-4 * np.random.default_rng(5).standard_normal(1000)
+
+
+@pytest.mark.parametrize(
+    ("y", "flags", "why"),
+    [
+        (NOTHING[:15], 0, "15 samples so far"),
+        (NOTHING[:0], 0, "0 samples so far"),
+        (NOTHING, int(Quality.MISSING), ""),
+        (QUIET, 0, ""),
+        (np.full(1000, 0.25), 0, ""),
+        (np.linspace(0.2, 0.4, 1000), 0, ""),
+        (np.where(np.arange(1000) == 500, 0.3, np.nan), 0, ""),
+        (np.where(np.arange(1000) < 990, 0.25, 0.3), 0, ""),
+    ],
+    ids=["fifteen", "none", "all-missing", "still", "constant", "ramp", "one", "step"],
+)
+def test_it_says_why_there_is_no_value_yet(y: np.ndarray, flags: int, why: str) -> None:
+    """Too few samples, no target or a bob at rest give one sentence, no exception and no number."""
+    held = MotionAccumulator(RATE_HZ)
+    held.push(np.arange(y.size) / RATE_HZ, y, np.full(y.size, flags, np.uint8))
+    told = held.value()
+    assert isinstance(told, NotYet)
+    assert told.why
+    assert "\n" not in told.why
+    assert told.why.startswith(why)
+
+
+def test_times_that_stand_still_or_run_back_are_no_exception() -> None:
+    """Repeated, reversed and unknown times are judged by the same stages as in the batch."""
+    t, y, flags = motion(10.0)
+    for spoiled in (np.zeros_like(t), t[::-1].copy(), np.full_like(t, np.nan)):
+        held = MotionAccumulator(RATE_HZ)
+        held.push(spoiled, y, flags)
+        assert isinstance(held.value(), LiveMotion | NotYet)
+
+
+def test_random_samples_never_raise() -> None:
+    """Whatever comes off a wrong sensor, the value is a motion or a reason."""
+    rng = np.random.default_rng(6)
+    for n in (16, 17, 40, 200, 1000):
+        for _ in range(6):
+            held = MotionAccumulator(RATE_HZ)
+            y = rng.choice([0.1, 0.25, 0.3, 4.0, np.nan], n)
+            held.push(np.arange(n) / RATE_HZ, y, np.where(np.isnan(y), np.uint8(Quality.MISSING), np.uint8(0)))
+            assert isinstance(held.value(), LiveMotion | NotYet)
+
+
+@pytest.mark.parametrize(("rate_hz", "window_s"), [(0.0, 10.0), (100.0, 0.0), (-1.0, 1.0)])
+def test_rate_and_window_are_positive(rate_hz: float, window_s: float) -> None:
+    """Others are refused with their values."""
+    with pytest.raises(ValueError, match="must be positive"):
+        MotionAccumulator(rate_hz, window_s)
+
+
+def test_a_value_is_plain_and_frozen() -> None:
+    """What the live page shows cannot be changed behind its back."""
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        NotYet("why").why = "other"  # type: ignore[misc]
