@@ -192,16 +192,25 @@ def test_a_polled_sensor_is_asked_and_recorded(cli: Callable, tmp_path: Path, op
     assert known.max() < 0.5
 
 
-def test_a_trigger_keeps_the_seconds_before_it(cli: Callable, tmp_path: Path, scene: Path) -> None:
-    """A run that starts when the bob moves holds samples from before that, and says so in its provenance."""
-    done = cli(
-        *("record", "--simulate", scene, "--trigger", "0.04", "--pre", "0.3", "--seconds", "1"),
-        *("-o", tmp_path / "run.h5"),
+def test_a_trigger_keeps_the_seconds_before_it(cli: Callable, tmp_path: Path) -> None:
+    """A run that starts when the bob moves holds half a second of rest from before that, and says so."""
+    finder = VirtualRangefinder(
+        lambda t: 0.4 + (0.05 * np.sin(OMEGA * (t - 2.0)) if t > 2.0 else 0.0),
+        VirtualSensor(false_echo_rate_hz=0.0),
+        np.random.default_rng(5),
     )
+    with VirtualPort(get_family("line-protocol"), finder, SystemClock(), seconds=30.0) as sensor:
+        sensor.start()
+        done = cli(
+            *("record", "--port", sensor.path, "--sensor", "line-protocol", "--trigger", "0.02", "--pre", "0.5"),
+            *("--seconds", "1", "-o", tmp_path / "run.h5"),
+        )
     assert done.code == 0, done.err
     with open_run(tmp_path / "run.h5") as run:
-        assert len(run) >= 115
+        distance = run.samples().distance
         assert "trigger" in json.dumps(dict(run.provenance))
+    assert len(distance) >= 140
+    assert np.all(np.abs(distance[:30] - 0.4) < 0.002)
 
 
 @pytest.mark.parametrize(
