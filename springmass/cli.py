@@ -222,7 +222,7 @@ def _add_sensors(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_ports(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--probe", action="store_true", help="listen to each port, a second at each of two speeds")
+    parser.add_argument("--no-probe", action="store_true", help="only list the ports, open none")
     parser.add_argument("--port", action="append", default=[], metavar="P", help="listen to this address too")
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
 

@@ -21,8 +21,8 @@ BAUDS = (115200, 9600)
 
 
 def run(options: argparse.Namespace) -> int:
-    """List ports; with --probe also listen to each, a second at each of the usual speeds."""
-    rows = [_row(port.device, port.description, options.probe) for port in list_ports()]
+    """List ports with what speaks on them: listens to each, a second at each of the usual speeds."""
+    rows = [_row(port.device, port.description, not options.no_probe) for port in list_ports()]
     rows += [_row(address, "named on the command line", True) for address in options.port]
     if options.json:
         print(json.dumps(rows))
