@@ -358,7 +358,7 @@ class Session:
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
         next_ns = start_ns + 1_000_000_000
         while end_ns is None or self._clock.now_ns() < end_ns:
-            self.poll(0.05)
+            self.poll(0.1)
             if recorder.status.error:
                 return  # close() raises it; what was recorded stands
             while marks is not None and not marks.empty():

@@ -1,0 +1,68 @@
+"""What a recording costs and keeps: `python benchmarks/recording.py`.
+
+A simulated sensor speaks from a process of its own; `springmass record` reads it twice, for a short and a long run. The
+difference of the two is the recording alone, without its start and without the run file built at its end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from springmass import load
+
+SENSOR = """
+import sys
+import numpy as np
+from acquisition.clock import SystemClock
+from acquisition.decoders.registry import get_family
+from acquisition.virtual import VirtualRangefinder, VirtualSensor
+from acquisition.virtual_port import VirtualPort
+
+finder = VirtualRangefinder(lambda t: 0.25 + 0.05 * np.cos(8 * t), VirtualSensor(), np.random.default_rng(5))
+with VirtualPort(get_family("line-protocol"), finder, SystemClock(), seconds=3600.0) as port:
+    print(port.path, flush=True)
+    port.start()
+    sys.stdin.read()
+"""
+
+
+def main() -> int:
+    """Record a short and a long run; print samples and CPU."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--short", type=int, default=5, metavar="S", help="seconds of the short run (%(default)s)")
+    parser.add_argument("--long", type=int, default=125, metavar="S", help="seconds of the long run (%(default)s)")
+    options = parser.parse_args()
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", SENSOR], stdin=pipe, stdout=pipe, text=True) as sensor:
+        assert sensor.stdout is not None
+        assert sensor.stdin is not None
+        port = sensor.stdout.readline().strip()
+        short, long = (measure(port, seconds) for seconds in (options.short, options.long))
+        sensor.stdin.close()
+    span = options.long - options.short
+    print(f"samples: {long[0]} in {options.long} s at 100 Hz, {long[1]} gaps")
+    print(f"CPU: {(long[2] - short[2]) / span:.2%} of a core while recording ({long[2]:.2f} s for all of the long run)")
+    return 0
+
+
+def measure(port: str, seconds: int) -> tuple[int, int, float]:
+    """Record once; return samples, gaps and CPU seconds."""
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(folder) / "run.h5"
+        command = ["record", "--port", port, "--sensor", "line-protocol", "--seconds", str(seconds), "-o", str(run)]
+        child = subprocess.Popen([sys.executable, "-m", "springmass", *command], stderr=subprocess.DEVNULL)
+        _, status, usage = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        if child.returncode:
+            raise SystemExit(f"springmass record ended with exit code {child.returncode}")
+        samples = load(run).samples
+        return len(samples), int((samples.flags != 0).sum()), usage.ru_utime + usage.ru_stime
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,23 @@
+"""The recording benchmark as a test: it runs, and every reading of a short run is there."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+SCRIPT = Path(__file__).with_name("recording.py")
+
+
+def test_a_short_measurement_keeps_every_reading():
+    """Two runs of one and two seconds: 200 readings in the longer one, no gap, a share of CPU printed."""
+    assert importlib.util.find_spec("springmass") is not None
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), "--short", "1", "--long", "2"], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.splitlines()
+    assert 195 <= int(first.split()[1]) <= 206
+    assert " 0 gaps" in first
+    assert "of a core while recording" in second
