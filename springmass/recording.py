@@ -6,10 +6,8 @@ thread decodes them for the progress line. What the session shows is what the re
 
 from __future__ import annotations
 
-import contextlib
 import queue
 import shutil
-import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,6 +28,7 @@ from acquisition.wired import Line, PortReader, Transport
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, USAGE, ProgramError
+from springmass.reads import Read, Tee, drained, joined_reads
 from storage.recorder import Recorder, RecorderStatus
 from storage.wire_layout import LogHeader, SensorEntry
 
@@ -112,84 +111,6 @@ class Progress:
     waiting: bool
 
 
-@dataclass(frozen=True, slots=True)
-class _Item:
-    channel: int
-    host_ns: int
-    data: bytes
-    event: str = ""
-    facts: Mapping[str, Any] = field(default_factory=dict)
-
-
-class _Tee:
-    """Hands every read to the recorder, once there is one, and to the session's queue."""
-
-    def __init__(self, askers: Mapping[int, Polled]) -> None:
-        # On the reading thread, beside the session's own decoders: they say what a polled sensor is asked next.
-        self._askers = askers
-        self._lock = threading.Lock()
-        self._recorder: Recorder | None = None
-        self.items: queue.SimpleQueue[_Item] = queue.SimpleQueue()
-
-    def start(self, recorder: Recorder, before: Sequence[_Item] | None) -> list[_Item]:
-        """Record from here on, no read twice and none left out; return the reads from before that belong to the run.
-
-        What a polled sensor is asked begins anew, as the recorded bytes do.
-        """
-        with self._lock:
-            waiting = _drained(self.items)
-            kept = [] if before is None else [item for item in (*before, *waiting) if item.data]
-            for item in kept:
-                recorder.data(item.channel, item.host_ns, item.data)
-            self._recorder = recorder
-            for asker in self._askers.values():
-                asker.flush()
-        return kept
-
-    def stop(self) -> None:
-        """Record no more."""
-        with self._lock:
-            self._recorder = None
-
-    def data(self, channel: int, host_ns: int, data: bytes) -> None:
-        with self._lock:
-            if self._recorder is not None:
-                self._recorder.data(channel, host_ns, data)
-            if channel in self._askers:
-                self._askers[channel].feed(host_ns, data)
-            self.items.put(_Item(channel, host_ns, data))
-
-    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        with self._lock:
-            if self._recorder is not None:
-                self._recorder.event(channel, host_ns, kind, facts)
-            if channel in self._askers:
-                self._askers[channel].flush()
-            self.items.put(_Item(channel, host_ns, b"", kind, facts))
-
-
-def _drained(items: queue.SimpleQueue[_Item]) -> list[_Item]:
-    """Return what waits in a queue."""
-    found: list[_Item] = []
-    with contextlib.suppress(queue.Empty):
-        while True:
-            found.append(items.get_nowait())
-    return found
-
-
-def _joined(items: list[_Item], has_device_time: Sequence[bool]) -> list[_Item]:
-    """Return items with neighbouring reads of one sensor as one, where its times do not come from the host's stamps."""
-    joined: list[_Item] = []
-    for item in items:
-        last = joined[-1] if joined else None
-        mergeable = last is not None and last.channel == item.channel and last.data and item.data
-        if last is not None and mergeable and has_device_time[item.channel]:
-            joined[-1] = _Item(item.channel, item.host_ns, last.data + item.data)
-        else:
-            joined.append(item)
-    return joined
-
-
 class Session:
     """Records one run.
 
@@ -223,7 +144,7 @@ class Session:
             for i, sensor in enumerate(self.sensors)
             if sensor.family.poll is not None
         }
-        self._tee = _Tee(self._askers)
+        self._tee = Tee(self._askers)
         self._chains = [self._chain(sensor) for sensor in self.sensors]
         self._reader: PortReader | None = None
         self._heard = [bytearray() for _ in self.sensors]
@@ -369,14 +290,14 @@ class Session:
                 free = shutil.disk_usage(recorder.path.parent).free
                 progress(self._progress((now - start_ns) * 1e-9, recorder.status, free))
 
-    def _wait_for(self, trigger: Trigger, rest: StillPoint | None, progress: Callable[[Progress], None]) -> list[_Item]:
+    def _wait_for(self, trigger: Trigger, rest: StillPoint | None, progress: Callable[[Progress], None]) -> list[Read]:
         """Wait until the bob moves; return the reads of the seconds before that."""
-        kept: deque[_Item] = deque()
+        kept: deque[Read] = deque()
         middle = rest.rest_m if rest is not None else None
         start_ns = next_ns = self._clock.now_ns()
         while True:
             self._clock.sleep_until_ns(self._clock.now_ns() + 50_000_000)
-            items = _drained(self._tee.items)
+            items = drained(self._tee.items)
             for number, item in enumerate(items):
                 if item.data:
                     kept.append(item)
@@ -393,12 +314,12 @@ class Session:
                 next_ns += 1_000_000_000
                 progress(self._progress((now - start_ns) * 1e-9, None, None))
 
-    def _items(self, wait_s: float) -> list[_Item]:
+    def _items(self, wait_s: float) -> list[Read]:
         # Not woken by every read: a hundred wake-ups a second would cost more than all the rest.
         self._clock.sleep_until_ns(self._clock.now_ns() + int(wait_s * 1e9))
-        return _joined(_drained(self._tee.items), [chain.family.has_device_time for chain in self._chains])
+        return joined_reads(drained(self._tee.items), [chain.family.has_device_time for chain in self._chains])
 
-    def _decode(self, item: _Item) -> Block | None:
+    def _decode(self, item: Read) -> Block | None:
         chain = self._chains[item.channel]
         if item.event:
             chain.lost()
