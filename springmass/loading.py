@@ -19,10 +19,9 @@ from pipeline.errors import SceneError
 from pipeline.scene import Scene
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, USAGE, ProgramError
+from storage.layout import MAGIC
 
 __all__ = ["Loaded", "load", "read_scene", "sample_data", "to_track"]
-
-HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,7 +170,7 @@ def sample_data() -> Path:
 def _is_hdf5(path: Path) -> bool:
     try:
         with path.open("rb") as file:
-            return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
+            return file.read(len(MAGIC)) == MAGIC
     except (OSError, ValueError):
         return False  # the format registry says what is wrong with it
 

@@ -23,13 +23,13 @@ from acquisition.chain import SensorChain
 from acquisition.clock import Clock
 from acquisition.decoders.base import Family, Polled
 from acquisition.decoders.registry import describe_bytes
-from acquisition.errors import PortError
 from acquisition.wired import Line, PortReader, Transport
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, USAGE, ProgramError
 from springmass.reads import Read, Tee, drained, joined_reads
 from storage.recorder import Recorder, RecorderStatus
+from storage.recover import run_paths
 from storage.wire_layout import LogHeader, SensorEntry
 
 __all__ = ["Progress", "Sensor", "Session", "Trigger"]
@@ -253,8 +253,6 @@ class Session:
 
     def poll(self, wait_s: float) -> list[tuple[int, Block]]:
         """Wait so long, then return the blocks that came since the last call."""
-        if self._reader is not None and self._reader.failure is not None:
-            raise self._reader.failure
         blocks: list[tuple[int, Block]] = []
         for item in self._items(wait_s):
             block = self._decode(item)
@@ -297,7 +295,7 @@ class Session:
         start_ns = next_ns = self._clock.now_ns()
         while True:
             self._clock.sleep_until_ns(self._clock.now_ns() + 50_000_000)
-            items = drained(self._tee.items)
+            items = self._reads()
             for number, item in enumerate(items):
                 if item.data:
                     kept.append(item)
@@ -317,7 +315,13 @@ class Session:
     def _items(self, wait_s: float) -> list[Read]:
         # Not woken by every read: a hundred wake-ups a second would cost more than all the rest.
         self._clock.sleep_until_ns(self._clock.now_ns() + int(wait_s * 1e9))
-        return joined_reads(drained(self._tee.items), [chain.family.has_device_time for chain in self._chains])
+        return joined_reads(self._reads(), [chain.family.has_device_time for chain in self._chains])
+
+    def _reads(self) -> list[Read]:
+        """What came since the last call; raises what ended the reading, if anything did."""
+        if self._reader is not None and self._reader.failure is not None:
+            raise self._reader.failure
+        return drained(self._tee.items)
 
     def _decode(self, item: Read) -> Block | None:
         chain = self._chains[item.channel]
@@ -391,25 +395,8 @@ def demand_new(path: Path, sensors: int) -> None:
     ProgramError
         With exit code 2 if the run file or its log exists.
     """
-    several = [path.with_name(f"{path.stem}.{i}{path.suffix}") for i in range(sensors)] if sensors > 1 else []
-    for there in (path, path.with_suffix(".wire"), *several):
+    for there in dict.fromkeys((path, path.with_suffix(".wire"), *run_paths(path, range(sensors)))):
         if there.exists():
             raise ProgramError(
                 f"{there}: exists already, and a recording never replaces one; choose another name", USAGE
             )
-
-
-def open_port(address: str, baud: int) -> Transport:
-    """Open a port.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 4, in one line.
-    """
-    from acquisition.serial_port import SerialPort
-
-    try:
-        return SerialPort(address, baud)
-    except PortError as error:
-        raise ProgramError(str(error), SENSOR) from error

@@ -23,7 +23,7 @@ from storage.wire_decode import Chain, Decoded, chain_of, decode_log
 from storage.wire_layout import Kind, LogHeader, Record, SensorEntry
 from storage.wire_read import Damage, LogContents, NotALog, parse_log
 
-__all__ = ["RecoverReport", "RecoveredRun", "recover"]
+__all__ = ["RecoverReport", "RecoveredRun", "recover", "run_paths"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +146,7 @@ def recover(
     log_path = Path(log_path)
     log = _read(log_path, header)
     sensors = _calibrated(log, speed_of_sound_m_per_s)
-    paths = _targets(log_path if out_path is None else Path(out_path), sensors)
+    paths = run_paths(log_path if out_path is None else Path(out_path), [sensor.channel for sensor in sensors])
     if not overwrite:
         _demand_free(paths)
     decoded = decode_log(log.contents, sensors, chain_for)
@@ -187,11 +187,12 @@ def _calibrated(log: _Log, speed_of_sound_m_per_s: float | None) -> tuple[Sensor
     )
 
 
-def _targets(path: Path, sensors: Sequence[SensorEntry]) -> list[Path]:
+def run_paths(path: Path, channels: Sequence[int]) -> list[Path]:
+    """Return the run files that a log of these channels becomes, named after ``path``."""
     path = path if path.suffix == ".h5" else path.with_suffix(".h5")
-    if len(sensors) == 1:
+    if len(channels) <= 1:
         return [path]
-    return [path.with_name(f"{path.stem}.{sensor.channel}{path.suffix}") for sensor in sensors]
+    return [path.with_name(f"{path.stem}.{channel}{path.suffix}") for channel in channels]
 
 
 def _demand_free(paths: Sequence[Path]) -> None:

@@ -1,1 +1,13 @@
 """One module a command: `run(options) -> exit code`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+__all__ = ["completions"]
+
+
+def completions(options: argparse.Namespace) -> dict[str, Any]:
+    """Return what the command line says of an input beyond its name, as :func:`springmass.loading.load` takes it."""
+    return {name: getattr(options, name) for name in ("velocity", "channel", "rate_hz", "unit")}

@@ -12,6 +12,7 @@ from acquisition.errors import AcquisitionError
 from pipeline.analyse import Motion
 from pipeline.errors import PipelineError
 from springmass.analysing import Analysed, analyse_loaded, make_folder
+from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain
 from springmass.loading import load, read_scene
 from storage.errors import StorageError
@@ -31,15 +32,7 @@ def run(options: argparse.Namespace) -> int:
     codes: list[int] = []
     for path, name in zip(options.input, _result_names(options.input), strict=True):
         try:
-            loaded = load(
-                path,
-                velocity=options.velocity,
-                channel=options.channel,
-                rate_hz=options.rate_hz,
-                unit=options.unit,
-                from_s=options.from_s,
-                to_s=options.to_s,
-            )
+            loaded = load(path, **completions(options), from_s=options.from_s, to_s=options.to_s)
             analysed = analyse_loaded(
                 loaded,
                 scene,

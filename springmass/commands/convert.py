@@ -11,6 +11,7 @@ from typing import Any
 from acquisition.recording import Original
 from springmass import __version__
 from springmass.analysing import now_utc
+from springmass.commands import completions
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError
 from springmass.loading import Loaded, load, read_scene
 from storage.atomic import write_whole
@@ -24,13 +25,7 @@ RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
 def run(options: argparse.Namespace) -> int:
     """Convert one input."""
     scene = None if options.scene is None else read_scene(options.scene).to_mapping()
-    loaded = load(
-        options.input,
-        velocity=options.velocity,
-        channel=options.channel,
-        rate_hz=options.rate_hz,
-        unit=options.unit,
-    )
+    loaded = load(options.input, **completions(options))
     out = Path(options.output)
     if out.suffix.lower() in RUN_SUFFIXES:
         written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=scene, overwrite=options.overwrite)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.registry import formats
+from springmass.commands import completions
 from springmass.errors import OK
 from springmass.loading import Loaded, load
 
@@ -21,13 +22,7 @@ def run(options: argparse.Namespace) -> int:
     """List the formats, or describe a file."""
     if options.input is None:
         return _list(options)
-    loaded = load(
-        options.input,
-        velocity=options.velocity,
-        channel=options.channel,
-        rate_hz=options.rate_hz,
-        unit=options.unit,
-    )
+    loaded = load(options.input, **completions(options))
     facts = _facts(loaded)
     if options.json:
         print(json.dumps(facts, allow_nan=False))

@@ -18,14 +18,15 @@ from acquisition.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
 from acquisition.errors import CalibrationError
+from acquisition.serial_port import SerialPort
 from pipeline.air import speed_of_sound
 from pipeline.scene import Scene
 from pipeline.streaming import LiveMotion
 from springmass import __version__
 from springmass.analysing import now_utc
-from springmass.errors import OK, SENSOR, USAGE, ProgramError
+from springmass.errors import OK, USAGE, ProgramError
 from springmass.loading import read_scene
-from springmass.recording import BYTES_PER_READ, Progress, Sensor, Session, Trigger, demand_new, open_port
+from springmass.recording import BYTES_PER_READ, Progress, Sensor, Session, Trigger, demand_new
 from storage.disk import check_disk
 from storage.recover import recover
 
@@ -81,16 +82,13 @@ def _demand_sense(options: argparse.Namespace) -> None:
 def _record(session: Session, options: argparse.Namespace, log: Path) -> bool:
     """Run the session; True where Ctrl-C ended it."""
     session.listen()
-    try:
-        rest = None
-        if options.still is not None:
-            print(f"let the bob hang still for {options.still:g} s ...", file=sys.stderr)
-            rest = session.still(options.still)
-            print(f"rest {rest.rest_m * 1e3:.2f} mm, noise {rest.noise_m * 1e3:.3f} mm", file=sys.stderr)
-            if options.ruler is not None:
-                session.calibrate(rest, options.ruler, 0.5e-3)
-    except CalibrationError as error:
-        raise ProgramError(str(error), SENSOR) from error
+    rest = None
+    if options.still is not None:
+        print(f"let the bob hang still for {options.still:g} s ...", file=sys.stderr)
+        rest = session.still(options.still)
+        print(f"rest {rest.rest_m * 1e3:.2f} mm, noise {rest.noise_m * 1e3:.3f} mm", file=sys.stderr)
+        if options.ruler is not None:
+            session.calibrate(rest, options.ruler, 0.5e-3)
     trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
     show = _Line()
     try:
@@ -179,7 +177,7 @@ def _sensors(options: argparse.Namespace, scene: Scene | None) -> Iterator[tuple
     try:
         for address, family in zip(options.port, families, strict=True):
             baud = options.baud or family.baud
-            port = open_port(address, baud)
+            port = SerialPort(address, baud)
             sensors.append(Sensor(family, port, options.rate_hz, family_options, calibration, baud))
         yield sensors, "live"
     finally:
@@ -193,7 +191,6 @@ def _simulated(
 ) -> Iterator[Sensor]:
     if os.name == "nt":
         raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port", USAGE)
-    from acquisition.serial_port import SerialPort
     from acquisition.virtual import VirtualRangefinder, VirtualSensor
     from acquisition.virtual_port import VirtualPort
     from springmass.bench import bench_position

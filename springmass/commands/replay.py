@@ -12,6 +12,7 @@ import numpy as np
 
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.replay import Replay
+from springmass.commands import completions
 from springmass.commands.convert import write_loaded
 from springmass.errors import OK, USAGE, ProgramError
 from springmass.loading import load
@@ -23,13 +24,7 @@ def run(options: argparse.Namespace) -> int:
     """Play the input to stdout, a line per sample, or into a run file."""
     if options.loop and options.output is not None:
         raise ProgramError("--loop never ends and a run file is written whole at the end; leave one of them out", USAGE)
-    loaded = load(
-        options.input,
-        velocity=options.velocity,
-        channel=options.channel,
-        rate_hz=options.rate_hz,
-        unit=options.unit,
-    )
+    loaded = load(options.input, **completions(options))
     fast = math.isinf(options.speed)
     clock: Clock = VirtualClock() if fast else SystemClock()
     source = Replay(
