@@ -71,9 +71,10 @@ class SerialPort:
 
         self.close()
         try:
-            options: dict[str, Any] = {} if "://" in self.name else {"exclusive": True}
-            port = serial.serial_for_url(self.name, baudrate=self._baud, timeout=0, write_timeout=1.0, **options)
-        except (serial.SerialException, OSError, ValueError) as error:
+            # pyserial's network ports know no write timeout (RFC 2217 refuses one) and no exclusive use.
+            options: dict[str, Any] = {} if "://" in self.name else {"exclusive": True, "write_timeout": 1.0}
+            port = serial.serial_for_url(self.name, baudrate=self._baud, timeout=0, **options)
+        except (serial.SerialException, OSError, ValueError, NotImplementedError) as error:
             raise PortError(f"{self.name}: cannot be opened ({error})") from error
         self._port = port
         self._descriptor = _descriptor(port)

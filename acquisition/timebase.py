@@ -214,7 +214,8 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     slope, u_slope = min(candidates, key=lambda line: line[1])
     around = delay - slope * x
     return ClockFit(
-        -slope * 1e6,
+        # Exactly, and not -slope: at 50 ppm the square is many times a long run's uncertainty.
+        -slope / (1.0 + slope) * 1e6,
         u_slope * 1e6,
         float(np.std(around)),
         float(np.ptp(around)),
@@ -253,9 +254,13 @@ def _through_all(x: F8, delay: F8) -> tuple[float, float]:
 
 
 def _line(x: F8, y: F8) -> tuple[float, float]:
-    """Slope of a least-squares line and its standard uncertainty from the residuals."""
+    """Slope of a least-squares line and its standard uncertainty from the residuals.
+
+    A scatter that few points tell is itself uncertain: the uncertainty is the standard deviation of Student's
+    distribution, not its scale.
+    """
     centred = x - x.mean()
     power = float(centred @ centred)
     slope = float(centred @ y) / power
     residual = y - y.mean() - slope * centred
-    return slope, math.sqrt(float(residual @ residual) / max(x.size - 2, 1) / power)
+    return slope, math.sqrt(float(residual @ residual) / max(x.size - 4, 1) / power)

@@ -83,7 +83,7 @@ class RecoverReport:
                 lost = sum(gap["lost"] for gap in gaps)
                 yield f"{run.path}: {len(gaps)} gaps, {lost} readings lost in them, the longest {longest:.3g} s"
             clock = run.decoding.get("clock", {})
-            if clock.get("rate_error_ppm") is not None:
+            if clock.get("kind") == "device" and clock.get("rate_error_ppm") is not None:
                 rate = f"{clock['rate_error_ppm']:+.1f} +- {clock['u_rate_error_ppm']:.1f} ppm"
                 jitter = f"{clock['host_jitter_s'] * 1e3:.2g} ms"
                 yield f"{run.path}: sensor clock {rate} against this host's, jitter {jitter}"

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import os
 import queue
+import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -56,7 +57,8 @@ def run(options: argparse.Namespace) -> int:
         )
         log = out.with_suffix(".wire")
         try:
-            stopped = _record(session, options, log)
+            with _told_to_end():
+                stopped = _record(session, options, log)
         finally:
             session.stop()
     report = recover(
@@ -68,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
     for line in report.describe():
         print(line, file=sys.stderr)
     if stopped:
-        print("stopped by Ctrl-C; the run is complete up to there", file=sys.stderr)
+        print("stopped before its end; the run is complete up to there", file=sys.stderr)
     return 130 if stopped else OK
 
 
@@ -77,6 +79,21 @@ def _demand_sense(options: argparse.Namespace) -> None:
     for name, needed in (("ruler", "still"), ("pre", "trigger")):
         if getattr(options, name) is not None and getattr(options, needed) is None:
             raise ProgramError(f"--{name} does nothing without --{needed}; name both or neither", USAGE)
+
+
+@contextlib.contextmanager
+def _told_to_end() -> Iterator[None]:
+    """Take the end of a terminal or a service (SIGTERM, SIGHUP) for Ctrl-C, so that it closes the run as cleanly."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals are the main thread's
+        return
+    signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {number: signal.signal(number, signal.default_int_handler) for number in signals}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _record(session: Session, options: argparse.Namespace, log: Path) -> bool:

@@ -283,10 +283,11 @@ def start(scene: Path, out: Path) -> subprocess.Popen[str]:
     return child
 
 
-def test_ctrl_c_closes_the_run_cleanly(tmp_path: Path, scene: Path) -> None:
-    """SIGINT: the run file is complete up to there, exit code 130."""
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_being_told_to_end_closes_the_run_cleanly(tmp_path: Path, scene: Path, number: signal.Signals) -> None:
+    """Ctrl-C, kill and a closed terminal: the run file is complete up to there, exit code 130."""
     child = start(scene, tmp_path / "run.h5")
-    child.send_signal(signal.SIGINT)
+    child.send_signal(number)
     _, told = child.communicate(timeout=30)
     assert child.returncode == 130, told
     assert "Traceback" not in told

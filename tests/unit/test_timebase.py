@@ -245,6 +245,21 @@ def test_clock_rate_with_scatter_to_both_sides() -> None:
     assert 0.6 < np.std(z) < 1.5
 
 
+@pytest.mark.parametrize("seconds", [5, 30, 300])
+def test_a_clock_rate_is_covered_by_its_uncertainty_however_short_the_run(seconds: int) -> None:
+    """From five seconds on, 68 and 95 % intervals cover as they claim: a dozen stretches tell their scatter badly."""
+    t = np.arange(seconds * 100) / RATE_HZ
+    z = []
+    for seed in range(200):
+        rng = np.random.default_rng([seed, seconds])
+        ppm = float(rng.uniform(-100.0, 100.0))
+        host = np.round((t / (1.0 + ppm * 1e-6) + rng.exponential(1e-3, t.size)) * 1e9).astype(np.int64)
+        fit = fit_clock(t, host)
+        z.append((fit.rate_error_ppm - ppm) / fit.u_rate_error_ppm)
+    assert np.mean(np.abs(z) < 1.0) == pytest.approx(0.683, abs=0.10)
+    assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=0.04)
+
+
 def test_too_few_readings_say_nothing_of_the_clock() -> None:
     """Below 24 readings, or with all of them at one time, the rate error is unknown and its u infinite."""
     for t in (np.arange(23.0), np.zeros(40)):

@@ -1,0 +1,162 @@
+"""A sensor behind an RFC 2217 server: pyserial's own server before the simulated sensor's port."""
+
+from __future__ import annotations
+
+import select
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import serial
+from serial.rfc2217 import PortManager
+
+from acquisition.clock import SystemClock
+from acquisition.decoders.registry import get_family
+from acquisition.virtual import VirtualRangefinder, VirtualSensor
+from acquisition.virtual_port import VirtualPort
+from springmass.cli import main
+from storage.run import open_run
+
+# pyserial 3.5 starts its reading thread in the old way.
+pytestmark = pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\) is deprecated:DeprecationWarning")
+
+OMEGA = 16.7
+CLOCK = SystemClock()
+
+
+def speaking(family: str, rate_hz: float) -> VirtualPort:
+    """Return a simulated sensor of a bob that swings, not started."""
+    finder = VirtualRangefinder(
+        lambda t: 0.4 + 0.05 * np.cos(OMEGA * t), VirtualSensor(rate_hz=rate_hz), np.random.default_rng(5)
+    )
+    return VirtualPort(get_family(family), finder, CLOCK, seconds=60.0)
+
+
+class Pty(serial.Serial):
+    """A pseudo-terminal as a serial port: one without the modem lines that a server asks for."""
+
+    cts = dsr = ri = cd = False
+    rts = dtr = True
+
+    def _update_rts_state(self) -> None:
+        """Have none."""
+
+    _update_dtr_state = _update_rts_state
+
+
+class Bridge:
+    """Serves one serial port by RFC 2217 to one client after the other, as pyserial's example server does."""
+
+    def __init__(self, path: str) -> None:
+        self._serial = Pty(path, timeout=0)
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener.settimeout(0.1)
+        self._stop = threading.Event()
+        self.hang_up = threading.Event()
+        self.served = 0
+        self.address = f"rfc2217://127.0.0.1:{self._listener.getsockname()[1]}"
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Hang up and close."""
+        self._stop.set()
+        self._thread.join()
+        self._listener.close()
+        self._serial.close()
+
+    @property
+    def baud(self) -> int:
+        """What the client set the port to."""
+        return int(self._serial.baudrate)
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                connection, _ = self._listener.accept()
+            except TimeoutError:
+                continue
+            self.served += 1
+            with connection:
+                self._serve(connection)
+
+    def _serve(self, connection: socket.socket) -> None:
+        manager = PortManager(self._serial, Writer(connection))
+        while not self._stop.is_set():
+            if self.hang_up.is_set():
+                self.hang_up.clear()
+                return
+            ready, _, _ = select.select([self._serial, connection], [], [], 0.05)
+            try:
+                if self._serial in ready:
+                    connection.sendall(b"".join(manager.escape(self._serial.read(self._serial.in_waiting))))
+                request = connection.recv(1024) if connection in ready else None
+            except OSError:
+                return
+            if request == b"":
+                return
+            self._serial.write(b"".join(manager.filter(request or b"")))
+
+
+class Writer:
+    """What the manager answers through."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._connection = connection
+
+    def write(self, data: bytes) -> None:
+        """Send to the client."""
+        self._connection.sendall(data)
+
+
+@contextmanager
+def bridged(family: str, rate_hz: float) -> Iterator[Bridge]:
+    """Run a sensor behind a server."""
+    with speaking(family, rate_hz) as port:
+        bridge = Bridge(port.path)
+        try:
+            port.start()
+            yield bridge
+        finally:
+            bridge.close()
+
+
+@pytest.mark.parametrize(("family", "rate_hz"), [("line-protocol", 100.0), ("us100", 20.0)])
+def test_a_sensor_behind_rfc2217_is_recorded_like_one_on_a_cable(family: str, rate_hz: float, tmp_path: Path) -> None:
+    """A sender's and a polled sensor's readings come through the telnet wrapping, at the baud rate asked for."""
+    out = tmp_path / "run.h5"
+    with bridged(family, rate_hz) as bridge:
+        options = ["--port", bridge.address, "--sensor", family, "--rate-hz", f"{rate_hz:g}", "--seconds", "2"]
+        assert main(["record", *options, "-o", str(out)]) == 0
+        assert bridge.baud == get_family(family).baud
+    with open_run(out) as run:
+        samples = run.samples()
+    assert len(samples) >= 0.8 * 2.0 * rate_hz
+    assert not samples.flags.any()
+    np.testing.assert_allclose(samples.distance, 0.4, atol=0.06)
+    assert np.ptp(samples.distance) > 0.08
+    if family == "line-protocol":
+        # Its numbers say that nothing is missing.
+        np.testing.assert_allclose(np.diff(samples.t), 1.0 / rate_hz, atol=1e-9)
+
+
+def test_a_server_that_hangs_up_is_a_gap_and_the_run_goes_on(tmp_path: Path) -> None:
+    """After the connection breaks the reader connects again, and the gap stands in the run with its length."""
+    out = tmp_path / "run.h5"
+    with bridged("line-protocol", 100.0) as bridge:
+        breaker = threading.Timer(1.0, bridge.hang_up.set)
+        breaker.start()
+        options = ["--port", bridge.address, "--sensor", "line-protocol", "--seconds", "5"]
+        assert main(["record", *options, "-o", str(out)]) == 0
+        assert bridge.served == 2
+    with open_run(out) as run:
+        events = run.provenance["events"]
+        gaps = run.provenance["decoding"]["gaps"]
+        samples = run.samples()
+    assert [event["kind"] for event in events if event["kind"] in ("lost", "reopened")] == ["lost", "reopened"]
+    assert len(samples) > 250
+    assert sum(gap["lost"] for gap in gaps) == round((samples.t[-1] - samples.t[0]) * 100) + 1 - len(samples)
