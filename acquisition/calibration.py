@@ -59,6 +59,12 @@ class Calibration:
         missing = (readings.flags & np.uint8(Flag.MISSING)) != 0
         return np.where(missing, np.nan, self.scale * raw + self.offset_m)
 
+    def restated(self, point: StillPoint, before: Calibration) -> StillPoint:
+        """Return a rest position that was measured with ``before``, another scale and offset, as this one states it."""
+        ratio = self.scale / before.scale
+        rest = (point.rest_m - before.offset_m) * ratio + self.offset_m
+        return StillPoint(rest, point.u_rest_m * ratio, point.noise_m * ratio, point.samples)
+
     def to_mapping(self) -> dict[str, Any]:
         """Return the numbers by name, for the log and the run file."""
         return asdict(self)

@@ -199,7 +199,12 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="option of the decoder")
     parser.add_argument("--still", type=_positive, metavar="S", help="measure rest position and noise first, so long")
     parser.add_argument(
-        "--ruler", type=_positive, metavar="M", help="the still distance by the ruler, m; needs --still"
+        "--ruler",
+        action="append",
+        default=[],
+        type=_positive,
+        metavar="M",
+        help="a still distance by the ruler, m; again for another, then they set the scale too; needs --still",
     )
     parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="applied to echo times, m/s")
     parser.add_argument("--trigger", type=_positive, metavar="M", help="start when the bob leaves its rest by this, m")

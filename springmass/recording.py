@@ -181,17 +181,23 @@ class Session:
 
     def still(self, seconds: float = 3.0) -> StillPoint:
         """Return rest position and noise of the first sensor's next seconds, the bob hanging still."""
+        self.poll(0.0)  # what came before is another rest, or none
         distances: list[np.ndarray[Any, Any]] = []
         end = self._clock.now_ns() + int(seconds * 1e9)
         while self._clock.now_ns() < end:
             distances += [block.distance for channel, block in self.poll(0.05) if channel == 0]
         return from_still(np.concatenate(distances) if distances else np.empty(0))
 
-    def calibrate(self, point: StillPoint, known_m: float, u_known_m: float) -> None:
-        """Take the still distance for a known one: the first sensor's offset."""
-        calibration = against_ruler((point,), (known_m,), u_known_m, self.sensors[0].calibration)
+    def calibrate(self, points: Sequence[StillPoint], known_m: Sequence[float], u_known_m: float) -> StillPoint:
+        """Carry still distances of the first sensor to known ones; return the last of them as it is now stated.
+
+        One known distance sets the offset, two or more the scale as well.
+        """
+        before = self.sensors[0].calibration
+        calibration = against_ruler(tuple(points), tuple(known_m), u_known_m, before)
         self.sensors[0] = replace(self.sensors[0], calibration=calibration)
         self._chains[0].calibration = calibration
+        return calibration.restated(points[-1], before)
 
     def record(
         self,

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
+from acquisition.calibration import SPEED_OF_SOUND_M_PER_S, Calibration, StillPoint
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
 from acquisition.errors import CalibrationError
 from acquisition.serial_port import SerialPort
 from pipeline.air import speed_of_sound
+from pipeline.estimate import format_value
 from pipeline.scene import Scene
 from pipeline.streaming import LiveMotion
 from springmass import __version__
@@ -33,6 +34,7 @@ from storage.recover import recover
 
 __all__ = ["run"]
 
+U_RULER_M = 0.5e-3
 UNLIMITED_S = 3600.0  # how long a run without --seconds is taken to be, for the look at the disk
 
 
@@ -77,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
 def _demand_sense(options: argparse.Namespace) -> None:
     """Refuse options that would do nothing without another."""
     for name, needed in (("ruler", "still"), ("pre", "trigger")):
-        if getattr(options, name) is not None and getattr(options, needed) is None:
+        if getattr(options, name) not in (None, []) and getattr(options, needed) is None:
             raise ProgramError(f"--{name} does nothing without --{needed}; name both or neither", USAGE)
 
 
@@ -99,13 +101,7 @@ def _told_to_end() -> Iterator[None]:
 def _record(session: Session, options: argparse.Namespace, log: Path) -> bool:
     """Run the session; True where Ctrl-C ended it."""
     session.listen()
-    rest = None
-    if options.still is not None:
-        print(f"let the bob hang still for {options.still:g} s ...", file=sys.stderr)
-        rest = session.still(options.still)
-        print(f"rest {rest.rest_m * 1e3:.2f} mm, noise {rest.noise_m * 1e3:.3f} mm", file=sys.stderr)
-        if options.ruler is not None:
-            session.calibrate(rest, options.ruler, 0.5e-3)
+    rest = None if options.still is None else _rest(session, options.still, options.ruler)
     trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
     show = _Line()
     try:
@@ -124,6 +120,42 @@ def _record(session: Session, options: argparse.Namespace, log: Path) -> bool:
     finally:
         show.end()
     return False
+
+
+def _rest(session: Session, seconds: float, ruler: list[float]) -> StillPoint:
+    """Measure the rest position, at the distances by the ruler first, which set offset and scale."""
+    if not ruler:
+        return _still(session, seconds, "let the bob hang still")
+    if len(ruler) == 1:
+        return session.calibrate([_still(session, seconds, "let the bob hang still")], ruler, U_RULER_M)
+    points = []
+    for known in ruler:
+        _ask(f"bring the target to {known:g} m by the ruler, then press Enter")
+        points.append(_still(session, seconds, "keep it still"))
+    session.calibrate(points, ruler, U_RULER_M)
+    found = session.sensors[0].calibration
+    scale = format_value(found.scale, found.u_scale)
+    print(f"scale {scale}, offset {format_value(found.offset_m, found.u_offset_m, 'm')}", file=sys.stderr)
+    _ask("hang the bob over the sensor, then press Enter")
+    return _still(session, seconds, "let it hang still")
+
+
+def _still(session: Session, seconds: float, demand: str) -> StillPoint:
+    print(f"{demand} for {seconds:g} s ...", file=sys.stderr)
+    rest = session.still(seconds)
+    print(f"rest {rest.rest_m * 1e3:.2f} mm, noise {rest.noise_m * 1e3:.3f} mm", file=sys.stderr)
+    return rest
+
+
+def _ask(demand: str) -> None:
+    """Wait for Enter."""
+    print(demand, file=sys.stderr, flush=True)
+    if sys.stdin is None or not sys.stdin.readline():
+        raise ProgramError(
+            "several --ruler distances are measured one after the other, each begun with Enter, and the standard input "
+            "is closed; name one --ruler, or run this at a terminal",
+            USAGE,
+        )
 
 
 class _Line:

@@ -8,6 +8,7 @@ import pty
 import signal
 import subprocess
 import sys
+import threading
 import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -330,3 +331,74 @@ def test_a_port_is_probed(cli: Callable) -> None:
         (rows,) = cli("ports", "--port", sensor.path, "--json").results
     (row,) = [row for row in rows if row["device"] == sensor.path]
     assert row["families"][0] == "line-protocol"
+
+
+class Hands:
+    """Somebody at the bench: brings the target to the next place, then presses Enter."""
+
+    def __init__(self, places: list[float]) -> None:
+        self._places = list(places)
+        self.place = places[0]
+
+    def isatty(self) -> bool:
+        """Be no terminal."""
+        return False
+
+    def readline(self) -> str:
+        """Move, then press Enter; nothing where there is nowhere left to go."""
+        if not self._places:
+            return ""
+        self.place = self._places.pop(0)
+        return "\n"
+
+
+def rulered(cli: Callable, tmp_path: Path, hands: Hands, *rulers: str) -> SimpleNamespace:
+    """Record a still target with a speed of sound that is 2 % too high, calibrated by a ruler."""
+    finder = VirtualRangefinder(lambda t: hands.place + 0.0 * t, VirtualSensor(), np.random.default_rng(5))
+    with VirtualPort(get_family("line-protocol"), finder, SystemClock(), seconds=30.0) as sensor:
+        sensor.start()
+        return cli(
+            *("record", "--port", sensor.path, "--sensor", "line-protocol", "--speed-of-sound", "350.88"),
+            *("--still", "0.5", *(word for known in rulers for word in ("--ruler", known))),
+            *("--trigger", "0.05", "--seconds", "0.5", "-o", tmp_path / "run.h5"),
+        )
+
+
+def test_two_distances_by_the_ruler_set_offset_and_scale(
+    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A scale 2 % off is put right by two known distances, and the trigger waits from the rest position found then."""
+    hands = Hands([0.2, 0.6, 0.4])
+    monkeypatch.setattr(sys, "stdin", hands)
+    mover = threading.Timer(4.0, lambda: setattr(hands, "place", 0.5))
+    mover.start()
+    done = rulered(cli, tmp_path, hands, "0.2", "0.6")
+    assert done.code == 0, done.err
+    assert "scale 0.980" in done.err
+    distance = load(tmp_path / "run.h5").samples.distance
+    np.testing.assert_allclose(distance[:10], 0.4, atol=0.002)
+    np.testing.assert_allclose(distance[-10:], 0.5, atol=0.002)
+
+
+def test_one_distance_by_the_ruler_moves_the_rest_position_with_it(cli: Callable, tmp_path: Path) -> None:
+    """An offset of a decimetre is no motion of the bob: the trigger comes with the motion, not before."""
+    hands = Hands([0.4])
+    mover = threading.Timer(3.0, lambda: setattr(hands, "place", 0.48))
+    mover.start()
+    done = rulered(cli, tmp_path, hands, "0.5")
+    assert done.code == 0, done.err
+    distance = load(tmp_path / "run.h5").samples.distance
+    np.testing.assert_allclose(distance[:10], 0.5, atol=0.002)
+    np.testing.assert_allclose(distance[-10:], 0.5816, atol=0.002)
+
+
+def test_several_distances_need_somebody_who_presses_enter(
+    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the standard input closed the second distance cannot be waited for: one line, exit code 2, no run."""
+    hands = Hands([0.2])
+    monkeypatch.setattr(sys, "stdin", hands)
+    done = rulered(cli, tmp_path, hands, "0.2", "0.6")
+    assert done.code == 2
+    assert "begun with Enter" in done.err.splitlines()[-1]
+    assert not (tmp_path / "run.wire").exists()
