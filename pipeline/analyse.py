@@ -33,8 +33,17 @@ __all__ = ["Analysis", "Motion", "Params", "analyse"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Options of every stage."""
+    """Options of every stage.
 
+    Parameters
+    ----------
+    accuracy : {"fast", "standard", "best"}
+        The tier; :func:`pipeline.accuracy.params_for` gives the options that belong to it.
+    condition, cycles, demodulate, damping, phase, derive
+        Of the stages of those names.
+    """
+
+    accuracy: str = "standard"
     condition: conditioning.Params = field(default_factory=conditioning.Params)
     cycles: cycling.Params = field(default_factory=cycling.Params)
     demodulate: demodulation.Params = field(default_factory=demodulation.Params)

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, analyse
 from pipeline.scene import Scene
 from springmass.errors import USAGE, ProgramError
@@ -57,7 +58,7 @@ def analyse_loaded(
         None: the scene that a run file carries, if any.
     parameters : mapping
         Options as resolved, stored with the result.
-    accuracy : str
+    accuracy : {"fast", "standard", "best"}
         Tier.
     with_classic : bool
         Whether the report's method is wanted; its estimates then stand in the result.
@@ -70,7 +71,7 @@ def analyse_loaded(
     """
     if scene is None:
         scene = Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
-    analysis = analyse(loaded.track, scene)
+    analysis = analyse(loaded.track, scene, params_for(accuracy))
     classic = None
     if with_classic:
         from pipeline.classic import classic as evaluate

@@ -139,9 +139,9 @@ def _add_analyse(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", metavar="FILE", help="scene file (TOML): masses, disc, air, sensor")
     parser.add_argument(
         "--accuracy",
-        choices=("standard",),
+        choices=("fast", "standard", "best"),
         default="standard",
-        help="how much time to spend for how much accuracy; one tier is measured so far",
+        help="how much time to spend for how much accuracy",
     )
     parser.add_argument("--method", choices=("classic",), help="the lab report's own method, to compare against")
     _add_input_options(parser)

@@ -1,0 +1,32 @@
+"""Accuracy: the tiers between which a user trades time for error, and the options that each stands for."""
+
+from __future__ import annotations
+
+from pipeline.analyse import Params
+from pipeline.errors import AnalysisError
+
+__all__ = ["TIERS", "params_for"]
+
+TIERS = ("fast", "standard", "best")
+
+
+def params_for(accuracy: str) -> Params:
+    """Return the options of an accuracy tier.
+
+    Parameters
+    ----------
+    accuracy : {"fast", "standard", "best"}
+
+    Raises
+    ------
+    AnalysisError
+        If there is no such tier.
+
+    Examples
+    --------
+    >>> params_for("best").accuracy
+    'best'
+    """
+    if accuracy not in TIERS:
+        raise AnalysisError(f"accuracy must be one of {', '.join(TIERS)}, got {accuracy!r}")
+    return Params(accuracy=accuracy)
