@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from pipeline import cycles as cycling
 from pipeline import damping as dampings
 from pipeline import demodulate as demodulation
 from pipeline import derive as derivation
+from pipeline import fullfit as fullfits
 from pipeline import phase as phases
 from pipeline.condition import Conditioned, condition
 from pipeline.cycles import Cycles, NoOscillation, find_cycles
@@ -21,6 +22,7 @@ from pipeline.derive import Derived, derive
 from pipeline.effects import Effect, tabulate
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate
+from pipeline.fullfit import FullFit, fit_record
 from pipeline.judge import Finding, count_quality, judge, judge_samples
 from pipeline.phase import PhaseFit, fit_phase
 from pipeline.rest import Rest, fit_rest
@@ -39,7 +41,7 @@ class Params:
     ----------
     accuracy : {"fast", "standard", "best"}
         The tier; :func:`pipeline.accuracy.params_for` gives the options that belong to it.
-    condition, cycles, demodulate, damping, phase, derive
+    condition, cycles, demodulate, damping, phase, derive, full
         Of the stages of those names.
     """
 
@@ -50,6 +52,7 @@ class Params:
     damping: dampings.Params = field(default_factory=dampings.Params)
     phase: phases.Params = field(default_factory=phases.Params)
     derive: derivation.Params = field(default_factory=derivation.Params)
+    full: fullfits.Params = field(default_factory=fullfits.Params)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +66,7 @@ class Motion:
     rest: Rest
     waveform: Waveform
     derived: Derived
+    full: FullFit | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,6 +146,12 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     damping = fit_damping(demodulated, start, params.damping)
     phase = fit_phase(demodulated, damping, params.phase)
     rest = fit_rest(demodulated)
+    waveform = reconstruct(track, demodulated, phase, rest)
+    full = None
+    if params.accuracy == "best":
+        full = fit_record(conditioned, demodulated, damping, phase, rest, waveform, params=params.full)
+        demodulated = replace(demodulated, flags=full.flags)
+        damping, phase, rest, waveform = full.damping, full.phase, full.rest, full.waveform
     effects = tabulate(
         scene,
         damping,
@@ -152,9 +162,8 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         u_clock=params.derive.u_clock_nominal,
     )
     derived = derive(demodulated, damping, phase, rest, scene, effects, clock=track.clock, params=params.derive)
-    waveform = reconstruct(track, demodulated, phase, rest)
     findings = judge(conditioned, cycles, demodulated, damping, phase, rest, waveform)
-    motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived)
+    motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived, full)
     return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
 
 

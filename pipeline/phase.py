@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.damping import Damping
+from pipeline.damping import Damping, LawFit
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate
 from pipeline.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, solve_weighted
 from pipeline.track import F8
 
-__all__ = ["Params", "PhaseFit", "fit_phase"]
+__all__ = ["Params", "PhaseFit", "fit_phase", "squared_amplitude_integral", "wrapped"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +128,7 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
     return PhaseFit(
         damping.t0,
         Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),
-        Estimate(_wrapped(at_start), math.sqrt(float(start @ covariance @ start)), "rad"),
+        Estimate(wrapped(at_start), math.sqrt(float(start @ covariance @ start)), "rad"),
         None if bent is None else _backbone(bent, spread, free),
         model.chi2 / free,
         length,
@@ -147,18 +147,29 @@ def _design(t: F8, middle: float, damping: Damping, bent: bool) -> F8:
 
 
 def _squared_amplitude_integral(t: F8, middle: float, damping: Damping) -> F8:
-    """Integral of A^2 from the middle of the record, m^2 s, by Simpson's rule on a fixed fine grid.
-
-    The grid does not depend on which times are asked for, so that windows and samples see one function.
-    """
     end = max(2.0 * middle - damping.t0, float(np.max(t)), damping.t0 + 1e-9)
-    grid = np.linspace(min(damping.t0, float(np.min(t))), end, 513)
+    grid, area = squared_amplitude_integral(damping.best, damping.t0, middle, min(damping.t0, float(np.min(t))), end)
+    return np.asarray(np.interp(t - middle, grid, area))
+
+
+def squared_amplitude_integral(fit: LawFit, t0: float, middle: float, first: float, last: float) -> tuple[F8, F8]:
+    """Return times from ``middle`` (513,), s, and the integral of A^2 from there, m^2 s, by Simpson's rule.
+
+    Parameters
+    ----------
+    fit : LawFit
+        Gives the amplitude, counted from ``t0``.
+    t0, middle, first, last : float, s
+        The table runs from ``first`` to ``last``.
+    """
+    grid = np.linspace(first - middle, last - middle, 513)
     half = 0.5 * (grid[1:] + grid[:-1])
-    squared = damping.best.amplitude(grid - damping.t0) ** 2
-    inner = damping.best.amplitude(half - damping.t0) ** 2
+    since = middle - t0
+    squared = fit.amplitude(grid + since) ** 2
+    inner = fit.amplitude(half + since) ** 2
     pieces = (grid[1] - grid[0]) / 6.0 * (squared[:-1] + 4.0 * inner + squared[1:])
     integral = np.concatenate([[0.0], np.cumsum(pieces)])
-    return np.asarray(np.interp(t, grid, integral) - np.interp(middle, grid, integral))
+    return grid, np.asarray(integral - np.interp(0.0, grid, integral))
 
 
 def _widening(line: Line, u: F8, spread: Scatter, params: Params) -> tuple[float, float]:
@@ -185,7 +196,7 @@ def _single(demodulated: Demodulated, damping: Damping, noise: float) -> PhaseFi
     return PhaseFit(
         damping.t0,
         Estimate(omega, u_omega, "rad/s"),
-        Estimate(_wrapped(phase), math.hypot(noise, 0.5 * math.pi), "rad"),
+        Estimate(wrapped(phase), math.hypot(noise, 0.5 * math.pi), "rad"),
         None,
         math.nan,
         1.0,
@@ -196,6 +207,7 @@ def _single(demodulated: Demodulated, damping: Damping, noise: float) -> PhaseFi
     )
 
 
-def _wrapped(angle: float) -> float:
+def wrapped(angle: float) -> float:
+    """Return an angle within (-pi, pi], rad."""
     turned = math.remainder(angle, 2.0 * math.pi)
     return math.pi if turned == -math.pi else turned
