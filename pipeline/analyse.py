@@ -135,6 +135,8 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     0.757010 +- 0.000022 s
     """
     scene, params = scene or Scene(), params or Params()
+    if track.sigma_m is None and scene.sensor_sigma_m is not None:
+        track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     conditioned = condition(track, params.condition)
     cycles = find_cycles(conditioned, params.cycles)
     if isinstance(cycles, NoOscillation):
@@ -169,7 +171,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
 
 def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
     """Why the motion is no oscillation although its spectrum has a peak: a step or a ramp has one too."""
-    size = float(np.median(demodulated.amplitude))
+    size = float(np.quantile(demodulated.amplitude, 0.9))
     left = demodulated.noise_m
     if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
         return NoOscillation("the distance does not follow the period that its spectrum shows")

@@ -16,6 +16,8 @@ __all__ = ["Conditioned", "Params", "condition", "fourth_difference_noise"]
 FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
 MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4)
 QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
+TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
+CREST_SIGMAS = 3.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +54,8 @@ class Conditioned:
         Distances at which the record is clipped, m.
     quantum_m : float or None
         Step in which the distances come: the track's, or a coarser one that the distances themselves show.
+    clipped_from_m : tuple of float
+        For each plateau the distance from which on samples were flagged, m.
     """
 
     track: Track
@@ -59,12 +63,30 @@ class Conditioned:
     noise_m: float
     plateaus_m: tuple[float, ...]
     quantum_m: float | None
+    clipped_from_m: tuple[float, ...] = ()
 
     @property
     def used(self) -> NDArray[np.bool_]:
         """(n,) bool: samples without any flag that speaks against them."""
         mask: NDArray[np.bool_] = (self.flags & UNUSABLE) == 0
         return mask
+
+    def near_plateau(self, model_m: F8, noise_m: float) -> NDArray[np.bool_]:
+        """Return where a model comes so near a plateau that noise decides whether a sample is clipped.
+
+        Samples there are left out by the model, not by their own noise: what is left is not biased.
+
+        Parameters
+        ----------
+        model_m : (...) float64, m
+        noise_m : float
+        """
+        near = np.zeros(model_m.shape, np.bool_)
+        middle = float(np.median(model_m))
+        for bottom in self.clipped_from_m:
+            sign = 1.0 if bottom > middle else -1.0
+            near |= sign * model_m > sign * bottom - CREST_SIGMAS * noise_m
+        return near
 
 
 def condition(track: Track, params: Params | None = None) -> Conditioned:
@@ -115,23 +137,26 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
         )
     y, rows = track.y[clean], np.flatnonzero(clean)
     half_step = 0.5 * (track.quantum_m or 0.0)
-    spikes = _spikes(y, max(_least_noise(y), half_step), params.spike_sigmas)
+    spikes = _spikes(y, half_step, params.spike_sigmas)
     flags[rows[spikes]] |= np.uint8(Quality.FALSE_ECHO)
     y_kept, rows = y[~spikes], rows[~spikes]
     noise_m = fourth_difference_noise(y_kept)
     plateaus: list[float] = []
+    bottoms: list[float] = []
     ordered = np.sort(y_kept)
     found = [
         (sign, *_plateau(sign * y_kept, increasing, max(noise_m, half_step), params.plateau_contrast))
         for sign, increasing in ((1.0, ordered), (-1.0, -ordered[::-1]))
     ]
     # A record that lies on plateaus for the most part is a step or a still bob, not a clipped motion.
-    if sum(members.size for _, _, members in found) <= 0.6 * y_kept.size:
-        for sign, level, members in found:
+    if sum(members.size for _, _, _, members in found) <= 0.6 * y_kept.size:
+        for sign, level, bottom, members in found:
             if members.size:
                 plateaus.append(sign * level)
+                bottoms.append(sign * bottom)
                 flags[rows[members]] |= np.uint8(Quality.CLIPPED)
-    return Conditioned(track, flags, noise_m, tuple(plateaus), _coarsest(ordered, track.quantum_m))
+    quantum_m = _coarsest(ordered, track.quantum_m)
+    return Conditioned(track, flags, noise_m, tuple(plateaus), quantum_m, tuple(bottoms))
 
 
 def _coarsest(ordered: F8, stated_m: float | None) -> float | None:
@@ -173,26 +198,35 @@ def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
     return flags
 
 
-def _least_noise(y: F8) -> float:
-    """Noise that a third of the fourth differences still shows: enough to find spikes by, however many there are.
+def _least_noise(y: F8) -> tuple[float, bool]:
+    """Noise that a third of the fourth differences still shows, and whether even so many are not clean.
 
-    A fifth of the samples being spikes leaves a third of the fourth differences clean.
+    A fifth of the samples being spikes leaves a third of the fourth differences clean, two fifths leave a twelfth.
     """
     if y.size < 5:
-        return 0.0
+        return 0.0, False
     size = np.abs(np.diff(y, 4))
-    quarter = float(np.partition(size, size.size // 4)[size.size // 4])
-    return quarter / (QUARTER_TO_SIGMA * float(FOURTH_DIFFERENCE_GAIN))
+    few, many = size.size // 20, size.size // 4
+    ordered = np.partition(size, (few, many))
+    gain = float(FOURTH_DIFFERENCE_GAIN)
+    quarter = float(ordered[many]) / (QUARTER_TO_SIGMA * gain)
+    twentieth = float(ordered[few]) / (TWENTIETH_TO_SIGMA * gain)
+    flooded = 0.0 < twentieth < 0.25 * quarter
+    return (twentieth if flooded else quarter), flooded
 
 
-def _spikes(y: F8, noise_m: float, sigmas: float) -> NDArray[np.bool_]:
+def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
     """Return which samples stand off the median of five around them by more than noise and curvature do."""
     spikes = np.zeros(y.size, np.bool_)
     if y.size < 8:
         return spikes
-    # What curvature alone does: a quantile of the second differences that spikes on a fifth of the samples spare.
+    noise_m, flooded = _least_noise(y)
+    # What curvature alone does: a quantile of the second differences that spikes on a fifth of the samples spare; of
+    # a cosine's second differences 0.15 lie within 0.40 of what 0.4 of them do.
+    share, gain = (0.15, 2.5) if flooded else (0.4, 1.0)
     second = np.abs(np.diff(y, 2))
-    bound = sigmas * noise_m + 5.0 * float(np.partition(second, int(0.4 * second.size))[int(0.4 * second.size)])
+    rank = int(share * second.size)
+    bound = sigmas * max(noise_m, half_step) + 5.0 * gain * float(np.partition(second, rank)[rank])
     smooth = y
     for _ in range(4):
         away = _off_median(smooth)
@@ -237,7 +271,7 @@ def _visits(y: F8, band: NDArray[np.bool_], low: float) -> int:
     return int(np.count_nonzero((known[1:] > 0) & (known[:-1] < 0))) + int(known[0] > 0)
 
 
-def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float, NDArray[np.int64]]:
+def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float, float, NDArray[np.int64]]:
     """Find a clipped plateau at the upper end of ``y``, which ``ordered`` holds in increasing order.
 
     A clipped record piles samples into a band a few sigma wide with almost none above and few beneath; an
@@ -245,9 +279,11 @@ def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float
     """
     none = np.empty(0, np.int64)
     low, high = ordered[0], ordered[-1]
+    if (level := _saturated(y, ordered, contrast)) is not None:
+        return level, level, np.flatnonzero(y >= level)
     width = 6.0 * noise_m
     if high - low < 6.0 * width or width == 0.0:
-        return 0.0, none
+        return 0.0, 0.0, none
     first = int(np.searchsorted(ordered, low + 0.6 * (high - low)))
     upper = ordered[first:]
     counts = np.searchsorted(upper, upper + width, side="right") - np.arange(upper.size)
@@ -257,12 +293,28 @@ def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float
     above = upper.size - start - inside
     beneath = int(np.count_nonzero((upper >= bottom - width) & (upper < bottom)))
     if inside < max(0.02 * y.size, 8) or above > 0.1 * inside or inside < contrast * (beneath + 1):
-        return 0.0, none
+        return 0.0, 0.0, none
     band = (y >= bottom) & (y <= bottom + width)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], band.astype(np.int8), [0]])))
     starts, stops = edges[::2], edges[1::2]
     if np.median(stops - starts) < 3 or _visits(y, band, bottom - 3.0 * width) < 2:
-        return 0.0, none
+        return 0.0, 0.0, none
     # Heavy tails of the noise stand above the band and belong to the plateau all the same.
     members = np.flatnonzero(y >= bottom)
-    return float(np.median(y[band])), members
+    return float(np.median(y[band])), float(bottom), members
+
+
+def _saturated(y: F8, ordered: F8, contrast: float) -> float | None:
+    """The value at which a sensor that saturates after its noise piles up the top samples, if it does."""
+    few = max(int(0.02 * y.size), 8)
+    level = float(ordered[-max(few // 2, 1)])
+    first, last = np.searchsorted(ordered, level), np.searchsorted(ordered, level, side="right")
+    inside = int(last - first)
+    if inside < few or ordered.size - last > 0.1 * inside or first == 0:
+        return None
+    next_lower = ordered[first - 1]
+    beneath = int(first - np.searchsorted(ordered, next_lower))
+    margin = 0.05 * (level - float(ordered[0]))
+    if inside < contrast * (beneath + 1) or _visits(y, y >= level, level - margin) < 2:
+        return None
+    return level

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from pipeline.windows import Solution, Windows, ranked, solve
 
 __all__ = ["Demodulated", "Params", "demodulate"]
 
+WEAK = 7.0  # standard uncertainties of an amplitude under which its phase is known to 0.14 rad and less well
 THIRD_TO_SIGMA = 0.3853204664075677  # 0.3-quantile of |x| for a standard normal x
 
 
@@ -38,7 +39,7 @@ class Params:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Demodulated:
-    """The oscillation in windows of one period: what every later stage works on.
+    """The oscillation in windows of whole periods: what every later stage works on.
 
     In window j the motion is :math:`o_j + A_j e^{-g\\tau}\\cos(\\omega\\tau + \\varphi_j)`, with :math:`\\tau`
     counted from the window's centre.
@@ -124,6 +125,10 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     solution = _let_go(windows, basis, conditioned.noise_m, params)
     solution = _rescue(windows, basis, solution, tuning, params)
     solution, weights = _clip(windows, basis, solution, params)
+    crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, _level(windows, solution))
+    if crest.any():
+        windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
+        weights = np.where(crest, 0.0, weights)
     # Once more in a basis that turns and decays in each window as the record does there.
     tuning = retune(windows, solution, tuning)
     basis = tuning.basis(windows)
@@ -207,7 +212,7 @@ def _clip(windows: Windows, basis: F8, solution: Solution, params: Params) -> tu
     spread = MAD_TO_SIGMA * ranked(size, windows.usable, 0.5)
     level = max(float(np.median(spread[solution.good])) if solution.good.any() else 0.0, windows.tiny)
     # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
-    bound = params.clip_sigmas * np.clip(spread, 0.5 * level, 2.0 * level)
+    bound = params.clip_sigmas * np.clip(spread, 0.75 * level, 2.0 * level)
     weights = np.where(size <= bound[:, None], windows.usable, 0.0)
     return solve(windows, basis, weights), weights
 
@@ -222,28 +227,24 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, weig
     squares = np.sum(weights * solution.residual**2, axis=1)
     noise = np.sqrt(squares / np.maximum(counts - 3, 1))
     pooled = math.sqrt(np.sum(squares[good]) / max(np.sum(counts[good] - 3), 1))
+    pooled = _with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
     # A window's own noise is known to a tenth only: it is drawn towards the record's.
     prior = 30.0
     shrunk = (prior * pooled**2 + counts * noise**2) / (prior + counts)
-    offset, a, b = solution.coefficients[good].T
-    amplitude = np.hypot(a, b)
-    safe = np.maximum(amplitude, windows.tiny)
-    jacobian = np.zeros((amplitude.size, 3, 3))
-    jacobian[:, 0, 1], jacobian[:, 0, 2] = a / safe, b / safe
-    jacobian[:, 1, 1], jacobian[:, 1, 2] = -b / safe**2, a / safe**2
-    jacobian[:, 2, 0] = 1.0
-    covariance = jacobian @ (solution.inverse[good] * shrunk[good, None, None]) @ jacobian.transpose(0, 2, 1)
+    t = windows.centre[good]
+    amplitude, phase, covariance = _polar(windows, solution, shrunk, tuning)
     flags = conditioned.flags.copy()
     inside = windows.inside & good[:, None]
     echoes = inside & (windows.usable > 0) & (weights == 0)
     flags[windows.rows[echoes]] |= np.uint8(Quality.FALSE_ECHO)
+    crests = inside & (windows.usable == 0) & (flags[windows.rows] == 0)
+    flags[windows.rows[crests]] |= np.uint8(Quality.CLIPPED)
     residual = _residual_of_all(conditioned, windows, solution, tuning)
-    t = windows.centre[good]
     return Demodulated(
         t,
         amplitude,
-        unwrap(np.arctan2(b, a), t, tuning.angular_frequency),
-        offset + windows.level,
+        phase,
+        solution.coefficients[good, 0] + windows.level,
         noise[good],
         covariance,
         counts[good],
@@ -253,6 +254,54 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, weig
         flags,
         int(np.count_nonzero(~good)),
     )
+
+
+def _with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
+    """The record's noise, drawn towards the one that sensor or scene state, if the two agree.
+
+    A stated noise counts as much as thirty samples; it matters to records of a few periods only.
+    """
+    if stated_m is None or abs(noise_m / stated_m - 1.0) > 3.3 / math.sqrt(2.0 * max(dof, 1.0)):
+        return noise_m
+    return math.sqrt((dof * noise_m**2 + 30.0 * stated_m**2) / (dof + 30.0))
+
+
+def _polar(windows: Windows, solution: Solution, variance: F8, tuning: Tuning) -> tuple[F8, F8, F8]:
+    """Amplitude, total phase and covariance of (amplitude, phase, offset) of the good windows.
+
+    An amplitude from :math:`\\sqrt{a^2+b^2}` is too large by half the variance of the phase, which is taken off. Where
+    that is more than a hundredth of it, amplitude and phase are read along and across the smooth phase of the record
+    instead: linear in a and b, they are right on average in the deepest noise, and an amplitude may come out negative.
+    """
+    good = solution.good
+    t = windows.centre[good]
+    _, a, b = solution.coefficients[good].T
+    size = np.maximum(np.hypot(a, b), windows.tiny)
+    inverse = solution.inverse[good] * variance[good, None, None]
+    along, scale = np.arctan2(b, a), size
+    phase = unwrap(along, t, tuning.angular_frequency)
+    amplitude = size
+    if tuning.phase is not None and tuning.amplitude is not None:
+        smooth, expected = tuning.phase[good], tuning.amplitude[good]
+        u = np.sqrt(0.5 * (inverse[:, 1, 1] + inverse[:, 2, 2]))
+        weak = expected < WEAK * u
+        strong = ~weak
+        turned = np.arctan2(b, a) - smooth
+        turned[strong] = np.unwrap(turned[strong])
+        along = np.where(weak, smooth, along)
+        scale = np.where(weak, np.maximum(expected, 0.3 * u), size)
+        cosine, sine = np.cos(along), np.sin(along)
+        amplitude = np.where(weak, a * cosine + b * sine, size)
+        phase = smooth + np.where(weak, (b * cosine - a * sine) / scale, turned)
+    else:
+        weak = np.zeros(t.size, np.bool_)
+        cosine, sine = np.cos(along), np.sin(along)
+    jacobian = np.zeros((t.size, 3, 3))
+    jacobian[:, 0, 1], jacobian[:, 0, 2] = cosine, sine
+    jacobian[:, 1, 1], jacobian[:, 1, 2] = -sine / scale, cosine / scale
+    jacobian[:, 2, 0] = 1.0
+    covariance = jacobian @ inverse @ jacobian.transpose(0, 2, 1)
+    return np.where(weak, amplitude, amplitude * (1.0 - 0.5 * covariance[:, 1, 1])), phase, covariance
 
 
 def _residual_of_all(conditioned: Conditioned, windows: Windows, solution: Solution, tuning: Tuning) -> F8:

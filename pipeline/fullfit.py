@@ -38,14 +38,11 @@ class Params:
         Most rounds of clipping and fitting again.
     steps : int
         Most Gauss-Newton steps of a fit.
-    crest_sigmas : float
-        How far below a clipped plateau the model must stay for a sample to count.
     """
 
     clip_sigmas: float = 4.0
     rounds: int = 5
     steps: int = 25
-    crest_sigmas: float = 6.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,7 +131,7 @@ def fit_record(
 
     Residuals beyond four standard deviations (from their median) leave, and the fit is repeated until no sample
     changes. Beneath a clipped plateau samples are taken or left by the model, not by their own noise: those that the
-    model sees within ``crest_sigmas`` of the plateau are left out, and nothing is biased.
+    model sees within 3.5 standard deviations of where samples count as clipped are left out, and nothing is biased.
 
     Where residuals are not white the covariance is that of the sums of score over whole periods, correlation
     between neighbours included, if it exceeds the white one significantly.
@@ -248,13 +245,16 @@ def _clipped(
     """Fit again without what lies off the model, until no sample changes."""
     steps = solved.steps
     echo = (demodulated.flags & np.uint8(Quality.FALSE_ECHO)) != 0
-    beside = np.concatenate([[False], echo[:-1]]) | np.concatenate([echo[1:], [False]])
-    # Single samples that a window's own narrow spread put out may come back; clusters may not.
-    candidates = base & ~(echo & beside)
+    # Samples that a window's narrow spread or a neighbour's spike put out may come back; those in clusters may not.
+    run = np.convolve(echo, np.ones(3), "same") == 3
+    cluster = np.convolve(run, np.ones(3), "same") > 0
+    told = (conditioned.track.flags & UNUSABLE) != 0
+    others = (demodulated.flags & UNUSABLE & ~np.uint8(Quality.FALSE_ECHO)) != 0
+    candidates = (base | (echo & ~told & ~others)) & ~cluster
     for _ in range(params.rounds):
         residual = solved.normal.residual
         spread = MAD_TO_SIGMA * float(np.median(np.abs(residual[candidates])))
-        kept = candidates & ~_near_plateau(record, conditioned, residual, demodulated.noise_m, params)
+        kept = candidates & ~conditioned.near_plateau(record.y - residual + record.level, demodulated.noise_m)
         if spread > 1.5 * demodulated.noise_m:
             # What the model leaves is not noise alone: the windows' own verdict on each sample stands.
             kept &= solved.weights > 0
@@ -270,19 +270,6 @@ def _clipped(
         if not solved.converged:
             break
     return replace(solved, steps=steps)
-
-
-def _near_plateau(
-    record: Record, conditioned: Conditioned, residual: F8, noise_m: float, params: Params
-) -> NDArray[np.bool_]:
-    """Samples that the model sees so near a clipped plateau that their own noise decides whether they are clipped."""
-    near = np.zeros(residual.size, np.bool_)
-    model = record.y - residual
-    for plateau in conditioned.plateaus_m:
-        level = plateau - record.level
-        sign = math.copysign(1.0, level)
-        near |= sign * model > sign * level - params.crest_sigmas * noise_m
-    return near
 
 
 def _other_law(record: Record, fit: LawFit, solved: _Solved, params: Params) -> _Solved:
@@ -365,7 +352,7 @@ def _finish(
     flags = conditioned.flags.copy()
     left = (conditioned.flags & UNUSABLE) == 0
     left &= solved.weights == 0
-    crest = left & _near_plateau(record, conditioned, solved.normal.residual, demodulated.noise_m, Params())
+    crest = left & conditioned.near_plateau(record.y - solved.normal.residual + record.level, demodulated.noise_m)
     flags[crest] |= np.uint8(Quality.CLIPPED)
     flags[left & ~crest] |= np.uint8(Quality.FALSE_ECHO)
     return FullFit(

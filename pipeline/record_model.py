@@ -49,7 +49,7 @@ class Record:
     @property
     def linear_count(self) -> int:
         """Number of columns that enter linearly."""
-        return self.order + 1 + self.extra.shape[1]
+        return self.order + 1 + int(self.extra.shape[1])
 
     def linear(self, part: slice) -> F8:
         """Return (k, m): rest position's polynomials and extra columns of some samples."""

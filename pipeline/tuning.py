@@ -11,6 +11,7 @@ from pipeline.windows import Solution, Windows, basis_of
 
 __all__ = ["Tuning", "retune", "unwrap"]
 
+KNOWN = 3.3  # standard uncertainties by which an amplitude must exceed 0 for its phase to mean something
 GREATEST = 0.05  # share of the frequency beyond which a detuning or a decay is a failed fit
 
 
@@ -26,11 +27,15 @@ class Tuning:
         What each window turns faster.
     decay : (w,) float64, 1/s
         Logarithmic decay in each window.
+    phase, amplitude : (w,) float64, rad, m, or None
+        Smooth curves through those of all windows that noise lets know their phase, at every window's centre.
     """
 
     angular_frequency: float
     detuning: F8
     decay: F8
+    phase: F8 | None = None
+    amplitude: F8 | None = None
 
     @classmethod
     def constant(cls, angular_frequency: float, windows: int) -> Tuning:
@@ -62,24 +67,45 @@ def retune(windows: Windows, solution: Solution, tuning: Tuning, *, degree: int 
         Of the polynomials in time through logarithms of amplitudes and through phases, fewer where windows are few.
         Drag makes the decay vary along a record, amplitude the frequency.
     """
-    good = solution.good
-    count = int(np.count_nonzero(good))
     omega = tuning.angular_frequency
-    if count < 3:
+    if np.count_nonzero(solution.good) < 3:
         return _retune_short(windows, tuning)
-    z = solution.coefficients[good, 1] + 1j * solution.coefficients[good, 2]
-    t, weight = windows.centre[good], np.maximum(np.abs(z), 1e-6 * np.max(np.abs(z)) + windows.tiny)
-    phase = unwrap(np.angle(z), t, omega) - omega * (t - t[0])
+    z = solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]
+    size = np.abs(z)
+    good = solution.good & (size > KNOWN * _u_amplitude(windows, solution))
+    if np.count_nonzero(good) < 3:
+        good = solution.good
+    count = int(np.count_nonzero(good))
+    t, weight = windows.centre[good], np.maximum(size[good], 1e-6 * np.max(size[good]) + windows.tiny)
+    phase = unwrap(np.angle(z[good]), t, omega) - omega * (t - t[0])
     span = float(np.ptp(t))
     x = 2.0 * (t - t[0]) / span - 1.0
     degree = min(degree, max(1, count // 6))
     curves = np.polynomial.chebyshev.chebfit(x, np.stack([np.log(weight), phase], axis=1), degree, w=weight)
     slopes = np.polynomial.chebyshev.chebder(curves) * 2.0 / span
-    everywhere = np.clip(2.0 * (windows.centre - t[0]) / span - 1.0, -1.0, 1.0)
-    growth, turning = np.polynomial.chebyshev.chebval(everywhere, slopes)
+    place = 2.0 * (windows.centre - t[0]) / span - 1.0
+    inside = np.clip(place, -1.0, 1.0)
+    growth, turning = np.polynomial.chebyshev.chebval(inside, slopes)
+    level, smooth = np.polynomial.chebyshev.chebval(inside, curves)
+    # Beyond the windows that know their phase both go on as they were there.
+    beyond = 0.5 * span * (place - inside)
     mean = float(np.average(turning[good], weights=weight**2))
     bound = GREATEST * omega
-    return Tuning(omega + mean, np.clip(turning - mean, -bound, bound), np.clip(-growth, -bound, bound))
+    return Tuning(
+        omega + mean,
+        np.clip(turning - mean, -bound, bound),
+        np.clip(-growth, -bound, bound),
+        smooth + turning * beyond + omega * (windows.centre - t[0]),
+        np.exp(level + np.minimum(growth, 0.0) * beyond),
+    )
+
+
+def _u_amplitude(windows: Windows, solution: Solution) -> F8:
+    """Standard uncertainty of each window's amplitude, m, at the noise that is typical of the record."""
+    counts = np.maximum(windows.usable.sum(axis=1), 4.0)
+    squares = np.sum(windows.usable * solution.residual**2, axis=1) / (counts - 3.0)
+    typical = float(np.median(squares[solution.good]))
+    return np.asarray(np.sqrt(0.5 * typical * (solution.inverse[:, 1, 1] + solution.inverse[:, 2, 2])))
 
 
 def _retune_short(windows: Windows, tuning: Tuning, rounds: int = 12) -> Tuning:

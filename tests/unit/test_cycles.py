@@ -56,16 +56,6 @@ def test_windows_cover_the_record_once(synthetic: ModuleType, seconds: float, ra
     assert periods < 2.1 * max(1.0, np.ceil(Params().samples_per_window * 8.3 / (2 * np.pi) / rate_hz))
 
 
-def test_crossings_are_a_period_apart(synthetic: ModuleType) -> None:
-    """Upward crossings are as many as periods and lie a period apart, for all the noise."""
-    truth = synthetic.Truth()
-    t = synthetic.times(20)
-    for seed in range(10):
-        found = cycles_of(t, synthetic.noisy(truth, t, 1e-3, seed))
-        assert abs(found.crossings_s.size - 20.0 / truth.period) <= 1.0
-        np.testing.assert_allclose(np.diff(found.crossings_s), truth.period, atol=0.03)
-
-
 def test_flagged_samples_are_bridged(synthetic: ModuleType) -> None:
     """A quarter of the samples missing in blocks does not move the frequency beyond its line."""
     t = synthetic.times(20)
