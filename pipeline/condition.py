@@ -291,7 +291,7 @@ def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float
     inside = int(counts[start])
     bottom = upper[start]
     above = upper.size - start - inside
-    beneath = int(np.count_nonzero((upper >= bottom - width) & (upper < bottom)))
+    beneath = first + start - int(np.searchsorted(ordered, bottom - width))
     if inside < max(0.02 * y.size, 8) or above > 0.1 * inside or inside < contrast * (beneath + 1):
         return 0.0, 0.0, none
     band = (y >= bottom) & (y <= bottom + width)

@@ -286,7 +286,7 @@ def _polar(windows: Windows, solution: Solution, variance: F8, tuning: Tuning) -
         u = np.sqrt(0.5 * (inverse[:, 1, 1] + inverse[:, 2, 2]))
         weak = expected < WEAK * u
         strong = ~weak
-        turned = np.arctan2(b, a) - smooth
+        turned = np.remainder(along - smooth + math.pi, 2.0 * math.pi) - math.pi
         turned[strong] = np.unwrap(turned[strong])
         along = np.where(weak, smooth, along)
         scale = np.where(weak, np.maximum(expected, 0.3 * u), size)
