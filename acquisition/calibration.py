@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.block import F8, Flag
+from acquisition.block import F8
 from acquisition.errors import CalibrationError
-from acquisition.readings import Readings
 
 __all__ = ["Calibration", "StillPoint", "against_ruler", "from_still"]
 
@@ -52,12 +51,10 @@ class Calibration:
         if not (math.isfinite(self.scale) and self.scale > 0 and math.isfinite(self.offset_m)):
             raise CalibrationError(f"scale must be positive and offset finite, got {self.scale:g}, {self.offset_m:g} m")
 
-    def distance(self, readings: Readings) -> F8:
-        """Return distances (n,) in m; NaN where a reading has none."""
-        echo = 0.5e-6 * self.speed_of_sound_m_per_s * readings.echo_us
-        raw = np.where(np.isfinite(readings.echo_us), echo, readings.distance_m)
-        missing = (readings.flags & np.uint8(Flag.MISSING)) != 0
-        return np.where(missing, np.nan, self.scale * raw + self.offset_m)
+    def distance(self, echo_us: float, distance_m: float) -> float:
+        """Return the distance in m of an echo time, or of a stated distance where there is none; NaN for neither."""
+        raw = 0.5e-6 * self.speed_of_sound_m_per_s * echo_us if math.isfinite(echo_us) else distance_m
+        return self.scale * raw + self.offset_m
 
     def restated(self, point: StillPoint, before: Calibration) -> StillPoint:
         """Return a rest position that was measured with ``before``, another scale and offset, as this one states it."""

@@ -19,6 +19,8 @@ from acquisition.timebase import Timebase
 
 __all__ = ["SensorChain"]
 
+MISSING, GAP_BEFORE = int(Flag.MISSING), int(Flag.GAP_BEFORE)
+
 
 class SensorChain:
     """One sensor's way from bytes to samples.
@@ -46,31 +48,59 @@ class SensorChain:
         self.calibration = calibration or Calibration()
         self.decoder = family.decoder(**(options or {}))
         self.timebase = Timebase(rate_hz or family.rate_hz)
-        self.last = NO_READINGS
-        self._next = 0
+        self.last: Readings = NO_READINGS
         self._broken = False
+        self._next = 0
+        self._t: list[float] = []
+        self._distance: list[float] = []
+        self._flags: list[int] = []
+        self._host_ns: list[int] = []
+
+    def __len__(self) -> int:
+        """Return how many samples :meth:`block` would give."""
+        return len(self._t)
 
     def feed(self, host_ns: int, data: bytes) -> Block:
         """Take the bytes of one read, return the samples they completed (perhaps none)."""
-        readings = self.decoder.feed(host_ns, data)
-        self.last = readings
-        return self.to_block(readings)
+        self.take(host_ns, data)
+        return self.block()
 
-    def to_block(self, readings: Readings) -> Block:
-        """Give readings their sensor time and distance, and the next indices of the run."""
-        t, late = self.timebase.push(readings)
-        if self._broken and len(readings):
-            late[0] |= np.uint8(Flag.GAP_BEFORE)
-            self._broken = False
-        block = Block(
-            self._next,
-            t,
-            self.calibration.distance(readings),
-            readings.flags | late,
-            readings.host_ns,
+    def take(self, host_ns: int, data: bytes) -> int:
+        """Take the bytes of one read, hold the samples they completed until :meth:`block`, and return how many.
+
+        Notes
+        -----
+        A sample is held as plain numbers: arrays are made once for many of them.
+        """
+        self.last = readings = self.decoder.feed(host_ns, data)
+        push, distance_of = self.timebase.push, self.calibration.distance
+        for reading in readings:
+            t, flag = push(reading)
+            distance = distance_of(reading.echo_us, reading.distance_m)
+            if distance != distance:
+                flag |= MISSING
+            if self._broken:
+                flag |= GAP_BEFORE
+                self._broken = False
+            self._t.append(t)
+            self._distance.append(distance)
+            self._flags.append(flag)
+            self._host_ns.append(host_ns)
+        return len(readings)
+
+    def block(self) -> Block:
+        """Return the samples held, with the next indices of the run, and hold none."""
+        first = self._next
+        self._next += len(self._t)
+        t, distance, flags, host_ns = self._t, self._distance, self._flags, self._host_ns
+        self._t, self._distance, self._flags, self._host_ns = [], [], [], []
+        return Block(
+            first,
+            np.array(t, np.float64),
+            np.array(distance, np.float64),
+            np.array(flags, np.uint8),
+            np.array(host_ns, np.int64),
         )
-        self._next += len(readings)
-        return block
 
     def lost(self) -> None:
         """The port went away: a frame cut in half by that is no frame, and the next sample is flagged."""

@@ -2,65 +2,106 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
-from acquisition.block import F8, I8, U8
+from acquisition.block import F8, I8, U8, Flag
 
-__all__ = ["NO_READINGS", "Readings", "join"]
+__all__ = ["COLUMNS", "NO_READINGS", "Reading", "Readings", "join"]
+
+NAN = math.nan
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Readings:
-    """Consecutive readings of one rangefinder, one row a frame.
+class Reading(NamedTuple):
+    """What one frame says.
 
-    A frame that says "no target" is a row with NaN and ``Flag.MISSING``; a frame that fails its check is no row but a
+    A frame that says "no target" has neither an echo nor a distance; a frame that fails its check is no reading but a
     counted fault of the decoder.
 
     Parameters
     ----------
-    host_ns : (n,) int64, ns
+    host_ns : int, ns
         Host clock of the read that completed the frame.
-    sequence : (n,) int64
+    sequence : int
         The device's own counter as sent, -1 where it sends none.
-    device_us : (n,) int64, us
+    device_us : int, us
         The device's own clock as sent (it may wrap at 2^32), -1 where it sends none.
-    echo_us : (n,) float64, us
+    echo_us : float, us
         Time of flight there and back, NaN where the device sends a distance instead.
-    distance_m : (n,) float64, m
+    distance_m : float, m
         As the device states it, NaN where it sends an echo time instead or saw no target.
-    temperature_c : (n,) float64, degC
+    temperature_c : float, degC
         NaN where it sends none.
-    flags : (n,) uint8
-        Sums of ``acquisition.block.Flag`` bits.
     """
 
-    host_ns: I8
-    sequence: I8
-    device_us: I8
-    echo_us: F8
-    distance_m: F8
-    temperature_c: F8
-    flags: U8
-
-    def __len__(self) -> int:
-        return int(self.host_ns.size)
+    host_ns: int
+    sequence: int = -1
+    device_us: int = -1
+    echo_us: float = NAN
+    distance_m: float = NAN
+    temperature_c: float = NAN
 
 
-def _empty() -> Readings:
-    whole, real = np.empty(0, np.int64), np.empty(0)
-    return Readings(whole, whole, whole, real, real, real, np.empty(0, np.uint8))
+COLUMNS = (*Reading._fields, "flags")
+"""The columns that readings have."""
 
 
-NO_READINGS = _empty()
+class Readings(tuple[Reading, ...]):
+    """Consecutive readings of one rangefinder: a tuple of rows, that gives its columns as arrays when asked.
+
+    Notes
+    -----
+    Live, a read of the port completes one frame. Seven arrays for one row cost more than all the rest of decoding it,
+    so there are none before many rows are at hand.
+    """
+
+    __slots__ = ()
+
+    @property
+    def host_ns(self) -> I8:
+        """(n,) int64, ns."""
+        return np.array([row.host_ns for row in self], np.int64)
+
+    @property
+    def sequence(self) -> I8:
+        """(n,) int64, -1 where there is none."""
+        return np.array([row.sequence for row in self], np.int64)
+
+    @property
+    def device_us(self) -> I8:
+        """(n,) int64, us, -1 where there is none."""
+        return np.array([row.device_us for row in self], np.int64)
+
+    @property
+    def echo_us(self) -> F8:
+        """(n,) float64, us, NaN where there is none."""
+        return np.array([row.echo_us for row in self], np.float64)
+
+    @property
+    def distance_m(self) -> F8:
+        """(n,) float64, m, NaN where there is none."""
+        return np.array([row.distance_m for row in self], np.float64)
+
+    @property
+    def temperature_c(self) -> F8:
+        """(n,) float64, degC, NaN where there is none."""
+        return np.array([row.temperature_c for row in self], np.float64)
+
+    @property
+    def flags(self) -> U8:
+        """(n,) uint8: ``Flag.MISSING`` where there is neither echo nor distance."""
+        silent = np.isnan(self.echo_us) & np.isnan(self.distance_m)
+        return np.where(silent, np.uint8(Flag.MISSING), np.uint8(0))
+
+
+NO_READINGS = Readings()
 """What a decoder returns where no frame was completed."""
 
 
 def join(parts: Iterable[Readings]) -> Readings:
     """Return readings one after the other as one."""
-    rows = [part for part in parts if len(part)]
-    if not rows:
-        return NO_READINGS
-    return Readings(*(np.concatenate([getattr(row, name) for row in rows]) for name in Readings.__slots__))
+    return Readings(chain.from_iterable(parts))

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.block import F8, I8, U8, Flag
-from acquisition.readings import Readings
+from acquisition.block import F8, I8, Flag
+from acquisition.readings import Reading
 from acquisition.source import ClockKind
 
 __all__ = ["ClockFit", "Gap", "Timebase", "fit_clock"]
@@ -20,8 +20,6 @@ __all__ = ["ClockFit", "Gap", "Timebase", "fit_clock"]
 WRAP_US = 1 << 32
 WRAP_S = WRAP_US * 1e-6
 NANO = 1e-9
-FEW = 16
-"""So many readings are sooner stepped through one by one than taken as arrays; live, a read brings one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +85,8 @@ class Timebase:
         if not (math.isfinite(rate_hz) and rate_hz > 0):
             raise ValueError(f"rate_hz must be positive and finite, got {rate_hz}")
         self.rate_hz = rate_hz
+        self._period_s = 1.0 / rate_hz
+        self._longest_s = 1.5 / rate_hz  # a step that is longer has readings missing in it
         self.gaps: list[Gap] = []
         self.restarts = 0
         self._count = 0
@@ -103,43 +103,26 @@ class Timebase:
         """Where times come from; known once a reading came."""
         return self._clock or "host"
 
-    def push(self, readings: Readings) -> tuple[F8, U8]:
-        """Return sensor times (n,) in s and the flags (n,) that time adds: gaps, repeats, steps back."""
-        n = len(readings)
-        if not n:
-            return np.empty(0), np.empty(0, np.uint8)
-        if self._clock is None:
-            self._clock = "device" if readings.device_us[0] >= 0 or readings.sequence[0] >= 0 else "host"
-        raw, unit_s = self._raw(readings)
-        if n > FEW and (regular := self._regular(raw, unit_s, readings.host_ns)) is not None:
-            return regular, np.zeros(n, np.uint8)
-        t = np.empty(n)
-        flags = np.zeros(n, np.uint8)
-        for i in range(n):
-            t[i], flags[i] = self._step(int(raw[i]), unit_s, int(readings.host_ns[i]))
-        return t, flags
-
-    def _regular(self, raw: I8, unit_s: float, host_ns: I8) -> F8 | None:
-        """Times of readings that follow each other as they should; None where one does not."""
-        if self._last_raw is None:
-            return None
-        ticks = self._ticks + np.cumsum(np.diff(raw, prepend=self._last_raw))
-        steps = np.diff(ticks, prepend=self._ticks) * unit_s
-        behind = self._anchor_s + self._ticks * unit_s < self._latest_s
-        if behind or np.any(steps <= 0.0) or np.any(steps > 1.5 / self.rate_hz):
-            return None
-        t = self._anchor_s + ticks * unit_s
-        self._last_raw, self._last_host_ns = int(raw[-1]), int(host_ns[-1])
-        self._ticks, self._latest_s = int(ticks[-1]), float(t[-1])
-        self._count += int(t.size)
-        return np.asarray(t)
-
-    def _raw(self, readings: Readings) -> tuple[I8, float]:
-        if readings.device_us[0] >= 0:
-            return readings.device_us, 1e-6
-        if readings.sequence[0] >= 0:
-            return readings.sequence, 1.0 / self.rate_hz
-        return readings.host_ns, NANO
+    def push(self, reading: Reading) -> tuple[float, int]:
+        """Return a reading's sensor time in s and the flag that time adds: a gap before it, a repeat, a step back."""
+        if reading.device_us >= 0:
+            raw, unit_s = reading.device_us, 1e-6
+        elif reading.sequence >= 0:
+            raw, unit_s = reading.sequence, self._period_s
+        else:
+            raw, unit_s = reading.host_ns, NANO
+        if self._last_raw is not None:
+            difference = raw - self._last_raw
+            ticks = self._ticks + difference
+            t = self._anchor_s + ticks * unit_s
+            if 0.0 < difference * unit_s <= self._longest_s and 0.0 < t - self._latest_s <= self._longest_s:
+                self._last_raw, self._last_host_ns = raw, reading.host_ns
+                self._ticks, self._latest_s = ticks, t
+                self._count += 1
+                return t, 0
+        elif self._clock is None:
+            self._clock = "host" if unit_s == NANO else "device"
+        return self._step(raw, unit_s, reading.host_ns)
 
     def _step(self, raw: int, unit_s: float, host_ns: int) -> tuple[float, int]:
         restarted = self._advance(raw, unit_s, host_ns)
@@ -152,7 +135,7 @@ class Timebase:
             flag = int(Flag.DUPLICATE_TIME)
         elif step < 0.0:
             flag = int(Flag.NON_MONOTONIC_TIME)
-        elif restarted or (step > 1.5 / self.rate_hz and not self._only_jitter(unit_s, step)):
+        elif restarted or (step > self._longest_s and not self._only_jitter(unit_s, step)):
             flag = int(Flag.GAP_BEFORE)
             self.gaps.append(Gap(self._count, step, max(round(step * self.rate_hz) - 1, 0)))
         self._latest_s = max(t, self._latest_s)
@@ -169,7 +152,7 @@ class Timebase:
             return False
         difference = raw - self._last_raw
         step = difference * unit_s
-        if unit_s != NANO and not 0.0 <= step <= 1.5 / self.rate_hz:
+        if unit_s != NANO and not 0.0 <= step <= self._longest_s:
             elapsed = (host_ns - self._last_host_ns) * NANO
             wraps = round((elapsed - step) / WRAP_S) if unit_s == 1e-6 else 0
             # A wrap continues smoothly; anything else is a device that started again.
@@ -177,7 +160,7 @@ class Timebase:
                 difference += wraps * WRAP_US
             elif step < -1.0 or (step > 0.0 and raw * unit_s < elapsed - 2.0):
                 self.restarts += 1
-                self._anchor_s, self._ticks = self._latest_s + max(elapsed, 1.0 / self.rate_hz), 0
+                self._anchor_s, self._ticks = self._latest_s + max(elapsed, self._period_s), 0
                 return True
         self._ticks += difference
         return False

@@ -15,17 +15,17 @@ from types import MappingProxyType
 
 from acquisition.decoders.base import Family
 from acquisition.decoders.lines import LineSplitter
-from acquisition.decoders.rows import NAN, rows
-from acquisition.readings import Readings
+from acquisition.readings import NAN, NO_READINGS, Reading, Readings
 
 __all__ = ["FAMILY", "LineProtocolDecoder", "LineProtocolEncoder", "checksum", "frame"]
 
 LONGEST = 96
 """Longest line without its line feed, bytes."""
 
-_Record = tuple[int, int, float, float]
 _WRAP = 1 << 32
-_RECORD = re.compile(rb"R1,([0-9]{1,10}),([0-9]{1,10}),([0-9]{1,6}\.[0-9]{2})?,(-?[0-9]{1,5})?,([A-Z])")
+_FIELDS = rb"R1,([0-9]{1,10}),([0-9]{1,10}),([0-9]{1,6}\.[0-9]{2})?,(-?[0-9]{1,5})?,([A-Z])"
+_SOUND = re.compile(rb"\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?")  # what nearly every line is
+_RECORD = re.compile(_FIELDS)
 _ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable, neither $ nor * within
 
 
@@ -71,33 +71,40 @@ class LineProtocolDecoder:
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
         """Return the readings whose lines these bytes end."""
-        found = [record for line in self._lines.split(data) if (record := self._record(line)) is not None]
-        if not found:
-            return rows(host_ns, echo_us=[])
-        sequence, device_us, echo_us, temperature_c = zip(*found, strict=True)
-        return rows(host_ns, sequence=sequence, device_us=device_us, echo_us=echo_us, temperature_c=temperature_c)
+        found: list[Reading] = []
+        for line in self._lines.split(data):
+            sound = _SOUND.fullmatch(line)
+            if sound is not None:
+                body, sequence, device_us, echo, temperature, status, crc = sound.groups()
+                reading = _reading(host_ns, sequence, device_us, echo, temperature, status)
+                if reading is not None and crc_hqx(body, 0xFFFF) == int(crc, 16):
+                    found.append(reading)
+                    continue
+            if (reading := self._behind_noise(host_ns, line)) is not None:
+                found.append(reading)
+        return Readings(found) if found else NO_READINGS
 
     def flush(self) -> None:
         """Forget a half-received line."""
         self._lines.flush()
 
-    def _record(self, line: bytes) -> _Record | None:
-        """Return what a line carries, or count why it carries nothing."""
+    def _behind_noise(self, host_ns: int, line: bytes) -> Reading | None:
+        """Return what a line that is not sound from its beginning carries, or count why it carries nothing."""
         # What stands before the last $ is noise, or a line whose end was lost; the rest may be whole.
         start = max(line.rfind(b"$"), 0)
-        record = _parse(line, start)
-        if isinstance(record, str):
-            self._faults[record] += 1
+        reading = _parse(host_ns, line, start)
+        if isinstance(reading, str):
+            self._faults[reading] += 1
             self._faults["garbage_bytes"] += len(line) + 1
             return None
         if start:
             self._faults["bad_frame"] += 1
             self._faults["garbage_bytes"] += start
-        return record
+        return reading
 
 
-def _parse(line: bytes, start: int) -> _Record | str:
-    """Return sequence, device us, echo us and degC, or the name of the fault."""
+def _parse(host_ns: int, line: bytes, start: int) -> Reading | str:
+    """Return the reading, or the name of the fault."""
     sealed = _ENVELOPE.fullmatch(line, start)
     if sealed is None:
         return "comment" if line.startswith(b"#") else "bad_frame"
@@ -106,12 +113,19 @@ def _parse(line: bytes, start: int) -> _Record | str:
     found = _RECORD.fullmatch(sealed[1])
     if found is None:
         return "unknown_record"
-    sequence, device_us, echo, temperature, status = found.groups()
-    if int(sequence) >= _WRAP or int(device_us) >= _WRAP:
-        return "unknown_record"
+    return _reading(host_ns, *found.groups()) or "unknown_record"
+
+
+def _reading(
+    host_ns: int, sequence: bytes, device_us: bytes, echo: bytes | None, temperature: bytes | None, status: bytes
+) -> Reading | None:
+    """Return the reading of a record's fields, None where a number has more than its 32 bits."""
+    count, clock_us = int(sequence), int(device_us)
+    if count >= _WRAP or clock_us >= _WRAP:
+        return None
     # Only status E vouches for an echo; with any other letter nothing was measured. No echo takes no time.
     echo_us = float(echo) if status == b"E" and echo else 0.0
-    return int(sequence), int(device_us), echo_us or NAN, int(temperature) / 100 if temperature else NAN
+    return Reading(host_ns, count, clock_us, echo_us or NAN, NAN, int(temperature) / 100 if temperature else NAN)
 
 
 class LineProtocolEncoder:

@@ -37,7 +37,8 @@ class LineSplitter:
 
     def split(self, data: bytes) -> list[bytes]:
         """Return the lines that these bytes end, without their ends."""
-        lines = (self._held + data).split(self._end)
+        data = self._held + data
+        lines = data.split(self._end)
         self._held = lines.pop()
         if lines and (self._skip or self._overlong):
             self._drop(lines.pop(0), "partial_line" if self._skip else "bad_frame")
@@ -46,7 +47,7 @@ class LineSplitter:
             self._faults["garbage_bytes"] += len(self._held)
             self._held = b""
             self._overlong = True
-        if lines and max(map(len, lines)) > self._limit:
+        if len(data) > self._limit and lines and max(map(len, lines)) > self._limit:
             for line in lines:
                 if len(line) > self._limit:
                     self._drop(line, "bad_frame")

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from itertools import repeat
 
-import numpy as np
-
-from acquisition.readings import NO_READINGS, Readings
+from acquisition.readings import NAN, NO_READINGS, Reading, Readings
 
 __all__ = ["NAN", "rows"]
 
-NAN = math.nan
-
-_NONE = np.array([-1], np.int64)
-_UNKNOWN = np.array([NAN])
+_NONE = repeat(-1)
+_UNKNOWN = repeat(NAN)
 
 
 def rows(
@@ -26,32 +22,25 @@ def rows(
     sequence: Sequence[int] | None = None,
     device_us: Sequence[int] | None = None,
 ) -> Readings:
-    """Return one row a frame, all stamped with the read that completed them.
+    """Return one reading a frame, all stamped with the read that completed them.
 
     Parameters
     ----------
     host_ns : int
         Host clock of the read, ns.
     distance_m, echo_us : sequence of float
-        One of the two, as the device measures; NaN means no target, and flags the row ``MISSING``.
+        One of the two, as the device measures; NaN means no target.
     temperature_c, sequence, device_us : sequence, optional
         What the device sends besides.
-
-    Notes
-    -----
-    It runs once a read, which mostly completes one frame: ``repeat`` of a constant costs a third of ``np.full``.
     """
-    measured = np.array(distance_m if echo_us is None else echo_us, np.float64)
-    n = measured.size
-    if n == 0:
+    if not (distance_m if echo_us is None else echo_us):
         return NO_READINGS
-    unknown = _UNKNOWN.repeat(n)
-    return Readings(
-        host_ns=np.array([host_ns], np.int64).repeat(n),
-        sequence=_NONE.repeat(n) if sequence is None else np.array(sequence, np.int64),
-        device_us=_NONE.repeat(n) if device_us is None else np.array(device_us, np.int64),
-        echo_us=unknown if echo_us is None else measured,
-        distance_m=unknown.copy() if echo_us is not None else measured,
-        temperature_c=unknown.copy() if temperature_c is None else np.array(temperature_c, np.float64),
-        flags=np.isnan(measured).view(np.uint8),  # Flag.MISSING is bit 0, as True is
+    columns = (
+        repeat(host_ns),
+        _NONE if sequence is None else sequence,
+        _NONE if device_us is None else device_us,
+        _UNKNOWN if echo_us is None else echo_us,
+        _UNKNOWN if distance_m is None else distance_m,
+        _UNKNOWN if temperature_c is None else temperature_c,
     )
+    return Readings(map(Reading, *columns))

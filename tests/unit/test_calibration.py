@@ -3,30 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.block import Flag
 from acquisition.calibration import Calibration, StillPoint, against_ruler, from_still
 from acquisition.errors import CalibrationError
-from acquisition.readings import Readings
-
-
-def readings(echo_us: list[float], distance_m: list[float], flags: list[int]) -> Readings:
-    """Return readings with those columns."""
-    n = len(flags)
-    whole = np.full(n, -1, np.int64)
-    return Readings(
-        np.zeros(n, np.int64),
-        whole,
-        whole,
-        np.array(echo_us),
-        np.array(distance_m),
-        np.full(n, np.nan),
-        np.array(flags, np.uint8),
-    )
 
 
 def still(rest_m: float, noise_m: float = 1e-4, seed: int = 1, n: int = 300) -> StillPoint:
@@ -125,8 +109,7 @@ def test_a_ruler_goes_on_from_the_calibration_before() -> None:
     known = 1.005 * (1.02 * raw + 0.004) + 0.003
     points = tuple(StillPoint(float(d), 1e-5, 1e-4, 300) for d in 1.02 * raw + 0.004)
     found = against_ruler(points, tuple(known), 1e-5, base)
-    given = readings([np.nan] * 2, list(raw), [0, 0])
-    np.testing.assert_allclose(found.distance(given), known, atol=1e-12)
+    np.testing.assert_allclose([found.distance(math.nan, distance) for distance in raw], known, atol=1e-12)
     assert found.speed_of_sound_m_per_s == 343.0
 
 
@@ -157,17 +140,15 @@ def test_each_ruler_distance_needs_its_measurement() -> None:
 
 def test_another_speed_of_sound_scales_stored_echo_times() -> None:
     """Echo times are stored, so distances follow the speed applied; a stated distance does not."""
-    given = readings([1000.0, np.nan, 2000.0], [np.nan, 0.25, np.nan], [0, 0, 0])
-    slow, fast = Calibration(340.0), Calibration(345.1)
-    np.testing.assert_allclose(slow.distance(given), [0.17, 0.25, 0.34], rtol=1e-15)
-    ratio = fast.distance(given) / slow.distance(given)
-    np.testing.assert_allclose(ratio, [345.1 / 340.0, 1.0, 345.1 / 340.0], rtol=1e-14)
+    readings = [(1000.0, math.nan), (math.nan, 0.25), (2000.0, math.nan)]
+    slow, fast = ([Calibration(speed).distance(*reading) for reading in readings] for speed in (340.0, 345.1))
+    np.testing.assert_allclose(slow, [0.17, 0.25, 0.34], rtol=1e-15)
+    np.testing.assert_allclose(np.divide(fast, slow), [345.1 / 340.0, 1.0, 345.1 / 340.0], rtol=1e-14)
 
 
 def test_missing_stays_missing() -> None:
     """Neither scale nor offset makes a distance of a reading that has none."""
-    given = readings([np.nan, 900.0], [np.nan, np.nan], [Flag.MISSING, Flag.MISSING])
-    assert np.isnan(Calibration(344.0, 1.1, 0.1).distance(given)).all()
+    assert math.isnan(Calibration(344.0, 1.1, 0.1).distance(math.nan, math.nan))
 
 
 def test_the_mapping_goes_there_and_back_through_json() -> None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.block import Flag
-from acquisition.readings import Readings
+from acquisition.readings import Reading, Readings
 from acquisition.timebase import Gap, Timebase, fit_clock
 
 RATE_HZ = 100.0
@@ -27,37 +26,29 @@ def readings(
     """Return readings with those columns; the host's is on time where it is left out."""
     given_columns = [column for column in (device_us, sequence, host_ns) if column is not None]
     n = len(given_columns[0])  # type: ignore[arg-type]
-    none, real = np.full(n, -1, np.int64), np.full(n, np.nan)
+    none = np.full(n, -1, np.int64)
     host = start_ns + np.arange(n) * SECOND_NS // 100 if host_ns is None else np.asarray(host_ns, np.int64)
-    return Readings(
-        host,
-        none if sequence is None else np.asarray(sequence, np.int64),
-        none if device_us is None else np.asarray(device_us, np.int64),
-        np.full(n, 1000.0),
-        real,
-        real,
-        np.zeros(n, np.uint8),
-    )
+    columns = (host, none if sequence is None else sequence, none if device_us is None else device_us)
+    whole = zip(*(np.asarray(column, np.int64).tolist() for column in columns), strict=True)
+    return Readings(Reading(*row, echo_us=1000.0) for row in whole)
 
 
-def slices(whole: Readings, cuts: list[int]) -> list[Readings]:
-    """Return the readings cut into consecutive parts."""
-    edges = [0, *sorted(cuts), len(whole)]
-    return [Readings(*(getattr(whole, name)[a:b] for name in Readings.__slots__)) for a, b in itertools.pairwise(edges)]
+def times(base: Timebase, part: Iterable[Reading]) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and flags of readings."""
+    rows = [base.push(reading) for reading in part]
+    return np.array([t for t, _ in rows]), np.array([flag for _, flag in rows], np.uint8)
 
 
-def pushed(whole: Readings, cuts: list[int] | None = None) -> tuple[np.ndarray, np.ndarray, Timebase]:
-    """Return times and flags of readings pushed in parts, and the timebase."""
+def pushed(whole: Readings) -> tuple[np.ndarray, np.ndarray, Timebase]:
+    """Return times and flags of readings, and the timebase."""
     base = Timebase(RATE_HZ)
-    parts = [base.push(part) for part in slices(whole, cuts or [])]
-    return np.concatenate([t for t, _ in parts]), np.concatenate([f for _, f in parts]), base
+    return *times(base, whole), base
 
 
-@pytest.mark.parametrize("cuts", [[], [1], [90, 130], list(range(1, 200))])
-def test_device_time_goes_on_through_its_wrap(cuts: list[int]) -> None:
+def test_device_time_goes_on_through_its_wrap() -> None:
     """Microseconds that start over at 2^32 give even steps and no flag."""
     ticks = np.arange(200) * STEP_US
-    t, flags, base = pushed(readings(device_us=(WRAP - 700_000 + ticks) % WRAP), cuts)
+    t, flags, base = pushed(readings(device_us=(WRAP - 700_000 + ticks) % WRAP))
     np.testing.assert_array_equal(t, ticks * 1e-6)
     assert not flags.any()
     assert (base.gaps, base.restarts, base.clock) == ([], 0, "device")
@@ -95,23 +86,21 @@ def test_host_stamps_alone_are_the_time() -> None:
 
 
 @pytest.mark.parametrize("column", ["device_us", "sequence"])
-@pytest.mark.parametrize("cuts", [[], [6], list(range(1, 20))])
-def test_gaps_have_their_length_and_their_lost_count(column: str, cuts: list[int]) -> None:
+def test_gaps_have_their_length_and_their_lost_count(column: str) -> None:
     """Seven readings left out are a gap of eight steps with seven lost, at the first reading after it."""
     index = np.concatenate([np.arange(10), np.arange(17, 27)])
     values = index * STEP_US if column == "device_us" else index
-    t, flags, base = pushed(readings(**{column: values}), cuts)
+    t, flags, base = pushed(readings(**{column: values}))
     assert np.flatnonzero(flags).tolist() == [10]
     assert flags[10] == Flag.GAP_BEFORE
     assert base.gaps == [Gap(10, pytest.approx(0.08), 7)]
     np.testing.assert_allclose(t, index / RATE_HZ, atol=1e-12)
 
 
-@pytest.mark.parametrize("cuts", [[], [4], [5], list(range(1, 9))])
-def test_repeats_and_steps_back_are_flagged_and_move_nothing_after_them(cuts: list[int]) -> None:
+def test_repeats_and_steps_back_are_flagged_and_move_nothing_after_them() -> None:
     """A repeated and a late reading keep their own time; those that follow stand where they would have stood."""
     order = np.array([0, 1, 2, 2, 3, 1, 4, 5, 6])
-    t, flags, base = pushed(readings(device_us=50_000 + order * STEP_US), cuts)
+    t, flags, base = pushed(readings(device_us=50_000 + order * STEP_US))
     np.testing.assert_allclose(t, order / RATE_HZ, atol=1e-12)
     expected = np.zeros(9, np.uint8)
     expected[3], expected[5] = Flag.DUPLICATE_TIME, Flag.NON_MONOTONIC_TIME
@@ -168,13 +157,9 @@ STEPS = st.lists(
 )
 
 
-@given(
-    steps=STEPS, cuts=st.lists(st.integers(0, 120), max_size=4), start=st.integers(0, WRAP - 1), kind=st.integers(0, 2)
-)
-def test_times_do_not_depend_on_how_the_readings_were_cut(
-    steps: list[int], cuts: list[int], start: int, kind: int
-) -> None:
-    """One by one (the slow path) or in any parts (the fast one), times and flags agree to the last bit."""
+@given(steps=STEPS, start=st.integers(0, WRAP - 1), kind=st.integers(0, 2))
+def test_the_short_way_of_regular_readings_is_the_general_one(steps: list[int], start: int, kind: int) -> None:
+    """Every reading taken the general way gives the same times, flags and gaps to the last bit."""
     device = (start + np.cumsum(steps)) % WRAP
     host = np.cumsum(np.abs(steps)) * 1000
     whole = [
@@ -182,22 +167,22 @@ def test_times_do_not_depend_on_how_the_readings_were_cut(
         readings(sequence=device // STEP_US, host_ns=host),
         readings(host_ns=host),
     ][kind]
-    n = len(whole)
-    t_one, flags_one, base_one = pushed(whole, list(range(1, n)))
-    t_cut, flags_cut, base_cut = pushed(whole, [min(cut, n) for cut in cuts])
-    assert t_one.tobytes() == t_cut.tobytes()
-    np.testing.assert_array_equal(flags_one, flags_cut)
-    assert (base_one.gaps, base_one.restarts) == (base_cut.gaps, base_cut.restarts)
-    unflagged = t_one[(flags_one & (Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)) == 0]
+    unit_s = (1e-6, 1.0 / RATE_HZ, 1e-9)[kind]
+    t, flags, base = pushed(whole)
+    general = Timebase(RATE_HZ)
+    rows = [general._step((r.device_us, r.sequence, r.host_ns)[kind], unit_s, r.host_ns) for r in whole]
+    assert t.tobytes() == np.array([t for t, _ in rows]).tobytes()
+    assert flags.tolist() == [flag for _, flag in rows]
+    assert (base.gaps, base.restarts) == (general.gaps, general.restarts)
+    unflagged = t[(flags & (Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)) == 0]
     assert np.all(np.diff(unflagged) > 0)
 
 
-def test_nothing_pushed_is_nothing() -> None:
-    """No readings give no times and decide nothing."""
+def test_the_first_reading_decides_the_clock() -> None:
+    """Before a reading came the times are said to be the host's."""
     base = Timebase(RATE_HZ)
-    t, flags = base.push(readings(host_ns=[]))
-    assert (t.size, flags.size, base.clock) == (0, 0, "host")
-    base.push(readings(device_us=[5]))
+    assert base.clock == "host"
+    times(base, readings(device_us=[5]))
     assert base.clock == "device"
 
 
