@@ -85,14 +85,22 @@ class SerialPort:
 
     def read(self, wait_s: float = WAIT_S) -> bytes:
         """Return what has come; without a descriptor, wait so long for it."""
+        if self._descriptor < 0:
+            return self._read_waiting(wait_s)
+        try:
+            data = os.read(self._descriptor, READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise PortError(f"{self.name}: the port has gone ({error})") from error
+        if not data:
+            raise PortError(f"{self.name}: the port has gone (end of file)")
+        return data
+
+    def _read_waiting(self, wait_s: float) -> bytes:
         import serial
 
         try:
-            if self._descriptor >= 0:
-                data = os.read(self._descriptor, READ_BYTES)
-                if not data:
-                    raise PortError(f"{self.name}: the port has gone (end of file)")
-                return data
             if self._port.timeout != wait_s:  # RFC 2217 negotiates the whole port anew when it is set
                 self._port.timeout = wait_s
             data = self._port.read(1)

@@ -2,7 +2,11 @@
 
 ``python benchmarks/ports.py --seconds 20 --ports 200 --rate 100``. Senders run in a process of their own and write the
 line protocol to pseudo-terminals, with the moment of sending as the device's clock; so the processor time counted is
-the reader's alone, and each sample tells how long it took from the wire.
+the reader's alone, and each sample tells how long it took from the wire until it was parsed.
+
+Both designs give each port's bytes to a chain of its own, from which the samples are taken ten times a second. One is
+what `springmass record` does: one thread reads, then decodes (`springmass/reads.py`). The other is a thread for each
+port that reads what is there and decodes it as it comes.
 """
 
 from __future__ import annotations
@@ -14,27 +18,36 @@ import resource
 import select
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import tty
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import serial
 
+from acquisition.block import Block
 from acquisition.chain import SensorChain
 from acquisition.clock import SystemClock
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from acquisition.serial_port import SerialPort
-from acquisition.wired import Line, PortReader
+from acquisition.wired import CADENCE_NS, Line, PortReader
+from springmass.reads import Tee
+from storage.recorder import Recorder
+from storage.wire_layout import LogHeader, SensorEntry
 
 WRAP_US = 1 << 32
 BAUD = 115200
 SETTLE_S = 0.5
 PATIENCE_S = 10.0
+LOOK_S = 0.1
+CADENCES_MS = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
 
 
 @dataclass(frozen=True)
@@ -54,88 +67,123 @@ class Figures:
         return f"{name:44} {self.received:8} of {self.expected:8}  {self.cpu_share:7.2%} of a core  {delay}".rstrip()
 
 
-@dataclass
-class Channel:
-    """Decodes one port's bytes, or counts its lines only, and notes how late they are."""
+class TimedChain(SensorChain):
+    """The real chain, that notes how late its samples are."""
 
-    decode: bool
-    rate_hz: float
-    received: int = 0
-    delays_us: list[int] = field(default_factory=list)
+    def __init__(self, rate_hz: float) -> None:
+        super().__init__(get_family("line-protocol"), rate_hz=rate_hz)
+        self.received = 0
+        self.delays_us: list[int] = []
 
-    def __post_init__(self) -> None:
-        """Make the chain."""
-        self._chain = SensorChain(get_family("line-protocol"), rate_hz=self.rate_hz)
-
-    def take(self, host_ns: int, data: bytes) -> None:
+    def take(self, host_ns: int, data: bytes) -> int:
         """Take the bytes of one read."""
-        if not self.decode:
-            self.received += data.count(b"\n")
-            return
-        count = len(self._chain.feed(host_ns, data))
+        count = super().take(host_ns, data)
         if count:
-            self.received += count
             now_us = time.monotonic_ns() // 1000
-            self.delays_us.append((now_us - int(self._chain.last.device_us[-1])) % WRAP_US)
+            self.received += count
+            self.delays_us.append((now_us - self.last[-1].device_us) % WRAP_US)
+        return count
 
 
-class Sink:
-    """Hands bytes to their channel."""
+class CountingChain(TimedChain):
+    """Counts lines and decodes none."""
 
-    def __init__(self, channels: Sequence[Channel]) -> None:
-        self._channels = channels
-
-    def data(self, channel: int, host_ns: int, data: bytes) -> None:
+    def take(self, host_ns: int, data: bytes) -> int:  # noqa: ARG002
         """Take the bytes of one read."""
-        self._channels[channel].take(host_ns, data)
-
-    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Say so: nothing is lost in a benchmark."""
-        print(f"port {channel}: {kind} at {host_ns} ns, {dict(facts)}", file=sys.stderr)
+        self.received += data.count(b"\n")
+        return 0
 
 
-def one_thread(paths: Sequence[str], channels: Sequence[Channel]) -> Callable[[], None]:
-    """Start this project's reader; return what stops it."""
-    lines = [Line(SerialPort(path, BAUD), i) for i, path in enumerate(paths)]
-    reader = PortReader(lines, Sink(channels), SystemClock())
-    reader.start()
-    return reader.stop
+class Running(Protocol):
+    """A design at work."""
+
+    def blocks(self) -> list[tuple[int, Block]]:
+        """Return the samples since the last call."""
+        ...
+
+    def stop(self) -> None:
+        """Come to an end."""
+        ...
 
 
-def thread_per_port(paths: Sequence[str], channels: Sequence[Channel]) -> Callable[[], None]:
-    """Start a thread for each port that reads what is there or waits for a byte; return what stops them.
+class OneThread:
+    """What a recording does, with the cadence to be tried, and a recorder where there is to be one."""
+
+    def __init__(
+        self,
+        paths: Sequence[str],
+        chains: Sequence[SensorChain],
+        *,
+        cadence_ns: int = CADENCE_NS,
+        log: Path | None = None,
+    ) -> None:
+        clock = SystemClock()
+        lines = [Line(SerialPort(path, BAUD), i) for i, path in enumerate(paths)]
+        tee = Tee(chains, {})
+        tee.heard_enough()
+        self._recorder = None
+        if log is not None:
+            entries = tuple(SensorEntry(i, "line-protocol", path, BAUD) for i, path in enumerate(paths))
+            self._recorder = Recorder(log, LogHeader(sensors=entries, mono_ns=0, unix_ns=0), clock)
+            tee.start(self._recorder, chains, 0)
+        self._reader = PortReader(lines, tee, clock, decode=tee.decode, cadence_ns=cadence_ns)
+        self._reader.start()
+        self.blocks = tee.blocks
+
+    def stop(self) -> None:
+        """Stop reading."""
+        self._reader.stop()
+        if self._recorder is not None:
+            self._recorder.close()
+
+
+class ThreadPerPort:
+    """A thread for each port that reads what is there or waits for a byte, and decodes it.
 
     The calls are those of pyserial's ``read(in_waiting or 1)``, but for ``poll`` in place of its ``select``, which
     refuses descriptors from 1024.
     """
-    stop = threading.Event()
-    ports = [serial.Serial(path, BAUD, timeout=0) for path in paths]
 
-    def read(port: Any, channel: Channel) -> None:
+    def __init__(self, paths: Sequence[str], chains: Sequence[SensorChain]) -> None:
+        self._stop = threading.Event()
+        self._ports = [serial.Serial(path, BAUD, timeout=0) for path in paths]
+        self._chains = chains
+        self._locks = [threading.Lock() for _ in paths]
+        self._threads = [threading.Thread(target=self._read, args=(i,), daemon=True) for i in range(len(paths))]
+        for thread in self._threads:
+            thread.start()
+
+    def _read(self, channel: int) -> None:
+        port, chain, lock = self._ports[channel], self._chains[channel], self._locks[channel]
         ready = select.poll()
         ready.register(port.fileno(), select.POLLIN)
-        while not stop.is_set():
+        while not self._stop.is_set():
             size = port.in_waiting or 1
             if ready.poll(250):
-                channel.take(time.monotonic_ns(), os.read(port.fileno(), size))
+                data = os.read(port.fileno(), size)
+                with lock:
+                    chain.take(time.monotonic_ns(), data)
 
-    pairs = zip(ports, channels, strict=True)
-    threads = [threading.Thread(target=read, args=pair, daemon=True) for pair in pairs]
-    for thread in threads:
-        thread.start()
+    def blocks(self) -> list[tuple[int, Block]]:
+        """Return the samples since the last call."""
+        found = []
+        for channel, (chain, lock) in enumerate(zip(self._chains, self._locks, strict=True)):
+            with lock:
+                if len(chain):
+                    found.append((channel, chain.block()))
+        return found
 
-    def end() -> None:
-        stop.set()
-        for thread in threads:
+    def stop(self) -> None:
+        """Stop all threads."""
+        self._stop.set()
+        for thread in self._threads:
             thread.join()
-        for port in ports:
+        for port in self._ports:
             port.close()
 
-    return end
 
-
-Design = Callable[[Sequence[str], Sequence[Channel]], Callable[[], None]]
-DESIGNS: dict[str, Design] = {"one thread": one_thread, "thread per port": thread_per_port}
+Design = Callable[[Sequence[str], Sequence[SensorChain]], Running]
+DESIGNS: dict[str, Design] = {"one thread": OneThread, "thread per port": ThreadPerPort}
 
 
 def measure(design: Design, *, ports: int, rate_hz: float, seconds: float, decode: bool) -> Figures:
@@ -146,22 +194,39 @@ def measure(design: Design, *, ports: int, rate_hz: float, seconds: float, decod
         assert sender.stdin is not None
         assert sender.stdout is not None
         paths = sender.stdout.readline().split()
-        channels = [Channel(decode, rate_hz) for _ in paths]
-        stop = design(paths, channels)
+        chains = [(TimedChain if decode else CountingChain)(rate_hz) for _ in paths]
+        running = design(paths, chains)
+        taken = 0
+        over = threading.Event()
         threading.Event().wait(SETTLE_S)
         began, cpu = time.monotonic(), time.process_time()
         sender.stdin.write("go\n")
         sender.stdin.flush()
-        expected = int(sender.stdout.readline())
+        expected = 0
+
+        def hear() -> None:
+            nonlocal expected
+            expected = int(sender.stdout.readline())  # type: ignore[union-attr]
+            over.set()
+
+        ear = threading.Thread(target=hear)
+        ear.start()
+        while not over.wait(LOOK_S):
+            taken += sum(len(block) for _, block in running.blocks())
         took, used = time.monotonic() - began, time.process_time() - cpu
+        ear.join()
         deadline = time.monotonic() + PATIENCE_S
-        while sum(channel.received for channel in channels) < expected and time.monotonic() < deadline:
+        while sum(chain.received for chain in chains) < expected and time.monotonic() < deadline:
             threading.Event().wait(0.05)
-        stop()
+        running.stop()
+        taken += sum(len(block) for _, block in running.blocks())
         sender.stdin.write("end\n")
-    delays = np.concatenate([np.array(channel.delays_us) for channel in channels]) / 1000 if decode else np.empty(0)
+    received = sum(chain.received for chain in chains)
+    if decode and taken != received:
+        raise AssertionError(f"{received} samples were parsed, and {taken} came in blocks")
+    delays = np.concatenate([np.array(chain.delays_us) for chain in chains]) / 1000 if decode else np.empty(0)
     p50, p99 = np.percentile(delays, [50, 99]) if delays.size else (np.nan, np.nan)
-    return Figures(sum(channel.received for channel in channels), expected, used / took, float(p50), float(p99))
+    return Figures(received, expected, used / took, float(p50), float(p99))
 
 
 def send(ports: int, rate_hz: float, seconds: float) -> None:
@@ -197,7 +262,7 @@ def allow_descriptors() -> None:
 
 
 def main() -> int:
-    """Print the figures of both designs, and of one port at 1 kHz."""
+    """Send, or compare."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--ports", type=int, default=200)
     parser.add_argument("--rate", type=float, default=100.0, help="Hz")
@@ -208,20 +273,31 @@ def main() -> int:
     if given.send:
         send(given.ports, given.rate, given.seconds)
         return 0
-    bad = 0
-    shares = {}
-    cases = [(1, 100.0, "one thread"), (1, 1000.0, "one thread")]
-    cases += [(given.ports, given.rate, name) for name in DESIGNS]
-    for decode in (True, False):
-        for ports, rate_hz, name in cases:
-            figures = measure(DESIGNS[name], ports=ports, rate_hz=rate_hz, seconds=given.seconds, decode=decode)
-            shares[decode, ports, rate_hz, name] = figures.cpu_share
-            what = "decoded" if decode else "read"
-            print(figures.line(f"{ports} x {rate_hz:g} Hz {what}, {name}"), flush=True)
-            bad += name == "one thread" and figures.received != figures.expected
-        ours, theirs = (shares[decode, given.ports, given.rate, name] for name in DESIGNS)
-        print(f"one thread over a thread per port: {ours / theirs:.2f} x", flush=True)
-    return int(bad > 0)
+    return compare(given.ports, given.rate, given.seconds)
+
+
+def compare(ports: int, rate_hz: float, seconds: float) -> int:
+    """Print one port, both designs on many, and the trade of the cadence; return 1 where this project lost samples."""
+
+    def figures(name: str, design: Design, count: int = ports, rate: float = rate_hz, decode: bool = True) -> Figures:
+        found = measure(design, ports=count, rate_hz=rate, seconds=seconds, decode=decode)
+        print(found.line(f"{count} x {rate:g} Hz {name}"), flush=True)
+        return found
+
+    ours = [figures("decoded, one thread", OneThread, 1, 100.0), figures("decoded, one thread", OneThread, 1, 1000.0)]
+    for what, decode in (("decoded", True), ("read", False)):
+        one = figures(f"{what}, one thread", OneThread, decode=decode)
+        other = figures(f"{what}, thread per port", ThreadPerPort, decode=decode)
+        print(f"one thread over a thread per port: {one.cpu_share / other.cpu_share:.2f} x", flush=True)
+        ours.append(one)
+    with tempfile.TemporaryDirectory() as folder:
+        ours.append(figures("recorded and decoded", partial(OneThread, log=Path(folder) / "run.wire")))
+    reference = figures("decoded, thread per port", ThreadPerPort)
+    for cadence_ms in CADENCES_MS:
+        one = figures(f"decoded, cadence {cadence_ms:g} ms", partial(OneThread, cadence_ns=round(cadence_ms * 1e6)))
+        print(f"  over a thread per port: {one.cpu_share / reference.cpu_share:.2f} x", flush=True)
+        ours.append(one)
+    return int(any(one.received != one.expected for one in ours))
 
 
 if __name__ == "__main__":

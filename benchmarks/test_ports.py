@@ -35,5 +35,5 @@ def test_every_sample_is_received(ports: ModuleType, design: str, decode: bool) 
 
 def test_one_kilohertz_on_one_port(ports: ModuleType) -> None:
     """A port at 1 kHz delivers what was sent."""
-    figures = ports.measure(ports.one_thread, ports=1, rate_hz=1000.0, seconds=0.3, decode=True)
+    figures = ports.measure(ports.OneThread, ports=1, rate_hz=1000.0, seconds=0.3, decode=True)
     assert figures.received == 300

@@ -1,71 +1,58 @@
-"""Reads on their way from the port: to the recorder as they are, and into the session's queue."""
+"""Reads on their way from the port: to the recorder as they are, then through the decoders.
+
+Both happen on the reading thread, and in this order: first every port that has something is read and its bytes are
+recorded, then what came is decoded, a bounded piece at a time. A second thread for the decoding would be woken by each
+read, and would hold the interpreter while the ports wait.
+"""
 
 from __future__ import annotations
 
-import contextlib
-import queue
 import threading
+from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
+from acquisition.block import Block
+from acquisition.chain import SensorChain
 from acquisition.decoders.base import Polled
 from storage.recorder import Recorder
 
-__all__ = ["Read", "Tee", "drained", "joined_reads"]
+__all__ = ["Tee"]
+
+ROUND_BYTES = 8192
+"""So many bytes are decoded before the ports are looked at again: a few milliseconds of the slowest decoder."""
+HEARD_BYTES = 4096
+"""So many bytes tell what sensor it is."""
+HELD_BYTES = 4 << 20
+"""So many bytes may wait for the decoders; a flood that is more than they can do is recorded and not shown."""
 
 
-@dataclass(frozen=True, slots=True)
-class Read:
-    """The bytes of one read of a port, or an event of it ("lost", "reopened", "timeout").
-
-    Parameters
-    ----------
-    channel : int
-    host_ns : int, ns
-    data : bytes
-        Empty for an event.
-    event : str
-    facts : mapping
-        Of the event.
-    """
-
-    channel: int
-    host_ns: int
-    data: bytes
-    event: str = ""
-    facts: Mapping[str, Any] = field(default_factory=dict)
+Read = tuple[int, int, bytes | None]
+"""Channel, host's stamp in ns, and bytes; None for the bytes where the port's stream was broken off."""
 
 
 class Tee:
-    """Hands every read to the recorder, once there is one, and to the session's queue."""
+    """Hands every read to the recorder, once there is one, and to the decoders.
 
-    def __init__(self, askers: Mapping[int, Polled]) -> None:
-        # On the reading thread, beside the session's own decoders: they say what a polled sensor is asked next.
+    Parameters
+    ----------
+    chains : sequence of SensorChain
+        By channel.
+    askers : mapping of int to Polled
+        By channel: decoders fed at once, that say what a polled sensor is asked next.
+    """
+
+    def __init__(self, chains: Sequence[SensorChain], askers: Mapping[int, Polled]) -> None:
+        self._chains = list(chains)
         self._askers = askers
         self._lock = threading.Lock()
         self._recorder: Recorder | None = None
-        self.items: queue.SimpleQueue[Read] = queue.SimpleQueue()
-
-    def start(self, recorder: Recorder, before: Sequence[Read] | None) -> list[Read]:
-        """Record from here on, no read twice and none left out; return the reads from before that belong to the run.
-
-        What a polled sensor is asked begins anew, as the recorded bytes do.
-        """
-        with self._lock:
-            waiting = drained(self.items)
-            kept = [] if before is None else [item for item in (*before, *waiting) if item.data]
-            for item in kept:
-                recorder.data(item.channel, item.host_ns, item.data)
-            self._recorder = recorder
-            for asker in self._askers.values():
-                asker.flush()
-        return kept
-
-    def stop(self) -> None:
-        """Record no more."""
-        with self._lock:
-            self._recorder = None
+        self._waiting: deque[Read] = deque()
+        self._waiting_bytes = 0
+        self._kept: deque[tuple[int, int, bytes]] | None = None
+        self._heard: list[bytearray] | None = [bytearray() for _ in chains]
+        self.gone: dict[int, str] = {}
+        self.skipped_bytes = 0
 
     def data(self, channel: int, host_ns: int, data: bytes) -> None:
         """Take the bytes of one read; called on the reading thread."""
@@ -74,7 +61,13 @@ class Tee:
                 self._recorder.data(channel, host_ns, data)
             if channel in self._askers:
                 self._askers[channel].feed(host_ns, data)
-            self.items.put(Read(channel, host_ns, data))
+            read = (channel, host_ns, data)
+            self._waiting.append(read)
+            self._waiting_bytes += len(data)
+            if self._kept is not None:
+                self._kept.append(read)
+            if self._waiting_bytes > HELD_BYTES:
+                self._skip()
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Take an event; called on the reading thread."""
@@ -83,26 +76,78 @@ class Tee:
                 self._recorder.event(channel, host_ns, kind, facts)
             if channel in self._askers:
                 self._askers[channel].flush()
-            self.items.put(Read(channel, host_ns, b"", kind, facts))
+            self._waiting.append((channel, host_ns, None))
+            if kind == "lost":
+                self.gone[channel] = str(facts.get("why", ""))
 
+    def decode(self) -> bool:
+        """Decode a piece of what waits, and tell whether more is left; called on the reading thread."""
+        with self._lock:
+            waiting, chains, done = self._waiting, self._chains, 0
+            while waiting and done < ROUND_BYTES:
+                channel, host_ns, data = waiting.popleft()
+                if data is None:
+                    chains[channel].lost()
+                    continue
+                done += len(data)
+                chains[channel].take(host_ns, data)
+                if self._heard is not None:
+                    self._heard[channel] += data[: HEARD_BYTES - len(self._heard[channel])]
+            self._waiting_bytes -= done
+            return bool(waiting)
 
-def drained(items: queue.SimpleQueue[Read]) -> list[Read]:
-    """Return what waits in a queue."""
-    found: list[Read] = []
-    with contextlib.suppress(queue.Empty):
-        while True:
-            found.append(items.get_nowait())
-    return found
+    def blocks(self) -> list[tuple[int, Block]]:
+        """Return the samples that came since the last call, by channel."""
+        with self._lock:
+            return [(channel, chain.block()) for channel, chain in enumerate(self._chains) if len(chain)]
 
+    def heard(self, channel: int) -> bytes:
+        """Return the first bytes that a sensor sent."""
+        with self._lock:
+            return b"" if self._heard is None else bytes(self._heard[channel])
 
-def joined_reads(items: list[Read], has_device_time: Sequence[bool]) -> list[Read]:
-    """Return items with neighbouring reads of one sensor as one, where its times do not come from the host's stamps."""
-    joined: list[Read] = []
-    for item in items:
-        last = joined[-1] if joined else None
-        mergeable = last is not None and last.channel == item.channel and last.data and item.data
-        if last is not None and mergeable and has_device_time[item.channel]:
-            joined[-1] = Read(item.channel, item.host_ns, last.data + item.data)
-        else:
-            joined.append(item)
-    return joined
+    def heard_enough(self) -> None:
+        """Keep no first bytes any more: every sensor is known."""
+        with self._lock:
+            self._heard = None
+
+    def keep(self) -> None:
+        """Keep reads from here on, for a run that may begin before the moment that starts it."""
+        with self._lock:
+            self._kept = deque()
+
+    def forget(self, before_ns: int) -> None:
+        """Keep no reads that are older."""
+        with self._lock:
+            while self._kept and self._kept[0][1] < before_ns:
+                self._kept.popleft()
+
+    def start(self, recorder: Recorder, chains: Sequence[SensorChain], since_ns: int) -> None:
+        """Record from here on, and the kept reads since a moment, no read twice and none left out.
+
+        What a polled sensor is asked, and what is decoded, begins anew, as the recorded bytes do.
+        """
+        with self._lock:
+            kept = deque(read for read in self._kept or () if read[1] >= since_ns)
+            for channel, host_ns, data in kept:
+                recorder.data(channel, host_ns, data)
+            self._recorder = recorder
+            self._chains = list(chains)
+            self._waiting, self._waiting_bytes = deque[Read](kept), sum(len(data) for _, _, data in kept)
+            self._kept = None
+            for asker in self._askers.values():
+                asker.flush()
+
+    def stop(self) -> None:
+        """Record no more."""
+        with self._lock:
+            self._recorder = None
+
+    def _skip(self) -> None:
+        """Let the oldest reads go undecoded, and no frame be put together across them."""
+        while self._waiting_bytes > HELD_BYTES // 2:
+            channel, _, data = self._waiting.popleft()
+            self._chains[channel].lost()
+            if data is not None:
+                self._waiting_bytes -= len(data)
+                self.skipped_bytes += len(data)

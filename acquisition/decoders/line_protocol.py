@@ -23,9 +23,9 @@ LONGEST = 96
 """Longest line without its line feed, bytes."""
 
 _WRAP = 1 << 32
-_FIELDS = rb"R1,([0-9]{1,10}),([0-9]{1,10}),([0-9]{1,6}\.[0-9]{2})?,(-?[0-9]{1,5})?,([A-Z])"
-_SOUND = re.compile(rb"\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?")  # what nearly every line is
+_FIELDS = rb"R1,([0-9]{1,10}+),([0-9]{1,10}+),([0-9]{1,6}+\.[0-9]{2})?+,(-?[0-9]{1,5}+)?+,([A-Z])"
 _RECORD = re.compile(_FIELDS)
+_SOUND = re.compile(rb"\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?+\n")  # what nearly every line is
 _ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable, neither $ nor * within
 
 
@@ -71,16 +71,13 @@ class LineProtocolDecoder:
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
         """Return the readings whose lines these bytes end."""
+        # Live, a read is one whole line as a rule; that one is not cut, nor looked at twice.
+        if self._lines.between and (reading := _sound(host_ns, data)) is not None:
+            return Readings((reading,))
         found: list[Reading] = []
         for line in self._lines.split(data):
-            sound = _SOUND.fullmatch(line)
-            if sound is not None:
-                body, sequence, device_us, echo, temperature, status, crc = sound.groups()
-                reading = _reading(host_ns, sequence, device_us, echo, temperature, status)
-                if reading is not None and crc_hqx(body, 0xFFFF) == int(crc, 16):
-                    found.append(reading)
-                    continue
-            if (reading := self._behind_noise(host_ns, line)) is not None:
+            reading = _sound(host_ns, line + b"\n") or self._behind_noise(host_ns, line)
+            if reading is not None:
                 found.append(reading)
         return Readings(found) if found else NO_READINGS
 
@@ -101,6 +98,19 @@ class LineProtocolDecoder:
             self._faults["bad_frame"] += 1
             self._faults["garbage_bytes"] += start
         return reading
+
+
+def _sound(host_ns: int, line: bytes) -> Reading | None:
+    """Return the reading of a line, with its end, in which nothing is wrong or unusual."""
+    found = _SOUND.fullmatch(line)
+    if found is None:
+        return None
+    body, sequence, device_us, echo, temperature, status, crc = found.groups()
+    return (
+        _reading(host_ns, sequence, device_us, echo, temperature, status)
+        if crc_hqx(body, 0xFFFF) == int(crc, 16)
+        else None
+    )
 
 
 def _parse(host_ns: int, line: bytes, start: int) -> Reading | str:
@@ -125,7 +135,9 @@ def _reading(
         return None
     # Only status E vouches for an echo; with any other letter nothing was measured. No echo takes no time.
     echo_us = float(echo) if status == b"E" and echo else 0.0
-    return Reading(host_ns, count, clock_us, echo_us or NAN, NAN, int(temperature) / 100 if temperature else NAN)
+    celsius = int(temperature) / 100 if temperature else NAN
+    # Reading(...) in a third of its time.
+    return tuple.__new__(Reading, (host_ns, count, clock_us, echo_us or NAN, NAN, celsius))
 
 
 class LineProtocolEncoder:

@@ -35,6 +35,11 @@ class LineSplitter:
         """Bytes of the line that has begun."""
         return len(self._held)
 
+    @property
+    def between(self) -> bool:
+        """Whether the next byte begins a line, and one that is not to be dropped."""
+        return not (self._held or self._overlong or self._skip)
+
     def split(self, data: bytes) -> list[bytes]:
         """Return the lines that these bytes end, without their ends."""
         data = self._held + data

@@ -458,7 +458,7 @@ def test_ports_are_listed_in_order() -> None:
 
 @contextmanager
 def server(turns: list[bytes]) -> Iterator[tuple[str, threading.Event]]:
-    """Serve on a local network port: each connection gets its bytes, and ends once the event is set."""
+    """Serve on a local network port: each connection that asks gets its bytes, and ends once the event is set."""
     go_on = threading.Event()
     listener = socket.create_server(("127.0.0.1", 0))
     listener.settimeout(WAIT_S)
@@ -467,6 +467,7 @@ def server(turns: list[bytes]) -> Iterator[tuple[str, threading.Event]]:
         for turn in turns:
             connection, _ = listener.accept()
             with connection:
+                connection.recv(1)  # what comes while pyserial opens the port, it discards
                 connection.sendall(turn)
                 go_on.wait(WAIT_S)
                 go_on.clear()
@@ -497,7 +498,8 @@ def test_a_socket_is_read_and_opened_again_as_a_port_is() -> None:
     with server([encoded(0, 50), encoded(80, 50)]) as (address, go_on):
         transport = SerialPort(address, 115200)
         assert transport.fileno() >= 0
-        reader = PortReader([Line(transport, 3)], keeper, CLOCK)
+        once = Poll(request=b"?", interval_s=600.0, timeout_s=600.0)
+        reader = PortReader([Line(transport, 3, once)], keeper, CLOCK)
         reader.start()
         try:
             keeper.until_samples(50)

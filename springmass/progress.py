@@ -1,0 +1,89 @@
+"""What a recording shows while it runs: counts, rate and the first sensor's motion."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.block import I8, Block, Flag
+from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
+from storage.recorder import RecorderStatus
+
+__all__ = ["Progress", "Shown"]
+
+SECOND_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """One line of progress.
+
+    Parameters
+    ----------
+    seconds : float
+        Since the recording began.
+    samples, missing, gaps : int
+        Of all sensors.
+    rate_hz : float
+        Samples per second over the last second, of the first sensor.
+    motion : callable
+        Returns the first sensor's motion, LiveMotion or NotYet; costs milliseconds, so it is asked only to be shown.
+    status : RecorderStatus
+    disk_free_bytes : int or None
+        Left on the disk that the log lies on; None before there is a log.
+    waiting : bool
+        Whether the trigger has not come yet.
+    skipped_bytes : int
+        Recorded and not decoded live, because more came than the decoders could do; the run file holds them decoded.
+    """
+
+    seconds: float
+    samples: int
+    missing: int
+    gaps: int
+    rate_hz: float
+    motion: Callable[[], LiveMotion | NotYet]
+    status: RecorderStatus | None
+    disk_free_bytes: int | None
+    waiting: bool
+    skipped_bytes: int = 0
+
+
+class Shown:
+    """What the samples so far amount to.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Nominal, of the first sensor.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self.samples = self.missing = 0
+        self.motion = MotionAccumulator(rate_hz)
+        self._stamps: deque[I8] = deque()
+
+    def clear(self) -> None:
+        """Count from here."""
+        self.samples = self.missing = 0
+        self.motion.clear()
+
+    def push(self, blocks: Iterable[tuple[int, Block]]) -> None:
+        """Take blocks of samples by channel."""
+        for channel, block in blocks:
+            self.samples += len(block)
+            self.missing += int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
+            if channel == 0:
+                self.motion.push(block.t, block.distance, block.flags)
+                if block.host_ns is not None:
+                    self._stamps.append(block.host_ns)
+
+    def rate_hz(self, now_ns: int) -> int:
+        """Return how many samples of the first sensor came within the last second."""
+        since = now_ns - SECOND_NS
+        while self._stamps and self._stamps[0][-1] < since:
+            self._stamps.popleft()
+        return sum(int(np.count_nonzero(stamps >= since)) for stamps in self._stamps)
