@@ -245,6 +245,8 @@ class PortReader:
 
     def _wait_s(self, lines: list[Line]) -> float:
         """How long nothing can be due."""
+        if not lines:
+            return IDLE_WAIT_S
         now = self._clock.now_ns()
         wait = IDLE_WAIT_S
         for line in lines:

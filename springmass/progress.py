@@ -15,6 +15,8 @@ from storage.recorder import RecorderStatus
 __all__ = ["Progress", "Shown"]
 
 SECOND_NS = 1_000_000_000
+MOTION_EVERY_NS = 1_900_000_000
+"""Every second line of progress: a swing lasts about as long, and an analysis costs a hundredth of a core a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,8 @@ class Progress:
     rate_hz : float
         Samples per second over the last second, of the first sensor.
     motion : callable
-        Returns the first sensor's motion, LiveMotion or NotYet; costs milliseconds, so it is asked only to be shown.
+        Returns the first sensor's motion, LiveMotion or NotYet; costs milliseconds, so it is asked only to be shown,
+        and is the one before for two seconds.
     status : RecorderStatus
     disk_free_bytes : int or None
         Left on the disk that the log lies on; None before there is a log.
@@ -63,13 +66,16 @@ class Shown:
 
     def __init__(self, rate_hz: float) -> None:
         self.samples = self.missing = 0
-        self.motion = MotionAccumulator(rate_hz)
+        self._motion = MotionAccumulator(rate_hz)
+        self._found: LiveMotion | NotYet = NotYet("no samples so far")
+        self._found_ns = -MOTION_EVERY_NS
         self._stamps: deque[I8] = deque()
 
     def clear(self) -> None:
         """Count from here."""
         self.samples = self.missing = 0
-        self.motion.clear()
+        self._motion.clear()
+        self._found_ns = -MOTION_EVERY_NS
 
     def push(self, blocks: Iterable[tuple[int, Block]]) -> None:
         """Take blocks of samples by channel."""
@@ -77,9 +83,15 @@ class Shown:
             self.samples += len(block)
             self.missing += int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
             if channel == 0:
-                self.motion.push(block.t, block.distance, block.flags)
+                self._motion.push(block.t, block.distance, block.flags)
                 if block.host_ns is not None:
                     self._stamps.append(block.host_ns)
+
+    def motion(self, now_ns: int) -> LiveMotion | NotYet:
+        """Return the first sensor's motion, found anew where the last is old enough."""
+        if isinstance(self._found, NotYet) or now_ns - self._found_ns >= MOTION_EVERY_NS:
+            self._found, self._found_ns = self._motion.value(), now_ns
+        return self._found
 
     def rate_hz(self, now_ns: int) -> int:
         """Return how many samples of the first sensor came within the last second."""

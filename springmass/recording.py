@@ -1,7 +1,7 @@
 """A recording session: ports opened, sensors heard, bytes kept, and the run file built at the end.
 
 The reading thread brings bytes; they go to the recorder as they are, and then through the decoders. The session's own
-thread looks at the samples ten times a second.
+thread looks for marks five times a second and at the samples once.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,7 +36,7 @@ from storage.wire_layout import LogHeader
 __all__ = ["Progress", "Sensor", "Session", "Trigger"]
 
 HEAR_S = 3.0  # silence longer than this before a run is no sensor
-LOOK_S, LOOK_FOR_TRIGGER_S = 0.1, 0.05
+LOOK_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 BYTES_PER_READ = 64  # log bytes a reading takes, for the look at the disk
 
 
@@ -180,11 +181,11 @@ class Session:
         return recorder.status
 
     def poll(self, wait_s: float) -> list[tuple[int, Block]]:
-        """Wait so long, then return the blocks that came since the last call; raises what ended the reading."""
-        # Not woken by every read: the reading thread has decoded them, and once in a while is enough to look.
-        self._clock.sleep_until_ns(self._clock.now_ns() + int(wait_s * 1e9))
-        if self._reader is not None and self._reader.failure is not None:
-            raise self._reader.failure
+        """Wait so long, then return the blocks that came since the last call."""
+        self._wait_until(self._clock.now_ns() + int(wait_s * 1e9))
+        return self._look()
+
+    def _look(self) -> list[tuple[int, Block]]:
         blocks = self._tee.blocks()
         self._shown.push(blocks)
         return blocks
@@ -203,21 +204,19 @@ class Session:
         progress: Callable[[Progress], None],
         marks: queue.SimpleQueue[str] | None,
     ) -> None:
-        end_ns = math.inf if seconds is None else start_ns + int(seconds * 1e9)
-        for _ in self._turns(LOOK_S, start_ns, progress, recorder):
+        end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
+        for _ in self._turns(LOOK_S, progress, recorder, start_ns, end_ns):
             if recorder.status.error:
                 return  # close() raises it; what was recorded stands
             while marks is not None and not marks.empty():
                 recorder.mark(marks.get())
-            if self._clock.now_ns() >= end_ns:
-                return
 
     def _wait_for(self, trigger: Trigger, rest: StillPoint | None, progress: Callable[[Progress], None]) -> int:
         """Wait until the bob moves; return the host's time from which on reads belong to the run."""
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
         keep_ns = int(trigger.keep_s * 1e9)
         self._tee.keep()
-        turns = self._turns(LOOK_FOR_TRIGGER_S, self._clock.now_ns(), progress, None)
+        turns = self._turns(LOOK_FOR_TRIGGER_S, progress, None, self._clock.now_ns(), None)
         while True:
             for channel, block in next(turns):
                 moment_ns = watch.moment_ns(block) if channel == 0 else None
@@ -226,17 +225,32 @@ class Session:
             # A second more than asked for: samples may lie a moment before they are looked at.
             self._tee.forget(self._clock.now_ns() - keep_ns - SECOND_NS)
 
+    def _wait_until(self, deadline_ns: int) -> None:
+        """Wait; raise what ended the reading, if anything did."""
+        self._clock.sleep_until_ns(deadline_ns)
+        if self._reader is not None and self._reader.failure is not None:
+            raise self._reader.failure
+
     def _turns(
-        self, wait_s: float, start_ns: int, progress: Callable[[Progress], None], recorder: Recorder | None
+        self,
+        wait_s: float,
+        progress: Callable[[Progress], None],
+        recorder: Recorder | None,
+        start_ns: int,
+        end_ns: int | None,
     ) -> Iterator[list[tuple[int, Block]]]:
-        """Poll without end, and once a second tell of the progress."""
-        next_ns = start_ns + SECOND_NS
-        while True:
-            yield self.poll(wait_s)
-            now = self._clock.now_ns()
-            if now >= next_ns:
-                next_ns += SECOND_NS
-                progress(self._progress((now - start_ns) * 1e-9, recorder))
+        """Wait in turns until the end, if there is one, and once a second tell of the progress.
+
+        Gives the samples of each turn; while recording those of each second, for nobody needs them before.
+        """
+        wait_ns, tick_ns = int(wait_s * 1e9), start_ns + SECOND_NS
+        while end_ns is None or self._clock.now_ns() < end_ns:
+            turn_ns = min(self._clock.now_ns() + wait_ns, tick_ns, tick_ns if end_ns is None else end_ns)
+            self._wait_until(turn_ns)
+            yield self._look() if recorder is None or turn_ns == tick_ns else []
+            if turn_ns == tick_ns:
+                progress(self._progress((self._clock.now_ns() - start_ns) * 1e-9, recorder))
+                tick_ns += SECOND_NS
 
     def _progress(self, seconds: float, recorder: Recorder | None) -> Progress:
         shown = self._shown
@@ -246,7 +260,7 @@ class Session:
             shown.missing,
             sum(len(chain.timebase.gaps) for chain in self._chains),
             shown.rate_hz(self._clock.now_ns()),
-            shown.motion.value,
+            partial(shown.motion, self._clock.now_ns()),
             None if recorder is None else recorder.status,
             None if recorder is None else shutil.disk_usage(recorder.path.parent).free,
             recorder is None,
