@@ -1,16 +1,21 @@
 """What a recording costs and keeps: `python benchmarks/recording.py`.
 
 A simulated sensor speaks from a process of its own; `springmass record` reads it twice, for a short and a long run. The
-difference of the two is the recording alone, without its start and without the run file built at its end.
+difference of the two is the recording alone, without its start and without the run file built at its end. Both are done
+with the progress line going nowhere, and with it on a terminal.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
+import pty
 import subprocess
 import sys
 import tempfile
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 from springmass import load
@@ -32,7 +37,7 @@ with VirtualPort(get_family("line-protocol"), finder, SystemClock(), seconds=360
 
 
 def main() -> int:
-    """Record a short and a long run; print samples and CPU."""
+    """Record a short and a long run, without and with a terminal; print samples and CPU."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--short", type=int, default=5, metavar="S", help="seconds of the short run (%(default)s)")
     parser.add_argument("--long", type=int, default=125, metavar="S", help="seconds of the long run (%(default)s)")
@@ -42,26 +47,52 @@ def main() -> int:
         assert sensor.stdout is not None
         assert sensor.stdin is not None
         port = sensor.stdout.readline().strip()
-        short, long = (measure(port, seconds) for seconds in (options.short, options.long))
+        for where, terminal in (("without a page", False), ("with its line on a terminal", True)):
+            short, long = (measure(port, seconds, terminal=terminal) for seconds in (options.short, options.long))
+            share = (long[2] - short[2]) / (options.long - options.short)
+            print(f"samples: {long[0]} in {options.long} s at 100 Hz, {long[1]} gaps")
+            print(f"CPU: {share:.2%} of a core while recording {where} ({long[2]:.2f} s for all of the long run)")
         sensor.stdin.close()
-    span = options.long - options.short
-    print(f"samples: {long[0]} in {options.long} s at 100 Hz, {long[1]} gaps")
-    print(f"CPU: {(long[2] - short[2]) / span:.2%} of a core while recording ({long[2]:.2f} s for all of the long run)")
     return 0
 
 
-def measure(port: str, seconds: int) -> tuple[int, int, float]:
+def measure(port: str, seconds: int, *, terminal: bool) -> tuple[int, int, float]:
     """Record once; return samples, gaps and CPU seconds."""
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / "run.h5"
         command = ["record", "--port", port, "--sensor", "line-protocol", "--seconds", str(seconds), "-o", str(run)]
-        child = subprocess.Popen([sys.executable, "-m", "springmass", *command], stderr=subprocess.DEVNULL)
-        _, status, usage = os.wait4(child.pid, 0)
+        with _stderr(terminal) as stderr:
+            child = subprocess.Popen([sys.executable, "-m", "springmass", *command], stderr=stderr)
+            _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         if child.returncode:
             raise SystemExit(f"springmass record ended with exit code {child.returncode}")
         samples = load(run).samples
         return len(samples), int((samples.flags != 0).sum()), usage.ru_utime + usage.ru_stime
+
+
+@contextlib.contextmanager
+def _stderr(terminal: bool) -> Iterator[int]:
+    """Give where the progress line goes: nowhere, or a terminal that somebody reads."""
+    if not terminal:
+        yield subprocess.DEVNULL
+        return
+    master, slave = pty.openpty()
+    reader = threading.Thread(target=_read_on, args=(master,))
+    reader.start()
+    try:
+        yield slave
+    finally:
+        os.close(slave)
+        reader.join()
+        os.close(master)
+
+
+def _read_on(master: int) -> None:
+    """Read until the other side is closed, which a pseudo-terminal says with an error."""
+    with contextlib.suppress(OSError):
+        while os.read(master, 4096):
+            pass
 
 
 if __name__ == "__main__":

@@ -68,14 +68,14 @@ class Shown:
         self.samples = self.missing = 0
         self._motion = MotionAccumulator(rate_hz)
         self._found: LiveMotion | NotYet = NotYet("no samples so far")
-        self._found_ns = -MOTION_EVERY_NS
+        self._found_ns = 0
         self._stamps: deque[I8] = deque()
 
     def clear(self) -> None:
         """Count from here."""
         self.samples = self.missing = 0
         self._motion.clear()
-        self._found_ns = -MOTION_EVERY_NS
+        self._found = NotYet("no samples so far")
 
     def push(self, blocks: Iterable[tuple[int, Block]]) -> None:
         """Take blocks of samples by channel."""

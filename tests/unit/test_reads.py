@@ -1,0 +1,144 @@
+"""What was read is recorded first and decoded after, and no read goes astray between the two."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from acquisition.block import Flag, concatenate
+from acquisition.chain import SensorChain
+from acquisition.decoders.registry import get_family
+from springmass import reads
+from springmass.reads import Tee
+from storage.recorder import Recorder
+
+STEP_NS = 10_000_000
+
+
+class Log:
+    """A recorder that remembers."""
+
+    def __init__(self) -> None:
+        self.reads: list[tuple[int, int, bytes]] = []
+        self.events: list[str] = []
+
+    def data(self, channel: int, host_ns: int, data: bytes) -> None:
+        """Remember a read."""
+        self.reads.append((channel, host_ns, data))
+
+    def event(self, channel: int, host_ns: int, kind: str, facts: dict[str, Any]) -> None:
+        """Remember an event."""
+        self.events.append(f"{channel} {host_ns} {kind} {json.dumps(facts)}")
+
+
+def chain() -> SensorChain:
+    """Return a chain of the line protocol."""
+    return SensorChain(get_family("line-protocol"), rate_hz=100.0)
+
+
+def frame(i: int) -> bytes:
+    """Return one reading."""
+    return (
+        get_family("line-protocol")
+        .encoder()
+        .encode(sequence=i, device_us=i * 10_000, echo_us=1500.0 + i, distance_m=0.25, temperature_c=21.0)
+    )
+
+
+def started(tee: Tee, chains: Sequence[SensorChain], since_ns: int) -> Log:
+    """Record from here on."""
+    log = Log()
+    tee.start(cast(Recorder, log), chains, since_ns)
+    return log
+
+
+def test_what_is_recorded_decodes_to_what_was_shown() -> None:
+    """Cut anywhere, with a break in between, the chain fed one read at a time gives the same bits as the tee."""
+    data = b"".join(map(frame, range(40)))
+    cuts = [0, *np.sort(np.random.default_rng(2).integers(1, len(data), 25)).tolist(), len(data)]
+    tee = Tee([chain()], {})
+    log = started(tee, [chain()], 0)
+    other = chain()
+    expected = []
+    for n, (a, b) in enumerate(itertools.pairwise(cuts)):
+        if n == 12:
+            tee.event(0, n * STEP_NS, "lost", {"why": "cable"})
+            other.lost()
+        tee.data(0, n * STEP_NS, data[a:b])
+        expected.append(other.feed(n * STEP_NS, data[a:b]))
+    assert tee.blocks() == []
+    assert tee.decode() is False
+    ((channel, block),) = tee.blocks()
+    whole = concatenate(expected)
+    assert channel == 0
+    assert block.host_ns is not None
+    assert whole.host_ns is not None
+    for name in ("t", "distance", "flags", "host_ns"):
+        assert getattr(block, name).tobytes() == getattr(whole, name).tobytes()
+    assert b"".join(data for _, _, data in log.reads) == data
+    assert log.events == [f'0 {12 * STEP_NS} lost {{"why": "cable"}}']
+    assert tee.gone == {0: "cable"}
+
+
+def test_decoding_stops_after_a_piece_and_goes_on_later() -> None:
+    """A flood does not keep the reader from its ports."""
+    tee = Tee([chain()], {})
+    for i in range(1000):
+        tee.data(0, i * STEP_NS, frame(i))
+    rounds = 1
+    while tee.decode():
+        rounds += 1
+    assert rounds == -(-sum(len(frame(i)) for i in range(1000)) // reads.ROUND_BYTES)
+    assert len(tee.blocks()[0][1]) == 1000
+
+
+def test_more_than_the_decoders_can_do_is_recorded_counted_and_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The oldest reads are skipped, the log has all, and the first sample after them is flagged."""
+    monkeypatch.setattr(reads, "HELD_BYTES", 4000)
+    tee = Tee([chain()], {})
+    log = started(tee, [chain()], 0)
+    for i in range(200):
+        tee.data(0, i * STEP_NS, frame(i))
+    while tee.decode():
+        pass
+    ((_, block),) = tee.blocks()
+    assert len(log.reads) == 200
+    assert tee.skipped_bytes == sum(len(frame(i)) for i in range(200 - len(block)))
+    assert 0 < len(block) < 200
+    assert block.flags[0] == Flag.GAP_BEFORE
+    assert not block.flags[1:].any()
+
+
+def test_a_run_begins_with_the_reads_kept_from_before() -> None:
+    """From the moment asked for on, each once, whether or not it was decoded before; breaks are no bytes."""
+    tee = Tee([chain()], {})
+    tee.data(0, 0, frame(0))
+    tee.keep()
+    for i in range(1, 20):
+        tee.data(0, i * STEP_NS, frame(i))
+        if i == 10:
+            tee.decode()
+    tee.forget(3 * STEP_NS)
+    log = started(tee, [chain()], 5 * STEP_NS)
+    tee.data(0, 20 * STEP_NS, frame(20))
+    tee.decode()
+    ((_, block),) = tee.blocks()
+    assert [host_ns // STEP_NS for _, host_ns, _ in log.reads] == list(range(5, 21))
+    np.testing.assert_allclose(block.t, np.arange(16) * 0.01, atol=1e-12)
+    assert block.first == 0
+
+
+def test_the_first_bytes_are_kept_until_the_sensor_is_known() -> None:
+    """So that silence or garbage can be described; not for ever."""
+    tee = Tee([chain()], {})
+    for _ in range(200):
+        tee.data(0, 0, b"x" * 100)
+        tee.decode()
+    assert tee.heard(0) == b"x" * reads.HEARD_BYTES
+    tee.heard_enough()
+    assert tee.heard(0) == b""

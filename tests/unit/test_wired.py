@@ -1,0 +1,112 @@
+"""The reading thread: how often it looks, and when it decodes."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from acquisition.clock import VirtualClock
+from acquisition.wired import CADENCE_NS, Line, PortReader
+
+WAIT_S = 10.0
+
+
+class Pipe:
+    """A transport over a pipe."""
+
+    name = "pipe"
+
+    def __init__(self) -> None:
+        self._read, self.end = os.pipe()
+
+    def fileno(self) -> int:
+        """Return the end to wait on."""
+        return self._read
+
+    def read(self, wait_s: float = 0.0) -> bytes:
+        """Return what is there."""
+        return os.read(self._read, 4096)
+
+    def write(self, data: bytes) -> None:
+        """Refuse: nothing is asked here."""
+        raise AssertionError(data)
+
+    def discard_input(self) -> None:
+        """Hold nothing."""
+
+    def reopen(self) -> None:
+        """Be open."""
+
+    def close(self) -> None:
+        """Close both ends."""
+        os.close(self._read)
+        os.close(self.end)
+
+
+class Order:
+    """A sink and its decoding, that notes what was called in which order."""
+
+    def __init__(self, pieces: int = 1) -> None:
+        self.calls: list[str] = []
+        self.decoded = threading.Event()
+        self._pieces = pieces
+        self._left = 0
+
+    def data(self, channel: int, host_ns: int, data: bytes) -> None:
+        """Note a read."""
+        self.calls.append(f"read {channel}")
+        self._left = self._pieces
+
+    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
+        """Refuse: nothing is lost here."""
+        raise AssertionError(kind)
+
+    def decode(self) -> bool:
+        """Note a piece of decoding."""
+        if self._left:
+            self._left -= 1
+            self.calls.append("decode")
+            if not self._left:
+                self.decoded.set()
+        return self._left > 0
+
+
+@contextmanager
+def reading(ports: int, sink: Order) -> Iterator[tuple[list[Pipe], VirtualClock]]:
+    """Read pipes, into each of which something was written before."""
+    pipes, clock = [Pipe() for _ in range(ports)], VirtualClock(1_000_000_000)
+    for pipe in pipes:
+        os.write(pipe.end, b"x")
+    reader = PortReader([Line(pipe, i) for i, pipe in enumerate(pipes)], sink, clock, decode=sink.decode)
+    reader.start()
+    try:
+        assert sink.decoded.wait(WAIT_S)
+        yield pipes, clock
+    finally:
+        reader.stop()
+
+
+def test_every_port_is_read_before_anything_is_decoded() -> None:
+    """What came on all ports is handed on first; then decoding goes on piece by piece until none is left."""
+    sink = Order(pieces=3)
+    with reading(5, sink):
+        assert sorted(sink.calls[:5]) == [f"read {i}" for i in range(5)]
+        assert sink.calls[5:] == ["decode"] * 3
+
+
+@pytest.mark.parametrize("ports", [1, 2])
+def test_only_several_busy_ports_are_looked_at_in_turns(ports: int) -> None:
+    """A port alone is read as soon as it speaks; of several, one wake-up soon after another is put off."""
+    sink = Order()
+    with reading(ports, sink) as (pipes, clock):
+        for _ in range(3):  # the clock stands still but for rests: the next wake-up comes at once
+            sink.decoded.clear()
+            os.write(pipes[0].end, b"x")
+            assert sink.decoded.wait(WAIT_S)
+        rested_ns = clock.now_ns() - 1_000_000_000
+    assert rested_ns == 0 if ports == 1 else rested_ns >= CADENCE_NS
