@@ -122,6 +122,7 @@ class Session:
         calibration = against_ruler(tuple(points), tuple(known_m), u_known_m, before)
         self.sensors[0] = replace(self.sensors[0], calibration=calibration)
         self._chains[0].calibration = calibration
+        self.poll(0.0)  # what was decoded with the calibration before
         return calibration.restated(points[-1], before)
 
     def record(
