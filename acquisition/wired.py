@@ -116,7 +116,10 @@ class Line:
 
 
 class PortReader:
-    """Reads every line on one thread with ``selectors``; a line without a descriptor gets a thread of its own.
+    """Reads every line on one thread with ``selectors``; a line that may block it gets a thread of its own.
+
+    That is one without a descriptor (Windows, RFC 2217), and one at a network address, which may take seconds to open
+    again after a loss.
 
     Parameters
     ----------
@@ -160,12 +163,12 @@ class PortReader:
 
     def start(self) -> None:
         """Begin to read."""
-        selectable = [line for line in self._lines if line.transport.fileno() >= 0]
-        blocking = [line for line in self._lines if line.transport.fileno() < 0]
-        loops = [(self._select_loop, (selectable,))] if selectable else []
-        loops += [(self._blocking_loop, ([line],)) for line in blocking]
+        shared = [line for line in self._lines if not _may_block(line)]
+        loops = [(self._select_loop, shared)] if shared else []
+        for line in filter(_may_block, self._lines):
+            loops.append((self._select_loop if line.transport.fileno() >= 0 else self._blocking_loop, [line]))
         for target, lines in loops:
-            thread = threading.Thread(target=self._guarded, args=(target, *lines), name="springmass-io", daemon=True)
+            thread = threading.Thread(target=self._guarded, args=(target, lines), name="springmass-io", daemon=True)
             self._threads.append(thread)
             thread.start()
 
@@ -311,3 +314,7 @@ class PortReader:
         line._ask_ns = 0
         self._sink.event(line.channel, now, "reopened", {"port": line.transport.name, "gap_s": gap_s})
         return True
+
+
+def _may_block(line: Line) -> bool:
+    return line.transport.fileno() < 0 or "://" in line.transport.name

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from acquisition.clock import VirtualClock
+from acquisition.errors import PortError
 from acquisition.wired import CADENCE_NS, Line, PortReader
 
 WAIT_S = 10.0
@@ -110,3 +111,62 @@ def test_only_several_busy_ports_are_looked_at_in_turns(ports: int) -> None:
             assert sink.decoded.wait(WAIT_S)
         rested_ns = clock.now_ns() - 1_000_000_000
     assert rested_ns == 0 if ports == 1 else rested_ns >= CADENCE_NS
+
+
+class Remote(Pipe):
+    """A transport at a network address, whose other side hung up and takes its time to answer again."""
+
+    name = "socket://bench:4000"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.opening = threading.Event()
+        self.answer = threading.Event()
+
+    def read(self, wait_s: float = 0.0) -> bytes:
+        """Be gone."""
+        raise PortError("socket://bench:4000: the port has gone")
+
+    def reopen(self) -> None:
+        """Wait for the other side."""
+        self.opening.set()
+        self.answer.wait(WAIT_S)
+        raise PortError("socket://bench:4000: cannot be opened")
+
+    def close(self) -> None:
+        """Keep the pipe, which the test closes."""
+
+
+class Lossy(Order):
+    """A sink that expects losses."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.came = threading.Event()
+
+    def data(self, channel: int, host_ns: int, data: bytes) -> None:
+        """Note a read."""
+        super().data(channel, host_ns, data)
+        self.came.set()
+
+    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
+        """Note an event."""
+        self.calls.append(f"{kind} {channel}")
+
+
+def test_a_network_port_that_is_slow_to_open_holds_up_no_other() -> None:
+    """While one address is being opened again, the ports on cables are read."""
+    cable, remote, sink = Pipe(), Remote(), Lossy()
+    clock = VirtualClock()
+    reader = PortReader([Line(cable, 0), Line(remote, 1)], sink, clock)
+    reader.start()
+    os.write(remote.end, b"x")
+    while not remote.opening.wait(0.01):
+        clock.sleep_until_ns(clock.now_ns() + 500_000_000)
+    os.write(cable.end, b"y")
+    assert sink.came.wait(WAIT_S)
+    assert sink.calls[0] == "lost 1"
+    assert "read 0" in sink.calls
+    remote.answer.set()
+    reader.stop()
+    Pipe.close(remote)
