@@ -25,6 +25,8 @@ from pipeline.estimate import Estimate
 from pipeline.fullfit import FullFit, fit_record
 from pipeline.judge import Finding, count_quality, judge, judge_samples
 from pipeline.phase import PhaseFit, fit_phase
+from pipeline.quick import condition_quickly, demodulate_quickly, find_cycles_quickly
+from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
 from pipeline.rest import Rest, fit_rest
 from pipeline.scene import Scene
 from pipeline.track import U8, Track
@@ -137,18 +139,28 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     scene, params = scene or Scene(), params or Params()
     if track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
-    conditioned = condition(track, params.condition)
-    cycles = find_cycles(conditioned, params.cycles)
+    fast = params.accuracy == "fast"
+    conditioned = (condition_quickly if fast else condition)(track, params.condition)
+    cycles = (find_cycles_quickly if fast else find_cycles)(conditioned, params.cycles)
     if isinstance(cycles, NoOscillation):
         return _still(track, scene, params, conditioned, cycles)
-    demodulated = demodulate(conditioned, cycles, params.demodulate)
+    quick = demodulate_quickly(conditioned, cycles) if fast else None
+    demodulated = demodulate(conditioned, cycles, params.demodulate) if quick is None else quick.demodulated
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
         return _still(track, scene, params, conditioned, why)
-    start = float(track.t[np.flatnonzero(conditioned.used)[0]])
-    damping = fit_damping(demodulated, start, params.damping)
-    phase = fit_phase(demodulated, damping, params.phase)
-    rest = fit_rest(demodulated)
-    waveform = reconstruct(track, demodulated, phase, rest)
+    start = float(track.t[np.argmax(conditioned.used)])
+    if quick is None:
+        damping = fit_damping(demodulated, start, params.damping)
+        phase = fit_phase(demodulated, damping, params.phase)
+        rest = fit_rest(demodulated)
+        waveform = reconstruct(track, demodulated, phase, rest)
+    else:
+        damping = fit_damping_quickly(demodulated, start, params.damping) or fit_damping(
+            demodulated, start, params.damping
+        )
+        phase = fit_phase_quickly(demodulated, damping, params.phase) or fit_phase(demodulated, damping, params.phase)
+        rest = fit_rest_quickly(demodulated) or fit_rest(demodulated)
+        waveform = quick.waveform(track, damping, phase, rest)
     full = None
     if params.accuracy == "best":
         full = fit_record(conditioned, demodulated, damping, phase, rest, waveform, params=params.full)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.errors import AnalysisError
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
-__all__ = ["Conditioned", "Params", "condition", "fourth_difference_noise"]
+__all__ = ["Conditioned", "Params", "coarsest_step", "condition", "fourth_difference_noise"]
 
 # Variance of y[i-2] - 4 y[i-1] + 6 y[i] - 4 y[i+1] + y[i+2] for unit white noise: 1 + 16 + 36 + 16 + 1.
 FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
@@ -155,12 +155,20 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
                 plateaus.append(sign * level)
                 bottoms.append(sign * bottom)
                 flags[rows[members]] |= np.uint8(Quality.CLIPPED)
-    quantum_m = _coarsest(ordered, track.quantum_m)
+    quantum_m = coarsest_step(ordered, track.quantum_m)
     return Conditioned(track, flags, noise_m, tuple(plateaus), quantum_m, tuple(bottoms))
 
 
-def _coarsest(ordered: F8, stated_m: float | None) -> float | None:
-    """The step between neighbouring values where values repeat; files print more digits than sensors have."""
+def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
+    """Return the step between neighbouring values where values repeat; files print more digits than sensors have.
+
+    Parameters
+    ----------
+    ordered : (n,) float64, m
+        Distances in increasing order.
+    stated_m : float or None
+        What stands where values do not repeat, or show no coarser step.
+    """
     steps = np.diff(ordered)
     apart = steps[steps > 1e-9]
     if not apart.size or apart.size > 0.5 * ordered.size:

@@ -15,7 +15,7 @@ from pipeline.track import F8, U8, Quality
 from pipeline.tuning import Tuning, retune, unwrap
 from pipeline.windows import Solution, Windows, ranked, solve
 
-__all__ = ["Demodulated", "Params", "demodulate"]
+__all__ = ["Demodulated", "Params", "demodulate", "polar"]
 
 WEAK = 7.0  # standard uncertainties of an amplitude under which its phase is known to 0.14 rad and less well
 THIRD_TO_SIGMA = 0.3853204664075677  # 0.3-quantile of |x| for a standard normal x
@@ -230,9 +230,12 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, weig
     pooled = _with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
     # A window's own noise is known to a tenth only: it is drawn towards the record's.
     prior = 30.0
-    shrunk = (prior * pooled**2 + counts * noise**2) / (prior + counts)
+    shrunk = ((prior * pooled**2 + counts * noise**2) / (prior + counts))[good]
+    _, a, b = solution.coefficients[good].T
     t = windows.centre[good]
-    amplitude, phase, covariance = _polar(windows, solution, shrunk, tuning)
+    smooth = unwrap(np.arctan2(b, a), t, tuning.angular_frequency) if tuning.phase is None else tuning.phase[good]
+    expected = None if tuning.amplitude is None else tuning.amplitude[good]
+    amplitude, phase, covariance = polar(a, b, solution.inverse[good] * shrunk[:, None, None], smooth, expected)
     flags = conditioned.flags.copy()
     inside = windows.inside & good[:, None]
     echoes = inside & (windows.usable > 0) & (weights == 0)
@@ -266,42 +269,46 @@ def _with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
     return math.sqrt((dof * noise_m**2 + 30.0 * stated_m**2) / (dof + 30.0))
 
 
-def _polar(windows: Windows, solution: Solution, variance: F8, tuning: Tuning) -> tuple[F8, F8, F8]:
-    """Amplitude, total phase and covariance of (amplitude, phase, offset) of the good windows.
+def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 | None) -> tuple[F8, F8, F8]:
+    """Return amplitude, total phase and covariance of (amplitude, phase, offset) of windows.
 
+    Parameters
+    ----------
+    a, b : (w,) float64, m
+        Of :math:`a\\cos\\omega\\tau - b\\sin\\omega\\tau`.
+    covariance : (w, 3, 3) float64
+        Of (offset, a, b).
+    smooth_phase : (w,) float64, rad
+        Total phase from a smooth curve through the record; says how many turns lie between windows.
+    smooth_amplitude : (w,) float64, m, or None
+        The same of the amplitude.
+
+    Notes
+    -----
     An amplitude from :math:`\\sqrt{a^2+b^2}` is too large by half the variance of the phase, which is taken off. Where
-    that is more than a hundredth of it, amplitude and phase are read along and across the smooth phase of the record
-    instead: linear in a and b, they are right on average in the deepest noise, and an amplitude may come out negative.
+    the smooth amplitude is below seven of its uncertainties, amplitude and phase are read along and across the smooth
+    phase instead: linear in a and b, they are right on average in the deepest noise, and an amplitude may come out
+    negative.
     """
-    good = solution.good
-    t = windows.centre[good]
-    _, a, b = solution.coefficients[good].T
-    size = np.maximum(np.hypot(a, b), windows.tiny)
-    inverse = solution.inverse[good] * variance[good, None, None]
+    size = np.maximum(np.hypot(a, b), 1e-150)
     along, scale = np.arctan2(b, a), size
-    phase = unwrap(along, t, tuning.angular_frequency)
-    amplitude = size
-    if tuning.phase is not None and tuning.amplitude is not None:
-        smooth, expected = tuning.phase[good], tuning.amplitude[good]
-        u = np.sqrt(0.5 * (inverse[:, 1, 1] + inverse[:, 2, 2]))
-        weak = expected < WEAK * u
-        strong = ~weak
-        turned = np.remainder(along - smooth + math.pi, 2.0 * math.pi) - math.pi
-        turned[strong] = np.unwrap(turned[strong])
-        along = np.where(weak, smooth, along)
-        scale = np.where(weak, np.maximum(expected, 0.3 * u), size)
-        cosine, sine = np.cos(along), np.sin(along)
-        amplitude = np.where(weak, a * cosine + b * sine, size)
-        phase = smooth + np.where(weak, (b * cosine - a * sine) / scale, turned)
-    else:
-        weak = np.zeros(t.size, np.bool_)
-        cosine, sine = np.cos(along), np.sin(along)
-    jacobian = np.zeros((t.size, 3, 3))
+    weak = np.zeros(a.size, np.bool_)
+    turned = np.remainder(along - smooth_phase + math.pi, 2.0 * math.pi) - math.pi
+    if smooth_amplitude is not None:
+        u = np.sqrt(0.5 * (covariance[:, 1, 1] + covariance[:, 2, 2]))
+        weak = smooth_amplitude < WEAK * u
+        along = np.where(weak, smooth_phase, along)
+        scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
+    turned[~weak] = np.unwrap(turned[~weak])
+    cosine, sine = np.cos(along), np.sin(along)
+    phase = smooth_phase + np.where(weak, (b * cosine - a * sine) / scale, turned)
+    jacobian = np.zeros((a.size, 3, 3))
     jacobian[:, 0, 1], jacobian[:, 0, 2] = cosine, sine
     jacobian[:, 1, 1], jacobian[:, 1, 2] = -sine / scale, cosine / scale
     jacobian[:, 2, 0] = 1.0
-    covariance = jacobian @ inverse @ jacobian.transpose(0, 2, 1)
-    return np.where(weak, amplitude, amplitude * (1.0 - 0.5 * covariance[:, 1, 1])), phase, covariance
+    covariance = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
+    amplitude = np.where(weak, a * cosine + b * sine, size * (1.0 - 0.5 * covariance[:, 1, 1]))
+    return amplitude, phase, covariance
 
 
 def _residual_of_all(conditioned: Conditioned, windows: Windows, solution: Solution, tuning: Tuning) -> F8:
