@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pipeline.analyse import Params
+from pipeline.damping import Params as DampingParams
 from pipeline.errors import AnalysisError
 
 __all__ = ["TIERS", "params_for"]
 
+FAST_LAWS = ("none", "linear", "quadratic", "linear+quadratic")
 TIERS = ("fast", "standard", "best")
 
 
@@ -29,4 +31,6 @@ def params_for(accuracy: str) -> Params:
     """
     if accuracy not in TIERS:
         raise AnalysisError(f"accuracy must be one of {', '.join(TIERS)}, got {accuracy!r}")
+    if accuracy == "fast":
+        return Params(accuracy=accuracy, damping=DampingParams(laws=FAST_LAWS))
     return Params(accuracy=accuracy)

@@ -158,7 +158,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         damping = fit_damping_quickly(demodulated, start, params.damping) or fit_damping(
             demodulated, start, params.damping
         )
-        phase = fit_phase_quickly(demodulated, damping, params.phase) or fit_phase(demodulated, damping, params.phase)
+        phase = fit_phase_quickly(demodulated, damping) or fit_phase(demodulated, damping, params.phase)
         rest = fit_rest_quickly(demodulated) or fit_rest(demodulated)
         waveform = quick.waveform(track, damping, phase, rest)
     full = None

@@ -125,8 +125,8 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     solution = _let_go(windows, basis, conditioned.noise_m, params)
     solution = _rescue(windows, basis, solution, tuning, params)
     solution, weights = _clip(windows, basis, solution, params)
-    crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, _level(windows, solution))
-    if crest.any():
+    if conditioned.clipped_from_m:
+        crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, _level(windows, solution))
         windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
         weights = np.where(crest, 0.0, weights)
     # Once more in a basis that turns and decays in each window as the record does there.
@@ -299,7 +299,8 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
         weak = smooth_amplitude < WEAK * u
         along = np.where(weak, smooth_phase, along)
         scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
-    turned[~weak] = np.unwrap(turned[~weak])
+    if np.ptp(turned) > math.pi:
+        turned[~weak] = np.unwrap(turned[~weak])
     cosine, sine = np.cos(along), np.sin(along)
     phase = smooth_phase + np.where(weak, (b * cosine - a * sine) / scale, turned)
     jacobian = np.zeros((a.size, 3, 3))

@@ -24,11 +24,14 @@ from pipeline.condition import Params as ConditionParams
 from pipeline.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.cycles import Params as CyclesParams
 from pipeline.damping import Damping
-from pipeline.demodulate import Demodulated, polar
+from pipeline.demodulate import THIRD_TO_SIGMA, WEAK, Demodulated, polar
 from pipeline.phase import PhaseFit
 from pipeline.rest import Rest
 from pipeline.track import F8, Quality, Track
 from pipeline.waveform import Waveform
+from pipeline.windows import Windows, ranked, solve
+
+C16 = NDArray[np.complex128]
 
 __all__ = ["Quick", "condition_quickly", "demodulate_quickly", "find_cycles_quickly"]
 
@@ -76,7 +79,7 @@ def condition_quickly(track: Track, params: ConditionParams) -> Conditioned:
     -----
     Clean means: no flag, all finite, time strictly increasing, no second difference beyond eight times their median
     (a spike of seven standard deviations makes one), and at neither end of the range a band with three times as many
-    samples as the next one.
+    samples as the next one or eight that are equal.
     """
     y = track.y
     if len(track) < 64 or track.flags.any() or not (np.isfinite(y).all() and np.isfinite(track.t).all()):
@@ -90,6 +93,8 @@ def condition_quickly(track: Track, params: ConditionParams) -> Conditioned:
     noise_m = MAD_TO_SIGMA * float(np.median(np.abs(fourth[:: max(fourth.size // 4000, 1)]))) / FOURTH_DIFFERENCE_GAIN
     width = 8.0 * max(noise_m, 0.5 * (track.quantum_m or 0.0))
     low, high = float(y.min()), float(y.max())
+    if max(np.count_nonzero(y == low), np.count_nonzero(y == high)) >= 8:
+        return condition(track, params)
     for top in (y - low, high - y):
         inside = np.count_nonzero(top <= width)
         if inside > max(0.02 * y.size, 8) and inside > 3.0 * (np.count_nonzero(top <= 2.0 * width) - inside):
@@ -101,19 +106,20 @@ def condition_quickly(track: Track, params: ConditionParams) -> Conditioned:
 def find_cycles_quickly(conditioned: Conditioned, params: CyclesParams) -> Cycles | NoOscillation:
     """Find the frequency on means of neighbouring samples, where a period has plenty of them."""
     track = conditioned.track
-    block = len(track) // 3000
-    if block >= 2 and not conditioned.flags.any():
+    block = len(track) // 2000
+    bad = conditioned.flags != 0
+    if block >= 2 and np.isfinite(track.t).all() and np.count_nonzero(bad) < 0.2 * bad.size:
         whole = len(track) // block * block
         few = replace(
             track,
             t=track.t[:whole].reshape(-1, block).mean(axis=1),
-            y=track.y[:whole].reshape(-1, block).mean(axis=1),
+            y=_bridged(track.y[:whole], bad[:whole]).reshape(-1, block).mean(axis=1),
             flags=np.zeros(whole // block, np.uint8),
             rate_hz=track.rate_hz / block,
         )
         noise_m = conditioned.noise_m / math.sqrt(block)
         found = find_cycles(replace(conditioned, track=few, flags=few.flags, noise_m=noise_m), params)
-        if isinstance(found, Cycles) and found.frequency_hz < few.rate_hz / 10.0:
+        if isinstance(found, Cycles) and found.frequency_hz < few.rate_hz / 8.0:
             return replace(found, bounds=found.bounds * block)
     return find_cycles(conditioned, params)
 
@@ -130,8 +136,8 @@ def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None
     -----
     Windows hold equally many samples, near a whole number of periods. A first product gives phases and amplitudes
     from which frequency and decay are told; a second one in a basis that has them gives the result. How far a window
-    differs from the record's mean in either is put right to first order. Flagged samples are replaced by the fit
-    itself until that stands still, which is the fit without them.
+    differs from the record's mean in either is put right to first order. Windows that hold flagged samples or false
+    echoes are fitted again without these, each by itself; where fewer than a third are clean nothing is returned.
     """
     track = conditioned.track
     rows = np.flatnonzero(conditioned.flags == 0) if conditioned.flags.any() else None
@@ -159,6 +165,8 @@ def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None
 class _Basis:
     """Rest position, cosine, minus sine, and the latter two times time: the common basis of all windows."""
 
+    omega: float
+    decay: float
     rows: F8
     solver: F8
     inverse: F8
@@ -170,9 +178,9 @@ class _Basis:
         rows = np.stack([np.ones(tau.size), wave.real, -wave.imag, tau * wave.real, -tau * wave.imag])
         inverse = np.linalg.inv(rows[:3] @ rows[:3].T)
         solver = inverse @ rows[:3]
-        return cls(rows, solver, inverse, solver @ rows[3:].T)
+        return cls(omega, decay, rows, solver, inverse, solver @ rows[3:].T)
 
-    def fit(self, y: F8, slope: F8) -> F8:
+    def fit(self, y: F8, slope: C16) -> F8:
         """Coefficients (w, 5) of windows y (w, l) whose complex amplitude changes by ``slope`` of itself per second."""
         found = y @ self.solver.T
         change = slope * (found[:, 1] + 1j * found[:, 2])
@@ -184,127 +192,170 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     track = conditioned.track
     part = slice(first, first + w * length)
     bad = conditioned.flags[part].reshape(w, length) != 0
-    dirty = np.flatnonzero(bad.any(axis=1))
-    values = track.y[part]
-    if dirty.size:
-        good = np.flatnonzero(~bad.ravel())
-        values = np.interp(np.arange(w * length), good, values[good])
+    values = _bridged(track.y[part], bad.ravel())
     level = float(values.mean())
     y = values.reshape(w, length) - level
-    tau = step * (np.arange(length) - 0.5 * (length - 1))
-    t = float(track.t[first]) + step * (0.5 * (length - 1) + length * np.arange(w))
-    omega = 2.0 * math.pi * cycles.frequency_hz
-    basis = _Basis.of(tau, omega, 0.0)
-    smooth = _smooth(y @ basis.solver.T, t, omega, 1)
-    omega, decay = smooth.mean_rate()
-    basis = _Basis.of(tau, omega, decay)
-    smooth = _smooth(y @ basis.solver.T, t, omega, 3)
-    slope = smooth.rate - (1j * omega - decay)
-    for attempt in range(2):
-        coefficients = basis.fit(y, slope)
-        if dirty.size:
-            coefficients = _without(bad, dirty, y, basis, slope, coefficients)
-        residual = y - coefficients @ basis.rows
-        squares = np.einsum("wl,wl->w", residual, residual)
-        typical = float(np.median(squares)) / max(length - 3, 1)
-        odd = np.abs(residual) > OUTLIER_SIGMAS * math.sqrt(typical)
-        odd &= ~bad
-        if not odd.any():
-            break
-        hit = np.flatnonzero(odd.any(axis=1))
-        # Single samples are taken out; what comes in numbers comes in clusters, which pull a window's fit.
-        if attempt or hit.size > max(2, 0.1 * w) or odd.sum(axis=1).max() > 3:
-            return None
-        bad |= odd
-        dirty = np.flatnonzero(bad.any(axis=1))
-    counts = length - bad.sum(axis=1)
-    keep = counts > 0.7 * length
-    if np.count_nonzero(keep) < max(0.9 * w, 5):
+    tau: F8 = step * (np.arange(length, dtype=np.float64) - 0.5 * (length - 1))
+    t: F8 = float(track.t[first]) + step * (0.5 * (length - 1) + length * np.arange(w, dtype=np.float64))
+    basis = _Basis.of(tau, 2.0 * math.pi * cycles.frequency_hz, 0.0)
+    basis = _Basis.of(tau, *_neighbours(y @ basis.solver.T, step * length, basis.omega))
+    coefficients = y @ basis.solver.T
+    residual = y - coefficients @ basis.rows[:3]
+    squares = np.einsum("wl,wl->w", residual, residual)
+    # The calmest quarter of the windows tells the noise: clusters of echoes may sit in all others.
+    typical = math.sqrt(float(np.partition(squares, w // 4)[w // 4]) / (length - 3)) + 1e-150
+    clean = ~(bad.any(axis=1) | (np.abs(residual) > OUTLIER_SIGMAS * typical).any(axis=1))
+    if np.count_nonzero(clean) < max(0.3 * w, 5):
         return None
-    return _quick(conditioned, part, t, level, tau, basis, coefficients, residual, bad, keep, smooth, omega, decay)
+    smooth = _smooth(coefficients, t, basis.omega, clean)
+    if float(smooth.amplitude.min()) < WEAK * typical * math.sqrt(2.0 / length):
+        return None
+    slope = smooth.rate - (1j * basis.omega - basis.decay)
+    fits = _Fits.of(basis, y, slope)
+    if not clean.all():
+        fits = _cleaned(fits, np.flatnonzero(~clean), basis, y, bad, slope, smooth, typical)
+    if np.count_nonzero(fits.good) < max(0.9 * w, 5):
+        return None
+    return _quick(conditioned, part, t, level, basis, fits, smooth)
 
 
-def _without(bad: NDArray[np.bool_], dirty: NDArray[np.int64], y: F8, basis: _Basis, slope: F8, found: F8) -> F8:
-    """Fit the windows that hold bad samples without these: replaced by the fit until it stands still."""
-    for _ in range(6):
-        y[dirty] = np.where(bad[dirty], found[dirty] @ basis.rows, y[dirty])
-        found[dirty] = basis.fit(y[dirty], slope[dirty])
-    return found
+def _bridged(y: F8, bad: NDArray[np.bool_]) -> F8:
+    if not bad.any():
+        return y
+    good = np.flatnonzero(~bad)
+    return np.interp(np.arange(y.size), good, y[good])
+
+
+@dataclass(slots=True)
+class _Fits:
+    """Coefficients (w, 5), inverse normal matrices (w, 3, 3), residuals and weights (w, l), and which are good (w,)."""
+
+    coefficients: F8
+    inverse: F8
+    residual: F8
+    weights: F8
+    good: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, basis: _Basis, y: F8, slope: C16) -> _Fits:
+        coefficients = basis.fit(y, slope)
+        inverse = np.broadcast_to(basis.inverse, (len(y), 3, 3))
+        return cls(coefficients, inverse, y - coefficients @ basis.rows, np.ones(y.shape), np.ones(len(y), np.bool_))
+
+
+def _cleaned(
+    fits: _Fits,
+    hit: NDArray[np.int64],
+    basis: _Basis,
+    y: F8,
+    bad: NDArray[np.bool_],
+    slope: C16,
+    smooth: _Smooth,
+    level: float,
+) -> _Fits:
+    """Fit windows that hold flagged samples or false echoes without these.
+
+    They start from what the clean windows' curves foretell; weights of Cauchy's form let go of clusters, and what is
+    left beyond four standard deviations is taken out for good.
+    """
+    z = smooth.amplitude[hit] * np.exp(1j * smooth.phase[hit])
+    drift = slope[hit] * z
+    others = np.setdiff1d(np.arange(len(y)), hit)
+    offset = np.interp(hit, others, fits.coefficients[others, 0])
+    expected = np.stack([offset, z.real, z.imag, drift.real, drift.imag], axis=1)
+    moved = expected[:, 3:] @ basis.rows[3:]
+    usable = (~bad[hit]).astype(np.float64)
+    windows = Windows(
+        np.empty((0, 0), np.int64),
+        np.empty((0, 0), np.bool_),
+        usable,
+        np.where(bad[hit], 0.0, y[hit] - moved),
+        np.empty((0, 0)),
+        np.empty(0),
+        0.0,
+        1e-150,
+    )
+    rows = np.empty((hit.size, 4, y.shape[1]))
+    rows[:, :3] = basis.rows[:3]
+    rows[:, 3] = windows.y
+    size = np.abs(windows.y - expected[:, :3] @ basis.rows[:3])
+    for _ in range(3):
+        spread = np.maximum(ranked(size, usable, 0.3) / THIRD_TO_SIGMA, level)
+        size = np.abs(solve(windows, rows, usable / (1.0 + (size / spread[:, None]) ** 2) ** 2).residual)
+    for _ in range(2):
+        weights = np.where(size <= 4.0 * level, usable, 0.0)
+        solution = solve(windows, rows, weights)
+        size = np.abs(solution.residual)
+    found = np.concatenate([solution.coefficients, expected[:, 3:]], axis=1)
+    few = weights.sum(axis=1) < 0.4 * y.shape[1]
+    parts = (fits.coefficients.copy(), fits.inverse.copy(), fits.residual.copy(), fits.weights.copy(), fits.good.copy())
+    new = (found, solution.inverse, y[hit] - found @ basis.rows, weights, solution.good & ~few)
+    for mine, theirs in zip(parts, new, strict=True):
+        mine[hit] = theirs
+    return _Fits(*parts)
+
+
+def _neighbours(coefficients: F8, apart_s: float, omega: float) -> tuple[float, float]:
+    """Angular frequency, rad/s, and decay, 1/s, from what windows differ from their neighbours."""
+    z = coefficients[:, 1] + 1j * coefficients[:, 2]
+    turn = complex(np.vdot(z[:-1], z[1:])) * np.exp(-1j * omega * apart_s)
+    size = np.abs(z)
+    ratio = float(size[:-1] @ size[1:]) / max(float(size[:-1] @ size[:-1]), 1e-300)
+    return omega + math.atan2(turn.imag, turn.real) / apart_s, -math.log(max(ratio, 1e-300)) / apart_s
 
 
 @dataclass(slots=True)
 class _Smooth:
-    """Curves through the windows' complex amplitudes: total phase, amplitude, and logarithmic rate at each centre."""
+    """Cubics through the windows' complex amplitudes: total phase, amplitude, and logarithmic rate at each centre."""
 
     phase: F8
     amplitude: F8
-    rate: NDArray[np.complex128]
-    weight: F8
-
-    def mean_rate(self) -> tuple[float, float]:
-        """Angular frequency, rad/s, and decay, 1/s, typical of the record."""
-        mean = complex(np.average(self.rate, weights=self.weight))
-        return mean.imag, -mean.real
+    rate: C16
 
 
-def _smooth(coefficients: F8, t: F8, omega: float, degree: int) -> _Smooth:
+def _smooth(coefficients: F8, t: F8, omega: float, clean: NDArray[np.bool_]) -> _Smooth:
     z = coefficients[:, 1] + 1j * coefficients[:, 2]
-    weight = np.abs(z) ** 2 + 1e-300
+    size = np.abs(z) + 1e-150
     since = t - t[0]
-    angle = np.unwrap(np.angle(z) - omega * since)
-    span = float(since[-1])
-    x = 2.0 * since / span - 1.0
-    degree = min(degree, max(1, t.size // 6))
-    design = np.polynomial.legendre.legvander(x, degree)
-    weighted = design * weight[:, None]
-    curve = np.linalg.solve(weighted.T @ design, weighted.T @ np.stack([0.5 * np.log(weight), angle], axis=1))
-    fitted = design @ curve
-    slopes = np.polynomial.legendre.legval(x, np.polynomial.legendre.legder(curve)) * (2.0 / span)
-    return _Smooth(fitted[:, 1] + omega * since, np.exp(fitted[:, 0]), slopes[0] + 1j * (slopes[1] + omega), weight)
+    angle = np.angle(z) - omega * since
+    angle[clean] = np.unwrap(angle[clean])
+    half = 0.5 * float(since[-1])
+    x = since / half - 1.0
+    order = min(3, max(1, t.size // 6)) + 1
+    powers = np.stack([np.ones_like(x), x, x * x, x**3][:order])
+    weighted = powers * np.where(clean, size, 0.0) ** 2
+    curve = np.linalg.solve(weighted @ powers.T, weighted @ np.stack([np.log(size), angle], axis=1))
+    level, turned = curve.T @ powers
+    rates = (curve[1:] * (np.arange(1, order) / half)[:, None]).T @ powers[:-1]
+    return _Smooth(turned + omega * since, np.exp(level), rates[0] + 1j * (rates[1] + omega))
 
 
 def _quick(
-    conditioned: Conditioned,
-    part: slice,
-    t: F8,
-    level: float,
-    tau: F8,
-    basis: _Basis,
-    coefficients: F8,
-    residual: F8,
-    bad: NDArray[np.bool_],
-    keep: NDArray[np.bool_],
-    smooth: _Smooth,
-    omega: float,
-    decay: float,
+    conditioned: Conditioned, part: slice, t: F8, level: float, basis: _Basis, fits: _Fits, smooth: _Smooth
 ) -> Quick:
-    track, length = conditioned.track, tau.size
-    counts = length - bad.sum(axis=1)
-    squares = np.einsum("wl,wl->w", residual, np.where(bad, 0.0, residual))
-    noise = np.sqrt(squares / (counts - 3))
+    track, length = conditioned.track, basis.rows.shape[1]
+    counts = np.sum(fits.weights, axis=1).astype(np.int64)
+    clean = int(counts.min()) == length
+    squares = np.einsum("wl,wl->w", fits.residual, fits.residual if clean else fits.weights * fits.residual)
+    noise = np.sqrt(squares / np.maximum(counts - 3, 1))
+    keep = fits.good
     pooled = float(np.sum(squares[keep])) / float(np.sum(counts[keep] - 3))
-    variance = (30.0 * pooled + counts * noise**2) / (30.0 + counts) * (length / counts)
-    inverse = basis.inverse * variance[keep, None, None]
+    variance = (30.0 * pooled + counts * noise**2) / (30.0 + counts)
+    coefficients = fits.coefficients
     amplitude, phase, covariance = polar(
-        coefficients[keep, 1], coefficients[keep, 2], inverse, smooth.phase[keep], smooth.amplitude[keep]
+        coefficients[keep, 1],
+        coefficients[keep, 2],
+        fits.inverse[keep] * variance[keep, None, None],
+        smooth.phase[keep],
+        smooth.amplitude[keep],
     )
+    position, velocity = _motion(track, part, t, level, basis, coefficients)
+    left = track.y - position
+    left[: part.start] = left[part.stop :] = np.nan
     flags = conditioned.flags.copy()
-    within = flags[part].reshape(bad.shape)
-    within[bad & (within == 0)] |= np.uint8(Quality.FALSE_ECHO)
-    left = np.full(len(track), np.nan)
-    left[part] = np.where(np.isfinite(track.y[part]), residual.ravel(), np.nan)
-    known = bad & np.isfinite(track.y[part]).reshape(bad.shape)
-    position = np.empty(len(track))
-    position[part] = (level + coefficients @ basis.rows).ravel()
-    left[part][known.ravel()] = (track.y[part] - position[part])[known.ravel()]
-    z = (coefficients[:, 1] + 1j * coefficients[:, 2]) * (1j * omega - decay)
-    velocity = np.empty(len(track))
-    velocity[part] = (z.real[:, None] * basis.rows[1] + z.imag[:, None] * basis.rows[2]).ravel()
-    for outside, window in ((slice(0, part.start), 0), (slice(part.stop, len(track)), -1)):
-        since = track.t[outside] - t[window]
-        wave = np.exp((1j * omega - decay) * since) * (coefficients[window, 1] + 1j * coefficients[window, 2])
-        position[outside] = level + coefficients[window, 0] + wave.real
-        velocity[outside] = (wave * (1j * omega - decay)).real
+    if not clean:
+        within = flags[part].reshape(fits.weights.shape)
+        within[(fits.weights == 0.0) & (within == 0)] |= np.uint8(Quality.FALSE_ECHO)
     demodulated = Demodulated(
         t[keep],
         amplitude,
@@ -313,10 +364,27 @@ def _quick(
         noise[keep],
         covariance,
         counts[keep],
-        omega,
+        basis.omega,
         -smooth.rate.real[keep],
         left,
         flags,
         int(np.count_nonzero(~keep)),
     )
     return Quick(demodulated, position, velocity, length)
+
+
+def _motion(track: Track, part: slice, t: F8, level: float, basis: _Basis, coefficients: F8) -> tuple[F8, F8]:
+    """Position and velocity at every sample as the windows have them; the first and the last reach to the ends."""
+    shape = (t.size, basis.rows.shape[1])
+    rate = 1j * basis.omega - basis.decay
+    z = coefficients[:, 1] + 1j * coefficients[:, 2]
+    change = z * rate
+    position, velocity = np.empty(len(track)), np.empty(len(track))
+    np.matmul(coefficients, basis.rows, out=position[part].reshape(shape))
+    position[part] += level
+    np.matmul(np.stack([change.real, change.imag], axis=1), basis.rows[1:3], out=velocity[part].reshape(shape))
+    for outside, window in ((slice(0, part.start), 0), (slice(part.stop, len(track)), -1)):
+        wave = z[window] * np.exp(rate * (track.t[outside] - t[window]))
+        position[outside] = level + coefficients[window, 0] + wave.real
+        velocity[outside] = (wave * rate).real
+    return position, velocity

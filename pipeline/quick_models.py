@@ -16,7 +16,6 @@ from pipeline.damping import Params as DampingParams
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate, Joint
 from pipeline.laws import LAWS, Law
-from pipeline.phase import Params as PhaseParams
 from pipeline.phase import PhaseFit, wrapped
 from pipeline.regression import Scatter, chi2_quantile, correlation_length
 from pipeline.rest import Rest
@@ -137,14 +136,13 @@ def _weigh(law: Law, theta: F8, covariance: F8, chi2: float, points: int, params
     return LawFit(law, joint, chi2 / free, float(free), chi2 + count * math.log(points), True, rejection)
 
 
-def fit_phase_quickly(demodulated: Demodulated, damping: Damping, params: PhaseParams) -> PhaseFit | None:
+def fit_phase_quickly(demodulated: Demodulated, damping: Damping) -> PhaseFit | None:
     """Fit a constant frequency to the windows' phases; None where they bend or scatter.
 
     Parameters
     ----------
     demodulated : Demodulated
     damping : Damping
-    params : pipeline.phase.Params
     """
     t, u = demodulated.t, np.sqrt(demodulated.covariance[:, 1, 1])
     weight = 1.0 / np.maximum(u, 1e-12) ** 2
