@@ -144,12 +144,12 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     cycles = (find_cycles_quickly if fast else find_cycles)(conditioned, params.cycles)
     if isinstance(cycles, NoOscillation):
         return _still(track, scene, params, conditioned, cycles)
-    quick = demodulate_quickly(conditioned, cycles) if fast else None
+    quick = demodulate_quickly(conditioned, cycles)
     demodulated = demodulate(conditioned, cycles, params.demodulate) if quick is None else quick.demodulated
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
         return _still(track, scene, params, conditioned, why)
     start = float(track.t[np.argmax(conditioned.used)])
-    if quick is None:
+    if quick is None or not fast:
         damping = fit_damping(demodulated, start, params.damping)
         phase = fit_phase(demodulated, damping, params.phase)
         rest = fit_rest(demodulated)

@@ -153,8 +153,10 @@ def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None
     off = np.abs(track.t[first : last + 1] - regular)
     if not float(np.max(off if rows is None else off[rows - first])) <= 0.02 * step:
         return None
+    # Samples left over at the end are lost, and in windows of part periods rest position and swing share samples.
     counts = np.arange(max(windows - max(windows // 8, 1), 5), windows + 1)
-    w = int(counts[np.lexsort((-counts, n % counts))[0]])
+    spans = (n // counts) * step * cycles.frequency_hz
+    w = int(counts[np.argmin(1.5 * (n % counts) / n + 4.0 * (spans - np.round(spans)) ** 2)])
     length = n // w
     if length > 4096 or length < 12:
         return None

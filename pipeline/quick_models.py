@@ -109,6 +109,8 @@ def _gauss_newton(law: Law, t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, F8, flo
         if not math.isfinite(chi2) or not np.isfinite(jacobian).all():
             return None
         scale = np.sqrt(np.einsum("np,np->p", jacobian, jacobian))
+        if not scale.min() > 0.0:
+            return None
         scaled = jacobian / scale
         normal = scaled.T @ scaled
         if np.linalg.det(normal) < 1e-12:
