@@ -15,8 +15,10 @@ from pathlib import Path
 import lmfit
 import numpy as np
 
+from pipeline.accuracy import params_for
 from pipeline.analyse import analyse
 from pipeline.scene import Scene
+from pipeline.track import Track
 from springmass import load, sample_data
 from springmass.loading import read_scene
 
@@ -45,6 +47,7 @@ def cases() -> list[tuple[str, str, float, Callable[[], object], Callable[[], ob
     data = sample_data() / "damped_simulated_position.txt"
     track = load(data).track
     scene = read_scene(sample_data() / "damped.scene.toml")
+    clean = clean_record()
     return [
         ("springmass --help", "bare python", 3.0, process(program, "--help"), process(python, "-c", "pass"), 30),
         (
@@ -55,23 +58,40 @@ def cases() -> list[tuple[str, str, float, Callable[[], object], Callable[[], ob
             process(python, "-c", "import numpy"),
             15,
         ),
-        (
-            "analyse(), standard accuracy, 12,000 samples",
-            "lmfit damped sine, same samples",
-            1.0,
-            lambda: analyse(track, scene),
-            damped_sine(track.t, track.y),
-            40,
-        ),
-        (
-            "analyse(), no scene",
-            "lmfit damped sine, same samples",
-            1.0,
-            lambda: analyse(track, Scene()),
-            damped_sine(track.t, track.y),
-            40,
+        *(
+            tier(name, what, limit, one, scene)
+            for name, what, limit, one in (
+                ("fast", "clean", 0.2, clean),
+                ("fast", "5 % false echoes", 0.5, track),
+                ("standard", "clean", 1.0, clean),
+                ("standard", "5 % false echoes", 1.0, track),
+                ("best", "clean", 3.0, clean),
+                ("best", "5 % false echoes", 3.0, track),
+            )
         ),
     ]
+
+
+def tier(
+    name: str, what: str, limit: float, track: Track, scene: Scene
+) -> tuple[str, str, float, Callable[[], object], Callable[[], object], int]:
+    """Return one accuracy tier on one record, everything from track to findings, against one lmfit fit."""
+    params = params_for(name)
+    return (
+        f"analyse(), {name}, 12,000 samples, {what}",
+        "lmfit damped sine, same samples",
+        limit,
+        lambda: analyse(track, scene, params),
+        damped_sine(track.t, track.y),
+        30,
+    )
+
+
+def clean_record() -> Track:
+    """Return a damped sine of 120 s at 100 Hz in white noise of 0.3 mm."""
+    t = np.arange(12_000) / 100.0
+    noise = np.random.default_rng(5).standard_normal(t.size)
+    return Track.from_arrays(t, 0.22 + 0.05 * np.exp(-0.01463 * t) * np.cos(8.3 * t + 0.7) + 3e-4 * noise)
 
 
 def damped_sine(t: np.ndarray, y: np.ndarray) -> Callable[[], object]:
