@@ -177,8 +177,19 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     )
     derived = derive(demodulated, damping, phase, rest, scene, effects, clock=track.clock, params=params.derive)
     findings = judge(conditioned, cycles, demodulated, damping, phase, rest, waveform)
+    if full is not None and not full.converged:
+        findings = (*findings, _not_converged(full))
     motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived, full)
     return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
+
+
+def _not_converged(full: FullFit) -> Finding:
+    return Finding(
+        "not_converged",
+        "warning",
+        f"the fit of the whole waveform did not converge in {full.steps} Gauss-Newton steps from the windows' values; "
+        "these stand, as at standard accuracy",
+    )
 
 
 def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:

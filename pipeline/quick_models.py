@@ -40,7 +40,7 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
     Returns
     -------
     Damping or None
-        None where the mixture of both leaves more than noise, or what it leaves is correlated, or coefficients are
+        None where other laws are asked for, the mixture of both leaves more than noise, or what it leaves is correlated, or coefficients are
         negative: then amplitudes need all laws, and their scatter measured.
 
     Notes
@@ -50,7 +50,7 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
     """
     t, y = demodulated.t - t0, demodulated.amplitude
     u = np.sqrt(demodulated.covariance[:, 0, 0])
-    if t.size < 8 or not y.min() > 5.0 * u.max():
+    if set(params.laws) != set(NESTED) or t.size < 8 or not y.min() > 5.0 * u.max():
         return None
     full = LAWS["linear+quadratic"]
     theta = _start(t, y, u)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import springmass
+from pipeline.accuracy import params_for
 from pipeline.classic import classic
 from pipeline.judge import Finding
 
@@ -300,6 +301,16 @@ def test_the_classic_method_gives_the_reports_numbers(cli: Cli, data: Path) -> N
     assert {n: e["value"] for n, e in result["estimates"].items()} == {n: e.value for n, e in own.estimates.items()}
     assert result["provenance"]["accuracy"] == "classic"
     assert result["damping"] == {"selected": None, "admissible": [], "laws": {}}
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "standard", "best"])
+def test_a_tier_is_what_the_result_says_it_is(cli: Cli, data: Path, accuracy: str) -> None:
+    """The estimates under --accuracy are those of the library's tier, and the provenance names it."""
+    path = data / "undamped_simulated_position.txt"
+    result = cli("analyse", "--json", "--accuracy", accuracy, path).results[0]
+    own = springmass.analyse(springmass.load(path).track, params=params_for(accuracy))
+    assert {n: e["value"] for n, e in result["estimates"].items()} == {n: e.value for n, e in own.estimates.items()}
+    assert result["provenance"]["accuracy"] == accuracy
 
 
 def test_a_velocity_file_is_joined(cli: Cli, data: Path) -> None:
