@@ -200,9 +200,12 @@ def _area(record: Record, fit: LawFit, phase: PhaseFit) -> tuple[F8, F8]:
 
 def _solve(record: Record, state: State, weights: F8, params: Params) -> _Solved:
     """Gauss-Newton to a thousandth of the standard uncertainties."""
-    normal = accumulate(record, state, weights)
+    with np.errstate(all="ignore"):
+        normal = accumulate(record, state, weights)
     dof = max(float(np.sum(weights)) - normal.right.size, 1.0)
     for taken in range(1, params.steps + 1):
+        if not (np.isfinite(normal.matrix).all() and np.isfinite(normal.right).all()):
+            return _Solved(state, normal, weights, taken, False)
         step = _pseudo_inverse(normal.matrix) @ normal.right
         expected = float(step @ normal.right)
         if not math.isfinite(expected):

@@ -40,8 +40,8 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
     Returns
     -------
     Damping or None
-        None where other laws are asked for, the mixture of both leaves more than noise, or what it leaves is correlated, or coefficients are
-        negative: then amplitudes need all laws, and their scatter measured.
+        None where other laws are asked for, where the mixture of both leaves more than noise or what it leaves is
+        correlated, and where every law is rejected: the amplitudes' scatter must then be measured first.
 
     Notes
     -----

@@ -9,11 +9,13 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from pipeline.accuracy import TIERS, params_for
 from pipeline.analyse import Motion, analyse
 from pipeline.track import Track
 
-TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "100"))
+TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "50"))
 SLACK = 0.02  # of coverage: what a model of the noise may cost, on either side
+EFFICIENCY = {"fast": 1.15, "standard": 1.10, "best": 1.05}  # greatest rms error over the Cramer-Rao bound
 QUANTITIES = ("period", "amplitude", "phase", "gamma")
 
 pytestmark = pytest.mark.trials
@@ -25,14 +27,16 @@ def limits(share: float) -> tuple[float, float]:
     return share - width, min(share + width, 1.0)
 
 
-def run(synthetic: ModuleType, seconds: float, sigma_m: float, gamma: float) -> tuple[np.ndarray, np.ndarray]:
+def run(
+    synthetic: ModuleType, seconds: float, sigma_m: float, gamma: float, accuracy: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Return errors and stated uncertainties, (trials, quantities), of runs that differ in noise and phase."""
     t = synthetic.times(seconds)
     errors, stated = [], []
     for seed in range(TRIALS):
         phase = float(np.random.default_rng((seed, 1)).uniform(-math.pi, math.pi))
         truth = synthetic.Truth(gamma=gamma, phase=phase)
-        result = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)))
+        result = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), params=params_for(accuracy))
         assert isinstance(result.motion, Motion)
         linear = result.motion.damping.fits["linear"].joint
         found = {
@@ -47,11 +51,14 @@ def run(synthetic: ModuleType, seconds: float, sigma_m: float, gamma: float) -> 
     return np.array(errors), np.array(stated)
 
 
+@pytest.mark.parametrize("accuracy", TIERS)
 @pytest.mark.parametrize("sigma_m", [3e-4, 2.39e-3])
 @pytest.mark.parametrize(("seconds", "gamma"), [(10.0, 0.01463), (120.0, 0.01463)])
-def test_coverage_and_efficiency(synthetic: ModuleType, seconds: float, gamma: float, sigma_m: float) -> None:
-    """68 and 95 % intervals of period, amplitude, phase and gamma hold so often; errors stay within 1.1 bounds."""
-    errors, stated = run(synthetic, seconds, sigma_m, gamma)
+def test_coverage_and_efficiency(
+    synthetic: ModuleType, seconds: float, gamma: float, sigma_m: float, accuracy: str
+) -> None:
+    """68 and 95 % intervals of period, amplitude, phase and gamma hold so often; errors stay near the bound."""
+    errors, stated = run(synthetic, seconds, sigma_m, gamma, accuracy)
     t = synthetic.times(seconds)
     # The bound hardly depends on the phase: the mean over phases is taken.
     phases = np.linspace(-math.pi, math.pi, 9)[:-1]
@@ -62,14 +69,17 @@ def test_coverage_and_efficiency(synthetic: ModuleType, seconds: float, gamma: f
     for k, name in enumerate(QUANTITIES):
         bound = math.sqrt(np.mean([b[name] ** 2 for b in each]))
         ratio = math.sqrt(np.mean(errors[:, k] ** 2)) / bound
+        bias = float(np.mean(errors[:, k])) / bound
         line = (
-            f"{seconds:g} s, {sigma_m * 1e3:g} mm, {name}: covers {inside68[k]:.3f} and {inside95[k]:.3f}, "
-            f"rms error {ratio:.3f} bounds"
+            f"{accuracy}, {seconds:g} s, {sigma_m * 1e3:g} mm, {name}: covers {inside68[k]:.3f} and {inside95[k]:.3f}, "
+            f"rms error {ratio:.3f} bounds, bias {bias:+.3f}"
         )
         print(line)
         # The root mean square of n normal errors scatters by 1 / sqrt(2 n) of itself.
-        if ratio > 1.10 * (1.0 + 3.3 / math.sqrt(2.0 * TRIALS)):
+        if ratio > EFFICIENCY[accuracy] * (1.0 + 3.3 / math.sqrt(2.0 * TRIALS)):
             failures.append(f"inefficient: {line}")
+        if abs(bias) > 0.1 + 3.3 / math.sqrt(TRIALS):
+            failures.append(f"biased: {line}")
         for share, found in ((0.6827, inside68[k]), (0.95, inside95[k])):
             low, high = limits(share)
             if not low <= found <= high:
@@ -103,3 +113,53 @@ def test_reported_amplitude_and_rate_hold(
         # Selection among laws is part of the price: a further 6 and 3 % are allowed below, anything above.
         assert one / TRIALS >= limits(0.6827)[0] - 0.06, line
         assert two / TRIALS >= limits(0.95)[0] - 0.03, line
+
+
+@pytest.mark.parametrize("accuracy", TIERS)
+@pytest.mark.parametrize("sigma_m", [3e-4, 2.39e-3])
+def test_false_echoes_cost_little(synthetic: ModuleType, sigma_m: float, accuracy: str) -> None:
+    """Echoes anywhere within 2 m on 5 % of the samples raise rms errors to 1.15 of the clean ones, on 20 % to 1.30."""
+    t = synthetic.times(20.0)
+    errors: dict[float, list[list[float]]] = {0.0: [], 0.05: [], 0.2: []}
+    for seed in range(TRIALS):
+        truth = synthetic.Truth(gamma=0.01463, phase=float(np.random.default_rng((seed, 1)).uniform(-3.0, 3.0)))
+        clean = synthetic.noisy(truth, t, sigma_m, seed)
+        rng = np.random.default_rng((seed, 2))
+        draw, echo = rng.random(t.size), rng.uniform(0.0, 2.0, t.size)
+        for share, found in errors.items():
+            motion = analyse(
+                Track.from_arrays(t, np.where(draw < share, echo, clean)), params=params_for(accuracy)
+            ).motion
+            assert isinstance(motion, Motion)
+            linear = motion.damping.fits["linear"].joint
+            start = truth.amplitude_at(np.array([motion.damping.t0]))[0]
+            period = motion.derived.statistical["period"].value
+            found.append([period - truth.period, linear["A0"].value - start, linear["gamma"].value - truth.gamma])
+    rms = {share: np.sqrt(np.mean(np.square(found), axis=0)) for share, found in errors.items()}
+    for share, limit in ((0.05, 1.15), (0.2, 1.30)):
+        ratio = rms[share] / rms[0.0]
+        print(f"{accuracy}, {sigma_m * 1e3:g} mm, {share:.0%} false echoes: rms over clean rms {np.round(ratio, 3)}")
+        # Both hold the same noise, so the ratio scatters less than two independent ones would.
+        assert np.all(ratio <= limit * (1.0 + 2.0 / math.sqrt(TRIALS)))
+
+
+@pytest.mark.parametrize("accuracy", TIERS)
+@pytest.mark.parametrize("decibel", [-5.0, -10.0])
+def test_no_gross_failure_in_deep_noise(synthetic: ModuleType, decibel: float, accuracy: str) -> None:
+    """Down to -10 dB no frequency is off by more than six bounds, in 10 and in 60 s."""
+    for seconds in (10.0, 60.0):
+        t = synthetic.times(seconds)
+        sigma_m = 0.05 * math.sqrt(0.5 * 10.0 ** (-decibel / 10.0))
+        gross = 0
+        for seed in range(TRIALS):
+            truth = synthetic.Truth(phase=float(np.random.default_rng((seed, 1)).uniform(-3.0, 3.0)))
+            bound = synthetic.fisher_bounds(truth, t, sigma_m)["period"]
+            motion = analyse(
+                Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), params=params_for(accuracy)
+            ).motion
+            gross += not isinstance(motion, Motion) or (
+                abs(motion.derived.statistical["period"].value - truth.period) > 6.0 * bound
+            )
+        print(f"{accuracy}, {decibel:g} dB, {seconds:g} s: {gross} of {TRIALS} gross failures")
+        # A line of -10 dB stays below the threshold of one false alarm in a million once in five thousand records.
+        assert gross <= TRIALS // 1000
