@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
 
 import numpy as np
 
+from pipeline.condition import MAD_TO_SIGMA
 from pipeline.demodulate import Demodulated
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
+from pipeline.law_fit import Fitted, fit_laws
 from pipeline.laws import LAWS, Law
-from pipeline.regression import Scatter, chi2_quantile, covariance_of, scatter
+from pipeline.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.track import F8
 
-__all__ = ["Damping", "LawFit", "Params", "fit_damping"]
+__all__ = ["Damping", "LawFit", "Params", "fit_damping", "in_phase"]
 
 TINY = 1e-100  # stands for zero where something is divided by an uncertainty
+Rejection = Literal["", "misfit", "negative", "not converged"]
 BARE_MENTION = 2.0  # difference of BIC below which evidence is none
+NEGATIVE = 3.0  # standard uncertainties below zero at which a coefficient speaks against its law
+WEAK, STRONG = 8.0, 5.0  # amplitudes over their noise: biased below the one, of known phase above the other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,11 +65,14 @@ class LawFit:
     dof : float
         Degrees of freedom after correlation between points.
     bic : float
-        Bayesian information criterion, up to a constant that all laws share.
+        Bayesian information criterion, up to a constant that all laws share, of the law at its best without a
+        coefficient below zero.
     converged : bool
     rejection : {"", "misfit", "negative", "not converged"}
         Why the law is rejected, if it is: chi-square is improbable, a coefficient is negative beyond three standard
         uncertainties, or the fit did not converge.
+    tried : str
+        What was tried where the fit did not converge.
     """
 
     law: Law
@@ -73,7 +81,8 @@ class LawFit:
     dof: float
     bic: float
     converged: bool
-    rejection: Literal["", "misfit", "negative", "not converged"]
+    rejection: Rejection
+    tried: str = ""
 
     @property
     def rejected(self) -> bool:
@@ -117,7 +126,7 @@ class Damping:
     t0 : float
         Time of the first sample used, s; laws count from here.
     fits : mapping of str to LawFit
-        Every law tried that had points enough.
+        Every law tried that could be fitted.
     selected : str
         The admissible law of lowest BIC; of all laws where every one is rejected. Where BIC differs by less than 2
         ("not worth more than a bare mention") the law with fewer parameters, then the one listed first.
@@ -125,6 +134,8 @@ class Damping:
         Laws the record does not contradict and whose evidence is within reach of the best, best first.
     scatter : Scatter
         Of the amplitudes about a smooth curve.
+    unfitted : mapping of str to str
+        Why a law asked for has no fit.
     """
 
     t0: float
@@ -132,6 +143,7 @@ class Damping:
     selected: str
     admissible: tuple[str, ...]
     scatter: Scatter
+    unfitted: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def best(self) -> LawFit:
@@ -139,9 +151,27 @@ class Damping:
         return self.fits[self.selected]
 
     @property
+    def considered(self) -> Mapping[str, LawFit]:
+        """The fits that an average over laws may draw on: the selected one and the admissible ones."""
+        return {name: self.fits[name] for name in dict.fromkeys((self.selected, *self.admissible))}
+
+    @property
+    def rivals(self) -> tuple[str, ...]:
+        """Admissible laws that tell another story than the selected one.
+
+        A law that holds the selected one as a special case, and whose further coefficient gains nothing for it (a BIC
+        higher by more than 2), tells the same story.
+        """
+        return tuple(name for name in self.admissible if name != self.selected and not self._idle(name))
+
+    def _idle(self, name: str) -> bool:
+        fit = self.fits[name]
+        return self.selected in fit.law.cases and fit.bic - self.best.bic > BARE_MENTION
+
+    @property
     def settled(self) -> bool:
-        """Whether the selected law is the only admissible one, so that its coefficients mean something."""
-        return self.admissible == (self.selected,)
+        """Whether the selected law is admissible and has no rival, so that its coefficients mean something."""
+        return self.selected in self.admissible and not self.rivals
 
     def averaged(self, values: Mapping[str, Estimate]) -> Estimate:
         """Return the selected law's value of a quantity, its uncertainty widened by what admissible laws differ.
@@ -149,6 +179,7 @@ class Damping:
         Parameters
         ----------
         values : mapping of law name to Estimate
+            Of the laws :attr:`considered` at least.
 
         Notes
         -----
@@ -185,105 +216,192 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     -----
     Real amplitudes scatter more than their noise says (beats with a sideways mode, clusters of false echoes).
     The excess is measured against a smooth curve that no law restricts, so that a wrong law cannot hide its misfit
-    in it. Points that are correlated count as fewer: chi-square, BIC and degrees of freedom are divided and the
-    covariance is multiplied by the correlation length.
+    in it; where friction stops the motion at a corner that no smooth curve follows, a law that leaves less than
+    half of it takes the curve's place. Points that are correlated count as fewer: chi-square, BIC and degrees of
+    freedom are divided and the covariance is multiplied by the correlation length.
+
+    Coefficients of drag are not negative, yet their estimates may be by chance, and unbounded estimates are unbiased
+    with intervals that hold. So fits are unbounded; a law with a coefficient below zero by more than three standard
+    uncertainties is rejected; and the BIC is that of the law's best without negative coefficients, which lies in one
+    of its special cases.
     """
     params = params or Params()
-    t, amplitude = demodulated.t - t0, demodulated.amplitude
+    t, amplitude = demodulated.t - t0, in_phase(demodulated)
     noise = np.sqrt(demodulated.covariance[:, 0, 0])
     if t.size < 3:
         # One or two points show no law: what the amplitude lost since the start is then its uncertainty.
         noise = np.hypot(noise, amplitude * demodulated.decay * t)
     # Perfect data still carry rounding: without a floor chi-square would divide by nothing.
-    spread = scatter(t, amplitude, np.maximum(noise, 1e-12 * float(np.max(amplitude)) + TINY))
-    fits: dict[str, LawFit] = {}
-    for name in params.laws:
-        law = LAWS[name]
-        if np.count_nonzero(spread.kept) >= len(law.parameters):
-            fit = _fit(law, t, amplitude, spread, params)
-            if fit is not None:
-                fits[name] = fit
+    noise = np.maximum(noise, 1e-12 * float(np.max(amplitude)) + TINY)
+    spread = scatter(t, amplitude, noise)
+    unfitted: dict[str, str] = {}
+    laws = _affordable(params.laws, int(np.count_nonzero(spread.kept)), unfitted)
+    fits = _fit_all(laws, t, amplitude, spread, params, unfitted)
+    if fits and (closer := _corner(fits, t, amplitude, noise, spread)) is not None:
+        spread = closer
+        fits = _fit_all(laws, t, amplitude, spread, params, unfitted)
     if not fits:
         raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
-    allowed = [name for name in fits if not fits[name].rejected] or list(fits)
-    least = min(fits[name].bic for name in allowed)
-    ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
-    selected = min(ties, key=lambda name: (len(fits[name].joint.names), list(fits).index(name)))
-    order = sorted(allowed, key=lambda name: (name != selected, fits[name].bic))
-    admissible = tuple(name for name in order if not fits[name].rejected and fits[name].bic - least <= params.evidence)
-    return Damping(t0, fits, selected, admissible, spread)
+    selected, admissible = choose(fits, params)
+    return Damping(t0, fits, selected, admissible, spread, unfitted)
 
 
-def _fit(law: Law, t: F8, amplitude: F8, spread: Scatter, params: Params) -> LawFit | None:
-    """Fit one law; None where its numbers run out of range, which no law with a chance does."""
+def in_phase(demodulated: Demodulated) -> F8:
+    """Return the windows' amplitudes (w,), m, without the bias that noise gives to weak ones.
+
+    Notes
+    -----
+    The length of a noisy vector is too great by :math:`u^2/2A` and 1.25 u where nothing is left of A. Its component
+    along the phase that the strong windows foretell is not. Used where an amplitude is below eight of its
+    uncertainties; elsewhere the bias is below a sixteenth of it and the phase is better not assumed.
+    """
+    amplitude, t = demodulated.amplitude, demodulated.t
+    noise = np.sqrt(demodulated.covariance[:, 0, 0])
+    strong = amplitude > STRONG * noise
+    count = int(np.count_nonzero(strong))
+    if not np.any(amplitude < WEAK * noise) or count < 6:
+        return amplitude
+    phase = demodulated.phase - demodulated.angular_frequency * (t - t[0])
+    first, last = t[strong][0], t[strong][-1]
+    x = 2.0 * (t - first) / (last - first) - 1.0
+    weight = np.minimum(amplitude / noise, 1e6)[strong]
+    curve = np.polynomial.legendre.legfit(x[strong], phase[strong], 3 if count >= 24 else 1, w=weight)
+    inside = np.clip(x, -1.0, 1.0)
+    slope = np.polynomial.legendre.legder(curve)
+    foretold = np.polynomial.legendre.legval(inside, curve) + (x - inside) * np.polynomial.legendre.legval(
+        inside, slope
+    )
+    return np.asarray(amplitude * np.cos(phase - foretold))
+
+
+def _affordable(names: Sequence[str], points: int, unfitted: dict[str, str]) -> list[Law]:
+    laws = []
+    for name in names:
+        needed = len(LAWS[name].parameters)
+        if points >= needed:
+            laws.append(LAWS[name])
+        else:
+            unfitted[name] = f"{needed} parameters need as many windows, and there are {points}"
+    return laws
+
+
+def _fit_all(
+    laws: Sequence[Law], t: F8, amplitude: F8, spread: Scatter, params: Params, unfitted: dict[str, str]
+) -> dict[str, LawFit]:
+    """Fit the laws; those whose numbers ran out of range, which no law with a chance does, are listed as unfitted."""
+    if not laws:
+        return {}
     t, y, u = t[spread.kept], amplitude[spread.kept], spread.u[spread.kept]
-    theta, converged = _levenberg_marquardt(law, t, y, u, law.guess(t, y))
-    with np.errstate(all="ignore"):
-        residual = (y - law.amplitude(t, theta)) / u
-        jacobian = law.jacobian(t, theta) / u[:, None]
+    found = {law.name: fit for law, fit in zip(laws, fit_laws(laws, t, y, u), strict=True)}
+    sound = {}
+    for law in laws:
+        if (why := _astray(law, found[law.name], t, y)) is None:
+            sound[law.name] = found[law.name]
+            unfitted.pop(law.name, None)
+        else:
+            unfitted[law.name] = why
+    least = _least_chi2(sound)
+    return {
+        name: _weigh(LAWS[name], fit, least[name], y.size, spread.correlation, params) for name, fit in sound.items()
+    }
+
+
+def _astray(law: Law, fit: Fitted, t: F8, y: F8) -> str | None:
+    """Why a fit's numbers are of no use."""
     top = float(np.max(y))
+    if not 1e-3 * top <= fit.theta[0] <= 1e3 * top or not math.isfinite(fit.chi2):
+        return "its numbers ran out of range"
+    with np.errstate(all="ignore"):
+        growth = -law.rate(y, fit.theta) * (t[-1] - t[0])
     # A growth that outruns the record by e^20 is a fit gone astray.
-    growing = np.any(-law.rate(y, theta) * (t[-1] - t[0]) > 20.0 * top)
-    absurd = growing or not 1e-3 * top <= theta[0] <= 1e3 * top
-    if absurd or not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
-        return None
-    with np.errstate(over="ignore", invalid="ignore"):
-        covariance = spread.correlation * covariance_of(jacobian)[0]
-    if not np.all(np.isfinite(covariance)):
-        return None
-    chi2 = float(residual @ residual)
+    if np.any(growth > 20.0 * top):
+        return "its numbers ran out of range"
+    if not np.isfinite(fit.covariance).all():
+        return "the windows do not determine its parameters"
+    return None
+
+
+def _least_chi2(fits: Mapping[str, Fitted]) -> dict[str, float]:
+    """Each law's chi-square at its best without negative coefficients, which is a special case's or its own."""
+    least: dict[str, float] = {}
+    for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
+        fit = fits[name]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            below = np.minimum(fit.theta, 0.0) ** 2 / np.diag(fit.covariance)
+        least[name] = fit.chi2
+        if np.any(below > 0.0):
+            cases = [least[case] for case in LAWS[name].cases if case in least]
+            # Without its special cases at hand: what the worst coefficient costs to be zero.
+            least[name] = min(cases) if cases else fit.chi2 + float(np.max(below))
+    return least
+
+
+def _weigh(law: Law, fit: Fitted, least_chi2: float, points: int, correlation: float, params: Params) -> LawFit:
     count = len(law.parameters)
-    free = y.size - count
-    dof = max(free / spread.correlation, 1.0) if free > 0 else 0.0
-    reduced = chi2 / free if free > 0 else math.nan
-    bic = chi2 / spread.correlation + count * math.log(max(y.size / spread.correlation, 2.0))
-    joint = Joint(law.parameters, theta, covariance, law.units)
-    rejection: Literal["", "misfit", "negative", "not converged"] = ""
+    covariance = correlation * fit.covariance
+    free = points - count
+    dof = max(free / correlation, 1.0) if free > 0 else 0.0
+    reduced = fit.chi2 / free if free > 0 else math.nan
+    bic = least_chi2 / correlation + count * math.log(max(points / correlation, 2.0))
+    rejection: Rejection = ""
     if dof > 0 and reduced * dof > chi2_quantile(1.0 - params.rejection, dof):
         rejection = "misfit"
-    elif np.any(theta < -3.0 * np.sqrt(np.diag(covariance))):
+    elif np.any(fit.theta < -NEGATIVE * np.sqrt(np.diag(covariance))):
         rejection = "negative"
-    elif not converged:
+    elif not fit.converged:
         rejection = "not converged"
-    return LawFit(law, joint, reduced, dof, bic, converged, rejection)
+    joint = Joint(law.parameters, fit.theta, covariance, law.units)
+    return LawFit(law, joint, reduced, dof, bic, fit.converged, rejection, fit.tried)
 
 
-def _levenberg_marquardt(law: Law, t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, bool]:
-    """Minimise chi-square; analytic Jacobian, at most fifty steps."""
+def _corner(fits: Mapping[str, LawFit], t: F8, amplitude: F8, noise: F8, spread: Scatter) -> Scatter | None:
+    """The scatter about a law that follows the points much closer than the smooth curve does, if there is one."""
+    fit = min(fits.values(), key=lambda fit: fit.reduced_chi2)
+    if spread.excess == 0.0 or not fit.reduced_chi2 < 0.25:
+        return None
+    residual = amplitude - fit.amplitude(t)
+    typical = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
+    excess = math.sqrt(max(typical**2 - float(np.median(noise)) ** 2, 0.0))
+    excess = excess if typical > 1.3 * float(np.median(noise)) else 0.0
+    u = np.hypot(noise, excess)
+    kept = np.abs(residual) <= 5.0 * u
+    if np.count_nonzero(kept) < 0.8 * kept.size:
+        return None
+    return Scatter(u, excess, kept, correlation_length(residual[kept] / u[kept]))
 
-    def cost(trial: F8) -> tuple[F8, float]:
-        with np.errstate(all="ignore"):
-            residual = (y - law.amplitude(t, trial)) / u
-            value = float(residual @ residual)
-        return residual, value if math.isfinite(value) else math.inf
 
-    residual, chi2 = cost(theta)
-    damping = 1e-5
-    for _ in range(50):
-        with np.errstate(all="ignore"):
-            jacobian = law.jacobian(t, theta) / u[:, None]
-        if not np.all(np.isfinite(jacobian)):
-            break
-        scale = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
-        scaled = jacobian / scale
-        normal, right = scaled.T @ scaled, scaled.T @ residual
-        try:
-            step = np.linalg.solve(normal + damping * np.eye(theta.size), right)
-        except np.linalg.LinAlgError:
-            break
-        trial = theta + step / scale
-        trial_residual, trial_chi2 = cost(trial)
-        gain = chi2 - trial_chi2
-        if gain >= 0:
-            theta, residual, chi2 = trial, trial_residual, trial_chi2
-            # A thousandth of a standard uncertainty (which a bad fit has larger): what is left is its square.
-            if float(step @ step) <= 1e-6 * max(1.0, chi2 / y.size) or gain <= 1e-12 * chi2:
-                return theta, True
-            damping = max(damping * 0.1, 1e-12)
-        else:
-            if float(step @ step) <= 1e-10:
-                return theta, True
-            damping *= 10.0
-            if damping > 1e10:
-                break
-    return theta, False
+class Weighed(Protocol):
+    """A fit that takes part in the choice among laws: of one run, or of several together."""
+
+    @property
+    def law(self) -> Law:
+        """Which law."""
+        ...
+
+    @property
+    def bic(self) -> float:
+        """Bayesian information criterion."""
+        ...
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the points contradict the law."""
+        ...
+
+    @property
+    def reduced_chi2(self) -> float:
+        """Chi-square by degrees of freedom."""
+        ...
+
+
+def choose(fits: Mapping[str, Weighed], params: Params) -> tuple[str, tuple[str, ...]]:
+    """Return the selected law and the admissible ones, best first; of rejected laws the one that fits best."""
+    allowed = [name for name in fits if not fits[name].rejected]
+    count = {name: len(fit.law.parameters) for name, fit in fits.items()}
+    if not allowed:
+        return min(fits, key=lambda name: (fits[name].reduced_chi2, count[name])), ()
+    least = min(fits[name].bic for name in allowed)
+    ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
+    selected = min(ties, key=lambda name: (count[name], list(fits).index(name)))
+    order = sorted(allowed, key=lambda name: (name != selected, fits[name].bic))
+    return selected, tuple(name for name in order if fits[name].bic - least <= params.evidence)

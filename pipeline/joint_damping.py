@@ -1,0 +1,257 @@
+"""Joint damping: does one law, with one set of coefficients, hold across several runs?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.damping import NEGATIVE, Damping, Params, choose, in_phase
+from pipeline.demodulate import Demodulated
+from pipeline.errors import AnalysisError
+from pipeline.estimate import Estimate, Joint
+from pipeline.law_fit import covariance_or_infinite, minimise
+from pipeline.laws import LAWS, Law
+from pipeline.regression import chi2_quantile
+from pipeline.track import F8
+
+__all__ = ["JointDamping", "JointFit", "fit_joint"]
+
+Rejection = Literal["", "misfit", "differ", "negative", "not converged"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointFit:
+    """One law with shared coefficients on all runs.
+
+    Parameters
+    ----------
+    law : Law
+    coefficients : Joint
+        What the runs share; empty for the law "none".
+    amplitudes : tuple of Estimate
+        At the first sample used of each run, m.
+    chi2, dof : float
+        After correlation between points, of all runs together.
+    bic : float
+        Bayesian information criterion, up to a constant that all laws share.
+    excess_chi2, excess_dof : float
+        What sharing the coefficients costs against fitting every run by itself, and how many coefficients it saves.
+    rejection : {"", "misfit", "differ", "negative", "not converged"}
+        Why the law does not hold across the runs, if so: chi-square is improbable; each run follows the law but their
+        coefficients differ; a coefficient is negative beyond three standard uncertainties; no convergence.
+    """
+
+    law: Law
+    coefficients: Joint
+    amplitudes: tuple[Estimate, ...]
+    chi2: float
+    dof: float
+    bic: float
+    excess_chi2: float
+    excess_dof: float
+    rejection: Rejection
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the runs contradict one such law."""
+        return self.rejection != ""
+
+    @property
+    def reduced_chi2(self) -> float:
+        """Chi-square by degrees of freedom."""
+        return self.chi2 / self.dof if self.dof > 0 else math.nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointDamping:
+    """What several runs say together about damping.
+
+    Parameters
+    ----------
+    runs : tuple of str
+        Names.
+    fits : mapping of str to JointFit
+    selected : str
+        As in :class:`pipeline.damping.Damping`.
+    admissible : tuple of str
+        Laws that hold across all runs, best first; empty where none does.
+    message : str
+        One sentence.
+    """
+
+    runs: tuple[str, ...]
+    fits: Mapping[str, JointFit]
+    selected: str
+    admissible: tuple[str, ...]
+    message: str
+
+    @property
+    def best(self) -> JointFit:
+        """The selected law's fit."""
+        return self.fits[self.selected]
+
+    @property
+    def one_law(self) -> bool:
+        """Whether one law with one set of coefficients holds across all runs."""
+        return bool(self.admissible)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Points:
+    """The amplitudes of all runs, one after the other; ``parts`` are their places."""
+
+    t: tuple[F8, ...]
+    y: F8
+    u: F8
+    parts: tuple[slice, ...]
+
+
+def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params | None = None) -> JointDamping:
+    """Fit each damping law with coefficients that all runs share and an amplitude of its own for each run.
+
+    Parameters
+    ----------
+    runs : sequence of (name, Demodulated, Damping)
+        Two at least, of one bob and disc: the coefficients go as one over the mass.
+    params : Params, optional
+        Of :func:`pipeline.damping.fit_damping`; laws that lack a fit in any run are left out.
+
+    Returns
+    -------
+    JointDamping
+
+    Raises
+    ------
+    AnalysisError
+        If fewer than two runs are given, or no law was fitted to every run.
+
+    Notes
+    -----
+    The points and their uncertainties, excess scatter included, are those that each run's own fits used; each run's
+    chi-square is divided by its correlation length. The sum of the runs' own chi-squares under a law, subtracted from
+    that of the joint fit, tests whether the coefficients are the same: under that hypothesis the difference is
+    chi-square distributed with (runs - 1) times the number of coefficients.
+    """
+    params = params or Params()
+    if len(runs) < 2:
+        raise AnalysisError(f"a joint fit needs two runs at least, got {len(runs)}")
+    shared = [name for name in params.laws if all(name in damping.fits for _, _, damping in runs)]
+    if not shared:
+        raise AnalysisError("no damping law was fitted to every run; a joint fit has nothing to join")
+    points = _points(runs)
+    fits = {name: _fit(LAWS[name], runs, points, params) for name in shared}
+    fits = {name: fit for name, fit in fits.items() if math.isfinite(fit.chi2)}
+    if not fits:
+        raise AnalysisError("no damping law could be fitted to the runs together; fit them one by one")
+    selected, admissible = choose(fits, params)
+    names = tuple(name for name, _, _ in runs)
+    return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
+
+
+def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:
+    times, values, errors, parts = [], [], [], []
+    at = 0
+    for _, demodulated, damping in runs:
+        spread = damping.scatter
+        kept = spread.kept
+        times.append((demodulated.t - damping.t0)[kept])
+        values.append(in_phase(demodulated)[kept])
+        # Points that count as one share their information.
+        errors.append(spread.u[kept] * math.sqrt(spread.correlation))
+        parts.append(slice(at, at + int(np.count_nonzero(kept))))
+        at = parts[-1].stop
+    return _Points(tuple(times), np.concatenate(values), np.concatenate(errors), tuple(parts))
+
+
+class _Shared:
+    """One law on all runs: parameters are the runs' amplitudes, then the coefficients."""
+
+    def __init__(self, law: Law, points: _Points) -> None:
+        self.law, self.points = law, points
+        self.free = np.ones((1, len(points.t) + len(law.parameters) - 1), np.bool_)
+
+    def evaluate(self, rows: NDArray[np.int64], theta: F8) -> tuple[F8, F8]:  # noqa: ARG002 - there is one row
+        """Return the amplitudes (1, n) and their derivatives (1, p, n)."""
+        count = len(self.points.t)
+        amplitude = np.empty((1, self.points.y.size))
+        jacobian = np.zeros((1, theta.shape[1], self.points.y.size))
+        for run, (t, part) in enumerate(zip(self.points.t, self.points.parts, strict=True)):
+            own = np.concatenate([theta[0, run : run + 1], theta[0, count:]])
+            amplitude[0, part] = self.law.amplitude(t, own)
+            by = self.law.jacobian(t, own).T
+            jacobian[0, run, part], jacobian[0, count:, part] = by[0], by[1:]
+        return amplitude, jacobian
+
+
+def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Points, params: Params) -> JointFit:
+    count, shared = len(runs), len(law.parameters) - 1
+    own = [damping.fits[law.name] for _, _, damping in runs]
+    length = float(np.sqrt(np.mean(points.y**2))) or 1.0
+    theta = _scaled(law, _start([fit.joint for fit in own]), length, count)
+    model = _Shared(law, points)
+    found, _, converged = minimise(model, points.y / length, length / points.u, theta[None, :])
+    values = _scaled(law, found[0], 1.0 / length, count)
+    with np.errstate(all="ignore"):
+        amplitude, jacobian = model.evaluate(np.zeros(1, np.int64), values[None, :])
+        residual = (points.y - amplitude[0]) / points.u
+        chi2 = float(residual @ residual)
+        covariance = covariance_or_infinite((jacobian[0] / points.u).T)
+    size = sum(float(t.size) / damping.scatter.correlation for t, (_, _, damping) in zip(points.t, runs, strict=True))
+    dof = max(size - values.size, 0.0)
+    separate = sum(
+        _chi2(fit.reduced_chi2, t.size - len(law.parameters)) / damping.scatter.correlation
+        for fit, t, (_, _, damping) in zip(own, points.t, runs, strict=True)
+    )
+    excess, saved = max(chi2 - separate, 0.0), float((count - 1) * shared)
+    deviation = np.sqrt(np.diag(covariance))
+    rejection: Rejection = ""
+    if dof >= 1.0 and chi2 > chi2_quantile(1.0 - params.rejection, dof):
+        rejection = "misfit"
+    elif saved and excess > chi2_quantile(1.0 - params.rejection, saved):
+        rejection = "differ"
+    elif np.any(values < -NEGATIVE * deviation):
+        rejection = "negative"
+    elif not converged[0]:
+        rejection = "not converged"
+    amplitudes = tuple(
+        Estimate(float(a), float(u), "m") for a, u in zip(values[:count], deviation[:count], strict=True)
+    )
+    joint = Joint(law.parameters[1:], values[count:], covariance[count:, count:], law.units[1:])
+    bic = chi2 + values.size * math.log(max(size, 2.0))
+    return JointFit(law, joint, amplitudes, chi2, dof, bic, excess, saved, rejection)
+
+
+def _start(joints: Sequence[Joint]) -> F8:
+    """The runs' own amplitudes, and their coefficients' mean with weights by variance."""
+    amplitudes = [joint.values[0] for joint in joints]
+    coefficients = np.array([joint.values[1:] for joint in joints])
+    weights = 1.0 / np.maximum([np.diag(joint.covariance)[1:] for joint in joints], 1e-300)
+    return np.concatenate([amplitudes, (coefficients * weights).sum(axis=0) / weights.sum(axis=0)])
+
+
+def _scaled(law: Law, theta: F8, length_m: float, count: int) -> F8:
+    """All parameters with lengths divided by ``length_m``."""
+    coefficients = law.rescaled(np.concatenate([[1.0], theta[count:]]), length_m)[1:]
+    return np.concatenate([theta[:count] / length_m, coefficients])
+
+
+def _chi2(reduced: float, free: int) -> float:
+    """Chi-square of a run's own fit; nothing where it passes through its points."""
+    return reduced * free if free > 0 else 0.0
+
+
+def _message(names: tuple[str, ...], fits: Mapping[str, JointFit], selected: str, admissible: tuple[str, ...]) -> str:
+    together, best = ", ".join(names), fits[selected]
+    if admissible:
+        values = ", ".join(f"{name} = {value}" for name, value in best.coefficients.estimates().items()) or "none"
+        rest = f"; {', '.join(admissible[1:])} would do as well" if len(admissible) > 1 else ""
+        return f"One damping law holds across {together}: {best.law.words} ({values}){rest}."
+    alike = [fit.law.words for fit in fits.values() if fit.rejection == "differ"]
+    if alike:
+        return f"No common coefficients: {together} each follow {alike[0]}, with coefficients of their own."
+    return f"No one damping law holds across {together}; the least bad is {best.law.words}."

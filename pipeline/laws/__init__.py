@@ -1,0 +1,18 @@
+"""Laws of damping: how the amplitude of a free oscillation falls with time.
+
+:mod:`pipeline.laws.law` says what a law offers, :mod:`pipeline.laws.drag` holds the eight laws of
+:math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)`, :mod:`pipeline.laws.power` that of :math:`-c A^n`. A law is one
+small class and one entry of :data:`LAWS`; ``tests/conformance/test_laws.py`` holds each to its differential equation, to its
+Jacobian and to its guess.
+"""
+
+from __future__ import annotations
+
+from pipeline.laws.drag import DRAGS, Drag
+from pipeline.laws.law import Law
+from pipeline.laws.power import Power
+
+__all__ = ["LAWS", "Drag", "Law", "Power"]
+
+_ALL: tuple[Law, ...] = (*DRAGS, Power())
+LAWS: dict[str, Law] = {law.name: law for law in _ALL}
