@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -23,6 +23,8 @@ __all__ = ["Damping", "LawFit", "Params", "fit_damping", "in_phase"]
 TINY = 1e-100  # stands for zero where something is divided by an uncertainty
 Rejection = Literal["", "misfit", "negative", "not converged"]
 BARE_MENTION = 2.0  # difference of BIC below which evidence is none
+ALIKE = 0.1  # share of the damping that two laws may differ by and still say the same
+SMALLEST_SHARE = 0.1  # of the first amplitude, below which damping is not compared
 NEGATIVE = 3.0  # standard uncertainties below zero at which a coefficient speaks against its law
 WEAK, STRONG = 8.0, 5.0  # amplitudes over their noise: biased below the one, of known phase above the other
 
@@ -104,6 +106,10 @@ class LawFit:
         variance = np.einsum("ni,ij,nj->n", jacobian, self.joint.covariance, jacobian)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
+    def rates(self, amplitude: F8) -> tuple[F8, F8]:
+        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
+        return rates_of(self.law, amplitude, self.joint.values, self.joint.covariance)
+
     def damping_rate(self) -> Estimate:
         """Logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
         values = self.joint.values
@@ -131,7 +137,8 @@ class Damping:
         The admissible law of lowest BIC; of all laws where every one is rejected. Where BIC differs by less than 2
         ("not worth more than a bare mention") the law with fewer parameters, then the one listed first.
     admissible : tuple of str
-        Laws the record does not contradict and whose evidence is within reach of the best, best first.
+        Laws the record does not contradict and whose evidence is within reach of the best, best first; without those
+        that repeat a simpler one (:func:`choose`).
     scatter : Scatter
         Of the amplitudes about a smooth curve.
     unfitted : mapping of str to str
@@ -156,22 +163,9 @@ class Damping:
         return {name: self.fits[name] for name in dict.fromkeys((self.selected, *self.admissible))}
 
     @property
-    def rivals(self) -> tuple[str, ...]:
-        """Admissible laws that tell another story than the selected one.
-
-        A law that holds the selected one as a special case, and whose further coefficient gains nothing for it (a BIC
-        higher by more than 2), tells the same story.
-        """
-        return tuple(name for name in self.admissible if name != self.selected and not self._idle(name))
-
-    def _idle(self, name: str) -> bool:
-        fit = self.fits[name]
-        return self.selected in fit.law.cases and fit.bic - self.best.bic > BARE_MENTION
-
-    @property
     def settled(self) -> bool:
-        """Whether the selected law is admissible and has no rival, so that its coefficients mean something."""
-        return self.selected in self.admissible and not self.rivals
+        """Whether the selected law is the only admissible one, so that its coefficients mean something."""
+        return self.admissible == (self.selected,)
 
     def averaged(self, values: Mapping[str, Estimate]) -> Estimate:
         """Return the selected law's value of a quantity, its uncertainty widened by what admissible laws differ.
@@ -242,7 +236,7 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
         fits = _fit_all(laws, t, amplitude, spread, params, unfitted)
     if not fits:
         raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
-    selected, admissible = choose(fits, params)
+    selected, admissible = choose(fits, params, lambda name: fits[name].amplitude(np.array([0.0, float(t[-1])])))
     return Damping(t0, fits, selected, admissible, spread, unfitted)
 
 
@@ -311,14 +305,14 @@ def _astray(law: Law, fit: Fitted, t: F8, y: F8) -> str | None:
     top = float(np.max(y))
     if not 1e-3 * top <= fit.theta[0] <= 1e3 * top or not math.isfinite(fit.chi2):
         return "its numbers ran out of range"
+    if not np.isfinite(fit.covariance).all():
+        return "the windows do not determine its parameters"
+    if fit.theta.min() >= 0.0:
+        return None
     with np.errstate(all="ignore"):
         growth = -law.rate(y, fit.theta) * (t[-1] - t[0])
     # A growth that outruns the record by e^20 is a fit gone astray.
-    if np.any(growth > 20.0 * top):
-        return "its numbers ran out of range"
-    if not np.isfinite(fit.covariance).all():
-        return "the windows do not determine its parameters"
-    return None
+    return "its numbers ran out of range" if np.any(growth > 20.0 * top) else None
 
 
 def _least_chi2(fits: Mapping[str, Fitted]) -> dict[str, float]:
@@ -326,10 +320,10 @@ def _least_chi2(fits: Mapping[str, Fitted]) -> dict[str, float]:
     least: dict[str, float] = {}
     for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
         fit = fits[name]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            below = np.minimum(fit.theta, 0.0) ** 2 / np.diag(fit.covariance)
         least[name] = fit.chi2
-        if np.any(below > 0.0):
+        if fit.theta.min() < 0.0:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                below = np.minimum(fit.theta, 0.0) ** 2 / np.diag(fit.covariance)
             cases = [least[case] for case in LAWS[name].cases if case in least]
             # Without its special cases at hand: what the worst coefficient costs to be zero.
             least[name] = min(cases) if cases else fit.chi2 + float(np.max(below))
@@ -393,9 +387,28 @@ class Weighed(Protocol):
         """Chi-square by degrees of freedom."""
         ...
 
+    def rates(self, amplitude: F8) -> tuple[F8, F8]:
+        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
+        ...
 
-def choose(fits: Mapping[str, Weighed], params: Params) -> tuple[str, tuple[str, ...]]:
-    """Return the selected law and the admissible ones, best first; of rejected laws the one that fits best."""
+
+def choose(fits: Mapping[str, Weighed], params: Params, span: Callable[[str], F8]) -> tuple[str, tuple[str, ...]]:
+    """Return the selected law and the admissible ones, best first; of rejected laws the one that fits best.
+
+    Parameters
+    ----------
+    fits : mapping of str to fit
+    params : Params
+    span : callable
+        Gives the greatest and the least amplitude, m, that a law shows over the points.
+
+    Notes
+    -----
+    A law that holds the selected one as a special case is no other answer where its further coefficient gains it
+    nothing (its BIC is higher by more than 2) and where the damping it tells is, with twice its uncertainty, within a
+    tenth of the simpler law's at both ends of the span. It is left out. Where the record cannot exclude a tenth, it
+    stays.
+    """
     allowed = [name for name in fits if not fits[name].rejected]
     count = {name: len(fit.law.parameters) for name, fit in fits.items()}
     if not allowed:
@@ -403,5 +416,28 @@ def choose(fits: Mapping[str, Weighed], params: Params) -> tuple[str, tuple[str,
     least = min(fits[name].bic for name in allowed)
     ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
     selected = min(ties, key=lambda name: (count[name], list(fits).index(name)))
+    best = fits[selected]
     order = sorted(allowed, key=lambda name: (name != selected, fits[name].bic))
-    return selected, tuple(name for name in order if fits[name].bic - least <= params.evidence)
+    reach = [name for name in order if fits[name].bic - least <= params.evidence]
+    idle = {n for n in reach if selected in fits[n].law.cases and fits[n].bic - best.bic > BARE_MENTION}
+    if idle:
+        amplitudes = span(selected)
+        amplitudes = np.maximum(amplitudes, SMALLEST_SHARE * float(np.max(amplitudes)))
+        alone, _ = best.rates(amplitudes)
+        for name in sorted(idle):
+            rate, u = fits[name].rates(amplitudes)
+            if not np.all(np.abs(rate - alone) + 2.0 * u <= ALIKE * alone):
+                idle.remove(name)
+    return selected, tuple(name for name in reach if name not in idle)
+
+
+def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
+    """Return a law's -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
+    steps = 1e-6 * np.maximum(np.abs(theta[1:]), 1e-9)
+    gradient = np.zeros((theta.size, amplitude.size))
+    for k, step in enumerate(steps, start=1):
+        shift = np.zeros(theta.size)
+        shift[k] = step
+        gradient[k] = (law.rate(amplitude, theta + shift) - law.rate(amplitude, theta - shift)) / (2.0 * step)
+    variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
+    return law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))

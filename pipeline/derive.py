@@ -111,8 +111,8 @@ def derive(
     omega_stat = phase.angular_frequency
     rate_error = _variable(Estimate(1.0, params.u_clock_nominal if clock == "nominal" else 0.0))
     omega = _variable(omega_stat) * rate_error
-    amplitude = damping.averaged({n: f.joint["A0"] for n, f in damping.fits.items()})
-    decay = damping.averaged({n: f.damping_rate() for n, f in damping.fits.items()})
+    amplitude = damping.averaged({n: f.joint["A0"] for n, f in damping.considered.items()})
+    decay = damping.averaged({n: f.damping_rate() for n, f in damping.considered.items()})
     start = _variable(amplitude)
     lam = _variable(decay) * rate_error
     v_rms = omega * _variable(_root_mean_square(damping.best, demodulated, damping.t0))

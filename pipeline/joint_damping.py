@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.damping import NEGATIVE, Damping, Params, choose, in_phase
+from pipeline.damping import NEGATIVE, Damping, Params, choose, in_phase, rates_of
 from pipeline.demodulate import Demodulated
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
@@ -65,6 +65,22 @@ class JointFit:
     def reduced_chi2(self) -> float:
         """Chi-square by degrees of freedom."""
         return self.chi2 / self.dof if self.dof > 0 else math.nan
+
+    def rates(self, amplitude: F8) -> tuple[F8, F8]:
+        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
+        # A rate depends on the coefficients alone: any first amplitude will do.
+        theta = np.concatenate([[1.0], self.coefficients.values])
+        covariance = np.zeros((theta.size, theta.size))
+        covariance[1:, 1:] = self.coefficients.covariance
+        return rates_of(self.law, amplitude, theta, covariance)
+
+    def span(self, times: Sequence[F8]) -> F8:
+        """Return the greatest and the least amplitude over all runs' times since their first samples, m."""
+        ends = [
+            self.law.amplitude(np.array([0.0, float(t[-1])]), np.concatenate([[a.value], self.coefficients.values]))
+            for t, a in zip(times, self.amplitudes, strict=True)
+        ]
+        return np.array([np.max(ends), np.min(ends)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,7 +164,8 @@ def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params |
     fits = {name: fit for name, fit in fits.items() if math.isfinite(fit.chi2)}
     if not fits:
         raise AnalysisError("no damping law could be fitted to the runs together; fit them one by one")
-    selected, admissible = choose(fits, params)
+    ends = points.t
+    selected, admissible = choose(fits, params, lambda name: fits[name].span(ends))
     names = tuple(name for name, _, _ in runs)
     return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
 
@@ -194,13 +211,12 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
     length = float(np.sqrt(np.mean(points.y**2))) or 1.0
     theta = _scaled(law, _start([fit.joint for fit in own]), length, count)
     model = _Shared(law, points)
-    found, _, converged = minimise(model, points.y / length, length / points.u, theta[None, :])
-    values = _scaled(law, found[0], 1.0 / length, count)
+    end = minimise(model, points.y / length, length / points.u, theta[None, :])
+    values = _scaled(law, end.theta[0], 1.0 / length, count)
     with np.errstate(all="ignore"):
-        amplitude, jacobian = model.evaluate(np.zeros(1, np.int64), values[None, :])
-        residual = (points.y - amplitude[0]) / points.u
-        chi2 = float(residual @ residual)
-        covariance = covariance_or_infinite((jacobian[0] / points.u).T)
+        jacobian = model.evaluate(np.zeros(1, np.int64), values[None, :])[1][0] / points.u
+    covariance = covariance_or_infinite(jacobian)
+    chi2 = float(end.chi2[0])
     size = sum(float(t.size) / damping.scatter.correlation for t, (_, _, damping) in zip(points.t, runs, strict=True))
     dof = max(size - values.size, 0.0)
     separate = sum(
@@ -216,7 +232,7 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
         rejection = "differ"
     elif np.any(values < -NEGATIVE * deviation):
         rejection = "negative"
-    elif not converged[0]:
+    elif not end.converged[0]:
         rejection = "not converged"
     amplitudes = tuple(
         Estimate(float(a), float(u), "m") for a, u in zip(values[:count], deviation[:count], strict=True)

@@ -9,13 +9,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.laws import Drag, Law
+from pipeline.laws import Drag, Law, Power
 from pipeline.laws.drag import guesses, jacobians_of
 from pipeline.track import F8
 
-__all__ = ["Fitted", "Model", "covariance_or_infinite", "fit_laws", "minimise"]
+__all__ = ["Fitted", "Minimum", "Model", "covariance_or_infinite", "fit_laws", "minimise"]
 
 STEPS = 60
+# Square of a hundredth of a standard uncertainty: steps shrink quadratically, so what is left is far less.
+NEGLIGIBLE = 1e-4
 SLOTS = 4  # parameters of the richest law of drag
 
 
@@ -74,7 +76,7 @@ class _Batch:
         drags = np.flatnonzero(self.drag)
         if drags.size:
             theta[drags, :SLOTS] = guesses(self.t, y, [law for law in self.laws if isinstance(law, Drag)])
-        for row in np.flatnonzero(~self.drag):
+        for row in np.flatnonzero(~self.drag).tolist():
             theta[row, self.slots[row]] = self.laws[row].guess(self.t, y)
         return theta
 
@@ -87,10 +89,15 @@ class _Batch:
         jacobian = np.zeros((rows.size, self.width, self.t.size))
         if drags.any():
             amplitude[drags], jacobian[drags, :SLOTS] = jacobians_of(self.t, theta[drags, :SLOTS])
-        for k in np.flatnonzero(~drags):
-            law, slots = self.laws[int(rows[k])], self.slots[int(rows[k])]
-            amplitude[k] = law.amplitude(self.t, theta[k, slots])
-            jacobian[k, slots] = law.jacobian(self.t, theta[k, slots]).T
+        for k, row in enumerate(rows.tolist()):
+            if drags[k]:
+                continue
+            law, slots = self.laws[row], self.slots[row]
+            if isinstance(law, Power):
+                amplitude[k], by = law.both(self.t, theta[k, slots])
+            else:
+                amplitude[k], by = law.amplitude(self.t, theta[k, slots]), law.jacobian(self.t, theta[k, slots])
+            jacobian[k, slots] = by.T
         return amplitude, jacobian
 
 
@@ -116,48 +123,111 @@ def fit_laws(laws: Sequence[Law], t: F8, y: F8, u: F8) -> list[Fitted]:
     is left of its step is a thousandth of a standard uncertainty (which a bad fit has larger).
     """
     length = float(np.sqrt(np.mean(y * y))) or 1.0
-    # Lengths near the smallest number would leave no room for their squares.
     batch = _Batch(laws, t)
     scaled, weight = y / length, length / u
-    theta, steps, converged = minimise(batch, scaled, weight, batch.guess(scaled))
+    end = minimise(batch, scaled, weight, batch.guess(scaled))
+    covariances = _covariances(end.jacobian, batch.free)
     fitted = []
     for row, law in enumerate(laws):
-        values = law.rescaled(theta[row, batch.slots[row]], 1.0 / length)
-        with np.errstate(all="ignore"):
-            residual = (y - law.amplitude(t, values)) / u
-            chi2 = float(residual @ residual)
-            covariance = covariance_or_infinite(law.jacobian(t, values) / u[:, None])
-        note = "" if converged[row] else f"{int(steps[row])} steps of Levenberg-Marquardt from the law's own guess"
-        fitted.append(Fitted(values, covariance, chi2, bool(converged[row]), note))
+        slots = batch.slots[row]
+        theta = end.theta[row, slots]
+        values = law.rescaled(theta, 1.0 / length)
+        covariance = _rescaled_covariance(law, theta, covariances[row][slots][:, slots], length)
+        note = (
+            "" if end.converged[row] else f"{int(end.steps[row])} steps of Levenberg-Marquardt from the law's own guess"
+        )
+        fitted.append(Fitted(values, covariance, float(end.chi2[row]), bool(end.converged[row]), note))
     return fitted
 
 
+def _covariances(jacobian: F8, free: NDArray[np.bool_]) -> F8:
+    """Return the rows' covariances (k, p, p), infinite where the points do not determine every parameter."""
+    with np.errstate(all="ignore"):
+        scale = np.sqrt(np.einsum("kpn,kpn->kp", jacobian, jacobian))
+        scale[~free] = 1.0
+        normal = (jacobian @ jacobian.transpose(0, 2, 1)) / (scale[:, :, None] * scale[:, None, :])
+        normal += np.eye(free.shape[1]) * ~free[:, :, None]
+        sound = np.isfinite(normal).all(axis=(1, 2)) & scale.all(axis=1)
+        normal[~sound] = np.eye(free.shape[1])
+        # Where the determinant is that small the inverse would lose half of its digits: see below.
+        sound &= np.linalg.det(normal) > 1e-8
+        normal[~sound] = np.eye(free.shape[1])
+        found = np.linalg.inv(normal) / (scale[:, :, None] * scale[:, None, :])
+    for row in np.flatnonzero(~sound).tolist():
+        slots = np.flatnonzero(free[row])
+        found[row][np.ix_(slots, slots)] = covariance_or_infinite(jacobian[row, slots])
+    return np.asarray(found)
+
+
+def _rescaled_covariance(law: Law, theta: F8, covariance: F8, length: float) -> F8:
+    """The covariance that belongs to ``law.rescaled(theta, 1 / length)``."""
+    if isinstance(law, Drag):
+        factor = law.rescaled(np.ones(theta.size), 1.0 / length)
+        return np.asarray(covariance * np.outer(factor, factor))
+    steps = 1e-5 * np.maximum(np.abs(theta), 1e-3)
+    by = np.stack(
+        [
+            (law.rescaled(theta + d, 1.0 / length) - law.rescaled(theta - d, 1.0 / length)) / (2.0 * step)
+            for d, step in zip(np.diag(steps), steps, strict=True)
+        ],
+        axis=1,
+    )
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(by @ covariance @ by.T)
+
+
 def covariance_or_infinite(jacobian: F8) -> F8:
-    """Return :math:`(J^T J)^{-1}` by QR of columns scaled to unit length.
+    """Return :math:`(J J^T)^{-1}`.
 
     Parameters
     ----------
-    jacobian : (n, p) float64
-        Each row divided by its point's standard uncertainty.
+    jacobian : (p, n) float64
+        Each column divided by its point's standard uncertainty.
 
     Returns
     -------
     (p, p) float64
         Infinite where the points do not determine every parameter: a pseudo-inverse would call it known.
+
+    Notes
+    -----
+    By QR of rows scaled to unit length.
     """
     with np.errstate(all="ignore"):
-        scale = np.sqrt(np.einsum("ni,ni->i", jacobian, jacobian))
+        scale = np.sqrt(np.einsum("pn,pn->p", jacobian, jacobian))
     unknown = np.full((scale.size, scale.size), np.inf)
-    if not np.isfinite(scale).all() or not scale.all():
+    if not np.isfinite(scale).all() or not scale.all() or jacobian.shape[1] < scale.size:
         return unknown
-    r: F8 = np.asarray(np.linalg.qr(jacobian / scale, mode="r"))
-    if r.shape[0] < r.shape[1] or np.abs(np.diagonal(r)).min() <= 1e-13:
+    unit = jacobian / scale[:, None]
+    r: F8 = np.asarray(np.linalg.qr(unit.T, mode="r"))
+    if np.abs(np.diagonal(r)).min() <= 1e-13:
         return unknown
-    inverse = np.linalg.inv(r) / scale[:, None]
-    return np.asarray(inverse @ inverse.T)
+    triangle = np.linalg.inv(r) / scale[:, None]
+    return np.asarray(triangle @ triangle.T)
 
 
-def minimise(model: Model, y: F8, weight: F8, theta: F8) -> tuple[F8, NDArray[np.int64], NDArray[np.bool_]]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Minimum:
+    """Where :func:`minimise` ended.
+
+    Parameters
+    ----------
+    theta : (k, p) float64
+    chi2 : (k,) float64
+    jacobian : (k, p, n) float64
+        At theta, divided by the points' standard uncertainties; zero for parameters that a row has not.
+    steps : (k,) int64
+    converged : (k,) bool
+    """
+
+    theta: F8
+    chi2: F8
+    jacobian: F8
+    steps: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+
+
+def minimise(model: Model, y: F8, weight: F8, theta: F8) -> Minimum:
     """Minimise every row's chi-square by Levenberg and Marquardt's method.
 
     Parameters
@@ -166,16 +236,10 @@ def minimise(model: Model, y: F8, weight: F8, theta: F8) -> tuple[F8, NDArray[np
     y, weight : (n,) float64
         Points and reciprocals of their standard uncertainties.
     theta : (k, p) float64
-        Start values; changed in place.
-
-    Returns
-    -------
-    theta : (k, p) float64
-    steps : (k,) int64
-        Taken by each row.
-    converged : (k,) bool
+        Start values.
     """
     count, width = theta.shape
+    theta = theta.copy()
     identity = np.eye(width)
     active = np.arange(count)
     damping = np.full(count, 1e-6)
@@ -183,36 +247,34 @@ def minimise(model: Model, y: F8, weight: F8, theta: F8) -> tuple[F8, NDArray[np
     with np.errstate(all="ignore"):
         residual, jacobian, chi2 = _linearised(model, active, theta, y, weight)
         while active.size:
-            fixed = ~model.free[active]
-            norm = np.sqrt(np.einsum("kpn,kpn->kp", jacobian, jacobian))
-            norm[fixed | (norm == 0.0)] = 1.0
-            unit = jacobian / norm[:, :, None]
-            normal = unit @ unit.transpose(0, 2, 1)
-            right = (unit @ residual[:, :, None])[:, :, 0]
-            pivot = identity * (damping[active, None] + fixed)[:, None, :]
-            sound = np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
+            here, rest = jacobian[active], residual[active]
+            norm = np.sqrt(np.einsum("kpn,kpn->kp", here, here))
+            norm[norm == 0.0] = 1.0
+            normal = (here @ here.transpose(0, 2, 1)) / (norm[:, :, None] * norm[:, None, :])
+            right = (here @ rest[:, :, None])[:, :, 0] / norm
+            sound = np.isfinite(right).all(axis=1) & np.isfinite(normal).all(axis=(1, 2))
             normal[~sound], right[~sound] = identity, 0.0
-            step = np.linalg.solve(normal + pivot, right[:, :, None])[:, :, 0]
+            # A parameter that a row has not keeps a row of zeros: one on its diagonal leaves it where it is.
+            lever = damping[active, None] + ~model.free[active]
+            step = np.linalg.solve(normal + identity * lever[:, None, :], right[:, :, None])[:, :, 0]
             steps[active] += 1
             trial = theta[active] + step / norm
             new_residual, new_jacobian, new_chi2 = _linearised(model, active, trial, y, weight)
             length = np.einsum("kp,kp->k", step, step)
-            gain = chi2 - new_chi2
+            gain = chi2[active] - new_chi2
             better = gain >= 0.0
-            theta[active[better]] = trial[better]
-            residual[better], jacobian[better], chi2[better] = (
-                new_residual[better],
-                new_jacobian[better],
-                new_chi2[better],
-            )
-            small = length <= 1e-6 * np.maximum(1.0, chi2 / y.size)
-            done = sound & np.where(better, small | (gain <= 1e-12 * chi2), length <= 1e-10)
-            damping[active] = np.where(better, np.maximum(0.1 * damping[active], 1e-12), 10.0 * damping[active])
+            rows = active[better]
+            theta[rows], chi2[rows] = trial[better], new_chi2[better]
+            residual[rows], jacobian[rows] = new_residual[better], new_jacobian[better]
+            small = length <= NEGLIGIBLE * np.maximum(1.0, chi2[active] / y.size)
+            # A short step means the end only where no lever has shortened it.
+            level = np.where(damping[active] <= 1e-3, small, length <= 1e-10)
+            done = sound & np.where(better, level | (gain <= 1e-12 * chi2[active]), level)
+            damping[active] *= np.where(better, 0.1, 10.0)
+            np.maximum(damping, 1e-12, out=damping)
             converged[active[done]] = True
-            stay = ~done & sound & (damping[active] <= 1e10) & (steps[active] < STEPS)
-            active = active[stay]
-            residual, jacobian, chi2 = residual[stay], jacobian[stay], chi2[stay]
-    return theta, steps, converged
+            active = active[~done & sound & (damping[active] <= 1e10) & (steps[active] < STEPS)]
+    return Minimum(theta, chi2, jacobian, steps, converged)
 
 
 def _linearised(model: Model, rows: NDArray[np.int64], theta: F8, y: F8, weight: F8) -> tuple[F8, F8, F8]:
@@ -220,7 +282,7 @@ def _linearised(model: Model, rows: NDArray[np.int64], theta: F8, y: F8, weight:
     amplitude, jacobian = model.evaluate(rows, theta)
     residual = (y - amplitude) * weight
     jacobian *= weight
-    jacobian[~model.free[rows]] = 0.0
+    jacobian *= model.free[rows][:, :, None]
     chi2 = np.einsum("kn,kn->k", residual, residual)
     chi2[~np.isfinite(chi2)] = np.inf
     return residual, jacobian, chi2

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +16,9 @@ F8 = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """A free oscillation: y = offset + A(t) cos(phase(t)), dA/dt = -(gamma A + beta A^2), omega(A) = omega + kappa A^2.
+    """A free oscillation: y = offset + A(t) cos(phase(t)), omega(A) = omega + kappa A^2.
 
-    Lengths in m, times in s, ``phase`` in rad at t = 0.
+    dA/dt = -(mu + gamma A + beta A^2 + c A^n) until A is zero. Lengths in m, times in s, ``phase`` in rad at t = 0.
     """
 
     amplitude: float = 0.05
@@ -26,6 +28,9 @@ class Truth:
     gamma: float = 0.0
     beta: float = 0.0
     kappa: float = 0.0
+    mu: float = 0.0
+    c: float = 0.0
+    n: float = 1.0
 
     @property
     def period(self) -> float:
@@ -33,7 +38,9 @@ class Truth:
         return 2.0 * np.pi / self.omega
 
     def amplitude_at(self, t: F8) -> F8:
-        """Return A at t (n,), m."""
+        """Return A at t (n,), m: by hand without friction and power, else by integration."""
+        if self.mu or self.c:
+            return _integrated(self.amplitude, self.mu, self.gamma, self.beta, self.c, self.n, float(np.max(t)))(t)
         if self.gamma == 0.0:
             return self.amplitude / (1.0 + self.beta * self.amplitude * t)
         decay = np.exp(-self.gamma * t)
@@ -53,6 +60,32 @@ class Truth:
     def position(self, t: F8) -> F8:
         """Return y at t (n,), m."""
         return self.offset + self.amplitude_at(t) * np.cos(self.phase_at(t))
+
+
+@lru_cache(maxsize=64)
+def _integrated(
+    start: float, mu: float, gamma: float, beta: float, c: float, n: float, seconds: float
+) -> Callable[[F8], F8]:
+    """Return A(t) by an adaptive Runge-Kutta method of order 8, zero once it has reached zero."""
+    from scipy.integrate import solve_ivp
+
+    def fall(_: float, a: F8) -> F8:
+        left = np.maximum(a, 0.0)
+        return -(mu + gamma * left + beta * left**2 + c * left**n)
+
+    def stopped(_: float, a: F8) -> float:
+        return float(a[0]) - 1e-9 * start
+
+    stopped.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(
+        fall, (0.0, seconds + 1e-9), [start], "DOP853", rtol=1e-11, atol=1e-15, dense_output=True, events=stopped
+    )
+    end = float(found.t[-1])
+
+    def amplitude(t: F8) -> F8:
+        return np.where(t < end, found.sol(np.minimum(t, end))[0], 0.0 if found.t_events[0].size else found.y[0, -1])
+
+    return amplitude
 
 
 def times(seconds: float, rate_hz: float = 100.0) -> F8:

@@ -2,8 +2,8 @@
 
 :mod:`pipeline.laws.law` says what a law offers, :mod:`pipeline.laws.drag` holds the eight laws of
 :math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)`, :mod:`pipeline.laws.power` that of :math:`-c A^n`. A law is one
-small class and one entry of :data:`LAWS`; ``tests/conformance/test_laws.py`` holds each to its differential equation, to its
-Jacobian and to its guess.
+small class and one entry of :data:`LAWS`; ``tests/conformance/test_laws.py`` holds each to its differential equation,
+to its Jacobian and to its guess.
 """
 
 from __future__ import annotations

@@ -37,6 +37,7 @@ from pipeline.track import F8
 __all__ = ["Drag", "amplitudes", "guesses", "jacobians", "jacobians_of"]
 
 UNITS = {"A0": "m", "mu": "m/s", "gamma": "1/s", "beta": "1/(m s)"}
+POWERS = {"mu": 0, "gamma": 1, "beta": 2}
 SLOTS = tuple(UNITS)  # where each parameter stands in the full set of four
 FLOOR = 1e-3  # share of the greatest amplitude below which a start value divides by nothing smaller
 
@@ -88,8 +89,10 @@ class Drag:
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
         """Return mu + gamma A + beta A^2; nothing where there is no amplitude left."""
-        _, mu, gamma, beta = self.full(theta)[0]
-        return np.asarray(np.where(amplitude > 0.0, mu + amplitude * (gamma + amplitude * beta), 0.0))
+        rate = np.zeros_like(amplitude)
+        for name, value in zip(self.parameters[1:], theta[1:].tolist(), strict=True):
+            rate += value * amplitude ** POWERS[name]
+        return np.asarray(np.where(amplitude > 0.0, rate, 0.0))
 
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return the coefficients of a line through integrals of the amplitudes."""
@@ -111,40 +114,65 @@ class _Flow(NamedTuple):
     sinh: F8
     fall: F8  # e^(-2st), 1 where s is imaginary
     square: F8  # s^2, (k, 1)
-    gone: NDArray[np.bool_]  # friction has stopped the motion
-    lost: NDArray[np.bool_]  # beyond a pole of a growing amplitude
+    ends: NDArray[np.float64] | None  # 0 where friction has stopped the motion, infinite beyond a pole, else NaN
 
 
 def _flow(t: F8, theta: F8) -> _Flow:
     start, mu, gamma, beta = theta.T[:, :, None]
     square = 0.25 * gamma * gamma - beta * mu
     root = np.sqrt(np.maximum(square, 0.0))
+    growing = gamma < 0.0
     # The greater root of x^2 - gamma x + beta mu in size is safe, the lesser is their product over it.
-    greater = 0.5 * gamma + np.where(gamma < 0.0, -root, root)
+    greater = 0.5 * gamma + np.where(growing, -root, root)
     lesser = np.divide(beta * mu, greater, out=np.zeros_like(greater), where=greater != 0.0)
     twice = 2.0 * root
-    fall = np.exp(-twice * t)
-    sinh = np.where(twice * t > 1e-300, -np.expm1(-twice * t) / np.where(twice > 0.0, twice, 1.0), t)
-    cosh = 0.5 * (1.0 + fall)
-    growing = gamma < 0.0
-    numerator = np.where(growing, start, start * fall) - (mu + lesser * start) * sinh
-    denominator = np.where(growing, fall, 1.0) + (lesser + beta * start) * sinh
-    gone = (numerator <= 0.0) & ((denominator > 0.0) | (beta >= 0.0)) | (denominator <= 0.0) & (beta >= 0.0)
+    power = twice * -t
+    fall = np.exp(power)
+    sinh = np.expm1(power, out=power)
+    sinh /= np.where(twice > 0.0, -twice, -1.0)
+    sinh[twice[:, 0] == 0.0] = t
+    cosh = 0.5 * fall
+    cosh += 0.5
+    numerator = start * fall
+    numerator -= (mu + lesser * start) * sinh
+    denominator = (lesser + beta * start) * sinh
+    if growing.any():
+        rows = growing[:, 0]
+        numerator[rows] += start[rows] * (1.0 - fall[rows])
+        denominator[rows] += fall[rows]
+        denominator[~rows] += 1.0
+    else:
+        denominator += 1.0
+    turning = np.flatnonzero(square[:, 0] < 0.0)
+    if turning.size:
+        pace = np.sqrt(-square[turning])
+        angle = np.minimum(pace * t, np.pi)
+        cosh[turning], sinh[turning], fall[turning] = np.cos(angle), np.sin(angle) / pace, 1.0
+        c, s, a = cosh[turning], sinh[turning], start[turning]
+        numerator[turning] = a * c - (mu[turning] + 0.5 * gamma[turning] * a) * s
+        denominator[turning] = c + (beta[turning] * a + 0.5 * gamma[turning]) * s
+    ends = None
+    if turning.size or min(numerator.min(), denominator.min()) <= 0.0:
+        ends = _ends(t, theta, numerator, denominator, square)
+    return _Flow(t, numerator, denominator, cosh, sinh, fall, square, ends)
+
+
+def _ends(t: F8, theta: F8, numerator: F8, denominator: F8, square: F8) -> NDArray[np.float64]:
+    """What becomes of amplitudes that have an end: at rest, or beyond a pole."""
+    start, mu, gamma, beta = theta.T[:, :, None]
+    # Zero is reached before a pole where beta is not negative, for a pole is then on the side of negative amplitudes.
     lost = (denominator <= 0.0) & (beta < 0.0)
+    ends = np.where(lost, np.inf, np.where((numerator <= 0.0) | (denominator <= 0.0), 0.0, np.nan))
     turning = np.flatnonzero(square[:, 0] < 0.0)
     if turning.size:
         a, m, g, b = start[turning], mu[turning], gamma[turning], beta[turning]
         pace = np.sqrt(-square[turning])
-        angle = np.minimum(pace * t, np.pi)
-        c, s = np.cos(angle), np.sin(angle) / pace
-        pull, push = m + 0.5 * g * a, b * a + 0.5 * g
-        cosh[turning], sinh[turning], fall[turning] = c, s, 1.0
-        numerator[turning], denominator[turning] = a * c - pull * s, c + push * s
         # Both coefficients have one sign: positive ones end in rest, negative ones at a pole.
-        end = np.where(b > 0.0, np.arctan2(pace * a, pull), np.arctan2(pace, -push))
-        over = angle >= end
-        gone[turning], lost[turning] = over & (b > 0.0), over & (b <= 0.0)
-    return _Flow(t, numerator, denominator, cosh, sinh, fall, square, gone, lost)
+        rest = np.arctan2(pace * a, m + 0.5 * g * a)
+        pole = np.arctan2(pace, -b * a - 0.5 * g)
+        over = pace * t >= np.where(b > 0.0, rest, pole)
+        ends[turning] = np.where(over, np.where(b > 0.0, 0.0, np.inf), np.nan)
+    return ends
 
 
 def amplitudes(t: F8, theta: F8) -> F8:
@@ -165,11 +193,11 @@ def amplitudes(t: F8, theta: F8) -> F8:
 
 
 def _amplitudes(flow: _Flow) -> F8:
+    if flow.ends is None:
+        return flow.numerator / flow.denominator
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         values = flow.numerator / flow.denominator
-    values[flow.gone] = 0.0
-    values[flow.lost] = np.inf
-    return np.asarray(values)
+    return np.where(np.isnan(flow.ends), values, flow.ends)
 
 
 def jacobians(t: F8, theta: F8) -> F8:
@@ -195,9 +223,9 @@ def jacobians_of(t: F8, theta: F8) -> tuple[F8, F8]:
         jacobian[:, 1] = over * (cosines + push * (2.0 * mixed + push * squares))
         jacobian[:, 2] = over * (start * cosines + (start * push - pull) * mixed - pull * push * squares)
         jacobian[:, 3] = over * (start * start * cosines - pull * (2.0 * start * mixed - pull * squares))
-    # After the stop nothing depends on anything; beyond a pole there is nothing to depend.
-    jacobian.transpose(0, 2, 1)[flow.gone] = 0.0
-    jacobian.transpose(0, 2, 1)[flow.lost] = np.inf
+    if flow.ends is not None:
+        # After the stop nothing depends on anything; beyond a pole there is nothing to depend.
+        jacobian = np.where(np.isnan(flow.ends)[:, None, :], jacobian, flow.ends[:, None, :])
     return _amplitudes(flow), jacobian
 
 
@@ -230,10 +258,10 @@ def guesses(t: F8, amplitude: F8, laws: Sequence[Drag]) -> F8:
     parameters; integrals of noisy points are far less noisy than their differences.
     """
     found = np.zeros((len(laws), 4))
-    found[:, 0] = max(float(np.median(amplitude)), FLOOR * float(np.max(amplitude)))
+    found[:, 0] = max(float(amplitude.mean()), FLOOR * float(amplitude.max()))
     if amplitude.size < 2 or not t[-1] > t[0]:
         return found
-    level = float(np.max(amplitude))
+    level = float(amplitude.max())
     y, span = amplitude / level, float(t[-1])
     step = np.diff(t) / span
     columns = np.empty((4, t.size))
@@ -242,15 +270,17 @@ def guesses(t: F8, amplitude: F8, laws: Sequence[Drag]) -> F8:
         # Up to the first point the fall is taken as flat; it is a part of a period.
         columns[row, 0] = -power[0] * t[0] / span
         columns[row, 1:] = columns[row, 0] - np.cumsum(0.5 * (power[1:] + power[:-1]) * step)
-    gram, right = columns @ columns.T, columns @ y
     units = np.array([level, level / span, 1.0 / span, 1.0 / (level * span)])
+    absent = np.ones((len(laws), 4), np.bool_)
     for row, law in enumerate(laws):
-        slots = list(law.slots)
-        part = gram[np.ix_(slots, slots)]
-        part.flat[:: len(slots) + 1] *= 1.0 + 1e-12
-        values = np.linalg.solve(part, right[slots])
-        if np.isfinite(values).all() and values[0] > 0.0:
-            found[row, slots] = values * units[slots]
+        absent[row, list(law.slots)] = False
+    gram = np.where(absent[:, :, None] | absent[:, None, :], 0.0, columns @ columns.T)
+    diagonal = np.arange(4)
+    gram[:, diagonal, diagonal] = np.where(absent, 1.0, gram[:, diagonal, diagonal] * (1.0 + 1e-12))
+    right = np.where(absent, 0.0, columns @ y)
+    values = np.linalg.solve(gram, right[:, :, None])[:, :, 0]
+    usable = np.isfinite(values).all(axis=1) & (values[:, 0] > 0.0)
+    found[usable] = values[usable] * units
     return found
 
 
