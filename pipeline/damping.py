@@ -26,6 +26,7 @@ BARE_MENTION = 2.0  # difference of BIC below which evidence is none
 ALIKE = 0.1  # share of the damping that two laws may differ by and still say the same
 SMALLEST_SHARE = 0.1  # of the first amplitude, below which damping is not compared
 NEGATIVE = 3.0  # standard uncertainties below zero at which a coefficient speaks against its law
+LOOSEST_POWER = 3.0  # standard uncertainty of a power that still says anything: known ones lie between 0 and 2
 WEAK, STRONG = 8.0, 5.0  # amplitudes over their noise: biased below the one, of known phase above the other
 
 
@@ -307,6 +308,8 @@ def _astray(law: Law, fit: Fitted, t: F8, y: F8) -> str | None:
         return "its numbers ran out of range"
     if not np.isfinite(fit.covariance).all():
         return "the windows do not determine its parameters"
+    if law.units[-1] == "" and fit.covariance[-1, -1] > LOOSEST_POWER**2:
+        return "the windows do not determine its power"
     if fit.theta.min() >= 0.0:
         return None
     with np.errstate(all="ignore"):
@@ -378,6 +381,11 @@ class Weighed(Protocol):
         ...
 
     @property
+    def rejection(self) -> str:
+        """Why the law is rejected, empty where it is not."""
+        ...
+
+    @property
     def rejected(self) -> bool:
         """Whether the points contradict the law."""
         ...
@@ -412,7 +420,11 @@ def choose(fits: Mapping[str, Weighed], params: Params, span: Callable[[str], F8
     allowed = [name for name in fits if not fits[name].rejected]
     count = {name: len(fit.law.parameters) for name, fit in fits.items()}
     if not allowed:
-        return min(fits, key=lambda name: (fits[name].reduced_chi2, count[name])), ()
+        # A law of damping that does not fit is better than one that fits by driving the motion, if any damps.
+        damping = [name for name, fit in fits.items() if fit.rejection != "negative" and count[name] > 1]
+        least = min(fits.values(), key=lambda fit: fit.bic).bic
+        tolerable = [name for name in damping if fits[name].bic == least]
+        return (tolerable or [min(fits, key=lambda name: (fits[name].reduced_chi2, count[name]))])[0], ()
     least = min(fits[name].bic for name in allowed)
     ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
     selected = min(ties, key=lambda name: (count[name], list(fits).index(name)))

@@ -15,8 +15,9 @@ from pipeline.track import F8
 
 __all__ = ["Fitted", "Minimum", "Model", "covariance_or_infinite", "fit_laws", "minimise"]
 
-STEPS = 60
-# Square of a hundredth of a standard uncertainty: steps shrink quadratically, so what is left is far less.
+STEPS = 40
+PATIENCE, IDLE = 10, 0.01  # steps after which a fit that gains less than this in chi-square a step is given up
+# Gain in chi-square that a hundredth of a standard uncertainty brings: steps shrink quadratically, so far less is left.
 NEGLIGIBLE = 1e-4
 SLOTS = 4  # parameters of the richest law of drag
 
@@ -118,9 +119,9 @@ def fit_laws(laws: Sequence[Law], t: F8, y: F8, u: F8) -> list[Fitted]:
 
     Notes
     -----
-    Levenberg and Marquardt's method with analytic derivatives, at most sixty steps, on amplitudes in units of their
-    root mean square, so that no power of a metre disturbs it. A row leaves the batch when it has converged: when what
-    is left of its step is a thousandth of a standard uncertainty (which a bad fit has larger).
+    Levenberg and Marquardt's method with analytic derivatives, at most forty steps, on amplitudes in units of their
+    root mean square, so that no power of a metre disturbs it. A row leaves the batch when it has converged: when its
+    step was a hundredth of a standard uncertainty (which a bad fit has larger), in whatever direction.
     """
     length = float(np.sqrt(np.mean(y * y))) or 1.0
     batch = _Batch(laws, t)
@@ -165,14 +166,14 @@ def _rescaled_covariance(law: Law, theta: F8, covariance: F8, length: float) -> 
         factor = law.rescaled(np.ones(theta.size), 1.0 / length)
         return np.asarray(covariance * np.outer(factor, factor))
     steps = 1e-5 * np.maximum(np.abs(theta), 1e-3)
-    by = np.stack(
-        [
-            (law.rescaled(theta + d, 1.0 / length) - law.rescaled(theta - d, 1.0 / length)) / (2.0 * step)
-            for d, step in zip(np.diag(steps), steps, strict=True)
-        ],
-        axis=1,
-    )
-    with np.errstate(invalid="ignore", over="ignore"):
+    with np.errstate(all="ignore"):
+        by = np.stack(
+            [
+                (law.rescaled(theta + d, 1.0 / length) - law.rescaled(theta - d, 1.0 / length)) / (2.0 * step)
+                for d, step in zip(np.diag(steps), steps, strict=True)
+            ],
+            axis=1,
+        )
         return np.asarray(by @ covariance @ by.T)
 
 
@@ -260,20 +261,22 @@ def minimise(model: Model, y: F8, weight: F8, theta: F8) -> Minimum:
             steps[active] += 1
             trial = theta[active] + step / norm
             new_residual, new_jacobian, new_chi2 = _linearised(model, active, trial, y, weight)
-            length = np.einsum("kp,kp->k", step, step)
+            promised = np.einsum("kp,kp->k", step, right)
             gain = chi2[active] - new_chi2
             better = gain >= 0.0
             rows = active[better]
             theta[rows], chi2[rows] = trial[better], new_chi2[better]
             residual[rows], jacobian[rows] = new_residual[better], new_jacobian[better]
-            small = length <= NEGLIGIBLE * np.maximum(1.0, chi2[active] / y.size)
-            # A short step means the end only where no lever has shortened it.
-            level = np.where(damping[active] <= 1e-3, small, length <= 1e-10)
+            # A small gain means the end only where no lever has shortened the step.
+            negligible = np.where(damping[active] <= 1e-3, NEGLIGIBLE, 1e-10)
+            level = promised <= negligible * np.maximum(1.0, chi2[active] / y.size)
             done = sound & np.where(better, level | (gain <= 1e-12 * chi2[active]), level)
             damping[active] *= np.where(better, 0.1, 10.0)
             np.maximum(damping, 1e-12, out=damping)
             converged[active[done]] = True
-            active = active[~done & sound & (damping[active] <= 1e10) & (steps[active] < STEPS)]
+            # In a valley without a floor, where no gain counts, more steps find nothing.
+            idle = (steps[active] >= PATIENCE) & (gain < IDLE * np.maximum(1.0, chi2[active] / y.size))
+            active = active[~done & ~idle & sound & (damping[active] <= 1e10) & (steps[active] < STEPS)]
     return Minimum(theta, chi2, jacobian, steps, converged)
 
 

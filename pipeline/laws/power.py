@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -50,8 +49,8 @@ class Power:
             # d ln A / dx = -1/(1 - m x); x depends on A0, c and n through c t A0^(n-1).
             fall = -amplitude / found.rest
             jacobian[:, 0] = (amplitude - (1.0 - n) * fall * x) / start
-            jacobian[:, 1] = fall * at * start ** (n - 1.0)
-            jacobian[:, 2] = (fall * math.log(start) + amplitude * x * _logarithm_slope(found)) * x
+            jacobian[:, 1] = fall * at * np.float64(start) ** (n - 1.0)
+            jacobian[:, 2] = (fall * np.log(np.float64(start)) + amplitude * x * _logarithm_slope(found)) * x
         if found.rest.min() <= 0.0:
             jacobian[found.rest <= 0.0] = 0.0 if n < 1.0 and c > 0 else np.inf
         return amplitude, jacobian
@@ -59,7 +58,7 @@ class Power:
     def rate(self, amplitude: F8, theta: F8) -> F8:
         """Return c A^n; nothing where there is no amplitude left."""
         left = amplitude > 0.0
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(np.where(left, theta[1] * np.where(left, amplitude, 1.0) ** theta[2], 0.0))
 
     def guess(self, t: F8, amplitude: F8) -> F8:
@@ -74,8 +73,9 @@ class Power:
 
     def rescaled(self, theta: F8, length_m: float) -> F8:
         """Return theta with lengths divided by ``length_m``: c carries their power 1 - n."""
-        start, c, n = theta
-        return np.array([start / length_m, c * length_m ** (n - 1.0), n])
+        start, c, n = theta.tolist()
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.array([start / length_m, c * np.float64(length_m) ** (n - 1.0), n])
 
 
 class _Solution(NamedTuple):
@@ -91,7 +91,8 @@ class _Solution(NamedTuple):
 def _solution(t: F8, theta: F8) -> _Solution:
     start, c, n = theta.tolist()
     with np.errstate(all="ignore"):
-        x = (c * np.float64(start) ** (n - 1.0)) * t
+        # Not a number where A0 is not positive, through which a fit may step.
+        x = (c * np.float64(start) ** (n - 1.0)) * t if start > 0.0 else np.full(t.size, np.nan)
         z = (1.0 - n) * x
         rest = 1.0 - z
         # Not a number beyond the end, which is put right below.
@@ -110,7 +111,8 @@ def _solution(t: F8, theta: F8) -> _Solution:
 def _logarithm_slope(found: _Solution) -> F8:
     """Derivative of -ln(1 - z)/z, a series where it would cancel."""
     z = found.z
-    closed = (found.logarithm + z / found.rest) / (z * z)
+    with np.errstate(all="ignore"):
+        closed = (found.logarithm + z / found.rest) / (z * z)
     small = np.abs(z) < 1e-2
     if small.any():
         part = z[small]
