@@ -270,7 +270,7 @@ def test_small_and_imaginary_s_join_smoothly() -> None:
 
 
 def test_growing_amplitudes_end_at_a_pole() -> None:
-    """Negative coefficients, through which a fit may step, grow to a pole and are infinite beyond it, never negative."""
+    """Negative coefficients, through which a fit may step, grow to a pole and are infinite beyond it."""
     t = np.linspace(0.0, 300.0, 301)
     for theta in ([0.05, -0.001, -0.5], [0.05, 0.001, -0.5]):
         found = LAWS["linear+quadratic"].amplitude(t, np.array(theta))
