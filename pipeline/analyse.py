@@ -14,6 +14,7 @@ from pipeline import demodulate as demodulation
 from pipeline import derive as derivation
 from pipeline import fullfit as fullfits
 from pipeline import phase as phases
+from pipeline import relaxation as relaxations
 from pipeline.condition import Conditioned, condition
 from pipeline.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.damping import Damping, fit_damping
@@ -23,10 +24,11 @@ from pipeline.effects import Effect, tabulate
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate
 from pipeline.fullfit import FullFit, fit_record
-from pipeline.judge import Finding, count_quality, judge, judge_samples
+from pipeline.judge import Finding, count_quality, judge, judge_samples, judge_still
 from pipeline.phase import PhaseFit, fit_phase
 from pipeline.quick import condition_quickly, demodulate_quickly, find_cycles_quickly
 from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
+from pipeline.relaxation import Relaxation, find_relaxation, spring_constant
 from pipeline.rest import Rest, fit_rest
 from pipeline.scene import Scene
 from pipeline.track import U8, Track
@@ -43,7 +45,7 @@ class Params:
     ----------
     accuracy : {"fast", "standard", "best"}
         The tier; :func:`pipeline.accuracy.params_for` gives the options that belong to it.
-    condition, cycles, demodulate, damping, phase, derive, full
+    condition, cycles, demodulate, damping, phase, derive, full, relaxation
         Of the stages of those names.
     """
 
@@ -55,6 +57,7 @@ class Params:
     phase: phases.Params = field(default_factory=phases.Params)
     derive: derivation.Params = field(default_factory=derivation.Params)
     full: fullfits.Params = field(default_factory=fullfits.Params)
+    relaxation: relaxations.Params = field(default_factory=relaxations.Params)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +85,8 @@ class Analysis:
     params : Params
     conditioned : Conditioned
     motion : Motion or NoOscillation
-        The latter says why there is nothing to fit; ``estimates`` then holds offset and noise alone.
+        The latter says why there is nothing to fit; ``estimates`` then holds offset and noise alone. Where damping
+        ends the motion within a few cycles it is a :class:`pipeline.relaxation.Relaxation` and brings its rates.
     effects : tuple of Effect
     findings : tuple of Finding
         Gravest first.
@@ -143,21 +147,23 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     conditioned = (condition_quickly if fast else condition)(track, params.condition)
     cycles = (find_cycles_quickly if fast else find_cycles)(conditioned, params.cycles)
     if isinstance(cycles, NoOscillation):
-        return _still(track, scene, params, conditioned, cycles)
+        return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or cycles)
     quick = demodulate_quickly(conditioned, cycles)
     demodulated = demodulate(conditioned, cycles, params.demodulate) if quick is None else quick.demodulated
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
-        return _still(track, scene, params, conditioned, why)
+        return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or why)
     start = float(track.t[np.argmax(conditioned.used)])
+    quickly = quick is not None and fast
+    damping = fit_damping_quickly(demodulated, start, params.damping) if quickly else None
+    damping = damping or fit_damping(demodulated, start, params.damping)
+    strong = damping.best.damping_rate().value > params.relaxation.least_damping * demodulated.angular_frequency
+    if strong and isinstance(relaxed := find_relaxation(conditioned, params.relaxation), Relaxation):
+        return _still(track, scene, params, conditioned, relaxed)
     if quick is None or not fast:
-        damping = fit_damping(demodulated, start, params.damping)
         phase = fit_phase(demodulated, damping, params.phase)
         rest = fit_rest(demodulated)
         waveform = reconstruct(track, demodulated, phase, rest)
     else:
-        damping = fit_damping_quickly(demodulated, start, params.damping) or fit_damping(
-            demodulated, start, params.damping
-        )
         phase = fit_phase_quickly(demodulated, damping) or fit_phase(demodulated, damping, params.phase)
         rest = fit_rest_quickly(demodulated) or fit_rest(demodulated)
         waveform = quick.waveform(track, damping, phase, rest)
@@ -214,8 +220,10 @@ def _still(track: Track, scene: Scene, params: Params, conditioned: Conditioned,
         "offset": Estimate(float(np.mean(y)), float(u), "m"),
         "noise": Estimate(conditioned.noise_m, conditioned.noise_m / np.sqrt(2.0 * y.size), "m"),
     }
+    if isinstance(why, Relaxation):
+        estimates = {**estimates, **why.estimates, **spring_constant(why, scene)}
     findings = (
-        Finding("no_oscillation", "error", why.why),
+        judge_still(why),
         *judge_samples(conditioned, conditioned.flags, conditioned.noise_m),
     )
     return Analysis(track, scene, params, conditioned, why, (), findings, estimates)

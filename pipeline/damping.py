@@ -18,7 +18,7 @@ from pipeline.laws import LAWS, Law
 from pipeline.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.track import F8
 
-__all__ = ["Damping", "LawFit", "Params", "fit_damping", "in_phase"]
+__all__ = ["Damping", "LawFit", "Params", "fit_damping"]
 
 TINY = 1e-100  # stands for zero where something is divided by an uncertainty
 Rejection = Literal["", "misfit", "negative", "not converged"]
@@ -27,7 +27,6 @@ ALIKE = 0.1  # share of the damping that two laws may differ by and still say th
 SMALLEST_SHARE = 0.1  # of the first amplitude, below which damping is not compared
 NEGATIVE = 3.0  # standard uncertainties below zero at which a coefficient speaks against its law
 LOOSEST_POWER = 3.0  # standard uncertainty of a power that still says anything: known ones lie between 0 and 2
-WEAK, STRONG = 8.0, 5.0  # amplitudes over their noise: biased below the one, of known phase above the other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,6 +167,17 @@ class Damping:
         """Whether the selected law is the only admissible one, so that its coefficients mean something."""
         return self.admissible == (self.selected,)
 
+    def squared_rate(self, t: F8) -> float:
+        """Return the mean of :math:`(\\dot A/A)^2` over times t (n,), s, weighted by :math:`A^2`, 1/s^2.
+
+        Added to the square of the angular frequency it gives that of the undamped oscillation: exactly for linear
+        drag, to second order in the damping for the others.
+        """
+        amplitude = self.best.amplitude(t - self.t0)
+        power = float(amplitude @ amplitude)
+        rate = self.best.law.rate(amplitude, self.best.joint.values)
+        return float(rate @ rate) / power if power > 0.0 else 0.0
+
     def averaged(self, values: Mapping[str, Estimate]) -> Estimate:
         """Return the selected law's value of a quantity, its uncertainty widened by what admissible laws differ.
 
@@ -221,7 +231,7 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     of its special cases.
     """
     params = params or Params()
-    t, amplitude = demodulated.t - t0, in_phase(demodulated)
+    t, amplitude = demodulated.t - t0, demodulated.amplitude
     noise = np.sqrt(demodulated.covariance[:, 0, 0])
     if t.size < 3:
         # One or two points show no law: what the amplitude lost since the start is then its uncertainty.
@@ -239,34 +249,6 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
         raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
     selected, admissible = choose(fits, params, lambda name: fits[name].amplitude(np.array([0.0, float(t[-1])])))
     return Damping(t0, fits, selected, admissible, spread, unfitted)
-
-
-def in_phase(demodulated: Demodulated) -> F8:
-    """Return the windows' amplitudes (w,), m, without the bias that noise gives to weak ones.
-
-    Notes
-    -----
-    The length of a noisy vector is too great by :math:`u^2/2A` and 1.25 u where nothing is left of A. Its component
-    along the phase that the strong windows foretell is not. Used where an amplitude is below eight of its
-    uncertainties; elsewhere the bias is below a sixteenth of it and the phase is better not assumed.
-    """
-    amplitude, t = demodulated.amplitude, demodulated.t
-    noise = np.sqrt(demodulated.covariance[:, 0, 0])
-    strong = amplitude > STRONG * noise
-    count = int(np.count_nonzero(strong))
-    if not np.any(amplitude < WEAK * noise) or count < 6:
-        return amplitude
-    phase = demodulated.phase - demodulated.angular_frequency * (t - t[0])
-    first, last = t[strong][0], t[strong][-1]
-    x = 2.0 * (t - first) / (last - first) - 1.0
-    weight = np.minimum(amplitude / noise, 1e6)[strong]
-    curve = np.polynomial.legendre.legfit(x[strong], phase[strong], 3 if count >= 24 else 1, w=weight)
-    inside = np.clip(x, -1.0, 1.0)
-    slope = np.polynomial.legendre.legder(curve)
-    foretold = np.polynomial.legendre.legval(inside, curve) + (x - inside) * np.polynomial.legendre.legval(
-        inside, slope
-    )
-    return np.asarray(amplitude * np.cos(phase - foretold))
 
 
 def _affordable(names: Sequence[str], points: int, unfitted: dict[str, str]) -> list[Law]:

@@ -95,7 +95,7 @@ def derive(
     Notes
     -----
     First-order propagation [1]_ through the ``uncertainties`` package:
-    :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`, :math:`k = \\omega^2 (m + m_s/3 + m_a)`,
+    :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`, :math:`k = (\\omega^2 + \\overline{\\lambda^2}) (m + m_s/3 + m_a)`,
     :math:`Q = \\omega/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start,
     :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta`,
     :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
@@ -134,7 +134,7 @@ def derive(
     own, share = _masses(scene, effects, diameter)
     mass = None if own is None else own + (share or 0.0)
     if mass is not None:
-        found["spring_constant"] = (omega**2 * mass, "N/m")
+        found["spring_constant"] = ((omega**2 + damping.squared_rate(demodulated.t)) * mass, "N/m")
     if diameter is not None:
         found["keulegan_carpenter_number"] = (2 * math.pi * start / diameter, "")
         if scene.air_temperature_c is not None:

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.damping import NEGATIVE, Damping, Params, choose, in_phase, rates_of
+from pipeline.damping import NEGATIVE, Damping, Params, choose, rates_of
 from pipeline.demodulate import Demodulated
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
@@ -177,7 +177,7 @@ def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:
         spread = damping.scatter
         kept = spread.kept
         times.append((demodulated.t - damping.t0)[kept])
-        values.append(in_phase(demodulated)[kept])
+        values.append(demodulated.amplitude[kept])
         # Points that count as one share their information.
         errors.append(spread.u[kept] * math.sqrt(spread.correlation))
         parts.append(slice(at, at + int(np.count_nonzero(kept))))

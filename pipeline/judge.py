@@ -9,15 +9,16 @@ from typing import Literal
 import numpy as np
 
 from pipeline.condition import Conditioned
-from pipeline.cycles import Cycles
+from pipeline.cycles import Cycles, NoOscillation
 from pipeline.damping import Damping
 from pipeline.demodulate import Demodulated
 from pipeline.phase import PhaseFit
+from pipeline.relaxation import Relaxation
 from pipeline.rest import Rest
 from pipeline.track import U8, UNUSABLE, Quality
 from pipeline.waveform import Waveform
 
-__all__ = ["Finding", "Severity", "count_quality", "judge", "judge_samples"]
+__all__ = ["Finding", "Severity", "count_quality", "judge", "judge_samples", "judge_still"]
 
 Severity = Literal["info", "warning", "error"]
 
@@ -68,6 +69,26 @@ def judge_samples(conditioned: Conditioned, flags: U8, noise_m: float) -> tuple[
         Standard deviation of one sample, m.
     """
     return tuple(_sample_findings(conditioned, flags, noise_m))
+
+
+def judge_still(why: NoOscillation) -> Finding:
+    """Return what is said of a record without cycles to analyse.
+
+    Parameters
+    ----------
+    why : NoOscillation
+        Or the relaxation that was found instead.
+    """
+    if not isinstance(why, Relaxation):
+        return Finding("no_oscillation", "error", why.why)
+    if why.kind == "strong":
+        return Finding(
+            "strongly_damped",
+            "info",
+            f"{why.why}; it was fitted as one solution of the equation of motion with linear drag, "
+            "and no damping law was chosen",
+        )
+    return Finding("overdamped", "warning", why.why)
 
 
 def judge(

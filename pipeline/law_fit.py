@@ -228,7 +228,7 @@ class Minimum:
     converged: NDArray[np.bool_]
 
 
-def minimise(model: Model, y: F8, weight: F8, theta: F8) -> Minimum:
+def minimise(model: Model, y: F8, weight: F8, theta: F8, *, most_steps: int = STEPS) -> Minimum:
     """Minimise every row's chi-square by Levenberg and Marquardt's method.
 
     Parameters
@@ -238,6 +238,8 @@ def minimise(model: Model, y: F8, weight: F8, theta: F8) -> Minimum:
         Points and reciprocals of their standard uncertainties.
     theta : (k, p) float64
         Start values.
+    most_steps : int
+        After which a row is given up.
     """
     count, width = theta.shape
     theta = theta.copy()
@@ -275,8 +277,8 @@ def minimise(model: Model, y: F8, weight: F8, theta: F8) -> Minimum:
             np.maximum(damping, 1e-12, out=damping)
             converged[active[done]] = True
             # In a valley without a floor, where no gain counts, more steps find nothing.
-            idle = (steps[active] >= PATIENCE) & (gain < IDLE * np.maximum(1.0, chi2[active] / y.size))
-            active = active[~done & ~idle & sound & (damping[active] <= 1e10) & (steps[active] < STEPS)]
+            idle = better & (steps[active] >= PATIENCE) & (gain < IDLE * np.maximum(1.0, chi2[active] / y.size))
+            active = active[~done & ~idle & sound & (damping[active] <= 1e10) & (steps[active] < most_steps)]
     return Minimum(theta, chi2, jacobian, steps, converged)
 
 

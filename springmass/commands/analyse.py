@@ -11,6 +11,7 @@ from typing import Any
 from acquisition.errors import AcquisitionError
 from pipeline.analyse import Motion
 from pipeline.errors import PipelineError
+from pipeline.relaxation import Relaxation
 from springmass.analysing import Analysed, analyse_loaded, make_folder
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain
@@ -78,7 +79,7 @@ def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | No
         _print_text(analysed)
     if results is not None:
         _write(analysed, results)
-    if not isinstance(analysed.analysis.motion, Motion):
+    if not isinstance(analysed.analysis.motion, (Motion, Relaxation)):
         complain(f"{analysed.loaded.path}: no oscillation: {analysed.analysis.motion.why}")
         return UNREADABLE
     wrong = [f["code"] for f in analysed.result["findings"] if f["severity"] == "error"]

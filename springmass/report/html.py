@@ -13,6 +13,7 @@ from pipeline.classic import Classic
 from pipeline.compare import Comparison
 from pipeline.cycles import NoOscillation
 from pipeline.estimate import Estimate
+from pipeline.relaxation import Relaxation
 from springmass.report.figures import ZOOM_PERIODS, has_error_bars, is_long, turn_step
 from springmass.report.tables import law_status, page_unit, pretty, pretty_number, table_rows
 
@@ -218,6 +219,8 @@ def _kept(estimate: Estimate) -> str:
 
 
 def _verdict(analysis: Analysis) -> str:
+    if isinstance(analysis.motion, Relaxation):
+        return f"{analysis.motion.why[0].upper()}{analysis.motion.why[1:]}."
     if isinstance(analysis.motion, NoOscillation):
         return "Nothing oscillates in this record; rest position and noise are all that it gives."
     damping = analysis.motion.damping

@@ -35,6 +35,9 @@ _QUANTITIES = (
     ("offset", "rest position", "y0", "y₀", "y_0"),
     ("noise", "noise of one sample", "sigma", "σ", r"\sigma"),
     ("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda"),
+    ("relaxation_rate", "relaxation rate", "r", "r", "r"),
+    ("relaxation_rate_slow", "slow relaxation rate", "r_1", "r 1", "r_1"),
+    ("relaxation_rate_fast", "fast relaxation rate", "r_2", "r 2", "r_2"),
     ("quality_factor", "quality factor", "Q", "Q", "Q"),
     ("velocity_rms", "velocity, root mean square", "v_rms", "v rms", r"v_\mathrm{rms}"),
     ("reynolds_number", "Reynolds number", "Re", "Re", r"\mathit{Re}"),
@@ -42,8 +45,11 @@ _QUANTITIES = (
     ("drag_coefficient", "drag coefficient", "C_d", "C d", r"C_\mathrm{d}"),
     ("gamma", "linear damping", "gamma", "γ", r"\gamma"),
     ("beta", "quadratic damping", "beta", "β", r"\beta"),
+    ("mu", "dry friction", "mu", "μ", r"\mu"),
+    ("c", "drag by a power of the amplitude", "c", "c", "c"),
+    ("n", "that power", "n", "n", "n"),
 )
-_OF_LAW = ("gamma", "beta")
+_OF_LAW = ("gamma", "beta", "mu", "c", "n")
 
 _SIUNITX = {
     "s": r"\second",
@@ -56,6 +62,7 @@ _SIUNITX = {
     "m/s": r"\metre\per\second",
     "1/s": r"\per\second",
     "1/(m s)": r"\per\metre\per\second",
+    "m^(1-n)/s": r"\metre^{1-n}\per\second",
 }
 _PAGE_UNITS = {"1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -76,7 +83,7 @@ class TableRow:
     Parameters
     ----------
     name : str
-        As in ``Analysis.estimates``; "gamma" and "beta" are the selected law's.
+        As in ``Analysis.estimates``; "gamma", "beta", "mu", "c" and "n" are the selected law's.
     quantity : str
         In words.
     symbol, page_symbol, tex_symbol : str
