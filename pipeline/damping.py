@@ -24,7 +24,7 @@ TINY = 1e-100  # stands for zero where something is divided by an uncertainty
 Rejection = Literal["", "misfit", "negative", "not converged"]
 BARE_MENTION = 2.0  # difference of BIC below which evidence is none
 ALIKE = 0.1  # share of the damping that two laws may differ by and still say the same
-SMALLEST_SHARE = 0.1  # of the first amplitude, below which damping is not compared
+SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # of the first amplitude, to which at most and at least it is compared
 NEGATIVE = 3.0  # standard uncertainties below zero at which a coefficient speaks against its law
 LOOSEST_POWER = 3.0  # standard uncertainty of a power that still says anything: known ones lie between 0 and 2
 
@@ -396,8 +396,8 @@ def choose(fits: Mapping[str, Weighed], params: Params, span: Callable[[str], F8
     -----
     A law that holds the selected one as a special case is no other answer where its further coefficient gains it
     nothing (its BIC is higher by more than 2) and where the damping it tells is, with twice its uncertainty, within a
-    tenth of the simpler law's at both ends of the span. It is left out. Where the record cannot exclude a tenth, it
-    stays.
+    tenth of the simpler law's at both ends of the span, which is taken to a third of the greatest amplitude where the
+    record ends before. It is left out. Where the record cannot exclude a tenth, it stays.
     """
     allowed = [name for name in fits if not fits[name].rejected]
     count = {name: len(fit.law.parameters) for name, fit in fits.items()}
@@ -415,8 +415,8 @@ def choose(fits: Mapping[str, Weighed], params: Params, span: Callable[[str], F8
     reach = [name for name in order if fits[name].bic - least <= params.evidence]
     idle = {n for n in reach if selected in fits[n].law.cases and fits[n].bic - best.bic > BARE_MENTION}
     if idle:
-        amplitudes = span(selected)
-        amplitudes = np.maximum(amplitudes, SMALLEST_SHARE * float(np.max(amplitudes)))
+        most, least_m = span(selected)
+        amplitudes = most * np.array([1.0, min(max(least_m / most, SMALLEST_SHARE), LARGEST_SHARE)])
         alone, _ = best.rates(amplitudes)
         for name in sorted(idle):
             rate, u = fits[name].rates(amplitudes)

@@ -95,7 +95,8 @@ def derive(
     Notes
     -----
     First-order propagation [1]_ through the ``uncertainties`` package:
-    :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`, :math:`k = (\\omega^2 + \\overline{\\lambda^2}) (m + m_s/3 + m_a)`,
+    :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`,
+    :math:`k = (\\omega^2 + \\overline{\\lambda^2}) (m + m_s/3 + m_a)`,
     :math:`Q = \\omega/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start,
     :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta`,
     :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.

@@ -168,14 +168,7 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
         yield Finding(
             "law_rejected", "error", "every damping law tried is rejected: none describes the amplitude's fall"
         )
-    for name in rejected:
-        fit = damping.fits[name]
-        yield Finding(
-            "law_rejected",
-            "info",
-            f"{fit.law.words} is rejected as the damping law: {_reason(damping, name)} "
-            f"({fit.dof:.0f} degrees of freedom)",
-        )
+    yield from _rejections(damping)
     drags = [name for name in damping.admissible if name != "none"]
     if len(damping.admissible) > 1:
         names = ", ".join(damping.admissible)
@@ -183,14 +176,30 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
         yield Finding("laws_not_separable", "info", f"the record cannot tell these damping laws apart: {names}{tail}")
 
 
-def _reason(damping: Damping, name: str) -> str:
-    fit = damping.fits[name]
-    left = f"reduced chi-square {_number(fit.reduced_chi2)}"
-    if fit.rejection == "misfit":
-        return f"{left} where {damping.selected} leaves {damping.best.reduced_chi2:.2g}"
-    if fit.rejection == "negative":
-        return f"a coefficient is negative beyond three standard uncertainties, {left}"
-    return f"its fit did not converge, {left}"
+def _rejections(damping: Damping) -> Iterator[Finding]:
+    """One sentence for each reason that speaks against laws, with the laws."""
+    by_reason: dict[str, list[str]] = {}
+    for fit in damping.fits.values():
+        by_reason.setdefault(fit.rejection, []).append(f"{fit.law.words} ({_number(fit.reduced_chi2)})")
+    if "misfit" in by_reason:
+        yield Finding(
+            "law_rejected",
+            "info",
+            f"rejected by their reduced chi-square, where {damping.selected} leaves {damping.best.reduced_chi2:.2g}: "
+            + ", ".join(by_reason["misfit"]),
+        )
+    if "negative" in by_reason:
+        yield Finding(
+            "law_rejected",
+            "info",
+            "rejected because a coefficient is negative beyond three standard uncertainties (reduced chi-square in "
+            f"brackets): {', '.join(by_reason['negative'])}",
+        )
+    for fit in damping.fits.values():
+        if fit.rejection == "not converged":
+            yield Finding("law_rejected", "info", f"{fit.law.words}: no convergence after {fit.tried}")
+    for name, why in damping.unfitted.items():
+        yield Finding("law_rejected", "info", f"no fit of the law {name}: {why}")
 
 
 def _number(value: float) -> str:

@@ -21,6 +21,7 @@ from pipeline.track import F8
 __all__ = ["Params", "Relaxation", "find_relaxation", "spring_constant"]
 
 Kind = Literal["overdamped", "critical", "strong"]
+FEWEST = 20  # samples in which five parameters can be looked for
 POINTS = 300  # to which a record is averaged where models of its shape are compared
 
 
@@ -128,10 +129,10 @@ def find_relaxation(conditioned: Conditioned, params: Params | None = None) -> R
     params = params or Params()
     used = conditioned.used
     t, y = conditioned.track.t[used], conditioned.track.y[used]
-    if t.size < 20:
+    if t.size < FEWEST:
         return None
     noise = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0), 1e-4 * float(np.ptp(y)))
-    if not _moves(y, noise, params.evidence):
+    if not (noise > 0.0 and _moves(y, noise, params.evidence)):
         return None
     for first in _starts(y, noise):
         found = _follow(t[first:], y[first:], noise, conditioned, params)
