@@ -1,0 +1,411 @@
+"""Sideways: modes beside the main oscillation, which make its amplitude and phase beat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from pipeline.condition import MAD_TO_SIGMA, Conditioned
+from pipeline.demodulate import Demodulated
+from pipeline.estimate import Estimate
+from pipeline.lines import Band, Blocks, Peak, false_alarm, rough_contrast, spectral_density, strongest
+from pipeline.track import F8, UNUSABLE
+
+__all__ = ["Carrier", "Mode", "Params", "Sideways", "find_sideways", "without"]
+
+GRAVITY_M_PER_S2 = 9.81
+# Turns of (sideways mode, main oscillation) at which a range measured along a slant shows a product of both.
+PRODUCTS = ((2, 0), (1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2), (3, 0))
+HARMONICS = ((0, 2), (0, 3))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`find_sideways`.
+
+    Parameters
+    ----------
+    false_alarm : float
+        Probability that a record without any shows a mode or a harmonic, half for either.
+    most : int
+        Modes sought, harmonics and products not counted.
+    envelope : int
+        Highest degree of the polynomial that a mode's amplitude and phase may follow.
+    least_windows : int
+        Fewer windows show no mode apart from the main oscillation.
+    """
+
+    false_alarm: float = 0.01
+    most: int = 4
+    envelope: int = 4
+    least_windows: int = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carrier:
+    """The main oscillation as the windows show it, smooth, whatever law it follows.
+
+    Parameters
+    ----------
+    t : (k,) float64, s
+        Nodes: the windows' centres and the record's ends.
+    amplitude, turning, rest : (k,) float64, m, rad, m
+        At the nodes; ``turning`` is the phase beyond ``angular_frequency`` times t - t[0].
+    angular_frequency : float, rad/s
+    degree, rest_degree : int
+        Of the polynomials in time.
+    """
+
+    t: F8
+    amplitude: F8
+    turning: F8
+    rest: F8
+    angular_frequency: float
+    degree: int
+    rest_degree: int
+
+    @classmethod
+    def through(cls, demodulated: Demodulated, start: float, end: float) -> Carrier:
+        """Draw polynomials through the windows' amplitudes, phases and rest positions."""
+        t, omega = demodulated.t, demodulated.angular_frequency
+        degree, rest_degree = min(8, max(1, t.size // 6)), min(6, max(1, t.size // 10))
+        turning = demodulated.phase - omega * (t - start)
+        nodes = np.concatenate([[start], t, [end]])
+        columns = ((demodulated.amplitude, degree), (turning, degree), (demodulated.offset, rest_degree))
+        curves = [_smooth(t, y, order, nodes) for y, order in columns]
+        return cls(nodes, *curves, omega, degree, rest_degree)
+
+    def phase(self, t: F8) -> F8:
+        """Return the total phase at t (n,), rad."""
+        return np.asarray(self.angular_frequency * (t - self.t[0]) + np.interp(t, self.t, self.turning))
+
+    def position(self, t: F8) -> F8:
+        """Return rest position and oscillation at t (n,), m."""
+        swing = np.interp(t, self.t, self.amplitude) * np.cos(self.phase(t))
+        return np.asarray(swing + np.interp(t, self.t, self.rest))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mode:
+    """One oscillation beside the main one: :math:`\\mathrm{Re}\\,E(t) e^{i\\theta(t)}`.
+
+    Parameters
+    ----------
+    kind : {"mode", "harmonic", "product"}
+        Of its own frequency; a multiple of the main one's; or a sum or difference of turns of both.
+    turns : (int, int)
+        Of the first mode and of the main oscillation; (1, 0) is a mode by itself.
+    frequency : Estimate
+        Mean, Hz.
+    amplitude : Estimate
+        Root mean square of the envelope :math:`|E|` over the record, m.
+    decay : Estimate
+        Logarithmic rate of the envelope, 1/s.
+    false_alarm : float
+        Probability that a record without it shows it.
+    carrier : Carrier
+    base : Mode or None
+        The mode that a product is made of.
+    degree : int
+        Of the polynomial envelope.
+    coefficients : (2 (degree + 1),) float64, m
+        Of :meth:`columns`.
+    """
+
+    kind: Literal["mode", "harmonic", "product"]
+    turns: tuple[int, int]
+    frequency: Estimate
+    amplitude: Estimate
+    decay: Estimate
+    false_alarm: float
+    carrier: Carrier
+    base: Mode | None
+    degree: int
+    coefficients: F8
+
+    def columns(self, t: F8) -> F8:
+        """Return the basis (n, 2 (degree + 1)) at times t (n,): cosines, then sines, times the envelope's powers."""
+        a, b = self.turns
+        if self.kind == "mode":
+            angle = 2.0 * math.pi * self.frequency.value * (t - self.carrier.t[0])
+            shape = np.ones(t.size)
+        else:
+            angle, shape = b * self.carrier.phase(t), _relative(self.carrier, t) ** abs(b)
+            if self.base is not None:
+                envelope = self.base.envelope(t)
+                angle = angle + a * np.angle(envelope) + a * self.base.angle(t)
+                shape = shape * (np.abs(envelope) / self.base.amplitude.value) ** abs(a)
+        powers = np.polynomial.legendre.legvander(self._x(t), self.degree) * shape[:, None]
+        return np.concatenate([powers * np.cos(angle)[:, None], powers * np.sin(angle)[:, None]], axis=1)
+
+    def position(self, t: F8) -> F8:
+        """Return what the mode adds to the distance at t (n,), m."""
+        return np.asarray(self.columns(t) @ self.coefficients)
+
+    def angle(self, t: F8) -> F8:
+        """Return the phase of a mode of its own at t (n,) less its envelope's, rad."""
+        return np.asarray(2.0 * math.pi * self.frequency.value * (t - self.carrier.t[0]))
+
+    def envelope(self, t: F8) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
+        """Return the complex envelope E at t (n,), m."""
+        powers = np.polynomial.legendre.legvander(self._x(t), self.degree)
+        half = self.degree + 1
+        return np.asarray(powers @ (self.coefficients[:half] - 1j * self.coefficients[half:]))
+
+    def _x(self, t: F8) -> F8:
+        start, end = self.carrier.t[0], self.carrier.t[-1]
+        return np.clip(2.0 * (t - start) / (end - start) - 1.0, -1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sideways:
+    """Every mode found, the strongest of its own frequency first.
+
+    Parameters
+    ----------
+    modes : tuple of Mode
+    carrier : Carrier or None
+        None where the record is too short to look.
+    """
+
+    modes: tuple[Mode, ...]
+    carrier: Carrier | None
+
+    def __bool__(self) -> bool:
+        return bool(self.modes)
+
+    def columns(self, t: F8) -> F8:
+        """Return the basis (n, k) of all modes at times t (n,) for a fit that is linear in them."""
+        return np.concatenate([np.empty((t.size, 0)), *(mode.columns(t) for mode in self.modes)], axis=1)
+
+    def position(self, t: F8) -> F8:
+        """Return what all modes add to the distance at t (n,), m."""
+        total = np.zeros(t.size)
+        for mode in self.modes:
+            total += mode.position(t)
+        return total
+
+
+def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None) -> Sideways:
+    """Look for lines beside the main oscillation.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    demodulated : Demodulated
+        Its windows give the main oscillation, whatever law that follows, its flags the samples.
+    params : Params, optional
+
+    Returns
+    -------
+    Sideways
+
+    Notes
+    -----
+    The main oscillation is taken out as smooth curves through the windows' values, then, together with each line, by
+    least squares with slowly varying amplitude and phase, on block means of a twelfth of a period.
+    A mode nearer to the main frequency than a few reciprocals of the record's length beats too slowly to be told
+    from a change of the amplitude and is not sought.
+    """
+    params = params or Params()
+    used = (demodulated.flags & UNUSABLE) == 0
+    t = conditioned.track.t[used]
+    if demodulated.t.size < params.least_windows:
+        return Sideways((), None)
+    carrier = Carrier.through(demodulated, float(t[0]), float(t[-1]))
+    residual = conditioned.track.y[used] - carrier.position(t)
+    spread = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
+    if spread == 0.0:
+        return Sideways((), carrier)
+    believed = np.abs(residual) <= 8.0 * spread
+    turn = 2.0 * math.pi / carrier.angular_frequency
+    blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, conditioned.track.rate_hz)
+    band = _band(carrier, blocks)
+    contrast, usual = rough_contrast(blocks, band)
+    if contrast < usual:
+        return Sideways((), carrier)
+    return Sideways(tuple(_Search(carrier, blocks, band, params).run()), carrier)
+
+
+def without(conditioned: Conditioned, sideways: Sideways) -> Conditioned:
+    """Return the record with the modes taken out of its distances; flags and times stay."""
+    track = conditioned.track
+    return replace(conditioned, track=replace(track, y=track.y - sideways.position(track.t)))
+
+
+def _band(carrier: Carrier, blocks: Blocks) -> Band:
+    main, bin_hz = carrier.angular_frequency / (2.0 * math.pi), 1.0 / blocks.seconds
+    low = max((0.5 * carrier.rest_degree + 2.0) * bin_hz, 0.1 * main)
+    return Band(low, min(3.4 * main, 0.4 / blocks.step), ((main, (0.5 * carrier.degree + 2.0) * bin_hz),))
+
+
+class _Search:
+    """The model of the blocks as it grows, mode by mode."""
+
+    def __init__(self, carrier: Carrier, blocks: Blocks, band: Band, params: Params) -> None:
+        self.carrier, self.blocks, self.params = carrier, blocks, params
+        self.band = band
+        self.t = blocks.t + blocks.origin
+        self.columns = _main_columns(carrier, self.t) * blocks.weight[:, None]
+        self.settle()
+
+    def settle(self) -> None:
+        """Fit what the model holds now."""
+        self.basis = np.linalg.qr(self.columns)[0]
+        target = self.blocks.y * self.blocks.weight
+        left = target - self.basis @ (self.basis.T @ target)
+        self.residual = np.where(self.blocks.weight > 0, left / np.maximum(self.blocks.weight, 1e-300), 0.0)
+
+    def run(self) -> Iterator[Mode]:
+        """Yield harmonics, then modes, the products after the first of them."""
+        yield from self.locked(HARMONICS, None)
+        main, width = self.carrier.angular_frequency / (2.0 * math.pi), 2.0 / self.blocks.seconds
+        self.hole(*((turns[1] * main, width) for turns in HARMONICS))
+        first: Mode | None = None
+        for _ in range(self.params.most):
+            peak = strongest(self.blocks, self.residual, self.basis, self.band)
+            if peak is None or peak.false_alarm > 0.5 * self.params.false_alarm:
+                return
+            mode = self.free(peak)
+            self.add(mode)
+            self.hole((mode.frequency.value, width))
+            yield mode
+            if first is None:
+                first = mode
+                yield from self.locked(PRODUCTS, mode)
+
+    def hole(self, *holes: tuple[float, float]) -> None:
+        self.band = replace(self.band, holes=(*self.band.holes, *holes))
+
+    def add(self, mode: Mode) -> None:
+        self.columns = np.concatenate([self.columns, self.weighted(mode)], axis=1)
+        self.settle()
+
+    def weighted(self, mode: Mode) -> F8:
+        fade = self.blocks.attenuation(mode.frequency.value)
+        return mode.columns(self.t) * (fade * self.blocks.weight[:, None])
+
+    def fitted(self, columns: F8) -> tuple[F8, F8, float]:
+        """Coefficients of columns beyond the model, their cofactors, and half the fall of chi-square."""
+        beyond = columns - self.basis @ (self.basis.T @ columns)
+        q, r = np.linalg.qr(beyond)
+        inverse = np.linalg.pinv(r)
+        share = q.T @ (self.residual * self.blocks.weight)
+        return inverse @ share, inverse @ inverse.T, 0.5 * float(share @ share)
+
+    def locked(self, orders: tuple[tuple[int, int], ...], base: Mode | None) -> Iterator[Mode]:
+        """Test what turns with the main oscillation and a mode together: no frequency is free."""
+        main = self.carrier.angular_frequency / (2.0 * math.pi)
+        nothing = Estimate(0.0, 0.0, "1/s")
+        for turns in orders:
+            f = turns[1] * main + (turns[0] * base.frequency.value if base else 0.0)
+            if not 0.1 * main < abs(f) < 0.4 / self.blocks.step or any(
+                abs(abs(f) - centre) < half for centre, half in self.band.holes
+            ):
+                continue
+            trial = Mode(
+                "harmonic" if base is None else "product",
+                turns,
+                Estimate(abs(f), base.frequency.u * abs(turns[0]) if base else 0.0, "Hz"),
+                Estimate(0.0, 0.0, "m"),
+                nothing,
+                1.0,
+                self.carrier,
+                base,
+                0,
+                np.zeros(2),
+            )
+            columns = self.weighted(trial)
+            values, cofactors, gain = self.fitted(columns)
+            left = self.residual - np.where(
+                self.blocks.weight > 0, columns @ values / np.maximum(self.blocks.weight, 1e-300), 0.0
+            )
+            unit = spectral_density(self.blocks, left, abs(f), self.band) * self.blocks.samples
+            chance = false_alarm(gain / unit, len(orders))
+            if chance > 0.5 * self.params.false_alarm:
+                continue
+            shape = math.sqrt(float(np.mean(_squared_shape(trial, self.t))))
+            size, u = float(np.hypot(*values)) * shape, math.sqrt(max(float(np.mean(np.diag(cofactors))) * unit, 0.0))
+            amplitude = Estimate(size, u * shape, "m")
+            mode = replace(trial, amplitude=amplitude, false_alarm=chance, coefficients=values)
+            self.add(mode)
+            yield mode
+
+    def free(self, peak: Peak) -> Mode:
+        """Refine a peak's frequency and choose how far its envelope varies."""
+        unit = peak.density * self.blocks.samples
+        f, rate, u_rate = peak.frequency_hz, 0.0, math.inf
+        middle = 0.5 * self.blocks.seconds
+        tau = self.blocks.t - middle
+        for _ in range(4):
+            angle = 2.0 * math.pi * f * tau
+            pair = np.stack([np.cos(angle), np.sin(angle)], axis=1) * self.blocks.weight[:, None]
+            values, cofactors, _ = self.fitted(np.concatenate([pair, pair * tau[:, None]], axis=1))
+            z, slope = complex(values[0], -values[1]), complex(values[2], -values[3])
+            ratio = slope / z
+            rate, u_rate = -ratio.real, math.sqrt(max(cofactors[2, 2] * unit, 0.0)) / abs(z)
+            step = float(np.clip(ratio.imag / (2.0 * math.pi), -0.5 / self.blocks.seconds, 0.5 / self.blocks.seconds))
+            f += step
+            if abs(step) < 1e-3 / self.blocks.seconds:
+                break
+        trial = Mode(
+            "mode",
+            (1, 0),
+            Estimate(f, u_rate / (2.0 * math.pi), "Hz"),
+            Estimate(0.0, 0.0, "m"),
+            Estimate(rate, u_rate, "1/s"),
+            peak.false_alarm,
+            self.carrier,
+            None,
+            0,
+            np.zeros(2),
+        )
+        best: tuple[float, Mode] | None = None
+        for degree in range(self.params.envelope + 1):
+            trial = replace(trial, degree=degree)
+            values, cofactors, gain = self.fitted(self.weighted(trial))
+            criterion = -2.0 * gain / unit + 2.0 * (degree + 1) * math.log(self.blocks.t.size)
+            if best is None or criterion < best[0]:
+                chosen = replace(trial, coefficients=values)
+                size = math.sqrt(float(np.mean(np.abs(chosen.envelope(self.t)) ** 2)))
+                u = math.sqrt(max(cofactors[0, 0] * unit, 0.0))
+                best = (criterion, replace(chosen, amplitude=Estimate(size, u, "m")))
+        assert best is not None
+        return best[1]
+
+
+def _main_columns(carrier: Carrier, t: F8) -> F8:
+    """Rest position, cosine and sine of the main oscillation, each times powers of time."""
+    x = np.clip(2.0 * (t - carrier.t[0]) / (carrier.t[-1] - carrier.t[0]) - 1.0, -1.0, 1.0)
+    powers = np.polynomial.legendre.legvander(x, carrier.degree)
+    phase = carrier.phase(t)
+    return np.concatenate(
+        [powers[:, : carrier.rest_degree + 1], powers * np.cos(phase)[:, None], powers * np.sin(phase)[:, None]], axis=1
+    )
+
+
+def _relative(carrier: Carrier, t: F8) -> F8:
+    """Amplitude over its largest value at a node."""
+    return np.asarray(np.interp(t, carrier.t, carrier.amplitude) / float(np.max(carrier.amplitude)))
+
+
+def _squared_shape(mode: Mode, t: F8) -> F8:
+    half = mode.degree + 1
+    columns = mode.columns(t)
+    return np.asarray(columns[:, 0] ** 2 + columns[:, half] ** 2)
+
+
+def _smooth(t: F8, y: F8, degree: int, nodes: F8) -> F8:
+    """Polynomial through points, without those far off, at the nodes."""
+    centre, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[-1] - t[0])
+    design = np.polynomial.legendre.legvander((t - centre) / half, degree)
+    values = np.linalg.lstsq(design, y, rcond=None)[0]
+    away = np.abs(y - design @ values)
+    kept = away <= 5.0 * MAD_TO_SIGMA * float(np.median(away))
+    if np.count_nonzero(kept) > 2 * degree + 2 and not kept.all():
+        values = np.linalg.lstsq(design[kept], y[kept], rcond=None)[0]
+    return np.asarray(np.polynomial.legendre.legvander((nodes - centre) / half, degree) @ values)
