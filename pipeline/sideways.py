@@ -9,13 +9,14 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.carrier import Carrier
 from pipeline.condition import MAD_TO_SIGMA, Conditioned
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate
 from pipeline.lines import Band, Blocks, Peak, false_alarm, rough_contrast, spectral_density, strongest
 from pipeline.track import F8, UNUSABLE
 
-__all__ = ["Carrier", "Mode", "Params", "Sideways", "find_sideways", "without"]
+__all__ = ["Mode", "Params", "Sideways", "find_sideways", "without"]
 
 GRAVITY_M_PER_S2 = 9.81
 # Turns of (sideways mode, main oscillation) at which a range measured along a slant shows a product of both.
@@ -43,50 +44,6 @@ class Params:
     most: int = 4
     envelope: int = 4
     least_windows: int = 6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Carrier:
-    """The main oscillation as the windows show it, smooth, whatever law it follows.
-
-    Parameters
-    ----------
-    t : (k,) float64, s
-        Nodes: the windows' centres and the record's ends.
-    amplitude, turning, rest : (k,) float64, m, rad, m
-        At the nodes; ``turning`` is the phase beyond ``angular_frequency`` times t - t[0].
-    angular_frequency : float, rad/s
-    degree, rest_degree : int
-        Of the polynomials in time.
-    """
-
-    t: F8
-    amplitude: F8
-    turning: F8
-    rest: F8
-    angular_frequency: float
-    degree: int
-    rest_degree: int
-
-    @classmethod
-    def through(cls, demodulated: Demodulated, start: float, end: float) -> Carrier:
-        """Draw polynomials through the windows' amplitudes, phases and rest positions."""
-        t, omega = demodulated.t, demodulated.angular_frequency
-        degree, rest_degree = min(8, max(1, t.size // 6)), min(6, max(1, t.size // 10))
-        turning = demodulated.phase - omega * (t - start)
-        nodes = np.concatenate([[start], t, [end]])
-        columns = ((demodulated.amplitude, degree), (turning, degree), (demodulated.offset, rest_degree))
-        curves = [_smooth(t, y, order, nodes) for y, order in columns]
-        return cls(nodes, *curves, omega, degree, rest_degree)
-
-    def phase(self, t: F8) -> F8:
-        """Return the total phase at t (n,), rad."""
-        return np.asarray(self.angular_frequency * (t - self.t[0]) + np.interp(t, self.t, self.turning))
-
-    def position(self, t: F8) -> F8:
-        """Return rest position and oscillation at t (n,), m."""
-        swing = np.interp(t, self.t, self.amplitude) * np.cos(self.phase(t))
-        return np.asarray(swing + np.interp(t, self.t, self.rest))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,7 +91,7 @@ class Mode:
             angle = 2.0 * math.pi * self.frequency.value * (t - self.carrier.t[0])
             shape = np.ones(t.size)
         else:
-            angle, shape = b * self.carrier.phase(t), _relative(self.carrier, t) ** abs(b)
+            angle, shape = b * self.carrier.phase(t), self.carrier.relative(t) ** abs(b)
             if self.base is not None:
                 envelope = self.base.envelope(t)
                 angle = angle + a * np.angle(envelope) + a * self.base.angle(t)
@@ -388,24 +345,7 @@ def _main_columns(carrier: Carrier, t: F8) -> F8:
     )
 
 
-def _relative(carrier: Carrier, t: F8) -> F8:
-    """Amplitude over its largest value at a node."""
-    return np.asarray(np.interp(t, carrier.t, carrier.amplitude) / float(np.max(carrier.amplitude)))
-
-
 def _squared_shape(mode: Mode, t: F8) -> F8:
     half = mode.degree + 1
     columns = mode.columns(t)
     return np.asarray(columns[:, 0] ** 2 + columns[:, half] ** 2)
-
-
-def _smooth(t: F8, y: F8, degree: int, nodes: F8) -> F8:
-    """Polynomial through points, without those far off, at the nodes."""
-    centre, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[-1] - t[0])
-    design = np.polynomial.legendre.legvander((t - centre) / half, degree)
-    values = np.linalg.lstsq(design, y, rcond=None)[0]
-    away = np.abs(y - design @ values)
-    kept = away <= 5.0 * MAD_TO_SIGMA * float(np.median(away))
-    if np.count_nonzero(kept) > 2 * degree + 2 and not kept.all():
-        values = np.linalg.lstsq(design[kept], y[kept], rcond=None)[0]
-    return np.asarray(np.polynomial.legendre.legvander((nodes - centre) / half, degree) @ values)
