@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pipeline import beside as besides
 from pipeline import condition as conditioning
 from pipeline import cycles as cycling
 from pipeline import damping as dampings
@@ -15,6 +16,7 @@ from pipeline import derive as derivation
 from pipeline import fullfit as fullfits
 from pipeline import phase as phases
 from pipeline import relaxation as relaxations
+from pipeline.beside import Beside, set_apart
 from pipeline.condition import Conditioned, condition
 from pipeline.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.damping import Damping, fit_damping
@@ -45,7 +47,7 @@ class Params:
     ----------
     accuracy : {"fast", "standard", "best"}
         The tier; :func:`pipeline.accuracy.params_for` gives the options that belong to it.
-    condition, cycles, demodulate, damping, phase, derive, full, relaxation
+    condition, cycles, demodulate, beside, damping, phase, derive, full, relaxation
         Of the stages of those names.
     """
 
@@ -53,6 +55,7 @@ class Params:
     condition: conditioning.Params = field(default_factory=conditioning.Params)
     cycles: cycling.Params = field(default_factory=cycling.Params)
     demodulate: demodulation.Params = field(default_factory=demodulation.Params)
+    beside: besides.Params = field(default_factory=besides.Params)
     damping: dampings.Params = field(default_factory=dampings.Params)
     phase: phases.Params = field(default_factory=phases.Params)
     derive: derivation.Params = field(default_factory=derivation.Params)
@@ -71,6 +74,7 @@ class Motion:
     rest: Rest
     waveform: Waveform
     derived: Derived
+    beside: Beside
     full: FullFit | None = None
 
 
@@ -152,6 +156,9 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     demodulated = demodulate(conditioned, cycles, params.demodulate) if quick is None else quick.demodulated
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
         return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or why)
+    beside = Beside.nothing(conditioned)
+    if not fast:
+        demodulated, beside = set_apart(conditioned, cycles, demodulated, params.beside, params.demodulate)
     start = float(track.t[np.argmax(conditioned.used)])
     quickly = quick is not None and fast
     damping = fit_damping_quickly(demodulated, start, params.damping) if quickly else None
@@ -162,16 +169,20 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     if quick is None or not fast:
         phase = fit_phase(demodulated, damping, params.phase)
         rest = fit_rest(demodulated)
-        waveform = reconstruct(track, demodulated, phase, rest)
+        waveform = reconstruct(beside.conditioned.track, demodulated, phase, rest)
     else:
         phase = fit_phase_quickly(demodulated, damping) or fit_phase(demodulated, damping, params.phase)
         rest = fit_rest_quickly(demodulated) or fit_rest(demodulated)
         waveform = quick.waveform(track, damping, phase, rest)
     full = None
     if params.accuracy == "best":
-        full = fit_record(conditioned, demodulated, damping, phase, rest, waveform, params=params.full)
+        extra = beside.columns(track.t)
+        full = fit_record(
+            beside.conditioned, demodulated, damping, phase, rest, waveform, extra=extra, params=params.full
+        )
         demodulated = replace(demodulated, flags=full.flags)
         damping, phase, rest, waveform = full.damping, full.phase, full.rest, full.waveform
+    rest, waveform = beside.put_back(rest, waveform)
     effects = tabulate(
         scene,
         damping,
@@ -180,12 +191,13 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         noise_m=demodulated.noise_m,
         clock=track.clock,
         u_clock=params.derive.u_clock_nominal,
+        beside=beside,
     )
     derived = derive(demodulated, damping, phase, rest, scene, effects, clock=track.clock, params=params.derive)
-    findings = judge(conditioned, cycles, demodulated, damping, phase, rest, waveform)
+    findings = judge(conditioned, cycles, demodulated, damping, phase, rest, waveform, beside)
     if full is not None and not full.converged:
         findings = (*findings, _not_converged(full))
-    motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived, full)
+    motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived, beside, full)
     return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
 
 

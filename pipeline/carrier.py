@@ -43,9 +43,15 @@ class Carrier:
         degree, rest_degree = min(8, max(1, t.size // 6)), min(6, max(1, t.size // 10))
         turning = demodulated.phase - omega * (t - start)
         nodes = np.concatenate([[start], t, [end]])
-        columns = ((demodulated.amplitude, degree), (turning, degree), (demodulated.offset, rest_degree))
-        curves = [_smooth(t, y, order, nodes) for y, order in columns]
-        return cls(nodes, *curves, omega, degree, rest_degree)
+        return cls(
+            nodes,
+            _smooth(t, demodulated.amplitude, degree, nodes),
+            _smooth(t, turning, degree, nodes),
+            _smooth(t, demodulated.offset, rest_degree, nodes),
+            omega,
+            degree,
+            rest_degree,
+        )
 
     def phase(self, t: F8) -> F8:
         """Return the total phase at t (n,), rad."""

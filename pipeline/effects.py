@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pipeline.air import air_density, air_viscosity, speed_of_sound
+from pipeline.beside import Beside
 from pipeline.damping import Damping
 from pipeline.estimate import Estimate
 from pipeline.phase import PhaseFit
@@ -66,7 +67,15 @@ def added_mass_kg(scene: Scene, diameter_m: float | None = None) -> float:
 
 
 def tabulate(
-    scene: Scene, damping: Damping, phase: PhaseFit, rest: Rest, *, noise_m: float, clock: str, u_clock: float
+    scene: Scene,
+    damping: Damping,
+    phase: PhaseFit,
+    rest: Rest,
+    *,
+    noise_m: float,
+    clock: str,
+    u_clock: float,
+    beside: Beside | None = None,
 ) -> tuple[Effect, ...]:
     """Return the effects table.
 
@@ -80,6 +89,8 @@ def tabulate(
         "nominal", "device" or "host".
     u_clock : float
         Relative standard uncertainty of the clock's rate.
+    beside : Beside, optional
+        Modes beside the main oscillation; left out, they were not sought.
     """
     omega = phase.angular_frequency
     u_k = 2.0 * math.hypot(omega.u / omega.value, u_clock if clock == "nominal" else 0.0)
@@ -90,6 +101,7 @@ def tabulate(
         *_drags(scene, damping, omega.value),
         _backbone(phase, damping),
         _rest_drift(rest, noise_m),
+        *_modes(beside),
         _buoyancy(scene, omega.value),
         _speed_of_sound(scene),
         Effect(
@@ -185,12 +197,39 @@ def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
 
 
 def _rest_drift(rest: Rest, noise_m: float) -> Effect:
-    why = (
-        "the rest position moves more than its scatter allows and is followed by a smooth curve"
-        if rest.drifts
-        else f"a constant rest position describes the record (noise of one sample {noise_m * 1e3:.2g} mm)"
-    )
-    return Effect("rest_drift", None, rest.drift_m, "m", rest.drifts, why)
+    if not rest.moves:
+        why = f"a constant rest position describes the record (noise of one sample {noise_m * 1e3:.2g} mm)"
+        return Effect("rest_drift", None, rest.drift_m, "m", False, why)
+    parts = ["it is followed by a smooth curve"] if rest.drifts else []
+    if rest.steps:
+        parts.append(f"its steps, {len(rest.steps)} in number, are taken out")
+    why = f"the rest position moves more than its scatter allows; {' and '.join(parts)}"
+    return Effect("rest_drift", None, rest.range_m, "m", True, why)
+
+
+def _modes(beside: Beside | None) -> Iterator[Effect]:
+    """A mode of its own frequency, and what turns with the main oscillation or with both."""
+    found = () if beside is None else beside.sideways.modes
+    own = [mode for mode in found if mode.kind == "mode"]
+    locked = [mode for mode in found if mode.kind != "mode"]
+    names = (("sideways_mode", own, "mode of a frequency of its own"), ("harmonics", locked, "harmonic or product"))
+    for name, members, what in names:
+        if beside is None or beside.sideways.carrier is None:
+            yield Effect(name, None, None, "m", False, "not sought: too few periods, or not at this accuracy")
+        elif not members:
+            yield Effect(name, None, None, "m", False, f"no {what} stands out of what the main oscillation leaves")
+        else:
+            size = math.sqrt(sum(mode.amplitude.value**2 for mode in members))
+            verdict = "more" if beside.modelled else "less"
+            why = (
+                f"{_count(len(members), what)}, together of this amplitude; the strongest line found would leave up to "
+                f"{beside.leak_m * 1e3:.2g} mm in the main amplitude, {verdict} than a tenth of its uncertainty"
+            )
+            yield Effect(name, None, size, "m", beside.modelled, why)
+
+
+def _count(number: int, what: str) -> str:
+    return f"one {what}" if number == 1 else f"{number} times a {what}"
 
 
 def _buoyancy(scene: Scene, omega: float) -> Effect:

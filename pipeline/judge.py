@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from pipeline.beside import Beside
 from pipeline.condition import Conditioned
 from pipeline.cycles import Cycles, NoOscillation
 from pipeline.damping import Damping
 from pipeline.demodulate import Demodulated
+from pipeline.echoes import Clusters, find_clusters
 from pipeline.phase import PhaseFit
 from pipeline.relaxation import Relaxation
 from pipeline.rest import Rest
@@ -19,6 +22,8 @@ from pipeline.track import U8, UNUSABLE, Quality
 from pipeline.waveform import Waveform
 
 __all__ = ["Finding", "Severity", "count_quality", "judge", "judge_samples", "judge_still"]
+
+GRAVITY_M_PER_S2 = 9.81
 
 Severity = Literal["info", "warning", "error"]
 
@@ -57,7 +62,9 @@ def count_quality(flags: U8) -> dict[str, int]:
     return {**counts, "used": int(np.count_nonzero((flags & UNUSABLE) == 0))}
 
 
-def judge_samples(conditioned: Conditioned, flags: U8, noise_m: float) -> tuple[Finding, ...]:
+def judge_samples(
+    conditioned: Conditioned, flags: U8, noise_m: float, clusters: Clusters | None = None
+) -> tuple[Finding, ...]:
     """Return what the samples alone say, whether they oscillate or not.
 
     Parameters
@@ -67,8 +74,10 @@ def judge_samples(conditioned: Conditioned, flags: U8, noise_m: float) -> tuple[
         Final ones.
     noise_m : float
         Standard deviation of one sample, m.
+    clusters : Clusters, optional
+        Of false echoes, where the record oscillates.
     """
-    return tuple(_sample_findings(conditioned, flags, noise_m))
+    return tuple(_sample_findings(conditioned, flags, noise_m, clusters))
 
 
 def judge_still(why: NoOscillation) -> Finding:
@@ -99,24 +108,29 @@ def judge(
     phase: PhaseFit,
     rest: Rest,
     waveform: Waveform,
+    beside: Beside | None = None,
 ) -> tuple[Finding, ...]:
     """Return every finding on a run that oscillates, the gravest first.
 
     Parameters
     ----------
-    conditioned, cycles, demodulated, damping, phase, rest, waveform
+    conditioned, cycles, demodulated, damping, phase, rest, waveform, beside
         Outputs of the stages of those names.
     """
+    clusters = find_clusters(demodulated, phase.total(conditioned.track.t))
     findings = [
         *_damping_findings(damping),
         *_motion_findings(cycles, demodulated, phase, rest, waveform),
-        *judge_samples(conditioned, demodulated.flags, demodulated.noise_m),
+        *_mode_findings(demodulated, phase, beside),
+        *judge_samples(conditioned, demodulated.flags, demodulated.noise_m, clusters),
     ]
     rank = {"error": 0, "warning": 1, "info": 2}
     return tuple(sorted(findings, key=lambda finding: rank[finding.severity]))
 
 
-def _sample_findings(conditioned: Conditioned, flags: U8, noise_m: float) -> Iterator[Finding]:
+def _sample_findings(
+    conditioned: Conditioned, flags: U8, noise_m: float, clusters: Clusters | None
+) -> Iterator[Finding]:
     track, plateaus_m, quantum_m = conditioned.track, conditioned.plateaus_m, conditioned.quantum_m
     counts, n = count_quality(flags), len(track)
     if counts["clipped"]:
@@ -132,7 +146,8 @@ def _sample_findings(conditioned: Conditioned, flags: U8, noise_m: float) -> Ite
         yield Finding(
             "false_echoes",
             "warning" if share > 0.1 else "info",
-            f"{counts['false_echo']} of {n} samples ({share:.1%}) are false echoes and were left out of the fit",
+            f"{counts['false_echo']} of {n} samples ({share:.1%}) are false echoes and were left out of the fit"
+            + _words_on(clusters),
         )
     if counts["missing"]:
         yield Finding("missing_samples", "info", f"{counts['missing']} of {n} samples carry no distance")
@@ -233,10 +248,8 @@ def _motion_findings(
             f"{start * 1e3:.0f} mm than at rest; the period given is the record's mean, "
             "its uncertainty covers the bend",
         )
-    if rest.drifts:
-        yield Finding(
-            "rest_drift", "warning", f"the rest position drifts by {rest.drift_m * 1e3:.2g} mm during the record"
-        )
+    if rest.moves:
+        yield Finding("rest_drift", "warning", _words_on_rest(rest))
     ratio = waveform.rms_m / demodulated.noise_m if demodulated.noise_m > 0 else 1.0
     excess = phase.damping.scatter.excess
     if ratio > 1.5:
@@ -247,3 +260,41 @@ def _motion_findings(
             f"the smooth model leaves {waveform.rms_m * 1e3:.2g} mm where samples scatter by "
             f"{demodulated.noise_m * 1e3:.2g} mm within a period{extra}; uncertainties were widened by what is left",
         )
+
+
+def _mode_findings(demodulated: Demodulated, phase: PhaseFit, beside: Beside | None) -> Iterator[Finding]:
+    own = [] if beside is None else [mode for mode in beside.sideways.modes if mode.kind == "mode"]
+    if beside is None or not own:
+        return
+    main = phase.angular_frequency.value / (2.0 * math.pi)
+    mode = own[0]
+    f, share = mode.frequency.value, mode.amplitude.value / float(np.median(demodulated.amplitude))
+    pendulum = (
+        f"; a pendulum {GRAVITY_M_PER_S2 / (2.0 * math.pi * f) ** 2:.2g} m long swings like that" if f < main else ""
+    )
+    others = f", and {len(own) - 1} more" if len(own) > 1 else ""
+    fate = "they were" if others else "it was"
+    yield Finding(
+        "sideways_mode",
+        "warning" if share > 0.01 else "info",
+        f"a second mode of {mode.amplitude.value * 1e3:.2g} mm at {f:.4g} Hz beats with the oscillation every "
+        f"{1.0 / abs(f - main):.2g} s{pendulum}{others}; "
+        + (f"{fate} fitted along" if beside.modelled else f"{fate} left in, too small to disturb the amplitude"),
+    )
+
+
+def _words_on_rest(rest: Rest) -> str:
+    drift = f"drifts by {rest.drift_m * 1e3:.2g} mm during the record" if rest.drifts else ""
+    shown = [f"{step.height.value * 1e3:+.2g} mm at {step.time.value:.4g} s" for step in rest.steps[:5]]
+    more = f" and {len(rest.steps) - 5} more" if len(rest.steps) > 5 else ""
+    jumps = f"jumps {len(rest.steps)} time{'s' * (len(rest.steps) > 1)}: {', '.join(shown)}{more}" if shown else ""
+    return f"the rest position {' and '.join(part for part in (drift, jumps) if part)}"
+
+
+def _words_on(clusters: Clusters | None) -> str:
+    if clusters is None or not clusters.count:
+        return ""
+    return (
+        f"; {clusters.samples} of them come in {clusters.count} clusters, {clusters.turning} of these at turning "
+        f"points; left in, all of them would change the amplitude by {clusters.shift_m * 1e3:+.2g} mm"
+    )

@@ -1,4 +1,4 @@
-"""Lines: single frequencies in what a smooth model of an oscillation leaves over, found at a stated false-alarm rate."""
+"""Lines: single frequencies in what a smooth model of an oscillation leaves, found at a stated false-alarm rate."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.track import F8
 
@@ -50,7 +51,7 @@ class Blocks:
         step = samples / rate_hz
         origin = float(t[0]) - 0.5 / rate_hz
         index = np.floor((t - origin) / step).astype(np.int64)
-        size = int(index[-1]) + 1
+        size = int(index.max()) + 1
         count = np.bincount(index, minlength=size).astype(np.float64)
         middle = (np.arange(size) + 0.5) * step
         safe = np.maximum(count, 1.0)
@@ -84,7 +85,7 @@ class Band:
     high_hz: float
     holes: tuple[tuple[float, float], ...]
 
-    def inside(self, frequency_hz: F8) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    def inside(self, frequency_hz: F8) -> NDArray[np.bool_]:
         """Return which frequencies (k,) belong to the band."""
         mask = (frequency_hz >= self.low_hz) & (frequency_hz <= self.high_hz)
         for centre, half in self.holes:
@@ -120,7 +121,8 @@ def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
     size = 1 << (OVERSAMPLING * y.size - 1).bit_length()
     tapered = taper * there
     power = np.abs(np.fft.rfft(tapered * there * y, size)) ** 2 / float(tapered @ tapered)
-    return np.fft.rfftfreq(size, blocks.step), power
+    frequency = np.asarray(np.fft.rfftfreq(size, blocks.step), np.float64)
+    return frequency, np.asarray(power, np.float64)
 
 
 def rough_contrast(blocks: Blocks, band: Band) -> tuple[float, float]:
@@ -153,9 +155,9 @@ def strongest(blocks: Blocks, residual: F8, basis: F8, band: Band) -> Peak | Non
     Notes
     -----
     Candidates come from the spectrum over that of a first-order autoregression. The line's evidence is half the
-    fall of chi-square that its cosine and sine bring beyond the model, over the noise's density at its frequency, the larger of
-    an autoregression's and of what the neighbouring frequencies hold, both with the line taken out.
-    A line of noise is then exponentially distributed but for the density's own error, which the heavier tail of
+    fall of chi-square that its cosine and sine bring beyond the model, over the noise's density at its frequency: the
+    larger of an autoregression's and of what the neighbouring frequencies hold, both with the line taken out. A line of
+    noise is then exponentially distributed but for the density's own error, which the heavier tail of
     :math:`(1 + z/\\nu)^{-\\nu}` stands for [1]_.
 
     References

@@ -1,15 +1,16 @@
-"""Rest position against time: constant unless the record shows otherwise."""
+"""Rest position against time: constant unless the record shows that it drifts, jumps, or both."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate
 from pipeline.regression import correlation_length, scatter, solve_weighted
+from pipeline.steps import Step, staircase
 from pipeline.track import F8
 
 __all__ = ["Rest", "fit_rest"]
@@ -28,7 +29,9 @@ class Rest:
     drifts : bool
         Whether the curve is far better than a constant.
     t, curve : (w,) float64, s, m
-        The curve at the windows' centres.
+        The curve at the windows' centres, steps left out.
+    steps : tuple of Step
+        What the rest position jumps by, in order of time.
     """
 
     mean: Estimate
@@ -36,12 +39,46 @@ class Rest:
     drifts: bool
     t: F8
     curve: F8
+    steps: tuple[Step, ...] = ()
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is anything but constant."""
+        return self.drifts or bool(self.steps)
+
+    @property
+    def range_m(self) -> float:
+        """Peak to peak of drift and steps together, m."""
+        curve = self.curve if self.drifts else np.zeros(self.t.size)
+        return float(np.ptp(curve + staircase(self.steps, self.t)))
 
     def at(self, t: F8) -> F8:
         """Return the rest position at times t (n,), m."""
-        if not self.drifts:
+        if not self.moves:
             return np.full(t.size, self.mean.value)
-        return np.asarray(np.interp(t, self.t, self.curve))
+        level = np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self._before())
+        return np.asarray(level + staircase(self.steps, t))
+
+    def stepping(self, steps: tuple[Step, ...]) -> Rest:
+        """Return the same with steps that had been taken out of the record before.
+
+        The mean becomes that of the whole record; the uncertainty of each step's height enters by the share of the
+        record that follows it.
+        """
+        if not steps:
+            return self
+        after = np.array([float(np.mean(self.t >= step.time.value)) for step in steps])
+        heights = np.array([(step.height.value, step.height.u) for step in steps])
+        mean = Estimate(
+            self.mean.value + float(after @ heights[:, 0]),
+            math.hypot(self.mean.u, *(after * (1.0 - after) * heights[:, 1])),
+            self.mean.unit,
+        )
+        return replace(self, mean=mean, steps=steps)
+
+    def _before(self) -> float:
+        """Rest position before the first step."""
+        return self.mean.value - float(np.mean(staircase(self.steps, self.t)))
 
 
 def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.0) -> Rest:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -14,11 +13,11 @@ from pipeline.condition import MAD_TO_SIGMA, Conditioned
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate
 from pipeline.lines import Band, Blocks, Peak, false_alarm, rough_contrast, spectral_density, strongest
+from pipeline.modes import Mode, Sideways
 from pipeline.track import F8, UNUSABLE
 
-__all__ = ["Mode", "Params", "Sideways", "find_sideways", "without"]
+__all__ = ["Params", "find_sideways", "without"]
 
-GRAVITY_M_PER_S2 = 9.81
 # Turns of (sideways mode, main oscillation) at which a range measured along a slant shows a product of both.
 PRODUCTS = ((2, 0), (1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2), (3, 0))
 HARMONICS = ((0, 2), (0, 3))
@@ -38,113 +37,15 @@ class Params:
         Highest degree of the polynomial that a mode's amplitude and phase may follow.
     least_windows : int
         Fewer windows show no mode apart from the main oscillation.
+    most_periods : int
+        Longer records are not searched: the model of the blocks would outgrow the memory.
     """
 
     false_alarm: float = 0.01
     most: int = 4
     envelope: int = 4
     least_windows: int = 6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Mode:
-    """One oscillation beside the main one: :math:`\\mathrm{Re}\\,E(t) e^{i\\theta(t)}`.
-
-    Parameters
-    ----------
-    kind : {"mode", "harmonic", "product"}
-        Of its own frequency; a multiple of the main one's; or a sum or difference of turns of both.
-    turns : (int, int)
-        Of the first mode and of the main oscillation; (1, 0) is a mode by itself.
-    frequency : Estimate
-        Mean, Hz.
-    amplitude : Estimate
-        Root mean square of the envelope :math:`|E|` over the record, m.
-    decay : Estimate
-        Logarithmic rate of the envelope, 1/s.
-    false_alarm : float
-        Probability that a record without it shows it.
-    carrier : Carrier
-    base : Mode or None
-        The mode that a product is made of.
-    degree : int
-        Of the polynomial envelope.
-    coefficients : (2 (degree + 1),) float64, m
-        Of :meth:`columns`.
-    """
-
-    kind: Literal["mode", "harmonic", "product"]
-    turns: tuple[int, int]
-    frequency: Estimate
-    amplitude: Estimate
-    decay: Estimate
-    false_alarm: float
-    carrier: Carrier
-    base: Mode | None
-    degree: int
-    coefficients: F8
-
-    def columns(self, t: F8) -> F8:
-        """Return the basis (n, 2 (degree + 1)) at times t (n,): cosines, then sines, times the envelope's powers."""
-        a, b = self.turns
-        if self.kind == "mode":
-            angle = 2.0 * math.pi * self.frequency.value * (t - self.carrier.t[0])
-            shape = np.ones(t.size)
-        else:
-            angle, shape = b * self.carrier.phase(t), self.carrier.relative(t) ** abs(b)
-            if self.base is not None:
-                envelope = self.base.envelope(t)
-                angle = angle + a * np.angle(envelope) + a * self.base.angle(t)
-                shape = shape * (np.abs(envelope) / self.base.amplitude.value) ** abs(a)
-        powers = np.polynomial.legendre.legvander(self._x(t), self.degree) * shape[:, None]
-        return np.concatenate([powers * np.cos(angle)[:, None], powers * np.sin(angle)[:, None]], axis=1)
-
-    def position(self, t: F8) -> F8:
-        """Return what the mode adds to the distance at t (n,), m."""
-        return np.asarray(self.columns(t) @ self.coefficients)
-
-    def angle(self, t: F8) -> F8:
-        """Return the phase of a mode of its own at t (n,) less its envelope's, rad."""
-        return np.asarray(2.0 * math.pi * self.frequency.value * (t - self.carrier.t[0]))
-
-    def envelope(self, t: F8) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
-        """Return the complex envelope E at t (n,), m."""
-        powers = np.polynomial.legendre.legvander(self._x(t), self.degree)
-        half = self.degree + 1
-        return np.asarray(powers @ (self.coefficients[:half] - 1j * self.coefficients[half:]))
-
-    def _x(self, t: F8) -> F8:
-        start, end = self.carrier.t[0], self.carrier.t[-1]
-        return np.clip(2.0 * (t - start) / (end - start) - 1.0, -1.0, 1.0)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sideways:
-    """Every mode found, the strongest of its own frequency first.
-
-    Parameters
-    ----------
-    modes : tuple of Mode
-    carrier : Carrier or None
-        None where the record is too short to look.
-    """
-
-    modes: tuple[Mode, ...]
-    carrier: Carrier | None
-
-    def __bool__(self) -> bool:
-        return bool(self.modes)
-
-    def columns(self, t: F8) -> F8:
-        """Return the basis (n, k) of all modes at times t (n,) for a fit that is linear in them."""
-        return np.concatenate([np.empty((t.size, 0)), *(mode.columns(t) for mode in self.modes)], axis=1)
-
-    def position(self, t: F8) -> F8:
-        """Return what all modes add to the distance at t (n,), m."""
-        total = np.zeros(t.size)
-        for mode in self.modes:
-            total += mode.position(t)
-        return total
+    most_periods: int = 4096
 
 
 def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None) -> Sideways:
@@ -173,13 +74,15 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
     t = conditioned.track.t[used]
     if demodulated.t.size < params.least_windows:
         return Sideways((), None)
+    turn = 2.0 * math.pi / demodulated.angular_frequency
+    if float(t[-1] - t[0]) > params.most_periods * turn:
+        return Sideways((), None)
     carrier = Carrier.through(demodulated, float(t[0]), float(t[-1]))
     residual = conditioned.track.y[used] - carrier.position(t)
     spread = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
     if spread == 0.0:
         return Sideways((), carrier)
     believed = np.abs(residual) <= 8.0 * spread
-    turn = 2.0 * math.pi / carrier.angular_frequency
     blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, conditioned.track.rate_hz)
     band = _band(carrier, blocks)
     contrast, usual = rough_contrast(blocks, band)

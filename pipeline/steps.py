@@ -61,9 +61,7 @@ class Step:
     false_alarm: float
 
 
-def find_steps(
-    conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None
-) -> tuple[Step, ...]:
+def find_steps(conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None) -> tuple[Step, ...]:
     """Find the jumps of the rest position, in order of time.
 
     Parameters
@@ -83,7 +81,8 @@ def find_steps(
     Polynomials of several degrees compete, each with the steps that it needs besides: a step is added where it lowers
     chi-square most, as long as that fall, over the residuals' correlation length, is more than noise would show
     anywhere (Bonferroni's bound on all windows); the BIC chooses among them, a step counting two parameters. So a
-    smooth drift is no staircase. What the samples show as a glide over a period or more is no step either. The uncertainty of a place is that of a maximum of a random walk's likelihood [1]_.
+    smooth drift is no staircase. What the samples show as a glide over a period or more is no step either. The
+    uncertainty of a place is that of a maximum of a random walk's likelihood [1]_.
 
     References
     ----------
@@ -263,7 +262,8 @@ def _place(t: F8, still: F8, rest: _Windows, index: int, coarse: dict[int, float
         return None
     noise = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(y)))) / math.sqrt(2.0)
     # Heavy tails would draw the place towards themselves.
-    middle, reach = float(np.median(y)), 4.0 * noise + 0.5 * abs(float(np.median(y[: cuts[0]]) - np.median(y[cuts[-1] :])))
+    middle, apart_m = float(np.median(y)), float(np.median(y[: cuts[0]]) - np.median(y[cuts[-1] :]))
+    reach = 4.0 * noise + 0.5 * abs(apart_m)
     y = np.clip(y, middle - reach, middle + reach)
     gain = _gains(np.cumsum(y - y.mean()), cuts)
     cut = int(cuts[int(np.argmax(gain))])

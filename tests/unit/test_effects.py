@@ -27,6 +27,8 @@ NAMES = (
     "friction",
     "amplitude_dependent_frequency",
     "rest_drift",
+    "sideways_mode",
+    "harmonics",
     "buoyancy",
     "speed_of_sound",
     "clock_rate",

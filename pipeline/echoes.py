@@ -1,0 +1,66 @@
+"""Echoes: clusters of false echoes, where in the motion they lie, and what they would have done to the amplitude."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.demodulate import Demodulated
+from pipeline.track import F8, UNUSABLE, Quality
+
+__all__ = ["Clusters", "find_clusters"]
+
+LEAST = 3  # false echoes that make a cluster
+BRIDGED = 2  # good samples between two false echoes of one cluster, at most
+TURNING = math.pi / 4.0  # phase from a turning point within which half the period's time, but a fourth of its way, lies
+
+
+@dataclass(frozen=True, slots=True)
+class Clusters:
+    """False echoes that come together.
+
+    Parameters
+    ----------
+    count : int
+    samples : int
+        False echoes in them.
+    turning : int
+        Clusters whose middle lies within an eighth of a period of a turning point; by chance it is half of them.
+    shift_m : float
+        By how much the mean amplitude would come out larger, were all false echoes left in, m.
+    """
+
+    count: int
+    samples: int
+    turning: int
+    shift_m: float
+
+
+def find_clusters(demodulated: Demodulated, angle: F8) -> Clusters:
+    """Count clusters of false echoes.
+
+    Parameters
+    ----------
+    demodulated : Demodulated
+        For its flags, and for how far off flagged samples lie.
+    angle : (n,) float64
+        Phase of the oscillation at every sample, rad.
+
+    Notes
+    -----
+    The shift is what least squares would make of the false echoes' residuals r, in first order:
+    :math:`2\\sum r_i\\cos\\varphi_i/N`, the sum over false echoes and N all samples fitted.
+    """
+    echo = (demodulated.flags & np.uint8(Quality.FALSE_ECHO)) != 0
+    rows = np.flatnonzero(echo)
+    if not rows.size:
+        return Clusters(0, 0, 0, 0.0)
+    groups = np.split(rows, np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1)
+    clusters = [group for group in groups if group.size >= LEAST]
+    away = np.array([abs(math.remainder(float(angle[group[group.size // 2]]), math.pi)) for group in clusters])
+    fitted = np.count_nonzero((demodulated.flags & UNUSABLE) == 0) + rows.size
+    residual = np.nan_to_num(demodulated.residual[rows])
+    shift = 2.0 * float(residual @ np.cos(angle[rows])) / fitted
+    return Clusters(len(clusters), sum(group.size for group in clusters), int(np.count_nonzero(away <= TURNING)), shift)
