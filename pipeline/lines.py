@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.track import F8
 
-__all__ = ["Band", "Blocks", "Peak", "false_alarm", "rough_contrast", "spectral_density", "strongest"]
+__all__ = ["Band", "Blocks", "Peak", "false_alarm", "rough_contrast", "smooth_density", "spectral_density", "strongest"]
 
 AR_ORDER = 4  # highest order of the autoregression that describes the residual's correlation
 OVERSAMPLING = 4  # of the spectrum; the dearest loss between two of its points is 5 % of a line's power
@@ -221,13 +221,21 @@ def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band) -> 
     band : Band
         Neighbours outside it say nothing.
     """
-    coefficients, variance = _autoregression(y, AR_ORDER)
-    smooth = float(_density(coefficients, variance, np.array([frequency_hz * blocks.step]))[0])
+    smooth = smooth_density(y, frequency_hz * blocks.step)
     frequency, power = spectrum(blocks, y)
     away = np.abs(frequency - frequency_hz) * blocks.seconds
     near = (away >= NEAR) & (away <= FAR) & band.inside(frequency)
     local = float(np.mean(power[near])) if np.count_nonzero(near) >= 4 * OVERSAMPLING else 0.0
     return max(smooth, local, 1e-300)
+
+
+def smooth_density(y: F8, turns: float) -> float:
+    """Return the spectral density of an autoregression fitted to y (n,), at a frequency in turns per step.
+
+    Its mean over all frequencies is the variance, so that white noise has its variance everywhere.
+    """
+    coefficients, variance = _autoregression(y, AR_ORDER)
+    return float(_density(coefficients, variance, np.array([turns]))[0])
 
 
 def _autoregression(y: F8, highest: int) -> tuple[F8, float]:

@@ -1,0 +1,293 @@
+"""Smoother: position, velocity and acceleration of a noisy oscillator at every sample, without differences."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.beside import Beside
+from pipeline.chain import Chain, Solved
+from pipeline.demodulate import Demodulated
+from pipeline.errors import AnalysisError
+from pipeline.lines import Blocks, smooth_density
+from pipeline.phase import PhaseFit
+from pipeline.rest import Rest
+from pipeline.track import F8, UNUSABLE, Track
+
+__all__ = ["Params", "Smoothed", "smooth"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`smooth`.
+
+    Parameters
+    ----------
+    nodes_per_period : int
+        Of the walk; between them it is interpolated.
+    most_nodes : int
+        Longer records have nodes further apart.
+    memories : int
+        Trial values of the memory, from one period to thirty times the record, for the likelihood.
+    """
+
+    nodes_per_period: int = 4
+    most_nodes: int = 100_000
+    memories: int = 13
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Smoothed:
+    """The bob's motion along the line of sight.
+
+    Parameters
+    ----------
+    t : (n,) float64, s
+        The track's times.
+    position, u_position : (n,) float64, m
+        From the sensor, sideways modes left out.
+    velocity, u_velocity : (n,) float64, m/s
+        Of the oscillation about the rest position.
+    acceleration, u_acceleration : (n,) float64, m/s^2
+    noise_m : float
+        Standard deviation of one sample about the smoothed motion, m.
+    memory_s : float
+        How long a stretch, before and after, speaks on a sample at the largest amplitude, s.
+    """
+
+    t: F8
+    position: F8
+    u_position: F8
+    velocity: F8
+    u_velocity: F8
+    acceleration: F8
+    u_acceleration: F8
+    noise_m: float
+    memory_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Carried:
+    """The fitted oscillation at some times: what the walk is a factor of."""
+
+    gain: F8  # amplitude over the largest
+    cosine: F8
+    sine: F8
+    rate: F8  # angular frequency, rad/s
+    decay: F8  # logarithmic, 1/s
+
+    @classmethod
+    def at(cls, t: F8, phase: PhaseFit, last: float) -> _Carried:
+        law = phase.damping.best
+        amplitude = law.amplitude(np.clip(t, phase.t0, last) - phase.t0)
+        largest = float(np.max(law.amplitude(np.array([0.0, last - phase.t0]))))
+        if not largest > 0.0:
+            raise AnalysisError("the damping law leaves no amplitude to smooth: record while the bob swings")
+        # A law may end at zero; the walk carries on from a thousandth.
+        amplitude = np.maximum(amplitude, 1e-3 * largest)
+        decay = law.law.rate(amplitude, law.joint.values) / amplitude
+        angle = phase.total(t)
+        return cls(amplitude / largest, np.cos(angle), np.sin(angle), phase.rate(t), decay)
+
+    def rows(self) -> tuple[F8, F8, F8]:
+        """Position, velocity and acceleration of a walk of 1 in either dimension, (2, n) each."""
+        position = self.gain * np.array([self.cosine, -self.sine])
+        quadrature = self.gain * np.array([self.sine, self.cosine])
+        velocity = -self.decay * position - self.rate * quadrature
+        acceleration = (self.decay**2 - self.rate**2) * position + 2.0 * self.decay * self.rate * quadrature
+        return position, velocity, acceleration
+
+
+def smooth(
+    track: Track,
+    demodulated: Demodulated,
+    phase: PhaseFit,
+    rest: Rest,
+    beside: Beside | None = None,
+    params: Params | None = None,
+) -> Smoothed:
+    """Estimate the motion at every sample from all samples, each weighted by what it can know.
+
+    Parameters
+    ----------
+    track : Track
+        As it came. Flagged samples are predicted, not used; times may be irregular.
+    demodulated : Demodulated
+        For its flags.
+    phase : PhaseFit
+        Carries the damping law.
+    rest : Rest
+    beside : Beside, optional
+        Modes that were taken out.
+    params : Params, optional
+
+    Returns
+    -------
+    Smoothed
+        NaN at samples without a finite time.
+
+    Raises
+    ------
+    AnalysisError
+        If fewer than eight samples are usable, or the law leaves no amplitude.
+
+    Notes
+    -----
+    The oscillator :math:`\\ddot x + 2\\lambda\\dot x + (\\omega^2 + \\lambda^2) x = f` is driven by white noise f, with
+    :math:`\\omega(t)` and :math:`\\lambda(t)` of the fitted phase and law. In the frame that turns and decays with it,
+    :math:`x = g(t)\\,\\mathrm{Re}(z e^{i\\varphi(t)})`, its state z is a random walk in two dimensions, over half a
+    period the same in both. Kalman filter and Rauch-Tung-Striebel smoother of that walk are solved in one go
+    (:class:`pipeline.chain.Chain`); then :math:`\\dot x = g\\,\\mathrm{Re}((i\\omega - \\lambda) z e^{i\\varphi})`, and
+    :math:`\\ddot x` has the factor squared. Nothing is differenced: noise at frequencies that an oscillator cannot
+    follow never enters.
+
+    The noise of the samples and the strength of the force, hence the memory, are those of the largest likelihood. A
+    record that follows its law to the end has the memory of all its samples: then this is the global fit. What
+    frequency and law are uncertain by is a polynomial in time added to z, one power for each of their parameters, whose
+    coefficients are estimated along; so the ends, with one side missing, carry their larger uncertainty.
+    Where residuals are correlated uncertainties are widened by their spectral density at the oscillation's frequency.
+    Clock and speed of sound, which scale everything alike, are not in these uncertainties.
+    """
+    params = params or Params()
+    known = np.isfinite(track.t)
+    used = known & np.isfinite(track.y) & ((demodulated.flags & UNUSABLE) == 0)
+    if np.count_nonzero(used) < 8:
+        raise AnalysisError(f"a smoother needs eight usable samples at least, got {np.count_nonzero(used)}")
+    t = track.t[used]
+    swing = track.y[used] - rest.at(t)
+    if beside is not None and beside.modelled:
+        swing = swing - beside.sideways.position(t)
+    walk = _Walk.of(t, swing, _Carried.at(t, phase, float(t[-1])), phase.angular_frequency.value, params)
+    memory_s = walk.likeliest(track.rate_hz, params)
+    powers = max(len(phase.damping.best.law.parameters), phase.coefficients.size) - 1
+    mean, covariance, noise_m = walk.smooth(memory_s, track.rate_hz, max(powers, 1))
+    at = np.where(known, track.t, t[0])
+    carried = _Carried.at(at, phase, float(t[-1]))
+    rows = carried.rows()
+    z = np.array([np.interp(at, walk.t, each) for each in mean])
+    spread = {(i, j): np.interp(at, walk.t, covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1))}
+    widening = _widening(track, t, swing, walk, mean, noise_m, phase.angular_frequency.value)
+    values, uncertainties = [], []
+    for row in rows:
+        variance = row[0] ** 2 * spread[0, 0] + 2.0 * row[0] * row[1] * spread[0, 1] + row[1] ** 2 * spread[1, 1]
+        values.append(np.where(known, row[0] * z[0] + row[1] * z[1], np.nan))
+        uncertainties.append(np.where(known, noise_m * widening * np.sqrt(variance), np.nan))
+    values[0] = values[0] + np.where(known, rest.at(at), np.nan)
+    uncertainties[0] = np.hypot(uncertainties[0], rest.mean.u)
+    return Smoothed(
+        track.t,
+        values[0],
+        uncertainties[0],
+        values[1],
+        uncertainties[1],
+        values[2],
+        uncertainties[2],
+        noise_m,
+        memory_s,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Walk:
+    """Samples gathered at the walk's nodes."""
+
+    t: F8
+    information: F8
+    score: F8
+    gain: F8
+    squares: float
+    samples: int
+    index: NDArray[np.int64]
+    carried: _Carried
+    period: float
+
+    @classmethod
+    def of(cls, t: F8, swing: F8, carried: _Carried, omega: float, params: Params) -> _Walk:
+        period = 2.0 * math.pi / omega
+        span = float(t[-1] - t[0])
+        step = max(period / params.nodes_per_period, span / params.most_nodes)
+        _, index = np.unique(np.floor((t - t[0]) / step), return_inverse=True)
+        count = np.bincount(index).astype(np.float64)
+        h = carried.gain * np.array([carried.cosine, -carried.sine])
+        information = np.empty((2, 2, count.size))
+        for i, j in ((0, 0), (0, 1), (1, 1)):
+            information[i, j] = information[j, i] = np.bincount(index, weights=h[i] * h[j])
+        score = np.array([np.bincount(index, weights=row * swing) for row in h])
+        middle = t[0] + np.bincount(index, weights=t - t[0]) / count
+        gain = np.bincount(index, weights=carried.gain) / count
+        return cls(middle, information, score, gain, float(swing @ swing), t.size, index, carried, period)
+
+    def solve(self, memory_s: float, rate_hz: float) -> tuple[Solved, float]:
+        """Smooth with a force that gives this memory; return the walk, and the noise of a sample, m."""
+        solved = Chain(self.information, self.score, self.bond(memory_s, rate_hz)).solve()
+        squares = self.squares - float(np.sum(self.score * solved.mean))
+        return solved, math.sqrt(max(squares, 1e-300) / max(self.samples - 2, 1))
+
+    def smooth(self, memory_s: float, rate_hz: float, powers: int) -> tuple[F8, F8, float]:
+        """Smooth with a polynomial in time beside the walk, whose coefficients are not known beforehand.
+
+        Returns means (2, w), m, covariances (2, 2, w) in units of the noise squared, and the noise, m. The polynomial
+        is eliminated by its Schur complement.
+        """
+        bond = self.bond(memory_s, rate_hz)
+        solved = Chain(self.information, self.score, bond).solve(covariance=True)
+        assert solved.covariance is not None
+        x = (self.t - self.t.mean()) / max(float(np.ptp(self.t)), 1e-300)
+        shapes = np.array([x**power for power in range(1, powers + 1)])
+        # One column for either dimension of each power.
+        columns = np.einsum("ijw,pw->pjiw", self.information, shapes).reshape(2 * powers, 2, -1)
+        answers = np.array([Chain(self.information, column, bond).solve().mean for column in columns])
+        direct = np.einsum("pw,ij->piwj", shapes, np.eye(2)).transpose(0, 3, 1, 2).reshape(2 * powers, 2, -1)
+        beyond = direct - answers
+        complement = np.einsum("aiw,biw->ab", columns, beyond)
+        inverse = np.linalg.pinv(0.5 * (complement + complement.T), rcond=1e-12, hermitian=True)
+        coefficients = inverse @ np.einsum("aiw,iw->a", beyond, self.score)
+        mean = solved.mean + np.einsum("a,aiw->iw", coefficients, beyond)
+        covariance = solved.covariance + np.einsum("aiw,ab,bjw->ijw", beyond, inverse, beyond)
+        squares = self.squares - float(np.sum(self.score * mean))
+        return mean, covariance, math.sqrt(max(squares, 1e-300) / max(self.samples - 2 - 2 * powers, 1))
+
+    def bond(self, memory_s: float, rate_hz: float) -> F8:
+        """Reciprocal variances of the walk's steps, noise of one sample being 1.
+
+        A walk of variance r per second seen with information J per second remembers :math:`1/\\sqrt{rJ}`.
+        The force is the same throughout, so that the walk's steps grow as the amplitude falls.
+        """
+        r = 2.0 / (rate_hz * memory_s**2)
+        return np.asarray(self.gain[1:] * self.gain[:-1] / (r * np.diff(self.t)))
+
+    def likeliest(self, rate_hz: float, params: Params) -> float:
+        """Memory of the largest likelihood, s."""
+        span = float(self.t[-1] - self.t[0])
+        if self.t.size < 4:
+            return 30.0 * max(span, self.period)
+        trials = np.geomspace(self.period, 30.0 * max(span, self.period), params.memories)
+        costs = np.array([self.cost(memory_s, rate_hz) for memory_s in trials])
+        best = int(np.argmin(costs))
+        if not 0 < best < trials.size - 1:
+            return float(trials[best])
+        low, here, high = costs[best - 1 : best + 2]
+        bend = low - 2.0 * here + high
+        shift = 0.5 * (low - high) / bend if bend > 0 else 0.0
+        return float(trials[best] * (trials[1] / trials[0]) ** float(np.clip(shift, -0.5, 0.5)))
+
+    def cost(self, memory_s: float, rate_hz: float) -> float:
+        """Minus twice the logarithm of the likelihood, the noise at its best value, up to a constant."""
+        solved, noise_m = self.solve(memory_s, rate_hz)
+        held = 2.0 * float(np.sum(np.log(self.bond(memory_s, rate_hz))))
+        return 2.0 * (self.samples - 2) * math.log(noise_m) + solved.log_determinant - held
+
+
+def _widening(track: Track, t: F8, swing: F8, walk: _Walk, mean: F8, noise_m: float, omega: float) -> float:
+    """By how much the residuals' density at the oscillation's frequency exceeds that of white noise, as a root."""
+    carried = walk.carried
+    z = np.array([np.interp(t, walk.t, each) for each in mean])
+    residual = swing - carried.gain * (carried.cosine * z[0] - carried.sine * z[1])
+    if float(t[-1] - t[0]) > 1e5 * walk.period or t.size < 64:
+        return 1.0
+    blocks = Blocks.of(t, residual, walk.period / 12.0, track.rate_hz)
+    density = smooth_density(blocks.y, omega * blocks.step / (2.0 * math.pi))
+    return math.sqrt(max(1.0, density * blocks.samples / noise_m**2))
