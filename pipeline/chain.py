@@ -20,8 +20,8 @@ class Chain:
     ----------
     information : (2, 2, w) float64
         Sums of :math:`h h^T` over the observations :math:`h^T z + \\text{noise}` of each node, noise of variance 1.
-    score : (2, w) float64
-        Sums of h times the value observed.
+    score : (2, k, w) float64
+        Sums of h times the value observed, for k sets of values.
     bond : (w - 1,) float64
         Reciprocal variance of a step from each node to the next, either dimension.
     """
@@ -63,7 +63,7 @@ class Solved:
 
     Parameters
     ----------
-    mean : (2, w) float64
+    mean : (2, k, w) float64
     covariance : (2, 2, w) float64 or None
     log_determinant : float
         Of the precision of all nodes together.
@@ -97,8 +97,7 @@ def _reduce(diagonal: F8, lower: F8, right: F8, covariance: bool) -> tuple[F8, F
     size = diagonal.shape[2]
     if size == 1:
         inverse, determinant = _inverse(diagonal)
-        mean = np.einsum("ijw,jw->iw", inverse, right)
-        return mean, inverse, np.zeros_like(inverse), math.log(float(determinant[0]))
+        return _times(inverse, right), inverse, np.zeros_like(inverse), math.log(float(determinant[0]))
     odd = slice(1, None, 2)
     inverse, determinant = _inverse(diagonal[:, :, odd])
     count = inverse.shape[2]
@@ -106,22 +105,21 @@ def _reduce(diagonal: F8, lower: F8, right: F8, covariance: bool) -> tuple[F8, F
     after = np.zeros_like(before)  # and after; the last odd node may have none
     inner = lower[:, :, 2::2]
     after[:, :, : inner.shape[2]] = _times(inverse[:, :, : inner.shape[2]], _turned(inner))
-    own = np.einsum("ijw,jw->iw", inverse, right[:, odd])
+    own = _times(inverse, right[:, :, odd])
     evens = (size + 1) // 2
-    kept, coupled, target = diagonal[:, :, ::2].copy(), np.zeros((2, 2, evens)), right[:, ::2].copy()
+    kept, coupled, target = diagonal[:, :, ::2].copy(), np.zeros((2, 2, evens)), right[:, :, ::2].copy()
     kept[:, :, :count] -= _times(_turned(lower[:, :, odd]), before)
-    target[:, :count] -= np.einsum("jiw,jw->iw", lower[:, :, odd], own)
+    target[:, :, :count] -= _times(_turned(lower[:, :, odd]), own)
     links = inner.shape[2]
     kept[:, :, 1 : links + 1] -= _times(inner, after[:, :, :links])
-    target[:, 1 : links + 1] -= np.einsum("ijw,jw->iw", inner, own[:, :links])
+    target[:, :, 1 : links + 1] -= _times(inner, own[:, :, :links])
     coupled[:, :, 1 : links + 1] = -_times(inner, before[:, :, :links])
     mean_even, spread_even, cross_even, rest = _reduce(kept, coupled, target, covariance)
-    following = np.zeros((2, count))
-    following[:, :links] = mean_even[:, 1 : links + 1]
+    following = np.zeros_like(own)
+    following[:, :, :links] = mean_even[:, :, 1 : links + 1]
     mean = np.empty_like(right)
-    mean[:, ::2] = mean_even
-    mean[:, odd] = own - np.einsum("ijw,jw->iw", before, mean_even[:, :count])
-    mean[:, odd] -= np.einsum("ijw,jw->iw", after, following)
+    mean[:, :, ::2] = mean_even
+    mean[:, :, odd] = own - _times(before, mean_even[:, :, :count]) - _times(after, following)
     log_determinant = rest + float(np.sum(np.log(determinant)))
     if not covariance or spread_even is None or cross_even is None:
         return mean, None, None, log_determinant

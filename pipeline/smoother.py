@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.beside import Beside
-from pipeline.chain import Chain, Solved
+from pipeline.chain import Chain
 from pipeline.demodulate import Demodulated
 from pipeline.errors import AnalysisError
 from pipeline.lines import Blocks, smooth_density
@@ -18,6 +18,8 @@ from pipeline.rest import Rest
 from pipeline.track import F8, UNUSABLE, Track
 
 __all__ = ["Params", "Smoothed", "smooth"]
+
+LEAST_WEIGHT = 0.01  # of the likeliest memory's likelihood, that another must have to count
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +57,7 @@ class Smoothed:
     noise_m : float
         Standard deviation of one sample about the smoothed motion, m.
     memory_s : float
-        How long a stretch, before and after, speaks on a sample at the largest amplitude, s.
+        How long a stretch, before and after, speaks on a sample at the largest amplitude, s: the likeliest.
     """
 
     t: F8
@@ -144,7 +146,7 @@ def smooth(
     :math:`\\ddot x` has the factor squared. Nothing is differenced: noise at frequencies that an oscillator cannot
     follow never enters.
 
-    The noise of the samples and the strength of the force, hence the memory, are those of the largest likelihood. A
+    The strength of the force, hence the memory, is averaged over by its likelihood, and the noise comes with it. A
     record that follows its law to the end has the memory of all its samples: then this is the global fit. What
     frequency and law are uncertain by is a polynomial in time added to z, one power for each of their parameters, whose
     coefficients are estimated along; so the ends, with one side missing, carry their larger uncertainty.
@@ -161,20 +163,19 @@ def smooth(
     if beside is not None and beside.modelled:
         swing = swing - beside.sideways.position(t)
     walk = _Walk.of(t, swing, _Carried.at(t, phase, float(t[-1])), phase.angular_frequency.value, params)
-    memory_s = walk.likeliest(track.rate_hz, params)
-    powers = max(len(phase.damping.best.law.parameters), phase.coefficients.size) - 1
-    mean, covariance, noise_m = walk.smooth(memory_s, track.rate_hz, max(powers, 1))
+    powers = max(len(phase.damping.best.law.parameters), phase.coefficients.size, 2) - 1
+    mean, covariance, noise_m, memory_s = walk.smooth(track.rate_hz, powers, params)
     at = np.where(known, track.t, t[0])
     carried = _Carried.at(at, phase, float(t[-1]))
     rows = carried.rows()
     z = np.array([np.interp(at, walk.t, each) for each in mean])
     spread = {(i, j): np.interp(at, walk.t, covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1))}
     widening = _widening(track, t, swing, walk, mean, noise_m, phase.angular_frequency.value)
-    values, uncertainties = [], []
+    values, uncertainties = list[F8](), list[F8]()
     for row in rows:
         variance = row[0] ** 2 * spread[0, 0] + 2.0 * row[0] * row[1] * spread[0, 1] + row[1] ** 2 * spread[1, 1]
         values.append(np.where(known, row[0] * z[0] + row[1] * z[1], np.nan))
-        uncertainties.append(np.where(known, noise_m * widening * np.sqrt(variance), np.nan))
+        uncertainties.append(np.where(known, widening * np.sqrt(variance), np.nan))
     values[0] = values[0] + np.where(known, rest.at(at), np.nan)
     uncertainties[0] = np.hypot(uncertainties[0], rest.mean.u)
     return Smoothed(
@@ -220,35 +221,26 @@ class _Walk:
         gain = np.bincount(index, weights=carried.gain) / count
         return cls(middle, information, score, gain, float(swing @ swing), t.size, index, carried, period)
 
-    def solve(self, memory_s: float, rate_hz: float) -> tuple[Solved, float]:
-        """Smooth with a force that gives this memory; return the walk, and the noise of a sample, m."""
-        solved = Chain(self.information, self.score, self.bond(memory_s, rate_hz)).solve()
-        squares = self.squares - float(np.sum(self.score * solved.mean))
-        return solved, math.sqrt(max(squares, 1e-300) / max(self.samples - 2, 1))
+    def smooth(self, rate_hz: float, powers: int, params: Params) -> tuple[F8, F8, float, float]:
+        """Smooth with every memory that the record admits and average them by their likelihood.
 
-    def smooth(self, memory_s: float, rate_hz: float, powers: int) -> tuple[F8, F8, float]:
-        """Smooth with a polynomial in time beside the walk, whose coefficients are not known beforehand.
-
-        Returns means (2, w), m, covariances (2, 2, w) in units of the noise squared, and the noise, m. The polynomial
-        is eliminated by its Schur complement.
+        Returns means (2, w), m, covariances (2, 2, w), m^2, which hold what memories differ by, the noise of a sample,
+        m, and the likeliest memory, s.
         """
-        bond = self.bond(memory_s, rate_hz)
-        solved = Chain(self.information, self.score, bond).solve(covariance=True)
-        assert solved.covariance is not None
-        x = (self.t - self.t.mean()) / max(float(np.ptp(self.t)), 1e-300)
-        shapes = np.array([x**power for power in range(1, powers + 1)])
-        # One column for either dimension of each power.
-        columns = np.einsum("ijw,pw->pjiw", self.information, shapes).reshape(2 * powers, 2, -1)
-        answers = np.array([Chain(self.information, column, bond).solve().mean for column in columns])
-        direct = np.einsum("pw,ij->piwj", shapes, np.eye(2)).transpose(0, 3, 1, 2).reshape(2 * powers, 2, -1)
-        beyond = direct - answers
-        complement = np.einsum("aiw,biw->ab", columns, beyond)
-        inverse = np.linalg.pinv(0.5 * (complement + complement.T), rcond=1e-12, hermitian=True)
-        coefficients = inverse @ np.einsum("aiw,iw->a", beyond, self.score)
-        mean = solved.mean + np.einsum("a,aiw->iw", coefficients, beyond)
-        covariance = solved.covariance + np.einsum("aiw,ab,bjw->ijw", beyond, inverse, beyond)
-        squares = self.squares - float(np.sum(self.score * mean))
-        return mean, covariance, math.sqrt(max(squares, 1e-300) / max(self.samples - 2 - 2 * powers, 1))
+        span = max(float(self.t[-1] - self.t[0]), self.period)
+        memories = np.geomspace(self.period, 30.0 * span, params.memories)
+        trials = [_Trial.of(self, float(memory_s), rate_hz, powers) for memory_s in memories]
+        costs = np.array([trial.cost for trial in trials])
+        weights = np.exp(-0.5 * (costs - costs.min()))
+        believed = np.flatnonzero(weights > LEAST_WEIGHT)
+        weights = weights[believed] / weights[believed].sum()
+        means = np.array([trials[k].mean for k in believed])
+        mean = np.einsum("k,kiw->iw", weights, means)
+        covariance = np.einsum("k,kiw,kjw->ijw", weights, means - mean, means - mean)
+        for k, weight in zip(believed, weights, strict=True):
+            covariance += weight * trials[k].noise_m ** 2 * trials[k].covariance()
+        best = int(np.argmin(costs))
+        return mean, covariance, trials[best].noise_m, float(memories[best])
 
     def bond(self, memory_s: float, rate_hz: float) -> F8:
         """Reciprocal variances of the walk's steps, noise of one sample being 1.
@@ -259,26 +251,50 @@ class _Walk:
         r = 2.0 / (rate_hz * memory_s**2)
         return np.asarray(self.gain[1:] * self.gain[:-1] / (r * np.diff(self.t)))
 
-    def likeliest(self, rate_hz: float, params: Params) -> float:
-        """Memory of the largest likelihood, s."""
-        span = float(self.t[-1] - self.t[0])
-        if self.t.size < 4:
-            return 30.0 * max(span, self.period)
-        trials = np.geomspace(self.period, 30.0 * max(span, self.period), params.memories)
-        costs = np.array([self.cost(memory_s, rate_hz) for memory_s in trials])
-        best = int(np.argmin(costs))
-        if not 0 < best < trials.size - 1:
-            return float(trials[best])
-        low, here, high = costs[best - 1 : best + 2]
-        bend = low - 2.0 * here + high
-        shift = 0.5 * (low - high) / bend if bend > 0 else 0.0
-        return float(trials[best] * (trials[1] / trials[0]) ** float(np.clip(shift, -0.5, 0.5)))
 
-    def cost(self, memory_s: float, rate_hz: float) -> float:
-        """Minus twice the logarithm of the likelihood, the noise at its best value, up to a constant."""
-        solved, noise_m = self.solve(memory_s, rate_hz)
-        held = 2.0 * float(np.sum(np.log(self.bond(memory_s, rate_hz))))
-        return 2.0 * (self.samples - 2) * math.log(noise_m) + solved.log_determinant - held
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trial:
+    """The walk smoothed with one memory, and a polynomial in time beside it whose coefficients are not known before.
+
+    The polynomial is eliminated by its Schur complement; ``cost`` is minus twice the logarithm of the likelihood that
+    is left, the noise at its best value, up to a constant.
+    """
+
+    chain: Chain
+    mean: F8
+    beyond: F8  # (2, 2 powers, w): what a coefficient of 1 does to the walk and itself together
+    inverse: F8
+    noise_m: float
+    cost: float
+
+    @classmethod
+    def of(cls, walk: _Walk, memory_s: float, rate_hz: float, powers: int) -> _Trial:
+        x = (walk.t - walk.t.mean()) / max(float(np.ptp(walk.t)), 1e-300)
+        shapes = np.array([x**power for power in range(1, powers + 1)])
+        # One column for either dimension of each power: the walk moved by it, and what is seen of that.
+        moved = np.einsum("pw,ij->ijpw", shapes, np.eye(2)).reshape(2, 2 * powers, -1)
+        seen = np.einsum("ijw,jaw->iaw", walk.information, moved)
+        bond = walk.bond(memory_s, rate_hz)
+        chain = Chain(walk.information, np.concatenate([walk.score[:, None], seen], axis=1), bond)
+        solved = chain.solve()
+        beyond = moved - solved.mean[:, 1:]
+        complement = np.einsum("iaw,ibw->ab", seen, beyond)
+        values, vectors = np.linalg.eigh(0.5 * (complement + complement.T))
+        kept = values > 1e-10 * max(float(values[-1]), 1e-300)
+        inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+        coefficients = inverse @ np.einsum("iaw,iw->a", beyond, walk.score)
+        mean = solved.mean[:, 0] + np.einsum("a,iaw->iw", coefficients, beyond)
+        dof = max(walk.samples - 2 - int(np.count_nonzero(kept)), 1)
+        squares = walk.squares - float(np.sum(walk.score * mean))
+        noise_m = math.sqrt(max(squares, 1e-300) / dof)
+        determinants = solved.log_determinant + float(np.sum(np.log(values[kept]))) - 2.0 * float(np.sum(np.log(bond)))
+        return cls(chain, mean, beyond, inverse, noise_m, 2.0 * dof * math.log(noise_m) + determinants)
+
+    def covariance(self) -> F8:
+        """Return the covariances of walk and polynomial together, (2, 2, w), in units of the noise squared."""
+        spread = self.chain.solve(covariance=True).covariance
+        assert spread is not None
+        return np.asarray(spread + np.einsum("iaw,ab,jbw->ijw", self.beyond, self.inverse, self.beyond))
 
 
 def _widening(track: Track, t: F8, swing: F8, walk: _Walk, mean: F8, noise_m: float, omega: float) -> float:
