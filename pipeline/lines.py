@@ -203,7 +203,7 @@ def false_alarm(evidence: float, trials: float) -> float:
     >>> false_alarm(0.0, 10.0)
     1.0
     >>> round(false_alarm(30.0, 100.0), 6)
-    0.006033
+    0.002141
     """
     single = math.exp(-FREEDOM * math.log1p(evidence / FREEDOM))
     return float(-math.expm1(trials * math.log1p(-single))) if single < 1.0 else 1.0
