@@ -16,7 +16,7 @@ from pipeline.demodulate import Params as Demodulation
 from pipeline.modes import Sideways
 from pipeline.rest import Rest
 from pipeline.sideways import find_sideways, without
-from pipeline.steps import Step, find_steps, staircase, unstepped
+from pipeline.steps import Step, find_steps, staircase, unstepped, weighed
 from pipeline.track import F8
 from pipeline.waveform import Waveform
 
@@ -119,7 +119,8 @@ def set_apart(
     -----
     A mode of amplitude B at a distance :math:`\\Delta f` from the main frequency leaves up to
     :math:`B/(\\pi\\,\\Delta f\\,T)` in the amplitude of a record of length T. Where that is less than a tenth of the
-    amplitude's standard uncertainty the mode is reported and left where it is.
+    amplitude's standard uncertainty the mode is reported and left where it is. Where it is taken out, the windows'
+    variances grow by what it costs to know it from the same samples.
     """
     params = params or Params()
     sideways = find_sideways(conditioned, demodulated, params.sideways)
@@ -132,15 +133,39 @@ def set_apart(
             sideways = find_sideways(conditioned, demodulated, params.sideways) or sideways
         cleared = without(conditioned, sideways)
         demodulated = demodulate(cleared, cycles, demodulation)
+    if modelled:
+        demodulated = replace(demodulated, covariance=demodulated.covariance * _price(sideways))
     steps = find_steps(cleared, demodulated, params.steps)
     if steps:
-        cleared = unstepped(cleared, steps)
-        demodulated = demodulate(cleared, cycles, demodulation)
+        whole = cleared
+        demodulated = demodulate(unstepped(whole, steps), cycles, demodulation)
+        steps, demodulated = weighed(steps, demodulated)
+        cleared = unstepped(whole, steps)
     return demodulated, Beside(cleared, sideways, modelled, leak_m, steps)
 
 
 def _u_amplitude(demodulated: Demodulated) -> float:
     return 1.0 / math.sqrt(float(np.sum(1.0 / np.maximum(demodulated.covariance[:, 0, 0], 1e-300))))
+
+
+def _price(sideways: Sideways) -> float:
+    """By what factor variances grow because the modes were estimated from the same samples.
+
+    That of rest position, amplitude, phase, frequency and decay, whichever grows most, from the normal equations with
+    and without the modes' columns, on a dozen times a period.
+    """
+    carrier = sideways.carrier
+    assert carrier is not None
+    start, end = carrier.t[0], carrier.t[-1]
+    t = np.linspace(start, end, int(12 * (end - start) * carrier.angular_frequency / (2.0 * math.pi)))
+    phase, x = carrier.phase(t), (t - start) / (end - start) - 0.5
+    pair = carrier.relative(t) * np.array([np.cos(phase), np.sin(phase)])
+    main = np.concatenate([np.ones((1, t.size)), pair, x * pair])
+    both = np.concatenate([main, sideways.columns(t).T])
+    both /= np.linalg.norm(both, axis=1)[:, None]
+    alone = np.linalg.pinv(both[:5] @ both[:5].T, hermitian=True)
+    together = np.linalg.pinv(both @ both.T, hermitian=True)[:5, :5]
+    return max(1.0, float(np.max(np.diag(together) / np.diag(alone))))
 
 
 def _leak(sideways: Sideways) -> float:

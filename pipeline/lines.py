@@ -16,6 +16,7 @@ AR_ORDER = 4  # highest order of the autoregression that describes the residual'
 OVERSAMPLING = 4  # of the spectrum; the dearest loss between two of its points is 5 % of a line's power
 CONTINUUM = 2.5  # independent trials per natural bin, because the frequency is sought between bins too
 NEAR, FAR = 2, 7  # natural bins beside a line that show how much power there is without it
+VARYING = 3  # degree of the polynomial that a line's amplitude and phase may follow while its noise is looked at
 FREEDOM = 6.0  # of that power, in complex amplitudes: twelve bins, which the taper makes half as many
 
 
@@ -173,18 +174,20 @@ def strongest(blocks: Blocks, residual: F8, basis: F8, band: Band) -> Peak | Non
     shaped = np.where(inside, power / _density(coefficients, variance, frequency * blocks.step), 0.0)
     peak = int(np.argmax(shaped))
     f = float(frequency[peak])
-    columns = np.stack([np.cos(2.0 * math.pi * f * blocks.t), np.sin(2.0 * math.pi * f * blocks.t)], axis=1)
+    pair = np.stack([np.cos(2.0 * math.pi * f * blocks.t), np.sin(2.0 * math.pi * f * blocks.t)], axis=1)
+    # The line itself first; then what it may vary by, which must not pass for noise beside it.
+    powers = np.polynomial.legendre.legvander(2.0 * blocks.t / blocks.seconds - 1.0, VARYING)
+    columns = (powers[:, :, None] * pair[:, None, :]).reshape(blocks.t.size, -1)
     weighted = columns * blocks.weight[:, None]
     beyond = weighted - basis @ (basis.T @ weighted)
-    size = np.linalg.norm(weighted, axis=0)
-    q, r = np.linalg.qr(beyond / size)
-    if np.min(np.abs(np.diagonal(r))) < 0.2:  # the model holds it already
+    q, r = np.linalg.qr(beyond / np.linalg.norm(weighted, axis=0))
+    if np.min(np.abs(np.diagonal(r)[:2])) < 0.2:  # the model holds it already
         return None
     share = q.T @ (residual * blocks.weight)
     left = residual - np.where(blocks.weight > 0, (q @ share) / np.maximum(blocks.weight, 1e-300), 0.0)
     density = spectral_density(blocks, left, f, band)
     # Rows are weighted by samples, the density is one full block's.
-    evidence = 0.5 * float(share @ share) / (density * blocks.samples)
+    evidence = 0.5 * float(share[:2] @ share[:2]) / (density * blocks.samples)
     trials = max(CONTINUUM * float(np.count_nonzero(inside)) * float(frequency[1]) * blocks.seconds, 1.0)
     return Peak(f, density, evidence, false_alarm(evidence, trials))
 

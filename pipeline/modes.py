@@ -31,14 +31,14 @@ class Mode:
     amplitude : Estimate
         Root mean square of the envelope :math:`|E|` over the record, m.
     decay : Estimate
-        Logarithmic rate of the envelope, 1/s.
+        Logarithmic rate of the envelope, 1/s; 0 for harmonics and products.
     false_alarm : float
         Probability that a record without it shows it.
     carrier : Carrier
     base : Mode or None
         The mode that a product is made of.
     degree : int
-        Of the polynomial envelope.
+        Of the polynomial that the envelope is beside its exponential.
     coefficients : (2 (degree + 1),) float64, m
         Of :meth:`columns`.
     """
@@ -58,8 +58,7 @@ class Mode:
         """Return the basis (n, 2 (degree + 1)) at times t (n,): cosines, then sines, times the envelope's powers."""
         a, b = self.turns
         if self.kind == "mode":
-            angle = 2.0 * math.pi * self.frequency.value * (t - self.carrier.t[0])
-            shape = np.ones(t.size)
+            angle, shape = self.angle(t), self.fall(t)
         else:
             angle, shape = b * self.carrier.phase(t), self.carrier.relative(t) ** abs(b)
             if self.base is not None:
@@ -77,9 +76,15 @@ class Mode:
         """Return the phase of a mode of its own at t (n,) less its envelope's, rad."""
         return np.asarray(2.0 * math.pi * self.frequency.value * (t - self.carrier.t[0]))
 
+    def fall(self, t: F8) -> F8:
+        """Return the exponential that a mode of its own follows, 1 in the middle of the record."""
+        middle = 0.5 * (self.carrier.t[0] + self.carrier.t[-1])
+        reach = np.clip(t, self.carrier.t[0], self.carrier.t[-1]) - middle
+        return np.asarray(np.exp(-self.decay.value * reach))
+
     def envelope(self, t: F8) -> NDArray[np.complex128]:
         """Return the complex envelope E at t (n,), m."""
-        powers = np.polynomial.legendre.legvander(self._x(t), self.degree)
+        powers = np.polynomial.legendre.legvander(self._x(t), self.degree) * self.fall(t)[:, None]
         half = self.degree + 1
         return np.asarray(powers @ (self.coefficients[:half] - 1j * self.coefficients[half:]))
 

@@ -88,7 +88,7 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
     contrast, usual = rough_contrast(blocks, band)
     if contrast < usual:
         return Sideways((), carrier)
-    return Sideways(tuple(_Search(carrier, blocks, band, params).run()), carrier)
+    return Sideways(_Search(carrier, blocks, band, params).run(), carrier)
 
 
 def without(conditioned: Conditioned, sideways: Sideways) -> Conditioned:
@@ -110,7 +110,8 @@ class _Search:
         self.carrier, self.blocks, self.params = carrier, blocks, params
         self.band = band
         self.t = blocks.t + blocks.origin
-        self.columns = _main_columns(carrier, self.t) * blocks.weight[:, None]
+        self.main = _main_columns(carrier, self.t) * blocks.weight[:, None]
+        self.columns = self.main
         self.settle()
 
     def settle(self) -> None:
@@ -120,23 +121,45 @@ class _Search:
         left = target - self.basis @ (self.basis.T @ target)
         self.residual = np.where(self.blocks.weight > 0, left / np.maximum(self.blocks.weight, 1e-300), 0.0)
 
-    def run(self) -> Iterator[Mode]:
-        """Yield harmonics, then modes, the products after the first of them."""
-        yield from self.locked(HARMONICS, None)
+    def run(self) -> tuple[Mode, ...]:
+        """Return modes, the strongest first, with their products, then harmonics; all fitted together."""
+        harmonics = list(self.locked(HARMONICS, None))
         main, width = self.carrier.angular_frequency / (2.0 * math.pi), 2.0 / self.blocks.seconds
         self.hole(*((turns[1] * main, width) for turns in HARMONICS))
-        first: Mode | None = None
+        own, products = list[Mode](), list[Mode]()
         for _ in range(self.params.most):
             peak = strongest(self.blocks, self.residual, self.basis, self.band)
             if peak is None or peak.false_alarm > 0.5 * self.params.false_alarm:
-                return
+                break
             mode = self.free(peak)
+            if not self.band.inside(np.array([mode.frequency.value]))[0]:
+                break  # it ran away into what the model holds already
             self.add(mode)
             self.hole((mode.frequency.value, width))
-            yield mode
-            if first is None:
-                first = mode
-                yield from self.locked(PRODUCTS, mode)
+            own.append(mode)
+            if len(own) == 1:
+                products.extend(self.locked(PRODUCTS, mode))
+        return self.together((*own, *products, *harmonics))
+
+    def together(self, modes: tuple[Mode, ...]) -> tuple[Mode, ...]:
+        """Fit the coefficients of all modes at once: each was found before the later ones were known."""
+        if not modes:
+            return modes
+        columns = np.concatenate([self.main, *(self.weighted(mode) for mode in modes)], axis=1)
+        values = np.linalg.lstsq(columns, self.blocks.y * self.blocks.weight, rcond=None)[0][self.main.shape[1] :]
+        ends = np.cumsum([mode.coefficients.size for mode in modes])
+        return tuple(
+            self.sized(replace(mode, coefficients=part))
+            for mode, part in zip(modes, np.split(values, ends[:-1]), strict=True)
+        )
+
+    def sized(self, mode: Mode) -> Mode:
+        """Return the mode with the amplitude that its coefficients give."""
+        half = mode.degree + 1
+        quadrature = np.concatenate([mode.coefficients[half:], -mode.coefficients[:half]])
+        columns = mode.columns(self.t)
+        size = math.sqrt(float(np.mean((columns @ mode.coefficients) ** 2 + (columns @ quadrature) ** 2)))
+        return replace(mode, amplitude=replace(mode.amplitude, value=size))
 
     def hole(self, *holes: tuple[float, float]) -> None:
         self.band = replace(self.band, holes=(*self.band.holes, *holes))
@@ -188,15 +211,15 @@ class _Search:
             chance = false_alarm(gain / unit, len(orders))
             if chance > 0.5 * self.params.false_alarm:
                 continue
-            shape = math.sqrt(float(np.mean(_squared_shape(trial, self.t))))
-            size, u = float(np.hypot(*values)) * shape, math.sqrt(max(float(np.mean(np.diag(cofactors))) * unit, 0.0))
-            amplitude = Estimate(size, u * shape, "m")
+            shape = math.sqrt(float(np.mean(trial.columns(self.t)[:, 0] ** 2 + trial.columns(self.t)[:, 1] ** 2)))
+            u = math.sqrt(max(float(np.mean(np.diag(cofactors))) * unit, 0.0)) * shape
+            amplitude = Estimate(float(np.hypot(*values)) * shape, u, "m")
             mode = replace(trial, amplitude=amplitude, false_alarm=chance, coefficients=values)
             self.add(mode)
             yield mode
 
     def free(self, peak: Peak) -> Mode:
-        """Refine a peak's frequency and choose how far its envelope varies."""
+        """Refine a peak's frequency, see whether it decays, and choose how far its envelope varies besides."""
         unit = peak.density * self.blocks.samples
         f, rate, u_rate = peak.frequency_hz, 0.0, math.inf
         middle = 0.5 * self.blocks.seconds
@@ -217,7 +240,7 @@ class _Search:
             (1, 0),
             Estimate(f, u_rate / (2.0 * math.pi), "Hz"),
             Estimate(0.0, 0.0, "m"),
-            Estimate(rate, u_rate, "1/s"),
+            Estimate(rate if abs(rate) > 3.0 * u_rate else 0.0, u_rate, "1/s"),
             peak.false_alarm,
             self.carrier,
             None,
@@ -225,15 +248,16 @@ class _Search:
             np.zeros(2),
         )
         best: tuple[float, Mode] | None = None
-        for degree in range(self.params.envelope + 1):
+        # A mode that varies reaches further; it must not reach what the main oscillation may vary by.
+        main = self.carrier.angular_frequency / (2.0 * math.pi)
+        room = int(2.0 * (abs(f - main) * self.blocks.seconds - 1.0) - self.carrier.degree)
+        for degree in range(min(self.params.envelope, max(room, 0)) + 1):
             trial = replace(trial, degree=degree)
             values, cofactors, gain = self.fitted(self.weighted(trial))
             criterion = -2.0 * gain / unit + 2.0 * (degree + 1) * math.log(self.blocks.t.size)
             if best is None or criterion < best[0]:
-                chosen = replace(trial, coefficients=values)
-                size = math.sqrt(float(np.mean(np.abs(chosen.envelope(self.t)) ** 2)))
                 u = math.sqrt(max(cofactors[0, 0] * unit, 0.0))
-                best = (criterion, replace(chosen, amplitude=Estimate(size, u, "m")))
+                best = (criterion, self.sized(replace(trial, coefficients=values, amplitude=Estimate(0.0, u, "m"))))
         assert best is not None
         return best[1]
 
@@ -246,9 +270,3 @@ def _main_columns(carrier: Carrier, t: F8) -> F8:
     return np.concatenate(
         [powers[:, : carrier.rest_degree + 1], powers * np.cos(phase)[:, None], powers * np.sin(phase)[:, None]], axis=1
     )
-
-
-def _squared_shape(mode: Mode, t: F8) -> F8:
-    half = mode.degree + 1
-    columns = mode.columns(t)
-    return np.asarray(columns[:, 0] ** 2 + columns[:, half] ** 2)

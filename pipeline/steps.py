@@ -13,13 +13,13 @@ from pipeline.carrier import Carrier
 from pipeline.condition import MAD_TO_SIGMA, Conditioned
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate
-from pipeline.regression import correlation_length
+from pipeline.regression import correlation_length, solve_weighted
 from pipeline.track import F8, UNUSABLE
 
-__all__ = ["Params", "Step", "find_steps", "staircase", "unstepped"]
+__all__ = ["Params", "Step", "find_steps", "staircase", "unstepped", "weighed"]
 
 DEGREES = (0, 1, 2, 4, 6, 9, 12)  # of the smooth drift that steps compete with
-SUDDEN = 3.0  # fall of chi-square by which a jump must beat a glide
+SUDDEN = 6.0  # fall of chi-square by which a jump must beat a glide
 POSSIBLE_DRAW = 5.1  # standard deviation of a jump's place over (noise/height)^2, samples: root of 26
 
 
@@ -109,6 +109,35 @@ def staircase(steps: tuple[Step, ...], t: F8) -> F8:
     for step in steps:
         total += step.height.value * (t >= step.time.value)
     return total
+
+
+def weighed(steps: tuple[Step, ...], demodulated: Demodulated) -> tuple[tuple[Step, ...], Demodulated]:
+    """Fit the heights of all steps together, to windows from which the steps were taken out.
+
+    Returns
+    -------
+    steps : tuple of Step
+    demodulated : Demodulated
+        With its rest positions less what the heights changed.
+
+    Notes
+    -----
+    Only now do the windows that hold a step know their rest position. A line is fitted along, so that a drift does not
+    pass for height.
+    """
+    rest = _Windows.of(demodulated)
+    after = np.array([rest.t >= step.time.value for step in steps], np.float64)
+    x = (rest.t - rest.t.mean()) / float(np.ptp(rest.t))
+    design = np.stack([np.ones_like(x), x, *after], axis=1)
+    line = solve_weighted(design, rest.y, np.full(rest.t.size, rest.u))
+    widened = math.sqrt(correlation_length(line.residual) * max(1.0, line.chi2 / max(x.size - design.shape[1], 1)))
+    more, u = line.values[2:], widened * np.sqrt(np.diag(line.covariance)[2:])
+    better = tuple(
+        replace(step, height=Estimate(step.height.value + float(d), float(s), "m"))
+        for step, d, s in zip(steps, more, u, strict=True)
+    )
+    change = staircase(better, demodulated.t) - staircase(steps, demodulated.t)
+    return better, replace(demodulated, offset=demodulated.offset - change)
 
 
 def unstepped(conditioned: Conditioned, steps: tuple[Step, ...]) -> Conditioned:
@@ -287,9 +316,9 @@ def _gains(sums: F8, cuts: NDArray[np.int64]) -> F8:
 
 
 def _best_ramp(t: F8, y: F8, centre: float, period: float) -> float:
-    """The same for the best of several ramps, one to four periods long, around a time."""
+    """The same for the best of several ramps, a period long to all of the span, around a time."""
     centred, best = y - y.mean(), 0.0
-    for width in (period, 2.0 * period, 4.0 * period):
+    for width in (period, 2.0 * period, 4.0 * period, 8.0 * period, 2.0 * float(np.ptp(t))):
         for shift in np.linspace(-0.75, 0.75, 7):
             ramp = np.clip((t - centre - shift * period) / width + 0.5, 0.0, 1.0)
             ramp -= ramp.mean()

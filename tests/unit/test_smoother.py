@@ -75,7 +75,7 @@ def test_intervals_of_velocity_and_acceleration_hold_the_truth(synthetic: Module
 
 def test_ends_carry_the_larger_uncertainty(synthetic: ModuleType) -> None:
     """The velocity's variance at either end is two to six times that of the middle."""
-    u = analysed(synthetic, 20.0, 3e-4).smoothed().u_velocity**2
+    u = analysed(synthetic, 20.0, 3e-4).smoothed().u_velocity ** 2
     middle = float(np.mean(u[950:1050]))
     for end in (u[:76], u[-76:]):
         assert 2.0 < float(np.mean(end)) / middle < 6.0
