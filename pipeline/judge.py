@@ -276,7 +276,7 @@ def _mode_findings(demodulated: Demodulated, phase: PhaseFit, beside: Beside | N
     fate = "they were" if others else "it was"
     yield Finding(
         "sideways_mode",
-        "warning" if share > 0.01 else "info",
+        "warning" if beside.modelled and share > 0.01 else "info",
         f"a second mode of {mode.amplitude.value * 1e3:.2g} mm at {f:.4g} Hz beats with the oscillation every "
         f"{1.0 / abs(f - main):.2g} s{pendulum}{others}; "
         + (f"{fate} fitted along" if beside.modelled else f"{fate} left in, too small to disturb the amplitude"),

@@ -135,3 +135,51 @@ def test_halves_of_a_run_agree_with_the_whole(name: str) -> None:
             "period"
         ]
         assert abs(half.value - whole.value) <= 5.0 * np.hypot(half.u, whole.u)
+
+
+@pytest.mark.parametrize("name", [BARE, DISC, *OTHERS])
+def test_every_bob_swings_sideways(name: str) -> None:
+    """Each run holds a second mode at 0.58 to 0.61 of the main frequency: a pendulum of 0.33 to 0.4 m, the bench's."""
+    motion = motion_of(analysed(name))
+    mode = motion.beside.sideways.modes[0]
+    main = motion.phase.angular_frequency.value / (2 * np.pi)
+    assert mode.kind == "mode"
+    assert mode.false_alarm < 0.005
+    assert 0.58 < mode.frequency.value / main < 0.61
+    assert 0.33 < 9.81 / (2 * np.pi * mode.frequency.value) ** 2 < 0.40
+    assert "sideways_mode" in codes(analysed(name))
+    assert motion.beside.modelled
+
+
+def test_disc_without_its_swing_is_six_times_sharper() -> None:
+    """Amplitudes of the disc run scatter by 0.54 mm with the sideways mode of 0.96 mm, by under 0.12 mm without it."""
+    motion = motion_of(analysed(DISC))
+    assert motion.beside.sideways.modes[0].amplitude.value == pytest.approx(9.6e-4, rel=0.05)
+    assert motion.damping.scatter.excess < 1.2e-4
+    assert motion.damping.fits["linear"].reduced_chi2 > 30
+    assert motion.damping.fits["quadratic"].reduced_chi2 > 30
+
+
+@pytest.mark.parametrize("name", [BARE, *OTHERS])
+def test_clean_runs_come_down_to_their_own_noise(name: str) -> None:
+    """With the mode put in the smooth model leaves at most 1.5 times the noise that fourth differences show."""
+    result = analysed(name)
+    assert motion_of(result).waveform.rms_m <= 1.5 * result.conditioned.noise_m
+    assert result.smoothed().noise_m <= 1.5 * result.conditioned.noise_m
+
+
+@pytest.mark.parametrize("name", [BARE, "kamjha__PHY224/position_osc.txt", DISC])
+def test_smoothed_velocity_is_the_recorded_one(name: str) -> None:
+    """LabVIEW's velocity is a difference over one sample; over five of them it is the smoother's within 2 %."""
+    file = name.replace("position", "velocity")
+    lines = (RECORDINGS / file).read_text("utf-8").splitlines()
+    rows = [line.split("\t") for line in lines if line[:1].isdigit()]
+    recorded = dict((round(float(row[0]), 3), float(row[1]) / 100.0) for row in rows)
+    result = analysed(name)
+    v = np.array([recorded.get(round(float(x), 3), np.nan) for x in result.track.t])
+    found = result.smoothed().velocity
+    # A backward difference belongs half a sample earlier.
+    middle = np.concatenate([[np.nan], 0.5 * (found[1:] + found[:-1])])
+    five = np.convolve(np.where(result.flags == 0, v - middle, np.nan), np.ones(5) / 5.0, mode="same")
+    swing = float(np.nanmedian(np.abs(found)))
+    assert float(np.nanmedian(np.abs(five))) < 0.02 * swing

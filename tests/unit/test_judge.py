@@ -63,11 +63,29 @@ def drifting(synthetic: ModuleType) -> Track:
     return replace(track, y=track.y + 1e-3 * track.t / track.t[-1])
 
 
-def beating(synthetic: ModuleType) -> Track:
-    """The amplitude beats with a sideways swing, a millimetre up and down in seven seconds."""
+def stepping(synthetic: ModuleType) -> Track:
+    """The rest position jumps up at 20 s and down at 41 s."""
     track = record(synthetic)
-    beat = 1e-3 * np.cos(2 * np.pi * track.t / 7.0) * np.cos(8.3 * track.t + 0.7)
-    return replace(track, y=track.y + beat)
+    return replace(track, y=track.y + 1.5e-3 * (track.t >= 20.0) - 1e-3 * (track.t >= 41.0))
+
+
+def beating(synthetic: ModuleType) -> Track:
+    """A pendulum's swing of 1 mm at 0.8 Hz beats with the oscillation of 1.32 Hz."""
+    track = record(synthetic)
+    return replace(track, y=track.y + 1e-3 * np.cos(2 * np.pi * 0.8 * track.t))
+
+
+def faintly_beating(synthetic: ModuleType) -> Track:
+    """A line of 0.7 mm far from the oscillation's, for two minutes in noise of 3 mm."""
+    track = record(synthetic, 120.0, 3e-3)
+    return replace(track, y=track.y + 7e-4 * np.cos(2 * np.pi * 4.1 * track.t))
+
+
+def wobbling(synthetic: ModuleType) -> Track:
+    """The amplitude wobbles by a millimetre, too slowly for a mode of its own."""
+    track = record(synthetic)
+    wobble = 1e-3 * np.cos(2 * np.pi * track.t / 20.0) * np.cos(8.3 * track.t + 0.7)
+    return replace(track, y=track.y + wobble)
 
 
 def growing(synthetic: ModuleType) -> Track:
@@ -112,7 +130,17 @@ MAKERS: dict[str, tuple[str, str, str, Maker]] = {
         lambda s: record(s, 120.0, kappa=-4.3),
     ),
     "drift": ("rest_drift", "warning", "by 1 mm", drifting),
-    "beats": ("correlated_residuals", "warning", "widened", beating),
+    "steps": ("rest_drift", "warning", "jumps 2 times: +1.5 mm at 20 s, -", stepping),
+    "wobble": ("correlated_residuals", "warning", "widened", wobbling),
+    "beats": (
+        "sideways_mode",
+        "warning",
+        "a second mode of 1 mm at 0.8 Hz beats with the oscillation every 1.9 s; a pendulum 0.39 m long swings like "
+        "that; it was fitted along",
+        beating,
+    ),
+    "faint beats": ("sideways_mode", "info", "too small to disturb the amplitude", faintly_beating),
+    "clusters": ("false_echoes", "warning", "clusters", echoes_everywhere),
     "still": ("no_oscillation", "error", "", lambda s: edited(record(s), slice(None), 0.2)),
     "noise": ("no_oscillation", "error", "no line", lambda s: record(s, 10.0, 1e-3, amplitude=1e-9)),
 }
