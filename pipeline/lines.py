@@ -10,7 +10,17 @@ from numpy.typing import NDArray
 
 from pipeline.track import F8
 
-__all__ = ["Band", "Blocks", "Peak", "false_alarm", "rough_contrast", "smooth_density", "spectral_density", "strongest"]
+__all__ = [
+    "Band",
+    "Blocks",
+    "Peak",
+    "evidence_for",
+    "false_alarm",
+    "smooth_density",
+    "spectral_density",
+    "strongest",
+    "worth_a_look",
+]
 
 AR_ORDER = 4  # highest order of the autoregression that describes the residual's correlation
 OVERSAMPLING = 4  # of the spectrum; the dearest loss between two of its points is 5 % of a line's power
@@ -126,14 +136,37 @@ def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
     return frequency, np.asarray(power, np.float64)
 
 
-def rough_contrast(blocks: Blocks, band: Band) -> tuple[float, float]:
-    """Strongest over median power in the band, and what white noise exceeds in a third of all records."""
+def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance: float) -> bool:
+    """Return whether any line could come out significant; one look at the spectrum spares most records the search.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        Their means are the residual.
+    band : Band
+    fixed_hz : tuple of float
+        Frequencies that are tested by themselves, Hz.
+    chance : float
+        False-alarm probability at which lines are accepted, here and there.
+
+    Notes
+    -----
+    Half the evidence that acceptance takes is let through, over the median density of the band.
+    """
     frequency, power = spectrum(blocks, blocks.y)
-    inside = power[band.inside(frequency)]
-    if inside.size < 8:
-        return 0.0, math.inf
-    trials = max(inside.size * (frequency[1] * blocks.seconds), 1.0)
-    return float(inside.max()) / max(float(np.median(inside)), 1e-300), math.log(trials / 0.4) / math.log(2.0)
+    inside = band.inside(frequency)
+    if np.count_nonzero(inside) < 8:
+        return False
+    usual = float(np.median(power[inside])) / math.log(2.0)
+    trials = _trials(inside, float(frequency[1]), blocks)
+    fixed = np.min(np.abs(frequency[:, None] - np.array(fixed_hz)), axis=1) <= 1.0 / blocks.seconds
+    # The taper costs a third of a line's power.
+    least, least_fixed = (0.5 * evidence_for(chance, n) / 1.5 * usual for n in (trials, float(len(fixed_hz))))
+    return bool(np.any(power[inside] > least) or np.any(power[fixed] > least_fixed))
+
+
+def _trials(inside: NDArray[np.bool_], spacing_hz: float, blocks: Blocks) -> float:
+    return max(CONTINUUM * float(np.count_nonzero(inside)) * spacing_hz * blocks.seconds, 1.0)
 
 
 def strongest(blocks: Blocks, residual: F8, basis: F8, band: Band) -> Peak | None:
@@ -188,8 +221,7 @@ def strongest(blocks: Blocks, residual: F8, basis: F8, band: Band) -> Peak | Non
     density = spectral_density(blocks, left, f, band)
     # Rows are weighted by samples, the density is one full block's.
     evidence = 0.5 * float(share[:2] @ share[:2]) / (density * blocks.samples)
-    trials = max(CONTINUUM * float(np.count_nonzero(inside)) * float(frequency[1]) * blocks.seconds, 1.0)
-    return Peak(f, density, evidence, false_alarm(evidence, trials))
+    return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
 
 
 def false_alarm(evidence: float, trials: float) -> float:
@@ -210,6 +242,18 @@ def false_alarm(evidence: float, trials: float) -> float:
     """
     single = math.exp(-FREEDOM * math.log1p(evidence / FREEDOM))
     return float(-math.expm1(trials * math.log1p(-single))) if single < 1.0 else 1.0
+
+
+def evidence_for(chance: float, trials: float) -> float:
+    """Return the evidence at which :func:`false_alarm` is ``chance``.
+
+    Examples
+    --------
+    >>> round(false_alarm(evidence_for(0.005, 100.0), 100.0), 6)
+    0.005
+    """
+    single = -math.expm1(math.log1p(-chance) / trials)
+    return float(FREEDOM * math.expm1(-math.log(single) / FREEDOM))
 
 
 def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band) -> float:

@@ -12,7 +12,7 @@ from pipeline.carrier import Carrier
 from pipeline.condition import MAD_TO_SIGMA, Conditioned
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate
-from pipeline.lines import Band, Blocks, Peak, false_alarm, rough_contrast, spectral_density, strongest
+from pipeline.lines import Band, Blocks, Peak, false_alarm, spectral_density, strongest, worth_a_look
 from pipeline.modes import Mode, Sideways
 from pipeline.track import F8, UNUSABLE
 
@@ -85,8 +85,8 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
     believed = np.abs(residual) <= 8.0 * spread
     blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, conditioned.track.rate_hz)
     band = _band(carrier, blocks)
-    contrast, usual = rough_contrast(blocks, band)
-    if contrast < usual:
+    multiples = tuple(turns[1] * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
+    if not worth_a_look(blocks, band, multiples, 0.5 * params.false_alarm):
         return Sideways((), carrier)
     return Sideways(_Search(carrier, blocks, band, params).run(), carrier)
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.lines import Band, Blocks, false_alarm, rough_contrast, smooth_density, spectral_density, strongest
+from pipeline.lines import Band, Blocks, false_alarm, smooth_density, spectral_density, strongest, worth_a_look
 
 BAND = Band(0.3, 5.0, ((1.3, 0.2),))
 
@@ -101,14 +101,16 @@ def test_line_within_a_hole_is_not_sought() -> None:
     peak = strongest(of, of.y - of.y.mean(), basis(of), BAND)
     assert peak is not None
     assert peak.false_alarm > 0.01
-    assert rough_contrast(of, BAND)[0] < 3.0 * rough_contrast(of, BAND)[1]
+    assert not worth_a_look(of, BAND, (3.7,), 0.005)
+    assert worth_a_look(of, Band(0.3, 5.0, ()), (2.6,), 0.005)
+    assert worth_a_look(of, BAND, (1.3,), 0.005)
 
 
 def test_empty_band_has_no_line() -> None:
     """Where nothing is left between the holes there is no peak."""
     of = blocks(np.random.default_rng(3).standard_normal(600))
     assert strongest(of, of.y, basis(of), Band(1.2, 1.4, ((1.3, 0.2),))) is None
-    assert rough_contrast(of, Band(1.2, 1.4, ((1.3, 0.2),))) == (0.0, math.inf)
+    assert not worth_a_look(of, Band(1.2, 1.4, ((1.3, 0.2),)), (2.6,), 0.005)
 
 
 def test_probability_falls_with_evidence_and_rises_with_trials() -> None:
