@@ -19,7 +19,7 @@ from pipeline.track import F8, UNUSABLE
 __all__ = ["Params", "Step", "find_steps", "staircase", "unstepped", "weighed"]
 
 DEGREES = (0, 1, 2, 4, 6, 9, 12)  # of the smooth drift that steps compete with
-SUDDEN = 6.0  # fall of chi-square by which a jump must beat a glide
+SUDDEN = 4.0  # fall of chi-square by which a jump must beat a glide
 POSSIBLE_DRAW = 5.1  # standard deviation of a jump's place over (noise/height)^2, samples: root of 26
 
 

@@ -30,6 +30,8 @@ PAGES = (
     "docs/reference/run-file.md",
     "docs/reference/command-line.md",
     "docs/explanation/method.md",
+    "docs/explanation/real-records.md",
+    "docs/explanation/velocity.md",
     "docs/decisions/0004-demodulation-first.md",
 )
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
