@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.beside import Beside
 from pipeline.chain import Chain
@@ -19,6 +18,7 @@ from pipeline.track import F8, UNUSABLE, Track
 
 __all__ = ["Params", "Smoothed", "smooth"]
 
+LONGEST = 100_000  # periods, beyond which noise is taken for white
 LEAST_WEIGHT = 0.01  # of the likeliest memory's likelihood, that another must have to count
 
 
@@ -150,7 +150,7 @@ def smooth(
     record that follows its law to the end has the memory of all its samples: then this is the global fit. What
     frequency and law are uncertain by is a polynomial in time added to z, one power for each of their parameters, whose
     coefficients are estimated along; so the ends, with one side missing, carry their larger uncertainty.
-    Where residuals are correlated uncertainties are widened by their spectral density at the oscillation's frequency.
+    Where noise is correlated samples count by its spectral density near the oscillation's frequency.
     Clock and speed of sound, which scale everything alike, are not in these uncertainties.
     """
     params = params or Params()
@@ -162,20 +162,22 @@ def smooth(
     swing = track.y[used] - rest.at(t)
     if beside is not None and beside.modelled:
         swing = swing - beside.sideways.position(t)
-    walk = _Walk.of(t, swing, _Carried.at(t, phase, float(t[-1])), phase.angular_frequency.value, params)
+    used_carrier = _Carried.at(t, phase, float(t[-1]))
+    walk = _Walk.of(t, swing, used_carrier, phase.angular_frequency.value, params)
     powers = max(len(phase.damping.best.law.parameters), phase.coefficients.size, 2) - 1
-    mean, covariance, noise_m, memory_s = walk.smooth(track.rate_hz, powers, params)
+    mean, covariance, noise_m, memory_s = walk.coloured(t, swing, used_carrier, track.rate_hz).smooth(
+        track.rate_hz, powers, params
+    )
     at = np.where(known, track.t, t[0])
     carried = _Carried.at(at, phase, float(t[-1]))
     rows = carried.rows()
     z = np.array([np.interp(at, walk.t, each) for each in mean])
     spread = {(i, j): np.interp(at, walk.t, covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1))}
-    widening = _widening(track, t, swing, walk, mean, noise_m, phase.angular_frequency.value)
     values, uncertainties = list[F8](), list[F8]()
     for row in rows:
         variance = row[0] ** 2 * spread[0, 0] + 2.0 * row[0] * row[1] * spread[0, 1] + row[1] ** 2 * spread[1, 1]
         values.append(np.where(known, row[0] * z[0] + row[1] * z[1], np.nan))
-        uncertainties.append(np.where(known, widening * np.sqrt(variance), np.nan))
+        uncertainties.append(np.where(known, np.sqrt(variance), np.nan))
     values[0] = values[0] + np.where(known, rest.at(at), np.nan)
     uncertainties[0] = np.hypot(uncertainties[0], rest.mean.u)
     return Smoothed(
@@ -201,9 +203,8 @@ class _Walk:
     gain: F8
     squares: float
     samples: int
-    index: NDArray[np.int64]
-    carried: _Carried
     period: float
+    noise_m: float | None = None
 
     @classmethod
     def of(cls, t: F8, swing: F8, carried: _Carried, omega: float, params: Params) -> _Walk:
@@ -219,7 +220,24 @@ class _Walk:
         score = np.array([np.bincount(index, weights=row * swing) for row in h])
         middle = t[0] + np.bincount(index, weights=t - t[0]) / count
         gain = np.bincount(index, weights=carried.gain) / count
-        return cls(middle, information, score, gain, float(swing @ swing), t.size, index, carried, period)
+        return cls(middle, information, score, gain, float(swing @ swing), t.size, period)
+
+    def coloured(self, t: F8, swing: F8, carried: _Carried, rate_hz: float) -> _Walk:
+        """Return the walk with what was seen weakened where noise is stronger near the oscillation than on the whole.
+
+        Else intervals would be those of as many independent samples. The density is read off half and
+        twice the frequency, on what the shortest memory leaves, so that motion which wanders does not pass for noise.
+        """
+        if t.size < 64 or float(t[-1] - t[0]) > LONGEST * self.period:
+            return self
+        trial = _Trial.of(self, self.period, rate_hz, 1)
+        z = np.array([np.interp(t, self.t, each) for each in trial.mean])
+        residual = swing - carried.gain * (carried.cosine * z[0] - carried.sine * z[1])
+        blocks = Blocks.of(t, residual, self.period / 12.0, rate_hz)
+        turn = blocks.step / self.period
+        density = math.sqrt(smooth_density(blocks.y, 0.5 * turn) * smooth_density(blocks.y, 2.0 * turn))
+        excess = max(1.0, density * blocks.samples / max(trial.noise_m**2, 1e-300))
+        return replace(self, information=self.information / excess, score=self.score / excess, noise_m=trial.noise_m)
 
     def smooth(self, rate_hz: float, powers: int, params: Params) -> tuple[F8, F8, float, float]:
         """Smooth with every memory that the record admits and average them by their likelihood.
@@ -257,7 +275,7 @@ class _Trial:
     """The walk smoothed with one memory, and a polynomial in time beside it whose coefficients are not known before.
 
     The polynomial is eliminated by its Schur complement; ``cost`` is minus twice the logarithm of the likelihood that
-    is left, the noise at its best value, up to a constant.
+    is left, up to a constant, the noise as known before or else at its best value.
     """
 
     chain: Chain
@@ -284,10 +302,12 @@ class _Trial:
         inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
         coefficients = inverse @ np.einsum("iaw,iw->a", beyond, walk.score)
         mean = solved.mean[:, 0] + np.einsum("a,iaw->iw", coefficients, beyond)
-        dof = max(walk.samples - 2 - int(np.count_nonzero(kept)), 1)
-        squares = walk.squares - float(np.sum(walk.score * mean))
-        noise_m = math.sqrt(max(squares, 1e-300) / dof)
+        explained = float(np.sum(walk.score * mean))
         determinants = solved.log_determinant + float(np.sum(np.log(values[kept]))) - 2.0 * float(np.sum(np.log(bond)))
+        if walk.noise_m is not None:
+            return cls(chain, mean, beyond, inverse, walk.noise_m, determinants - explained / walk.noise_m**2)
+        dof = max(walk.samples - 2 - int(np.count_nonzero(kept)), 1)
+        noise_m = math.sqrt(max(walk.squares - explained, 1e-300) / dof)
         return cls(chain, mean, beyond, inverse, noise_m, 2.0 * dof * math.log(noise_m) + determinants)
 
     def covariance(self) -> F8:
@@ -295,15 +315,3 @@ class _Trial:
         spread = self.chain.solve(covariance=True).covariance
         assert spread is not None
         return np.asarray(spread + np.einsum("iaw,ab,jbw->ijw", self.beyond, self.inverse, self.beyond))
-
-
-def _widening(track: Track, t: F8, swing: F8, walk: _Walk, mean: F8, noise_m: float, omega: float) -> float:
-    """By how much the residuals' density at the oscillation's frequency exceeds that of white noise, as a root."""
-    carried = walk.carried
-    z = np.array([np.interp(t, walk.t, each) for each in mean])
-    residual = swing - carried.gain * (carried.cosine * z[0] - carried.sine * z[1])
-    if float(t[-1] - t[0]) > 1e5 * walk.period or t.size < 64:
-        return 1.0
-    blocks = Blocks.of(t, residual, walk.period / 12.0, track.rate_hz)
-    density = smooth_density(blocks.y, omega * blocks.step / (2.0 * math.pi))
-    return math.sqrt(max(1.0, density * blocks.samples / noise_m**2))

@@ -108,6 +108,22 @@ def test_time_may_be_irregular(synthetic: ModuleType) -> None:
     assert rms(error) < 0.0015 * rms(velocity_of(truth, t[known]))
 
 
+def test_intervals_hold_in_correlated_noise(synthetic: ModuleType) -> None:
+    """In noise of a correlation of ten samples intervals of the velocity still hold the truth nearly so often."""
+    t, inside = synthetic.times(20.0), []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        white = np.fft.rfft(rng.standard_normal(2 * t.size))
+        response = np.sqrt(1.0 - 0.81) / (1.0 - 0.9 * np.exp(-2j * np.pi * np.fft.rfftfreq(2 * t.size)))
+        truth = synthetic.Truth(gamma=0.01463, phase=rng.uniform(-3.0, 3.0))
+        y = truth.position(t) + 3e-4 * np.fft.irfft(white * response)[: t.size]
+        found = analyse(Track.from_arrays(t, y)).smoothed()
+        pulls = np.abs(found.velocity - velocity_of(truth, t)) / found.u_velocity
+        inside.append([np.mean(pulls <= 1.0), np.mean(pulls <= 1.96)])
+    assert np.mean(inside, axis=0)[0] > 0.58
+    assert np.mean(inside, axis=0)[1] > 0.88
+
+
 def driven(synthetic: ModuleType, seconds: float, kick: float, seed: int) -> tuple[F8, F8, F8]:
     """Return times, positions and velocities of an oscillator that white force noise kicks at every sample."""
     truth, t = synthetic.Truth(gamma=0.01463), synthetic.times(seconds)
