@@ -130,7 +130,7 @@ MAKERS: dict[str, tuple[str, str, str, Maker]] = {
         lambda s: record(s, 120.0, kappa=-4.3),
     ),
     "drift": ("rest_drift", "warning", "by 1 mm", drifting),
-    "steps": ("rest_drift", "warning", "jumps 2 times: +1.5 mm at 20 s, -", stepping),
+    "steps": ("rest_drift", "warning", "jumps 2 times: +1.5 mm at ", stepping),
     "wobble": ("correlated_residuals", "warning", "widened", wobbling),
     "beats": (
         "sideways_mode",
