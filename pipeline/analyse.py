@@ -26,6 +26,7 @@ from pipeline.effects import Effect, tabulate
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate
 from pipeline.fullfit import FullFit, fit_record
+from pipeline.instrument import Instrument
 from pipeline.judge import Finding, count_quality, judge, judge_samples, judge_still
 from pipeline.phase import PhaseFit, fit_phase
 from pipeline.quick import condition_quickly, demodulate_quickly, find_cycles_quickly
@@ -206,17 +207,17 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         demodulated = replace(demodulated, flags=full.flags)
         damping, phase, rest, waveform = full.damping, full.phase, full.rest, full.waveform
     rest, waveform = beside.put_back(rest, waveform)
+    instrument = Instrument.of(track, u_crystal=params.derive.u_clock_nominal)
     effects = tabulate(
         scene,
         damping,
         phase,
         rest,
         noise_m=demodulated.noise_m,
-        clock=track.clock,
-        u_clock=params.derive.u_clock_nominal,
+        instrument=instrument,
         beside=beside,
     )
-    derived = derive(demodulated, damping, phase, rest, scene, effects, clock=track.clock, params=params.derive)
+    derived = derive(demodulated, damping, phase, rest, scene, effects, instrument=instrument, params=params.derive)
     findings = judge(conditioned, cycles, demodulated, damping, phase, rest, waveform, beside)
     if full is not None and not full.converged:
         findings = (*findings, _not_converged(full))

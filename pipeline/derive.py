@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pipeline.air import air_density, air_viscosity
+from pipeline.ambient import Ambient
+from pipeline.budget import Budget, Inputs
 from pipeline.condition import MAD_TO_SIGMA
+from pipeline.curves import Curve, by_parameters, drag_curve, energy_curve
 from pipeline.damping import Damping, LawFit
 from pipeline.demodulate import Demodulated
-from pipeline.effects import Effect, added_mass_kg
+from pipeline.effects import ADDED_MASS_SHAPE, Effect
 from pipeline.estimate import Estimate
+from pipeline.instrument import U_CRYSTAL, Instrument
 from pipeline.phase import PhaseFit
 from pipeline.rest import Rest
 from pipeline.scene import Scene
 from pipeline.track import UNUSABLE, Quality
 
 __all__ = ["Derived", "Params", "derive"]
+
+# Powers of length and of one over time in the unit of a law's parameter.
+_DIMENSIONS = {"A0": (1, 0), "gamma": (0, 1), "beta": (-1, 1), "mu": (1, 1)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,13 +36,13 @@ class Params:
     Parameters
     ----------
     u_clock_nominal : float
-        Relative standard uncertainty of a clock that nobody compared with another: a crystal's 50 ppm taken as
-        half-width of a rectangle. It does not average away.
+        Relative standard uncertainty of a clock by its crystal's specification: 50 ppm taken as half-width of a
+        rectangle. It does not average away.
     u_air_temperature_k : float
         Standard uncertainty of an air temperature stated without one, K.
     """
 
-    u_clock_nominal: float = 50e-6 / math.sqrt(3.0)
+    u_clock_nominal: float = U_CRYSTAL
     u_air_temperature_k: float = 0.5
 
 
@@ -47,20 +53,61 @@ class Derived:
     Parameters
     ----------
     estimates : mapping of str to Estimate
-        With every known contribution to the uncertainty, the clock's among them.
+        With every known contribution to the uncertainty, the clock's and the scale's among them.
     statistical : mapping of str to Estimate
-        From the record's own scatter alone (Type A), where that differs.
+        The same values with what the record's own scatter contributes alone (Type A).
+    coefficients : mapping of str to Estimate
+        The selected law's parameters with every known contribution.
+    budgets : mapping of str to Budget
+        Of every estimate and coefficient: which input contributes what.
     effective_mass_kg : Estimate or None
         Mass that oscillates: bob, a third of the spring, air carried along, as far as the scene requires them.
     own_mass_kg, spring_share_kg : Estimate or None
         Its parts: what belongs to this run alone, and the share of the spring, which other runs have too.
+    half_stiffness : Estimate
+        Mechanical energy over the recorded amplitude's square, N/m; per kilogram where the scene gives no mass.
+    drag_length : Estimate or None
+        Drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude, m; None without disc, mass or air
+        temperature.
+    law_weights : mapping of str to float
+        Of the admissible laws other than the selected one; with that one's they add up to 1.
     """
 
     estimates: Mapping[str, Estimate]
     statistical: Mapping[str, Estimate]
+    coefficients: Mapping[str, Estimate]
+    budgets: Mapping[str, Budget]
     effective_mass_kg: Estimate | None
     own_mass_kg: Estimate | None
     spring_share_kg: Estimate | None
+    half_stiffness: Estimate
+    drag_length: Estimate | None
+    law_weights: Mapping[str, float]
+
+    def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve:
+        """Return the mechanical energy against time with its band, J; J/kg where no mass is known.
+
+        Parameters
+        ----------
+        damping : Damping
+        demodulated : Demodulated
+            Of the same run.
+        """
+        unit = "J/kg" if self.effective_mass_kg is None else "J"
+        return energy_curve(damping, demodulated, self.half_stiffness, self.law_weights, unit)
+
+    def drag_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
+        """Return the drag coefficient against amplitude with its band; None where the scene or the record gives none.
+
+        Parameters
+        ----------
+        damping : Damping
+        demodulated : Demodulated
+            Of the same run.
+        """
+        if self.drag_length is None:
+            return None
+        return drag_curve(damping, demodulated, self.drag_length, self.law_weights)
 
 
 def derive(
@@ -71,7 +118,7 @@ def derive(
     scene: Scene,
     effects: tuple[Effect, ...],
     *,
-    clock: str,
+    instrument: Instrument,
     params: Params | None = None,
 ) -> Derived:
     """Propagate uncertainties to everything that is asked of a run.
@@ -84,8 +131,8 @@ def derive(
         What is not known there leaves out what depends on it.
     effects : tuple of Effect
         Say which masses count.
-    clock : str
-        "nominal", "device" or "host".
+    instrument : Instrument
+        Clock and scale of the sensor.
     params : Params, optional
 
     Returns
@@ -94,104 +141,149 @@ def derive(
 
     Notes
     -----
-    First-order propagation [1]_ through the ``uncertainties`` package:
-    :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`,
-    :math:`k = (\\omega^2 + \\overline{\\lambda^2}) (m + m_s/3 + m_a)`,
+    First-order propagation [1]_ through the ``uncertainties`` package, every input one variable wherever it enters:
+    with the clock's rate r and the distances' scale s (both 1 but for their uncertainty)
+    :math:`\\omega = r\\omega_0`, :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`,
+    :math:`k = (\\omega^2 + \\overline{\\lambda^2}) (m + m_s/3 + m_a)`, :math:`A_0 = s a_0`, :math:`\\beta = r b/s`,
     :math:`Q = \\omega/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start,
     :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta`,
     :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
+    What depends on the damping law carries the covariance of the selected law's parameters, and beside it what the
+    admissible laws differ by: :math:`\\sum_i w_i (x_i - x)^2` with :math:`w_i \\propto e^{-\\mathrm{BIC}_i/2}`.
 
     References
     ----------
     .. [1] JCGM 100:2008, "Guide to the expression of uncertainty in measurement".
     .. [2] K. Lelas, R. Pezer, arXiv:2502.07458.
     """
-    from uncertainties import wrap
-
     params = params or Params()
-    omega_stat = phase.angular_frequency
-    rate_error = _variable(Estimate(1.0, params.u_clock_nominal if clock == "nominal" else 0.0))
-    omega = _variable(omega_stat) * rate_error
-    amplitude = damping.averaged({n: f.joint["A0"] for n, f in damping.considered.items()})
-    decay = damping.averaged({n: f.damping_rate() for n, f in damping.considered.items()})
-    start = _variable(amplitude)
-    lam = _variable(decay) * rate_error
-    v_rms = omega * _variable(_root_mean_square(damping.best, demodulated, damping.t0))
-    found = {
+    inputs = Inputs()
+    ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
+    laws = _Laws(damping, inputs)
+    rate = inputs.add("clock_rate", instrument.clock_rate, "B")
+    scale = ambient.scale(instrument)
+    omega = inputs.add("angular_frequency", phase.angular_frequency, "A") * rate
+    start = laws.quantity(lambda fit: float(fit.joint.values[0])) * scale
+    lam = laws.quantity(_rate_at_start) * rate
+    v_rms = omega * scale * laws.quantity(lambda fit: _root_mean_square(fit, demodulated, damping.t0))
+    zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, "m"), "B")
+    found: dict[str, tuple[Any, str]] = {
         "period": (2 * math.pi / omega, "s"),
         "frequency": (omega / (2 * math.pi), "Hz"),
         "angular_frequency": (omega, "rad/s"),
         "amplitude": (start, "m"),
-        "offset": (_variable(rest.mean), "m"),
-        "phase": (_variable(phase.phase), "rad"),
-        "noise": (_variable(_noise(demodulated)), "m"),
+        "offset": (inputs.add("rest_position", rest.mean, "A") * scale + zero, "m"),
+        "phase": (inputs.add("phase", phase.phase, "A"), "rad"),
+        "noise": (inputs.add("noise", _noise(demodulated), "A"), "m"),
         "damping_rate": (lam, "1/s"),
         "velocity_rms": (v_rms, "m/s"),
     }
-    if decay.value > 0:
+    if laws.nominal(_rate_at_start) > 0:
         found["quality_factor"] = (omega / (2 * lam), "")
-    # One variable for the diameter, wherever it enters: what it shares must cancel or add up.
-    diameter = None if scene.disc_diameter_m is None else _variable(scene.disc_diameter_m)
-    own, share = _masses(scene, effects, diameter)
-    mass = None if own is None else own + (share or 0.0)
+    coefficients = _coefficients(damping, laws, rate, scale)
+    diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
+    own, share = _masses(scene, effects, diameter, ambient, inputs)
+    mass = None if own is None else own + (0.0 if share is None else share)
     if mass is not None:
-        found["spring_constant"] = ((omega**2 + damping.squared_rate(demodulated.t)) * mass, "N/m")
+        found["spring_constant"] = ((omega**2 + damping.squared_rate(demodulated.t) * rate**2) * mass, "N/m")
+    drag_length = None
     if diameter is not None:
         found["keulegan_carpenter_number"] = (2 * math.pi * start / diameter, "")
-        if scene.air_temperature_c is not None:
-            density, viscosity = wrap(air_density), wrap(air_viscosity)
-            given_c = scene.air_temperature_c
-            celsius = _variable(Estimate(given_c.value, given_c.u or params.u_air_temperature_k, "degC"))
-            rho = density(celsius, *(_variable(x) for x in _air(scene)))
-            found["reynolds_number"] = (rho * v_rms * diameter / viscosity(celsius), "")
-            best = damping.best
-            if damping.settled and "beta" in best.joint.names and mass is not None:
-                beta = _variable(best.joint["beta"])
-                area = math.pi * diameter**2 / 4
-                found["drag_coefficient"] = (3 * math.pi * mass * beta / (2 * omega * rho * area), "")
-    estimates = {name: _estimate(x, unit) for name, (x, unit) in found.items()}
-    relative = omega_stat.u / omega_stat.value
-    statistical = {
-        name: Estimate(estimates[name].value, estimates[name].value * relative, estimates[name].unit)
-        for name in ("period", "frequency", "angular_frequency")
-    }
+        if ambient.known:
+            found["reynolds_number"] = (ambient.density * v_rms * diameter / ambient.viscosity(), "")
+        if ambient.known and mass is not None:
+            # C over beta; the area, the mass and the density are in it once.
+            over_beta = 6 * mass / (omega * ambient.density * diameter**2)
+            drag_length = _estimate(over_beta * rate / scale, "m")
+            if damping.settled and "beta" in coefficients:
+                found["drag_coefficient"] = (over_beta * coefficients["beta"][0], "")
+    half_stiffness = _estimate(0.5 * omega**2 * scale**2 * (1.0 if mass is None else mass), "N/m")
+    budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
+    estimates = {name: budgets[name].estimate for name in found}
     effective, own_mass, spring_share = (None if m is None else _estimate(m, "kg") for m in (mass, own, share))
-    return Derived(estimates, statistical, effective, own_mass, spring_share)
+    return Derived(
+        estimates=estimates,
+        statistical={name: Estimate(e.value, budgets[name].u_of("A"), e.unit) for name, e in estimates.items()},
+        coefficients={name: budgets[name].estimate for name in coefficients},
+        budgets=budgets,
+        effective_mass_kg=effective,
+        own_mass_kg=own_mass,
+        spring_share_kg=spring_share,
+        half_stiffness=half_stiffness,
+        drag_length=drag_length,
+        law_weights=laws.weights,
+    )
+
+
+class _Laws:
+    """The damping laws as inputs: the selected one's parameters, and what the other admissible ones say instead."""
+
+    def __init__(self, damping: Damping, inputs: Inputs) -> None:
+        self.damping = damping
+        self.variables = inputs.add_joint("damping_law", damping.best.joint, "A")
+        names = damping.admissible or (damping.selected,)
+        odds = {name: math.exp(-0.5 * (damping.fits[name].bic - damping.best.bic)) for name in names}
+        total = sum(odds.values())
+        self.weights = {name: x / total for name, x in odds.items() if name != damping.selected}
+        self.others = inputs.add_alternatives("choice_of_law", self.weights, "B")
+
+    def nominal(self, f: Callable[[LawFit], float]) -> float:
+        """Return what the selected law says."""
+        return f(self.damping.best)
+
+    def quantity(self, f: Callable[[LawFit], float]) -> Any:
+        """Return a function of a law as a variable: linear in the parameters, with the choice of the law."""
+        best = self.damping.best
+        value = f(best)
+        x: Any = value
+        for variable, slope in zip(self.variables, by_parameters(best, f), strict=True):
+            x = x + slope * (variable - variable.nominal_value)
+        for name, z in self.others.items():
+            x = x + (f(self.damping.fits[name]) - value) * z
+        return x
+
+
+def _rate_at_start(fit: LawFit) -> float:
+    """Logarithmic rate of the amplitude at the first sample, 1/s."""
+    theta = fit.joint.values
+    return float(fit.law.rate(theta[:1], theta)[0] / theta[0])
+
+
+def _root_mean_square(fit: LawFit, demodulated: Demodulated, t0: float) -> float:
+    """Of the displacement over the windows, m."""
+    return math.sqrt(float(np.mean(fit.amplitude(demodulated.t - t0) ** 2)) / 2.0)
+
+
+def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
+    """The selected law's parameters in true seconds and metres."""
+    joint = damping.best.joint
+    found = {}
+    for name, unit, x in zip(joint.names, joint.units, laws.variables, strict=True):
+        if name in _DIMENSIONS and name != "A0":
+            length, per_time = _DIMENSIONS[name]
+            found[name] = (x * scale**length * rate**per_time, unit)
+    return found
+
+
+def _masses(
+    scene: Scene, effects: tuple[Effect, ...], diameter: Any, ambient: Ambient, inputs: Inputs
+) -> tuple[Any, Any]:
+    """Bob with the air it carries, and a third of the spring, as far as the effects table includes them."""
+    if scene.bob_mass_kg is None:
+        return None, None
+    own = inputs.add("bob_mass", scene.bob_mass_kg, "B")
+    included = {effect.name for effect in effects if effect.included}
+    if "added_mass" in included and diameter is not None:
+        own = own + ADDED_MASS_SHAPE * ambient.density * (diameter / 2) ** 3
+    if "spring_mass" in included and scene.spring_mass_kg is not None:
+        return own, inputs.add("spring_mass", scene.spring_mass_kg, "B") / 3
+    return own, None
 
 
 def _estimate(x: Any, unit: str) -> Estimate:
     from uncertainties import nominal_value, std_dev
 
     return Estimate(float(nominal_value(x)), float(std_dev(x)), unit)
-
-
-def _air(scene: Scene) -> tuple[Estimate, Estimate]:
-    return (
-        scene.air_pressure_pa or Estimate(101325.0, 1500.0, "Pa"),
-        scene.air_relative_humidity or Estimate(0.5, 0.2),
-    )
-
-
-def _variable(estimate: Estimate) -> Any:
-    """The estimate as a variable of the ``uncertainties`` package; a plain number where it is exact."""
-    from uncertainties import ufloat
-
-    return ufloat(estimate.value, estimate.u) if estimate.u > 0 else estimate.value
-
-
-def _masses(scene: Scene, effects: tuple[Effect, ...], diameter: Any) -> tuple[Any, Any]:
-    """Bob with the air it carries, and a third of the spring, as far as the effects table includes them."""
-    if scene.bob_mass_kg is None:
-        return None, None
-    own = _variable(scene.bob_mass_kg)
-    included = {effect.name for effect in effects if effect.included}
-    if "added_mass" in included and diameter is not None:
-        from uncertainties import wrap
-
-        own = own + wrap(lambda d: added_mass_kg(scene, d))(diameter)
-    if "spring_mass" in included and scene.spring_mass_kg is not None:
-        return own, _variable(scene.spring_mass_kg) / 3
-    return own, None
 
 
 def _noise(demodulated: Demodulated) -> Estimate:
@@ -209,14 +301,3 @@ def _noise(demodulated: Demodulated) -> Estimate:
     wide = float(np.mean((demodulated.flags & Quality.FALSE_ECHO) != 0))
     parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)
     return Estimate(value, math.hypot(*parts), "m")
-
-
-def _root_mean_square(fit: LawFit, demodulated: Demodulated, t0: float) -> Estimate:
-    """Of the displacement over the windows, m, with its standard uncertainty."""
-    t = demodulated.t - t0
-    amplitude = fit.amplitude(t)
-    value = math.sqrt(float(np.mean(amplitude**2)) / 2.0)
-    if value == 0.0:
-        return Estimate(0.0, 0.0, "m")
-    gradient = np.mean(amplitude[:, None] * fit.law.jacobian(t, fit.joint.values), axis=0) / (2.0 * value)
-    return Estimate(value, math.sqrt(max(float(gradient @ fit.joint.covariance @ gradient), 0.0)), "m")

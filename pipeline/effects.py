@@ -14,14 +14,16 @@ from pipeline.air import air_density, air_viscosity, speed_of_sound
 from pipeline.beside import Beside
 from pipeline.damping import Damping
 from pipeline.estimate import Estimate
+from pipeline.instrument import Instrument
 from pipeline.phase import PhaseFit
 from pipeline.rest import Rest
 from pipeline.scene import Scene
 
-__all__ = ["Effect", "added_mass_kg", "tabulate"]
+__all__ = ["ADDED_MASS_SHAPE", "Effect", "added_mass_kg", "tabulate"]
 
 SHARE = 0.1  # of the uncertainty that an effect would disturb
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
+ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc: added mass over rho a^3
 STEEL_KG_PER_M3 = 7850.0
 STEADY_DISC_DRAG = 1.17  # drag coefficient of a disc broadside on in steady flow, Re > 1000
 
@@ -52,18 +54,16 @@ class Effect:
     why: str
 
 
-def added_mass_kg(scene: Scene, diameter_m: float | None = None) -> float:
+def added_mass_kg(scene: Scene) -> float:
     """Mass of air that a thin disc carries along broadside on, :math:`(8/3)\\rho a^3`, kg.
 
     References
     ----------
     H. Lamb, "Hydrodynamics", 6th ed., Cambridge 1932, art. 102.
     """
-    if diameter_m is None:
-        if scene.disc_diameter_m is None:
-            return 0.0
-        diameter_m = scene.disc_diameter_m.value
-    return 8.0 / 3.0 * _density(scene) * (0.5 * diameter_m) ** 3
+    if scene.disc_diameter_m is None:
+        return 0.0
+    return ADDED_MASS_SHAPE * _density(scene) * (0.5 * scene.disc_diameter_m.value) ** 3
 
 
 def tabulate(
@@ -73,8 +73,7 @@ def tabulate(
     rest: Rest,
     *,
     noise_m: float,
-    clock: str,
-    u_clock: float,
+    instrument: Instrument,
     beside: Beside | None = None,
 ) -> tuple[Effect, ...]:
     """Return the effects table.
@@ -85,15 +84,13 @@ def tabulate(
         The bench and what the stages found.
     noise_m : float
         Standard deviation of one sample, m.
-    clock : str
-        "nominal", "device" or "host".
-    u_clock : float
-        Relative standard uncertainty of the clock's rate.
+    instrument : Instrument
+        Clock and scale of the sensor.
     beside : Beside, optional
         Modes beside the main oscillation; left out, they were not sought.
     """
     omega = phase.angular_frequency
-    u_k = 2.0 * math.hypot(omega.u / omega.value, u_clock if clock == "nominal" else 0.0)
+    u_k = 2.0 * math.hypot(omega.u / omega.value, instrument.clock_rate.u)
     if scene.bob_mass_kg is not None:
         u_k = math.hypot(u_k, scene.bob_mass_kg.u / scene.bob_mass_kg.value)
     return (
@@ -103,17 +100,8 @@ def tabulate(
         _rest_drift(rest, noise_m),
         *_modes(beside),
         _buoyancy(scene, omega.value),
-        _speed_of_sound(scene),
-        Effect(
-            "clock_rate",
-            u_clock if clock == "nominal" else None,
-            None,
-            "1",
-            clock == "nominal",
-            "times are row numbers over the nominal rate, so a crystal's error stands in every frequency's uncertainty"
-            if clock == "nominal"
-            else "times were measured by the device",
-        ),
+        _speed_of_sound(scene, instrument),
+        _clock_rate(instrument),
     )
 
 
@@ -179,7 +167,10 @@ def _drags(scene: Scene, damping: Damping, omega: float) -> Iterator[Effect]:
         predicted_beta = 4.0 * b * omega / (3.0 * math.pi * mass)
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
     yield Effect("quadratic_drag", predicted_beta, beta, "1/(m s)", beta is not None, chosen)
-    yield Effect("friction", None, None, "m/s", False, "no law with friction is among those tried")
+    mu = damping.best.joint["mu"].value if "mu" in names else None
+    tried = any("mu" in fit.joint.names for fit in damping.fits.values())
+    why = chosen if tried else "no law with friction is among those tried"
+    yield Effect("friction", None, mu, "m/s", mu is not None, why)
 
 
 def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
@@ -238,16 +229,28 @@ def _buoyancy(scene: Scene, omega: float) -> Effect:
     return Effect("buoyancy", shift, None, "m", False, why)
 
 
-def _speed_of_sound(scene: Scene) -> Effect:
-    why = (
-        "scales every distance alike: amplitude and beta, not the spring constant; "
-        f"relative to {SPEED_OF_SOUND_OF_RECORD:g} m/s, which old recordings take for granted"
-    )
+def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
+    record = instrument.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD
+    why = "it scales every distance alike: amplitude and beta, not the spring constant"
+    if instrument.u_scale > 0:
+        why += "; the distances were calibrated, so the calibration's uncertainty stands in its place"
+        return Effect("speed_of_sound", None, None, "1", False, why)
     if scene.air_temperature_c is None:
-        return Effect("speed_of_sound", None, None, "1", False, "the scene gives no air temperature; it " + why)
+        why = f"the scene gives no air temperature, so its 0.18 %/K stand in no uncertainty: {why}"
+        return Effect("speed_of_sound", None, None, "1", False, why)
     actual = speed_of_sound(
         scene.air_temperature_c.value,
         _value(scene.air_pressure_pa, 101325.0),
         _value(scene.air_relative_humidity, 0.5),
     )
-    return Effect("speed_of_sound", actual / SPEED_OF_SOUND_OF_RECORD - 1.0, None, "1", False, why)
+    whose = "of the record" if instrument.speed_of_sound_m_per_s else "that old recordings take for granted"
+    why += f"; relative to the {record:g} m/s {whose}; the air's uncertainty stands in theirs"
+    if instrument.speed_of_sound_m_per_s:
+        why += ", and so does the difference, which is not corrected"
+    return Effect("speed_of_sound", actual / record - 1.0, None, "1", True, why)
+
+
+def _clock_rate(instrument: Instrument) -> Effect:
+    rate = instrument.clock_rate
+    shift = None if rate.value == 1.0 else rate.value - 1.0
+    return Effect("clock_rate", rate.u, shift, "1", True, instrument.clock_words)

@@ -61,6 +61,15 @@ class Track:
         "live", "replay" or "simulated".
     velocity : (n,) float64, m/s, or None
         The velocity that the recording states.
+    rate_error, u_rate_error : float or None
+        By what share the sensor's clock runs faster than the host's, and the standard uncertainty; None where nobody
+        compared the two.
+    speed_of_sound_m_per_s : float or None
+        That made distances of echo times, m/s; None where it is not known.
+    u_scale : float
+        Relative standard uncertainty of the distances' scale from a calibration; 0 where none was made.
+    u_offset_m : float
+        Standard uncertainty of their zero from a calibration, m; 0 where none was made.
     """
 
     t: F8
@@ -73,6 +82,11 @@ class Track:
     clock: str = "nominal"
     kind: str = "replay"
     velocity: F8 | None = None
+    rate_error: float | None = None
+    u_rate_error: float | None = None
+    speed_of_sound_m_per_s: float | None = None
+    u_scale: float = 0.0
+    u_offset_m: float = 0.0
 
     def __len__(self) -> int:
         return int(self.t.size)

@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import Block
+from acquisition.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.recording import Original, Recording, Trap
 from acquisition.registry import open_recording
 from acquisition.source import SourceInfo
+from acquisition.timebase import fit_clock
 from pipeline.errors import SceneError
 from pipeline.scene import Scene
 from pipeline.track import Track
@@ -22,6 +24,9 @@ from springmass.errors import UNREADABLE, USAGE, ProgramError
 from storage.layout import MAGIC
 
 __all__ = ["Loaded", "load", "read_scene", "sample_data", "to_track"]
+
+MOTION_SENSOR = "motion-sensor"  # fixes the speed of sound
+LINE_PROTOCOL = "line-protocol"  # sends echo times
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,9 +124,22 @@ def load(
     return replace(loaded, track=_between(loaded, from_s, to_s))
 
 
-def to_track(samples: Block, info: SourceInfo) -> Track:
+def to_track(
+    samples: Block, info: SourceInfo, *, recorded_format: str = "", sensor: Mapping[str, Any] | None = None
+) -> Track:
     """Hand samples over to the pipeline.
 
+    Parameters
+    ----------
+    samples : Block
+    info : SourceInfo
+    recorded_format : str
+        Family of the recording that they come from, if any: it says which speed of sound stands in the distances.
+    sensor : mapping, optional
+        What a run file says of the sensor that it was recorded with.
+
+    Notes
+    -----
     The noise stated by a source is passed on; the error column of a file is not noise and travels apart.
     """
     return Track(
@@ -135,7 +153,33 @@ def to_track(samples: Block, info: SourceInfo) -> Track:
         clock=info.clock,
         kind=info.kind,
         velocity=samples.velocity,
+        **_clock_comparison(samples, info),
+        **_scale(recorded_format, sensor or {}),
     )
+
+
+def _clock_comparison(samples: Block, info: SourceInfo) -> dict[str, float]:
+    """How the device's clock ran against the host's, where stamps of both are there."""
+    if info.clock != "device" or samples.host_ns is None or not (samples.host_ns >= 0).all():
+        return {}
+    fit = fit_clock(samples.t, samples.host_ns)
+    if not np.isfinite(fit.rate_error_ppm):
+        return {}
+    return {"rate_error": fit.rate_error_ppm * 1e-6, "u_rate_error": fit.u_rate_error_ppm * 1e-6}
+
+
+def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, float]:
+    """What made distances: the speed of sound where echo times were recorded, and the calibration's uncertainties."""
+    if recorded_format == MOTION_SENSOR:
+        return {"speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
+    if not sensor:
+        return {}
+    calibration = Calibration.from_mapping(sensor.get("calibration", {}))
+    known = {"u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
+    # Families that state a distance have applied a speed of their own that nobody knows.
+    if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
+        known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
+    return known
 
 
 def read_scene(path: str | Path) -> Scene:
@@ -184,7 +228,7 @@ def _from_recording(path: Path, recording: Recording) -> Loaded:
         recording.channel,
         recording.title,
         recording.samples,
-        to_track(recording.samples, recording.info),
+        to_track(recording.samples, recording.info, recorded_format=recording.format),
         recording.traps,
         recording.malformed_rows,
         recording.originals,
@@ -206,7 +250,7 @@ def _load_run(path: Path) -> Loaded:
             run.channel,
             run.title,
             samples,
-            to_track(samples, run.info),
+            to_track(samples, run.info, recorded_format=run.format, sensor=run.provenance.get("sensor")),
             run.traps,
             run.malformed_rows,
             run.originals(),

@@ -13,9 +13,10 @@ from uncertainties import ufloat, umath
 from pipeline.analyse import Analysis, Motion, analyse
 from pipeline.damping import Damping, fit_damping
 from pipeline.demodulate import Demodulated
-from pipeline.derive import Derived, Params, derive
+from pipeline.derive import Derived, derive
 from pipeline.effects import Effect, tabulate
 from pipeline.estimate import Estimate
+from pipeline.instrument import U_CRYSTAL, Instrument
 from pipeline.phase import fit_phase
 from pipeline.rest import fit_rest
 from pipeline.scene import Scene
@@ -31,11 +32,15 @@ BENCH = {
 }
 
 
+EXACT = Instrument("device", Estimate(1.0, 0.0), "exact")
+CRYSTAL = Instrument("nominal", Estimate(1.0, U_CRYSTAL), "a crystal's")
+
+
 class Bench:
     """The stages of one run made by hand, and what is derived of it."""
 
     def __init__(
-        self, windows: Windows, tables: dict[str, object], *, clock: str = "device", gamma: float = GAMMA
+        self, windows: Windows, tables: dict[str, object], *, instrument: Instrument = EXACT, gamma: float = GAMMA
     ) -> None:
         t = 0.4 + 0.785 * np.arange(150)
         decay = np.exp(-gamma * t)
@@ -55,18 +60,17 @@ class Bench:
             self.phase,
             self.rest,
             noise_m=3e-4,
-            clock=clock,
-            u_clock=Params().u_clock_nominal,
+            instrument=instrument,
         )
         self.derived: Derived = derive(
-            self.points, self.damping, self.phase, self.rest, self.scene, self.effects, clock=clock
+            self.points, self.damping, self.phase, self.rest, self.scene, self.effects, instrument=instrument
         )
         self.estimates = self.derived.estimates
 
 
 @pytest.fixture
 def bench(windows: Windows) -> Bench:
-    """Return the whole bench, clock of the device."""
+    """Return the whole bench, its clock exact."""
     return Bench(windows, BENCH)
 
 
@@ -86,7 +90,7 @@ def test_frequency_period_and_angular_frequency_are_one_number(bench: Bench) -> 
 
 def test_nominal_clock_enters_everything_with_time(windows: Windows, bench: Bench) -> None:
     """A crystal of 50 ppm, half-width of a rectangle, adds to frequency's u but not to its statistical part."""
-    nominal = Bench(windows, BENCH, clock="nominal")
+    nominal = Bench(windows, BENCH, instrument=CRYSTAL)
     relative = bench.estimates["frequency"].u / bench.estimates["frequency"].value
     expected = math.hypot(relative, 50e-6 / math.sqrt(3))
     for name in ("frequency", "period", "angular_frequency"):
@@ -158,7 +162,7 @@ def test_root_mean_square_of_a_constant_amplitude(windows: Windows) -> None:
     points = windows(t, START, omega=OMEGA, phase=OMEGA * t, offset=0.2, u=(2e-5, 4e-4, 2e-5))
     damping = fit_damping(points, 0.0)
     phase, rest = fit_phase(points, damping), fit_rest(points)
-    derived = derive(points, damping, phase, rest, Scene(), (), clock="device")
+    derived = derive(points, damping, phase, rest, Scene(), (), instrument=EXACT)
     assert derived.estimates["velocity_rms"].value == pytest.approx(8.0 * 0.05 / math.sqrt(2), rel=1e-6)
     assert derived.effective_mass_kg is None
     assert not {"spring_constant", "reynolds_number", "keulegan_carpenter_number", "drag_coefficient"} & set(
@@ -167,13 +171,15 @@ def test_root_mean_square_of_a_constant_amplitude(windows: Windows) -> None:
 
 
 def test_reynolds_number_with_its_formula(bench: Bench) -> None:
-    """Re = rho v D / eta with density and viscosity moving together with the temperature."""
-    v = bench.estimates["velocity_rms"]
+    """Re = rho v D / eta; density, viscosity and the distances' scale move together with the temperature."""
+    v = bench.derived.statistical["velocity_rms"]
     celsius = ufloat(20.0, 0.3)
     kelvin = celsius + 273.15
+    scale = umath.sqrt(kelvin / 293.15) * ufloat(1.0, 4e-4)
     density = 101325.0 * 0.02896546 / (8.314462618 * kelvin)
     viscosity = 1.458e-6 * kelvin**1.5 / (kelvin + 110.4)
-    expected = density * ufloat(v.value, v.u) * ufloat(0.102, 0.0005) / viscosity
+    expected = density * ufloat(v.value, v.u) * scale * ufloat(0.102, 0.0005) / viscosity
+    expected = expected * ufloat(1.0, 5e-4) * ufloat(1.0, 5e-3)
     found = bench.estimates["reynolds_number"]
     assert found.value == pytest.approx(expected.nominal_value, rel=1e-9)
     assert found.u == pytest.approx(expected.std_dev, rel=1e-3)
@@ -196,12 +202,14 @@ def test_drag_coefficient_with_its_formula(bench: Bench) -> None:
     density = 101325.0 * 0.02896546 / (8.314462618 * (celsius + 273.15))
     added = 8 / 3 * (101325.0 * 0.02896546 / (8.314462618 * 293.15)) * (diameter / 2) ** 3
     mass = ufloat(0.2176, 0.00005) + ufloat(0.0100, 0.0005) / 3 + added
+    scale = umath.sqrt((celsius + 273.15) / 293.15) * ufloat(1.0, 4e-4)
     expected = (
         3
         * math.pi
         * mass
         * ufloat(beta.value, beta.u)
-        / (2 * ufloat(omega.value, omega.u) * density * math.pi * diameter**2 / 4)
+        / (2 * ufloat(omega.value, omega.u) * density * ufloat(1.0, 5e-4) * math.pi * diameter**2 / 4)
+        / scale
     )
     found = bench.estimates["drag_coefficient"]
     assert found.value == pytest.approx(expected.nominal_value, rel=1e-6)
@@ -232,7 +240,7 @@ def test_growing_oscillation_has_no_quality_factor(windows: Windows) -> None:
     t = 0.4 + 0.785 * np.arange(80)
     points = windows(t, 0.02 * np.exp(0.005 * t), omega=OMEGA, phase=OMEGA * t, u=(2e-5, 4e-4, 2e-5))
     damping = fit_damping(points, 0.0)
-    derived = derive(points, damping, fit_phase(points, damping), fit_rest(points), Scene(), (), clock="host")
+    derived = derive(points, damping, fit_phase(points, damping), fit_rest(points), Scene(), (), instrument=EXACT)
     assert "quality_factor" not in derived.estimates
     assert derived.estimates["damping_rate"].value < 0
 

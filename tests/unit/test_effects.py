@@ -13,6 +13,8 @@ from pipeline.analyse import analyse
 from pipeline.damping import fit_damping
 from pipeline.demodulate import Demodulated
 from pipeline.effects import Effect, added_mass_kg, tabulate
+from pipeline.estimate import Estimate
+from pipeline.instrument import Instrument
 from pipeline.phase import fit_phase
 from pipeline.rest import fit_rest
 from pipeline.scene import Scene
@@ -41,8 +43,11 @@ BENCH = {
 }
 
 
+NOMINAL = Instrument("nominal", Estimate(1.0, 3e-5), "as its crystal has it, nobody compared")
+
+
 def table(
-    windows: Windows, tables: dict[str, object], *, clock: str = "nominal", offset_drift_m: float = 0.0
+    windows: Windows, tables: dict[str, object], *, instrument: Instrument = NOMINAL, offset_drift_m: float = 0.0
 ) -> dict[str, Effect]:
     """Return the effects of a run of 8 rad/s with mixed drag, by name."""
     t = 0.4 + 0.785 * np.arange(150)
@@ -64,8 +69,7 @@ def table(
         fit_phase(points, damping),
         fit_rest(points),
         noise_m=3e-4,
-        clock=clock,
-        u_clock=3e-5,
+        instrument=instrument,
     )
     return {effect.name: effect for effect in effects}
 
@@ -124,10 +128,13 @@ def test_drags_by_hand(windows: Windows) -> None:
 
 
 def test_clock(windows: Windows) -> None:
-    """A nominal clock is an effect of its size, a device's own time none."""
-    nominal, device = table(windows, {})["clock_rate"], table(windows, {}, clock="device")["clock_rate"]
-    assert (nominal.included, nominal.predicted) == (True, 3e-5)
-    assert (device.included, device.predicted) == (False, None)
+    """The clock's uncertainty is always in the model; a correction is measured."""
+    plain = table(windows, {})["clock_rate"]
+    assert (plain.included, plain.predicted, plain.measured) == (True, 3e-5, None)
+    corrected = Instrument("device", Estimate(1.002, 3e-5), "the host's clock is the reference here")
+    found = table(windows, {}, instrument=corrected)["clock_rate"]
+    assert found.measured == pytest.approx(0.002)
+    assert found.why == corrected.clock_words
 
 
 def test_rest_drift(windows: Windows) -> None:
@@ -143,7 +150,24 @@ def test_speed_of_sound_against_the_old_programs(windows: Windows) -> None:
     assert table(windows, BENCH)["speed_of_sound"].predicted == pytest.approx(343.2 / 344.0 - 1.0, abs=3e-4)
     warm = BENCH | {"air": {"temperature_c": 30.0, "relative_humidity": 0.0}}
     assert table(windows, warm)["speed_of_sound"].predicted == pytest.approx(349.0 / 344.0 - 1.0, abs=6e-4)
-    assert table(windows, {})["speed_of_sound"].predicted is None
+    assert table(windows, BENCH)["speed_of_sound"].included
+
+
+def test_speed_of_sound_of_the_record_is_told(windows: Windows) -> None:
+    """What the record was made with is what the air is compared to; a calibrated scale needs neither."""
+    known = Instrument("device", Estimate(1.0, 3e-5), "a crystal's", speed_of_sound_m_per_s=340.0)
+    effect = table(windows, BENCH, instrument=known)["speed_of_sound"]
+    assert effect.predicted == pytest.approx(343.2 / 340.0 - 1.0, abs=3e-4)
+    assert "340 m/s" in effect.why
+    calibrated = Instrument("device", Estimate(1.0, 3e-5), "a crystal's", u_scale=1e-3)
+    assert "calibrated" in table(windows, BENCH, instrument=calibrated)["speed_of_sound"].why
+
+
+def test_air_without_temperature_is_said_to_be_missing(windows: Windows) -> None:
+    """Without an air temperature the scale's part stands in no uncertainty, and the table says so."""
+    effect = table(windows, {})["speed_of_sound"]
+    assert (effect.predicted, effect.included) == (None, False)
+    assert "no air temperature" in effect.why
 
 
 def test_buoyancy_by_hand(windows: Windows) -> None:

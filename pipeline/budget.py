@@ -1,0 +1,181 @@
+"""Uncertainty budgets: which input contributes what share of a result's variance.
+
+Inputs become variables of the ``uncertainties`` package, each marked with its name, so that a result made of them by
+ordinary arithmetic knows what it came from, correlations included.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pipeline.errors import AnalysisError
+from pipeline.estimate import Estimate, Joint
+
+__all__ = ["Budget", "Contribution", "Inputs", "Kind"]
+
+Kind = Literal["A", "B"]
+
+
+@dataclass(frozen=True, slots=True)
+class Contribution:
+    """One line of a budget.
+
+    Parameters
+    ----------
+    name : str
+        Of the input.
+    kind : {"A", "B"}
+        "A" from the record's own scatter, which a longer record averages away; "B" from anything else.
+    input : Estimate or None
+        Value and standard uncertainty of the input; None for a group of correlated parameters.
+    sensitivity : float or None
+        Derivative of the result by the input; None for a group.
+    u : float
+        What the input contributes to the result's standard uncertainty, in the result's unit.
+    share : float
+        Of the result's variance; the shares of a budget add up to 1.
+    """
+
+    name: str
+    kind: Kind
+    input: Estimate | None
+    sensitivity: float | None
+    u: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """The uncertainty of one result, input by input.
+
+    Parameters
+    ----------
+    quantity : str
+    estimate : Estimate
+    contributions : tuple of Contribution
+        The greatest share first; empty for an exact result.
+    """
+
+    quantity: str
+    estimate: Estimate
+    contributions: tuple[Contribution, ...]
+
+    def u_of(self, kind: Kind) -> float:
+        """Return the part of the standard uncertainty that inputs of one kind contribute, in the result's unit."""
+        return math.hypot(*(c.u for c in self.contributions if c.kind == kind))
+
+
+class Inputs:
+    """Input quantities by name, as variables to calculate with.
+
+    Examples
+    --------
+    k = omega^2 m, with u(k)^2 = (2 omega m u(omega))^2 + (omega^2 u(m))^2 = 0.0256^2 + 0.0064^2:
+
+    >>> inputs = Inputs()
+    >>> omega = inputs.add("angular_frequency", Estimate(8.0, 0.008, "rad/s"), "A")
+    >>> mass = inputs.add("bob_mass", Estimate(0.2, 1e-4, "kg"), "B")
+    >>> budget = inputs.budget("spring_constant", omega**2 * mass, "N/m")
+    >>> for c in budget.contributions:
+    ...     print(c.name, c.kind, f"{c.sensitivity:.1f} {c.u:.4f} {c.share:.3f}")
+    angular_frequency A 3.2 0.0256 0.941
+    bob_mass B 64.0 0.0064 0.059
+    """
+
+    def __init__(self) -> None:
+        self._kinds: dict[str, Kind] = {}
+        self._groups: set[str] = set()
+
+    def add(self, name: str, estimate: Estimate, kind: Kind) -> Any:
+        """Return an input as a variable; a plain number where it is exact.
+
+        Parameters
+        ----------
+        name : str
+            Unique.
+        estimate : Estimate
+        kind : {"A", "B"}
+
+        Raises
+        ------
+        ValueError
+            If the name was used before.
+        AnalysisError
+            If the uncertainty is negative or no number.
+        """
+        from uncertainties import ufloat
+
+        self._register(name, kind)
+        if not (math.isfinite(estimate.u) and estimate.u >= 0):
+            raise AnalysisError(
+                f"{name}: a standard uncertainty must be finite and not negative, got {estimate.u:g}; check the input"
+            )
+        return ufloat(estimate.value, estimate.u, tag=(name, estimate.unit)) if estimate.u > 0 else estimate.value
+
+    def add_joint(self, name: str, joint: Joint, kind: Kind) -> list[Any]:
+        """Return parameters estimated together as correlated variables; they are one line in every budget.
+
+        Parameters
+        ----------
+        name : str
+            Of the group.
+        joint : Joint
+        kind : {"A", "B"}
+        """
+        from uncertainties import correlated_values
+
+        self._register(name, kind)
+        self._groups.add(name)
+        return list(correlated_values(joint.values, joint.covariance, tags=[(name, "")] * len(joint.names)))
+
+    def add_alternatives(self, name: str, weights: Mapping[str, float], kind: Kind) -> dict[str, Any]:
+        """Return a variable of mean 0 and variance w for each alternative; they are one line in every budget.
+
+        A result x that would be x_i under the alternative i is x + sum_i (x_i - x) z_i, whose variance holds
+        sum_i w_i (x_i - x)^2, with the same sign for all results that an alternative moves together.
+        """
+        from uncertainties import ufloat
+
+        self._register(name, kind)
+        self._groups.add(name)
+        return {key: ufloat(0.0, math.sqrt(w), tag=(name, "")) if w > 0 else 0.0 for key, w in weights.items()}
+
+    def budget(self, quantity: str, x: Any, unit: str) -> Budget:
+        """Return the budget of a result made of these inputs.
+
+        Parameters
+        ----------
+        quantity : str
+        x : number or variable
+        unit : str
+        """
+        from uncertainties import nominal_value, std_dev
+
+        total = Estimate(float(nominal_value(x)), float(std_dev(x)), unit)
+        if total.u == 0:
+            return Budget(quantity, total, ())
+        variances: dict[str, float] = {}
+        single: dict[str, tuple[Estimate | None, float | None]] = {}
+        # Ordered by name: sums of floats depend on their order, and a mapping's order on addresses.
+        parts = sorted(x.error_components().items(), key=lambda part: (part[0].tag, part[0].nominal_value, part[1]))
+        for variable, error in parts:
+            name, input_unit = variable.tag
+            variances[name] = variances.get(name, 0.0) + error**2
+            if name not in self._groups:
+                given = Estimate(variable.nominal_value, variable.std_dev, input_unit)
+                single[name] = (given, float(x.derivatives[variable]))
+        whole = sum(variances.values())
+        lines = []
+        for name, variance in sorted(variances.items(), key=lambda item: (-item[1], item[0])):
+            if variance > 1e-12 * whole:  # less is rounding where a dependence cancels
+                alone = single.get(name, (None, None))
+                lines.append(Contribution(name, self._kinds[name], *alone, math.sqrt(variance), variance / whole))
+        return Budget(quantity, total, tuple(lines))
+
+    def _register(self, name: str, kind: Kind) -> None:
+        if name in self._kinds:
+            raise ValueError(f"an input {name!r} is there already")
+        self._kinds[name] = kind
