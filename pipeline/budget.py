@@ -163,9 +163,9 @@ class Inputs:
         parts = sorted(x.error_components().items(), key=lambda part: (part[0].tag, part[0].nominal_value, part[1]))
         for variable, error in parts:
             name, input_unit = variable.tag
-            variances[name] = variances.get(name, 0.0) + error**2
+            variances[name] = variances.get(name, 0.0) + float(error) ** 2
             if name not in self._groups:
-                given = Estimate(variable.nominal_value, variable.std_dev, input_unit)
+                given = Estimate(float(variable.nominal_value), float(variable.std_dev), input_unit)
                 single[name] = (given, float(x.derivatives[variable]))
         whole = sum(variances.values())
         lines = []

@@ -10,6 +10,7 @@ from springmass import __version__
 
 if TYPE_CHECKING:
     from pipeline.analyse import Analysis
+    from pipeline.budget import Contribution
     from pipeline.classic import Classic
     from pipeline.damping import LawFit
     from pipeline.estimate import Estimate
@@ -64,6 +65,7 @@ def result_of(
         "input": input_of(loaded),
         "quality": _quality(loaded, analysis),
         "estimates": {name: _estimate(e) for name, e in estimates.items()},
+        "budget": _budgets(analysis) if classic is None else {},
         "damping": _damping(analysis) if classic is None else _no_damping(),
         "effects": [
             {
@@ -121,6 +123,31 @@ def _quality(loaded: Loaded, analysis: Analysis) -> dict[str, int]:
     quality = analysis.quality
     used = quality.pop("used")
     return {**quality, "malformed_rows": loaded.malformed_rows, "used": used}
+
+
+def _budgets(analysis: Analysis) -> dict[str, Any]:
+    from pipeline.analyse import Motion
+
+    if not isinstance(analysis.motion, Motion):
+        return {}
+    return {
+        name: {**_estimate(budget.estimate), "inputs": [_contribution(c) for c in budget.contributions]}
+        for name, budget in analysis.motion.derived.budgets.items()
+    }
+
+
+def _contribution(c: Contribution) -> dict[str, Any]:
+    given = c.input
+    return {
+        "name": c.name,
+        "type": c.kind,
+        "value": None if given is None else _finite(given.value),
+        "u": None if given is None else _finite(given.u),
+        "unit": "" if given is None else given.unit,
+        "sensitivity": _finite(c.sensitivity),
+        "contribution": _finite(c.u),
+        "share": _finite(c.share),
+    }
 
 
 def _damping(analysis: Analysis) -> dict[str, Any]:

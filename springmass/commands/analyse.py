@@ -91,11 +91,14 @@ def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | No
 
 def _print_text(analysed: Analysed) -> None:
     from springmass.printing import classic_text, findings_text
+    from springmass.report.budgets import budget_text
     from springmass.report.tables import text_table
 
     print(text_table([analysed.loaded.path.name], [analysed.analysis]))
     if analysed.classic is not None:
         print(f"\n{classic_text(analysed.classic)}")
+    elif told := budget_text(analysed.analysis):
+        print(told)
     print()
     print(findings_text(analysed.result["findings"]))
 

@@ -1,13 +1,19 @@
 """Report: one run or several as a page to read, figures to print and tables to paste."""
 
+from springmass.report.budgets import budget_csv, budget_text, budgets_of
 from springmass.report.figures import draw, render
 from springmass.report.html import ReportRun, render_html
-from springmass.report.tables import TableRow, results_csv, table_rows, table_tex, text_table
+from springmass.report.latex import budget_tex, table_tex
+from springmass.report.tables import TableRow, results_csv, table_rows, text_table
 from springmass.report.write import write_report
 
 __all__ = [
     "ReportRun",
     "TableRow",
+    "budget_csv",
+    "budget_tex",
+    "budget_text",
+    "budgets_of",
     "draw",
     "render",
     "render_html",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -13,17 +12,17 @@ from pipeline.classic import Classic
 from pipeline.compare import Comparison
 from pipeline.cycles import NoOscillation
 from pipeline.estimate import Estimate
-from pipeline.relaxation import Relaxation
-from springmass.report.figures import ZOOM_PERIODS, has_error_bars, is_long, turn_step
+from springmass.report.budgets import INPUTS, budgets_of
+from springmass.report.inline import inline_svg
 from springmass.report.tables import law_status, page_unit, pretty, pretty_number, table_rows
+from springmass.report.words import LETTERS, caption, verdict
 
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-__all__ = ["ReportRun", "inline_svg", "render_html"]
+__all__ = ["ReportRun", "render_html"]
 
 _SEVERITIES = {"error": "Error", "warning": "Warning", "info": "Note"}
-_LETTERS = {"A0": "A₀", "gamma": "γ", "beta": "β", "mu": "μ"}
 _QUALITY = {
     "used": "used",
     "missing": "without a distance",
@@ -95,7 +94,7 @@ def render_html(
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"pretty": pretty, "number": pretty_number, "symbol": _symbol}
+    environment.filters |= {"pretty": pretty, "number": pretty_number, "symbol": _symbol, "input": INPUTS.__getitem__}
     source = files("springmass.report").joinpath("templates/report.html.j2").read_text(encoding="utf-8")
     counts = quality or [run.analysis.quality for run in runs]
     parts = [
@@ -112,60 +111,6 @@ def render_html(
     )
 
 
-def inline_svg(svg: bytes, prefix: str) -> Markup:
-    """Return an SVG file as an element for a page: names of its own, coordinates to a hundredth of a point.
-
-    Parameters
-    ----------
-    svg : bytes
-        As :func:`springmass.report.figures.render` makes it.
-    prefix : str
-        Of every id, so that figures on one page do not take each other's clip paths.
-    """
-    from markupsafe import Markup
-
-    text = svg.decode()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
-    text = re.sub(r' xmlns(:xlink)?="[^"]*"| version="1.1"', "", text).replace("xlink:href", "href")
-    used = dict.fromkeys(re.findall(r'(?:href="|url\()#([^")]+)', text))
-    short = {name: f"{prefix}{i}" for i, name in enumerate(used)}
-
-    def renamed(found: re.Match[str]) -> str:
-        # Groups are named as well, but nobody calls them.
-        return f' id="{short[found[1]]}"' if found[1] in short else ""
-
-    text = re.sub(r' id="([^"]*)"', renamed, text)
-    text = re.sub(r'(href="|url\()#([^")]+)', lambda found: f"{found[1]}#{short[found[2]]}", text)
-    # A style for "*" would reach the whole page from here.
-    text = re.sub(r"<style[^>]*>.*?</style>", "", text, flags=re.DOTALL)
-    text = re.sub(r"<defs>\s*</defs>", "", text)
-    text = re.sub(r"<[^>]+>", _rounded, text)
-    text = _shared_styles(text)
-    return Markup(re.sub(r">\s+<", "><", text).strip())
-
-
-def _rounded(tag: re.Match[str]) -> str:
-    # Text between tags, such as 0.0025 at an axis, is not touched, nor are pixels.
-    if tag[0].startswith("<image"):
-        return tag[0]
-    shorter = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0])
-    return re.sub(r"\s+", " ", shorter)
-
-
-def _shared_styles(text: str) -> str:
-    """Move the style of a run of equal markers to one group around them."""
-    one = r'<use href="[^"]*" x="[^"]*" y="[^"]*" style="[^"]*" ?/>'
-
-    def grouped(found: re.Match[str]) -> str:
-        styles = set(re.findall(r'style="([^"]*)"', found[0]))
-        if len(styles) != 1:
-            return found[0]
-        return f'<g style="{styles.pop()}">' + re.sub(r' style="[^"]*"', "", found[0]) + "</g>"
-
-    return re.sub(rf"{one}(?:\s*{one})+", grouped, text)
-
-
 def _part(index: int, run: ReportRun, pictures: Mapping[str, bytes], quality: Mapping[str, int]) -> dict[str, Any]:
     """Everything that the template says of one run."""
     analysis = run.analysis
@@ -175,12 +120,13 @@ def _part(index: int, run: ReportRun, pictures: Mapping[str, bytes], quality: Ma
         "subtitle": _subtitle(run),
         "kind": analysis.track.kind,
         "findings": _findings(analysis),
-        "verdict": _verdict(analysis),
+        "verdict": verdict(analysis),
         "figures": [
-            {"name": name, "svg": inline_svg(svg, f"{name}{index}-"), "caption": _caption(name, analysis)}
+            {"name": name, "svg": inline_svg(svg, f"{name}{index}-"), "caption": caption(name, analysis)}
             for name, svg in pictures.items()
         ],
         "laws": None if isinstance(motion, NoOscillation) else _laws(motion),
+        "budgets": budgets_of(analysis),
         "effects": analysis.effects,
         "quality": [(_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in _ordered(quality)],
         "classic": _classic_rows(run),
@@ -213,68 +159,6 @@ def _findings(analysis: Analysis) -> list[dict[str, str]]:
     ]
 
 
-def _kept(estimate: Estimate) -> str:
-    """Write an estimate so that no line breaks inside it."""
-    return pretty(estimate).replace(" ", "\u00a0")
-
-
-def _verdict(analysis: Analysis) -> str:
-    if isinstance(analysis.motion, Relaxation):
-        return f"{analysis.motion.why[0].upper()}{analysis.motion.why[1:]}."
-    if isinstance(analysis.motion, NoOscillation):
-        return "Nothing oscillates in this record; rest position and noise are all that it gives."
-    damping = analysis.motion.damping
-    chosen = damping.best.law.words
-    if damping.best.rejected:
-        return f"No damping law holds; the least bad is {chosen}, and its parameters must not be used."
-    parameters = [
-        f"{_LETTERS.get(name, name)}\u00a0=\u00a0{_kept(x)}"
-        for name, x in damping.best.joint.estimates().items()
-        if name != "A0"
-    ]
-    text = f"The amplitude is described by {chosen}" + (f": {', '.join(parameters)}." if parameters else ".")
-    if damping.selected == "none":
-        text = "The amplitude does not fall by more than this record can tell."
-    rejected = [fit.law.words for fit in damping.fits.values() if fit.rejected]
-    if rejected:
-        text += f" Rejected: {'; '.join(rejected)}."
-    others = [damping.fits[name].law.words for name in damping.admissible if name != damping.selected]
-    if others:
-        text += f" As good, as far as this record can tell: {'; '.join(others)}."
-    return text
-
-
-def _caption(name: str, analysis: Analysis) -> str:
-    noise = analysis.estimates["noise"]
-    sigma = _kept(Estimate(1e3 * noise.value, 1e3 * noise.u, "mm"))
-    motion = analysis.motion
-    if isinstance(motion, NoOscillation):
-        return f"Distance from the sensor; nothing oscillates. Samples scatter by {sigma}."
-    if name == "position":
-        bars = "shown as error bars" if has_error_bars(analysis) else "too small for error bars to show"
-        detail = f" Above the whole record, below its first {ZOOM_PERIODS} periods (shaded above)."
-        return (
-            "Distance from the sensor with the fitted motion; beneath, what the fit leaves, over the noise of "
-            f"one sample, σ\u00a0=\u00a0{sigma}, {bars}.{detail if is_long(analysis) else ''}"
-            " Flagged samples were left out of the fit and of the residuals."
-        )
-    if name == "amplitude":
-        return (
-            "Amplitude in windows of one period or a few, with one standard uncertainty u, and every law; "
-            f"beneath, the residuals of the selected law, {motion.damping.selected}, over u."
-        )
-    if name == "phase":
-        step = turn_step(motion)
-        every = f" One turn in {step} is drawn." if step > 1 else ""
-        return f"Velocity against displacement from rest; colour tells the time.{every}"
-    mass = motion.derived.effective_mass_kg
-    of = f"the mass that oscillates, {_kept(mass)}" if mass is not None else "one kilogram, as no mass was given"
-    return (
-        f"Energy of the oscillation, m ω² A²/2, for {of}; the band is one standard uncertainty u of a window, "
-        "mass and frequency would shift all points alike."
-    )
-
-
 def _laws(motion: Motion) -> dict[str, Any]:
     damping = motion.damping
     units = {
@@ -290,7 +174,7 @@ def _laws(motion: Motion) -> dict[str, Any]:
         }
         for law, fit in damping.fits.items()
     ]
-    heads = [_LETTERS.get(name, name) + (f" / {page_unit(unit)}" if unit else "") for name, unit in units.items()]
+    heads = [LETTERS.get(name, name) + (f" / {page_unit(unit)}" if unit else "") for name, unit in units.items()]
     return {"heads": heads, "rows": rows}
 
 

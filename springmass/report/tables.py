@@ -1,10 +1,9 @@
-"""Tables of a report: Table 1 for the terminal, for LaTeX and for the page, and every number as CSV."""
+"""Tables of a report: Table 1 for the terminal and the page, and every number as CSV."""
 
 from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,6 +13,7 @@ from pipeline.damping import Damping
 from pipeline.estimate import Estimate, format_value
 
 __all__ = [
+    "QUANTITIES",
     "TableRow",
     "law_status",
     "page_unit",
@@ -21,7 +21,6 @@ __all__ = [
     "pretty_number",
     "results_csv",
     "table_rows",
-    "table_tex",
     "text_table",
 ]
 
@@ -46,33 +45,11 @@ _QUANTITIES = (
     ("gamma", "linear damping", "gamma", "γ", r"\gamma"),
     ("beta", "quadratic damping", "beta", "β", r"\beta"),
     ("mu", "dry friction", "mu", "μ", r"\mu"),
-    ("c", "drag by a power of the amplitude", "c", "c", "c"),
-    ("n", "that power", "n", "n", "n"),
 )
-_OF_LAW = ("gamma", "beta", "mu", "c", "n")
+QUANTITIES = {name: quantity for name, quantity, *_ in _QUANTITIES}
 
-_SIUNITX = {
-    "s": r"\second",
-    "Hz": r"\hertz",
-    "rad": r"\radian",
-    "rad/s": r"\radian\per\second",
-    "N/m": r"\newton\per\metre",
-    "m": r"\metre",
-    "kg": r"\kilogram",
-    "m/s": r"\metre\per\second",
-    "1/s": r"\per\second",
-    "1/(m s)": r"\per\metre\per\second",
-    "m^(1-n)/s": r"\metre^{1-n}\per\second",
-}
-_PAGE_UNITS = {"1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
+_PAGE_UNITS = {"degC": "°C", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_WRITTEN = re.compile(r"\(?(?P<value>-?[\d.]+) \+- (?P<u>[\d.]+)\)?(?:e(?P<power>[+-]\d+))?")
-_TEX_SPECIAL = {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    **{character: "\\" + character for character in "&%$#_{}"},
-}
 NOTHING = "-"
 
 
@@ -83,7 +60,7 @@ class TableRow:
     Parameters
     ----------
     name : str
-        As in ``Analysis.estimates``; "gamma", "beta", "mu", "c" and "n" are the selected law's.
+        As in ``Analysis.estimates``; "gamma", "beta" and "mu" are the selected law's.
     quantity : str
         In words.
     symbol, page_symbol, tex_symbol : str
@@ -180,43 +157,6 @@ def results_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
     return out.getvalue()
 
 
-def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return Table 1 as a LaTeX table of siunitx quantities; it needs booktabs and siunitx, version 3.
-
-    Parameters
-    ----------
-    names : sequence of str
-    analyses : sequence of Analysis
-    """
-    body = [
-        " & ".join(
-            [f"{row.quantity[:1].upper()}{row.quantity[1:]} & ${row.tex_symbol}$", *map(_tex_quantity, row.estimates)]
-        )
-        + r" \\"
-        for row in table_rows(analyses)
-    ]
-    heads = " & ".join(["Quantity & Symbol", *map(_tex_text, names)]) + r" \\"
-    return "\n".join(
-        [
-            r"% needs \usepackage{booktabs} and \usepackage{siunitx}, version 3",
-            r"\begin{table}",
-            r"  \centering",
-            r"  \caption{Results of the oscillation experiment; in parentheses the standard uncertainty"
-            " ($k = 1$) of the last digits.}",
-            r"  \label{tab:springmass}",
-            rf"  \begin{{tabular}}{{ll{'l' * len(names)}}}",
-            r"    \toprule",
-            f"    {heads}",
-            r"    \midrule",
-            *(f"    {line}" for line in body),
-            r"    \bottomrule",
-            r"  \end{tabular}",
-            r"\end{table}",
-            "",
-        ]
-    )
-
-
 def pretty(estimate: Estimate | None) -> str:
     """Return an estimate for the page: the digits of :func:`pipeline.estimate.format_value`, typeset.
 
@@ -265,12 +205,9 @@ def law_status(damping: Damping, name: str) -> str:
 
 
 def _estimate(analysis: Analysis, name: str) -> Estimate | None:
-    if name not in _OF_LAW:
+    if name in analysis.estimates or isinstance(analysis.motion, NoOscillation):
         return analysis.estimates.get(name)
-    if isinstance(analysis.motion, NoOscillation):
-        return None
-    joint = analysis.motion.damping.best.joint
-    return joint[name] if name in joint.names else None
+    return analysis.motion.derived.coefficients.get(name)
 
 
 def _line(quantity: str, symbol: str, cells: Sequence[str], left: int, middle: int, widest: int) -> str:
@@ -291,28 +228,3 @@ def _typeset(number: str) -> str:
     mantissa, mark, power = number.replace("+-", "±").partition("e")
     mantissa = mantissa.replace("-", "−")
     return f"{mantissa} × 10{str(int(power)).translate(_SUPERSCRIPT)}" if mark else mantissa
-
-
-def _tex_quantity(estimate: Estimate | None) -> str:
-    """Write value(u)unit for siunitx, from the one place that decides on digits."""
-    if estimate is None:
-        return "--"
-    written = format_value(estimate.value, estimate.u)
-    found = _WRITTEN.fullmatch(written)
-    if found is None:
-        number = written if re.fullmatch(r"-?[\d.]+(e[+-]\d+)?", written) else ""
-    else:
-        # 0.7529 +- 0.0014 is 0.7529(14), 13.9 +- 1.2 is 13.9(12), 1100 +- 150 is 1100(150).
-        number = f"{found['value']}({int(found['u'].replace('.', ''))})"
-        number += f"e{int(found['power'])}" if found["power"] else ""
-    if not number:
-        return "--"
-    if not estimate.unit:
-        return rf"\num{{{number}}}"
-    unit = _SIUNITX.get(estimate.unit, rf"\text{{{_tex_text(estimate.unit)}}}")
-    return rf"\qty{{{number}}}{{{unit}}}"
-
-
-def _tex_text(text: str) -> str:
-    printable = "".join(character if character.isprintable() else " " for character in text)
-    return "".join(_TEX_SPECIAL.get(character, character) for character in printable)

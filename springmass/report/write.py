@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.compare import Comparison
-from springmass.report.figures import NAMES, draw, render
+from springmass.report.budgets import budget_csv
+from springmass.report.figures import MAKERS, draw, render
 from springmass.report.html import ReportRun, render_html
-from springmass.report.tables import results_csv, table_tex
+from springmass.report.latex import budget_tex, table_tex
+from springmass.report.tables import results_csv
 
 __all__ = ["ReportRun", "write_report"]
 
@@ -57,8 +59,8 @@ def write_report(
     Notes
     -----
     Beside the page: ``results.json`` (one object for one run, else a list; what is no number is null),
-    ``results.csv``, ``table.tex``, and ``figures/`` with every figure as SVG and PDF. The same arguments give
-    the same bytes.
+    ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, and ``figures/`` with every figure as SVG and PDF.
+    The same arguments give the same bytes.
     """
     from storage.atomic import write_whole
 
@@ -77,6 +79,8 @@ def write_report(
     write_whole(directory / "results.json", json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
     write_whole(directory / "results.csv", results_csv(names, analyses))
     write_whole(directory / "table.tex", table_tex(names, analyses))
+    write_whole(directory / "budget.csv", budget_csv(names, analyses))
+    write_whole(directory / "budget.tex", budget_tex(names, analyses))
     counts = [{**run.analysis.quality, **result.get("quality", {})} for run, result in zip(runs, results, strict=True)]
     page = render_html(runs, pictures, comparison=comparison, provenance=provenance, quality=counts)
     return write_whole(directory / "report.html", page)
@@ -85,7 +89,7 @@ def write_report(
 def _write_figures(folder: Path, stem: str, drawn: Mapping[str, Mapping[Literal["svg", "pdf"], bytes]]) -> None:
     from storage.atomic import write_whole
 
-    for name in NAMES:
+    for name in MAKERS:
         for kind in _KINDS:
             target = folder / f"{stem}{name}.{kind}"
             if name in drawn:

@@ -163,7 +163,12 @@ def paths(value: Any, above: str = "") -> Iterator[str]:
     if not isinstance(value, dict) or above == "provenance.parameters":
         return
     for key, inner in value.items():
-        shown = {"estimates": "NAME", "damping.laws": "LAW", "damping.laws.LAW.parameters": "NAME"}.get(above, key)
+        shown = {
+            "estimates": "NAME",
+            "budget": "NAME",
+            "damping.laws": "LAW",
+            "damping.laws.LAW.parameters": "NAME",
+        }.get(above, key)
         path = f"{above}.{shown}" if above else shown
         if not isinstance(inner, list) or not inner or not isinstance(inner[0], dict):
             yield path

@@ -25,6 +25,10 @@ from pipeline.scene import Scene
 from pipeline.track import Track
 from springmass.report import (
     ReportRun,
+    budget_csv,
+    budget_tex,
+    budget_text,
+    budgets_of,
     draw,
     render,
     results_csv,
@@ -33,7 +37,9 @@ from springmass.report import (
     text_table,
     write_report,
 )
-from springmass.report.html import inline_svg, render_html
+from springmass.report.budgets import INPUTS
+from springmass.report.html import render_html
+from springmass.report.inline import inline_svg
 from springmass.report.tables import law_status, pretty, pretty_number
 
 PROVENANCE = {"version": "0.1.0", "parameters": {"cycles": {"false_alarm": 1e-6}}, "command": "analyse <run>"}
@@ -104,13 +110,16 @@ def files_in(directory: Path) -> dict[str, bytes]:
 
 
 def test_every_file_of_a_report_is_written(tmp_path: Path) -> None:
-    """A report is a page, three tables and four figures in two forms each, and nothing besides."""
+    """A report is a page, five tables and every figure that the scene allows in two forms, and nothing besides."""
     written(tmp_path / "run.results", run_of(bare()))
     figures = {
         f"figures/{name}.{kind}" for name in ("position", "amplitude", "phase", "energy") for kind in ("svg", "pdf")
     }
-    tables = {"report.html", "results.json", "results.csv", "table.tex"}
+    tables = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv", "budget.tex"}
     assert set(files_in(tmp_path / "run.results")) == tables | figures
+    written(tmp_path / "disc.results", run_of(damped()))
+    drag = {"figures/drag.svg", "figures/drag.pdf"}
+    assert set(files_in(tmp_path / "disc.results")) == tables | figures | drag
 
 
 def test_the_page_needs_nothing_from_outside(tmp_path: Path) -> None:
@@ -200,6 +209,40 @@ def test_tex_is_balanced_and_states_uncertainties_in_parentheses() -> None:
     assert {line.count(" & ") for line in tex.splitlines() if line.endswith(r"\\")} == {3}
 
 
+def test_budget_tables_hold_every_input() -> None:
+    """The CSV gives back every contribution; the page and the LaTeX table those of a thousandth and more."""
+    motion = damped().motion
+    assert isinstance(motion, Motion)
+    budgets = motion.derived.budgets
+    rows = list(csv.DictReader(io.StringIO(budget_csv(["a"], [damped()]))))
+    assert [(row["quantity"], row["input"]) for row in rows] == [
+        (name, c.name) for name, budget in budgets.items() for c in budget.contributions
+    ]
+    for row in rows:
+        found = next(c for c in budgets[row["quantity"]].contributions if c.name == row["input"])
+        assert (float(row["contribution"]), float(row["share"]), row["type"]) == (found.u, found.share, found.kind)
+    page, tex = html.unescape(page_of(run_of(damped()))), budget_tex(["50%"], [damped()])
+    for row in budgets_of(damped()):
+        assert row.rest + sum(c.share for c in row.contributions) == pytest.approx(1.0)
+        assert all(INPUTS[c.name] in page and INPUTS[c.name] in tex for c in row.contributions)
+    plain = re.sub(r"\\[\\{}%_#&$]", "", tex)
+    assert plain.count("{") == plain.count("}")
+    assert {line.count(" & ") for line in tex.splitlines() if line.endswith(r"\\")} == {5}
+    assert budget_csv(["b"], [still()]).count("\n") == 1
+    assert budgets_of(still()) == ()
+
+
+def test_budget_in_brief_names_the_greatest_inputs() -> None:
+    """A line a quantity that has several inputs, in ASCII and within the terminal; nothing where nothing moves."""
+    text = budget_text(damped())
+    assert text.isascii()
+    assert max(map(len, text.splitlines())) <= 105
+    line = next(line for line in text.splitlines() if "spring constant" in line)
+    assert line.split("spring constant")[1].lstrip().startswith("mass of the spring (B) ")
+    assert "noise" not in text
+    assert budget_text(still()) == ""
+
+
 @pytest.mark.parametrize(
     ("estimate", "tex"),
     [
@@ -268,7 +311,7 @@ def test_several_runs_stand_side_by_side(tmp_path: Path) -> None:
     assert page.count("<th>same</th>") >= 2
     assert page.count("Phase plot") == 2
     assert html.escape(comparison.message) in page
-    assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 8
+    assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 10
 
 
 def test_the_classic_method_is_set_beside_with_its_biases() -> None:

@@ -1,0 +1,127 @@
+"""Uncertainty budgets for readers: which input contributes what share, in words and as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pipeline.analyse import Analysis
+from pipeline.budget import Budget, Contribution
+from pipeline.cycles import NoOscillation
+from springmass.report.tables import QUANTITIES
+
+__all__ = ["INPUTS", "BudgetRow", "budget_csv", "budget_text", "budgets_of"]
+
+INPUTS = {
+    "angular_frequency": "scatter of the phases",
+    "clock_rate": "rate of the clock",
+    "damping_law": "scatter of the amplitudes",
+    "choice_of_law": "choice among admissible laws",
+    "rest_position": "scatter of the rest position",
+    "phase": "scatter of the phases",
+    "noise": "scatter of the samples",
+    "bob_mass": "mass of the bob",
+    "spring_mass": "mass of the spring",
+    "disc_diameter": "diameter of the disc",
+    "air_temperature": "air temperature",
+    "air_pressure": "air pressure",
+    "relative_humidity": "relative humidity",
+    "density_formula": "formula of the air's density",
+    "viscosity_formula": "formula of the air's viscosity",
+    "speed_of_sound_formula": "formula of the speed of sound",
+    "recorded_speed_of_sound": "speed of sound of the record",
+    "calibrated_scale": "calibration of the scale",
+    "sensor_zero": "calibration of the zero",
+}
+"""Every input of :mod:`pipeline.derive` in words."""
+SAME = ("frequency", "angular_frequency")  # one number with the period
+LEAST_SHARE = 1e-3  # of the variance; what is less does not reach a printed digit of u
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetRow:
+    """One quantity of the budget table.
+
+    Parameters
+    ----------
+    name, quantity : str
+        As in ``Derived.budgets``, and in words.
+    budget : Budget
+    contributions : tuple of Contribution
+        Those of more than a thousandth of the variance.
+    rest : float
+        Share of all others together.
+    """
+
+    name: str
+    quantity: str
+    budget: Budget
+    contributions: tuple[Contribution, ...]
+    rest: float
+
+
+def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
+    """Return the budget table of a run, in the order of Table 1; empty where nothing oscillates.
+
+    Frequencies are left out: they share the period's budget.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    """
+    if isinstance(analysis.motion, NoOscillation):
+        return ()
+    budgets = analysis.motion.derived.budgets
+    rows = []
+    for name, quantity in QUANTITIES.items():
+        if name in budgets and name not in SAME and budgets[name].contributions:
+            every = budgets[name].contributions
+            told = tuple(c for c in every if c.share >= LEAST_SHARE)
+            rows.append(BudgetRow(name, quantity, budgets[name], told, sum(c.share for c in every[len(told) :])))
+    return tuple(rows)
+
+
+def budget_text(analysis: Analysis) -> str:
+    """Return the budget in brief: a line a quantity with its two greatest inputs, in ASCII.
+
+    Quantities with one input alone are left out: their line would say nothing.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    """
+    told = {row: [c for c in row.contributions if c.share >= 0.01] for row in budgets_of(analysis)}
+    rows = [row for row, inputs in told.items() if len(inputs) > 1]
+    if not rows:
+        return ""
+    left = max(len(row.quantity) for row in rows) + 2
+    lines = ["Where the uncertainty comes from (share of the variance; A: the record's scatter, B: anything else):"]
+    for row in rows:
+        greatest = [f"{INPUTS[c.name]} ({c.kind}) {100 * c.share:.0f} %" for c in told[row][:2]]
+        lines.append(f"  {row.quantity:<{left}}{', '.join(greatest)}")
+    return "\n".join(lines)
+
+
+def budget_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
+    """Return every budget as CSV, one line an input; numbers keep all their digits.
+
+    Parameters
+    ----------
+    names : sequence of str
+    analyses : sequence of Analysis
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    heads = ["run", "quantity", "input", "type", "value", "u", "unit", "sensitivity", "contribution", "share"]
+    writer.writerow(heads)
+    for run, analysis in zip(names, analyses, strict=True):
+        if isinstance(analysis.motion, NoOscillation):
+            continue
+        for quantity, budget in analysis.motion.derived.budgets.items():
+            for c in budget.contributions:
+                given = ["", "", ""] if c.input is None else [repr(c.input.value), repr(c.input.u), c.input.unit]
+                slope = "" if c.sensitivity is None else repr(c.sensitivity)
+                writer.writerow([run, quantity, c.name, c.kind, *given, slope, repr(c.u), repr(c.share)])
+    return out.getvalue()

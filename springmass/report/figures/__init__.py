@@ -1,0 +1,53 @@
+"""Figures of a report: position and residuals, amplitude and laws, drag, energy, phase plot.
+
+Every maker takes an analysis and returns a matplotlib ``Figure`` that belongs to no window, or None where the record
+or its scene give nothing to draw. Long series are thinned to what the eye can see or drawn as pixels inside the vector
+file, so that the page stays small. A further figure is a maker and a line in :data:`MAKERS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from pipeline.analyse import Analysis
+from pipeline.cycles import NoOscillation
+from springmass.report.figures.amplitude import amplitude_figure
+from springmass.report.figures.canvas import render
+from springmass.report.figures.curves import drag_figure, energy_figure
+from springmass.report.figures.phase import phase_figure
+from springmass.report.figures.position import position_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "MAKERS",
+    "amplitude_figure",
+    "drag_figure",
+    "draw",
+    "energy_figure",
+    "phase_figure",
+    "position_figure",
+    "render",
+]
+
+MAKERS: dict[str, Callable[[Analysis], Figure | None]] = {
+    "position": position_figure,
+    "amplitude": amplitude_figure,
+    "drag": drag_figure,
+    "energy": energy_figure,
+    "phase": phase_figure,
+}
+
+
+def draw(analysis: Analysis) -> dict[str, Figure]:
+    """Return every figure of a run by name, in the report's order; the position alone of one at rest.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    """
+    names = ("position",) if isinstance(analysis.motion, NoOscillation) else tuple(MAKERS)
+    drawn = {name: MAKERS[name](analysis) for name in names}
+    return {name: figure for name, figure in drawn.items() if figure is not None}

@@ -1,0 +1,71 @@
+"""Amplitude against time with every damping law, and the selected law's residuals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline.analyse import Analysis
+from springmass.report.figures.canvas import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    error_bars,
+    finish_residual,
+    legend_above,
+    moving,
+    panels,
+    share,
+    style,
+)
+from springmass.report.tables import law_status
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["amplitude_figure"]
+
+_DASHES = ((0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
+
+
+def amplitude_figure(analysis: Analysis) -> Figure:
+    """Draw the amplitudes with every law, and beneath them the selected law's residuals over their u.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of a record that oscillates.
+    """
+    motion = moving(analysis)
+    damping, t, amplitude = motion.damping, motion.demodulated.t, motion.demodulated.amplitude * 1e3
+    u, kept = damping.scatter.u * 1e3, damping.scatter.kept
+    end = float(np.nanmax(analysis.track.t))
+    grid = np.linspace(damping.t0, end, 240)
+    with style():
+        figure, (above, below) = panels([(2.7, 0.0), (1.0, 0.08)])
+        error_bars(above, t[kept], amplitude[kept], u[kept], "amplitude of one window")
+        if not kept.all():
+            above.plot(t[~kept], amplitude[~kept], "o", mfc="none", color=ORANGE, ms=4, label="left out of the fits")
+        shown = [float(np.min(amplitude - u)), float(np.max(amplitude + u))]
+        for i, name in enumerate(sorted(damping.fits, key=lambda name: name == damping.selected)):
+            status = law_status(damping, name)
+            chosen, rejected = name == damping.selected, status.startswith("rejected")
+            colour = "#000000" if chosen else GREY if rejected else (GREEN, PURPLE, VERMILLION, ORANGE)[i % 4]
+            dashes = "-" if chosen else _DASHES[i % len(_DASHES)]
+            curve = damping.fits[name].amplitude(grid - damping.t0) * 1e3
+            above.plot(grid, curve, color=colour, ls=dashes, lw=1.0, label=f"{name} ({status})", zorder=3)
+        margin = 0.12 * max(shown[1] - shown[0], 1e-9)
+        above.set_ylim(shown[0] - margin, shown[1] + margin)
+        above.set_ylabel("amplitude / mm")
+        residual = (amplitude - damping.best.amplitude(t - damping.t0) * 1e3) / np.where(u > 0, u, 1.0)
+        below.plot(t[kept], residual[kept], "o", ms=2.6, mew=0, color=BLUE)
+        below.plot(t[~kept], residual[~kept], "o", mfc="none", color=ORANGE, ms=4)
+        finish_residual(below, residual[kept], "residual / u")
+        below.set_xlabel("time / s")
+        share(above, below, damping.t0, end)
+        legend_above(above, handle=2.8)
+        return figure

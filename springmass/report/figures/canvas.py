@@ -1,0 +1,200 @@
+"""What all figures share: style, panels, legends, and the bytes of a file.
+
+Colours are those of Okabe and Ito, told apart by line style or marker as well. The same figure gives the same bytes:
+no dates, no random identifiers.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from pipeline.analyse import Analysis, Motion
+from pipeline.cycles import NoOscillation
+from pipeline.track import F8
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "BLUE",
+    "DENSE_POINTS",
+    "GREEN",
+    "GREY",
+    "ORANGE",
+    "PURPLE",
+    "SKY",
+    "VERMILLION",
+    "error_bars",
+    "finish_residual",
+    "legend_above",
+    "model_phase",
+    "moving",
+    "panels",
+    "render",
+    "share",
+    "style",
+]
+
+BLUE, SKY, ORANGE, GREEN, VERMILLION, PURPLE = (
+    "#0072B2",
+    "#56B4E9",
+    "#E69F00",
+    "#009E73",
+    "#D55E00",
+    "#CC79A7",
+)
+GREY = "#7f7f7f"
+_SETTINGS: dict[Any, Any] = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.5,
+    "axes.axisbelow": True,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "legend.markerscale": 1.8,
+    "lines.linewidth": 1.0,
+    "path.simplify": False,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "springmass",
+    "pdf.fonttype": 42,
+    "savefig.dpi": 200,
+}
+WIDTH = 7.2  # inches, as all lengths here
+LEFT, RIGHT, BOTTOM = 0.72, 0.12, 0.45
+DENSE_POINTS = 2500
+
+
+def render(figure: Figure, kind: Literal["svg", "pdf"]) -> bytes:
+    """Return a figure as the bytes of a file, the same at every call.
+
+    Parameters
+    ----------
+    figure : Figure
+    kind : {"svg", "pdf"}
+    """
+    metadata = {
+        "svg": {"Date": None, "Creator": None},
+        "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+    }
+    out = io.BytesIO()
+    with style():
+        figure.savefig(out, format=kind, metadata=metadata[kind])
+    return out.getvalue()
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Draw or save in the report's style, whatever the reader's own settings."""
+    from matplotlib import rc_context, rcdefaults, rcParams
+
+    with rc_context():
+        # A reader's own matplotlibrc must not change the report.
+        rcdefaults()
+        rcParams.update(_SETTINGS)
+        yield
+
+
+def panels(
+    rows: Sequence[tuple[float, float]], *, width: float = WIDTH, right: float = RIGHT, top: float = 0.12
+) -> tuple[Figure, list[Axes]]:
+    """Make panels under each other, each of a height and a gap above it in inches, left edges aligned."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    height = BOTTOM + top + sum(sum(row) for row in rows)
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    axes, at = [], height - top
+    for tall, gap in rows:
+        at -= tall + gap
+        panel = figure.add_axes((LEFT / width, at / height, (width - LEFT - right) / width, tall / height))
+        panel.yaxis.set_label_coords(-0.5 / (width - LEFT - right), 0.5)
+        axes.append(panel)
+    return figure, axes
+
+
+def moving(analysis: Analysis) -> Motion:
+    """Return what moves; ValueError where nothing oscillates."""
+    if isinstance(analysis.motion, NoOscillation):
+        raise ValueError(f"only the position of this record can be drawn, nothing oscillates: {analysis.motion.why}")
+    return analysis.motion
+
+
+def legend_above(panel: Axes, *, handle: float = 1.5) -> None:
+    """Put the legend above a figure's first panel, in as few rows as hold it, and make the paper as much taller."""
+    figure = panel.get_figure(root=True)
+    assert figure is not None
+    # What was measured comes first, though matplotlib lists error bars last.
+    entries = list(zip(*panel.get_legend_handles_labels(), strict=True))
+    entries.sort(key=lambda entry: not entry[1].startswith(("samples", "amplitude")))
+    handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
+    rows = 1
+    for rows in (1, 2, 3):
+        legend = panel.legend(
+            handles,
+            labels,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=-(-len(labels) // rows),
+            borderaxespad=0.2,
+            columnspacing=1.4,
+            handletextpad=0.5,
+            handlelength=handle,
+        )
+        if legend.get_window_extent().width <= panel.get_window_extent().width:
+            break
+    before = figure.get_figheight()
+    after = before + 0.2 * rows
+    for axes in figure.axes:
+        at = axes.get_position()
+        axes.set_position((at.x0, at.y0 * before / after, at.width, at.height * before / after))
+    figure.set_figheight(after)
+
+
+def finish_residual(panel: Axes, residual: F8, label: str) -> None:
+    """Give a panel of residuals its zero line and a range that is symmetric about it."""
+    reach = max(3.5, 1.1 * float(np.max(np.abs(residual), initial=0.0)))
+    panel.set_ylim(-reach, reach)
+    panel.axhline(0.0, color="#000000", lw=0.8)
+    panel.set_ylabel(label)
+
+
+def share(above: Axes, below: Axes, start: float, end: float) -> None:
+    """Let two panels share their axis of time, numbered beneath the lower one."""
+    below.sharex(above)
+    above.tick_params(labelbottom=False)
+    above.set_xlim(start, end)
+
+
+def error_bars(panel: Axes, t: F8, y: F8, u: F8, label: str) -> None:
+    """Set points with their standard uncertainties."""
+    look: dict[str, Any] = {
+        "fmt": "o",
+        "ms": 3.4,
+        "mew": 0,
+        "color": SKY,
+        "ecolor": BLUE,
+        "elinewidth": 0.9,
+        "capsize": 1.5,
+    }
+    panel.errorbar(t, y, yerr=u, label=label, **look)
+
+
+def model_phase(motion: Motion, t: F8) -> tuple[F8, F8]:
+    """Fitted displacement and velocity at times t, m and m/s."""
+    law, angle = motion.damping.best, motion.phase.total(t)
+    amplitude = law.amplitude(t - motion.phase.t0)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    velocity = -law.law.rate(amplitude, law.joint.values) * cosine - amplitude * motion.phase.rate(t) * sine
+    return amplitude * cosine, velocity

@@ -1,0 +1,105 @@
+"""Energy against time and drag coefficient against amplitude, each with its band."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pipeline.analyse import Analysis
+from pipeline.curves import Curve
+from pipeline.track import F8
+from springmass.report.figures.canvas import BLUE, SKY, legend_above, moving, panels, share, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["drag_figure", "energy_figure"]
+
+
+def energy_figure(analysis: Analysis) -> Figure:
+    """Draw the mechanical energy with its band, and beneath it what single amplitudes deviate from the law.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of a record that oscillates. Without a mass in its scene the energy is that of one kilogram.
+    """
+    motion = moving(analysis)
+    curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
+    low, high = curve.y - curve.u, curve.y_points
+    with style():
+        figure, (above, below) = panels([(2.3, 0.0), (1.1, 0.08)])
+        _draw(above, curve, 1.0, 1e3, "from single amplitudes", f"from the law {motion.damping.selected}")
+        if 0 < float(np.min(low)) < float(np.max(high)) / 20.0 and float(np.min(high)) > 0:
+            above.set_yscale("log")
+            above.yaxis.set_major_formatter("{x:g}")
+        above.set_ylabel("energy / mJ" if curve.unit == "J" else "energy per mass / (mJ/kg)")
+        law = np.interp(curve.x_points, curve.x, curve.y)
+        deviation, scatter = 100.0 * (curve.y_points / law - 1.0), 100.0 * curve.u_points / law
+        width = 100.0 * curve.u / curve.y
+        below.fill_between(curve.x, -width, width, color=SKY, alpha=0.45, lw=0)
+        _draw_points(below, curve.x_points, deviation, scatter, None)
+        below.axhline(0.0, color="#000000", lw=0.8)
+        reach = 1.08 * max(float(np.max(np.abs(deviation) + scatter)), float(np.max(width)), 1e-6)
+        below.set_ylim(-reach, reach)
+        below.set_ylabel("deviation / %")
+        below.set_xlabel("time / s")
+        share(above, below, float(curve.x[0]), float(np.nanmax(analysis.track.t)))
+        legend_above(above)
+        return figure
+
+
+def drag_figure(analysis: Analysis) -> Figure | None:
+    """Draw the drag coefficient against amplitude with its band; None where scene or record give none.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of a record that oscillates.
+    """
+    motion = moving(analysis)
+    curve = motion.derived.drag_curve(motion.damping, motion.demodulated)
+    diameter = analysis.scene.disc_diameter_m
+    if curve is None or diameter is None:
+        return None
+    with style():
+        # Room above for the second axis.
+        figure, (panel,) = panels([(2.8, 0.0)], top=0.5)
+        _draw(panel, curve, 1e3, 1.0, "from a stretch of the record", f"from the law {motion.damping.selected}")
+        points = [curve.y_points + curve.u_points, curve.y_points - curve.u_points]
+        shown = np.concatenate([curve.y + curve.u, curve.y - curve.u, *points])
+        # A stretch with hardly any damping has a bar that would flatten all else.
+        most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
+        low, high = min(0.0, max(float(np.min(shown)), -most)), min(float(np.max(shown)), most)
+        panel.set_ylim(low - 0.05 * (high - low) if low < 0 else 0.0, high + 0.08 * (high - low))
+        panel.set_ylabel("drag coefficient")
+        panel.set_xlabel("amplitude / mm")
+        edge = 0.04e3 * float(np.ptp(curve.x))
+        panel.set_xlim(max(1e3 * float(curve.x[0]) - edge, 0.0), 1e3 * float(curve.x[-1]) + edge)
+        per_mm = 2e-3 * np.pi / diameter.value
+        second = panel.secondary_xaxis("top", functions=(_times(per_mm), _times(1.0 / per_mm)))
+        second.set_xlabel("Keulegan-Carpenter number")
+        # The axis begins at 0, the coefficient falls as the amplitude grows: the lower left is free.
+        panel.legend(loc="lower left")
+        return figure
+
+
+def _times(factor: float) -> Callable[[ArrayLike], F8]:
+    return lambda x: np.asarray(x, np.float64) * factor
+
+
+def _draw(panel: Axes, curve: Curve, x: float, y: float, points: str, law: str) -> None:
+    """Draw band, points and curve, in units x and y."""
+    label = "± one standard uncertainty"
+    low, high = y * (curve.y - curve.u), y * (curve.y + curve.u)
+    panel.fill_between(x * curve.x, low, high, color=SKY, alpha=0.45, lw=0, label=label)
+    _draw_points(panel, x * curve.x_points, y * curve.y_points, y * curve.u_points, points)
+    panel.plot(x * curve.x, y * curve.y, color="#000000", lw=1.0, label=law, zorder=3)
+
+
+def _draw_points(panel: Axes, x: F8, y: F8, u: F8, label: str | None) -> None:
+    panel.errorbar(x, y, yerr=u, fmt="o", ms=2.6, mew=0, color=BLUE, elinewidth=0.7, label=label)

@@ -1,0 +1,99 @@
+"""Velocity against displacement: the phase plot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.analyse import Analysis, Motion
+from pipeline.track import F8, UNUSABLE
+from springmass.report.figures.canvas import DENSE_POINTS, legend_above, model_phase, moving, panels, style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["phase_figure", "turn_step"]
+
+LEAST_TURNS, MOST_TURNS = 4, 24  # drawn in a phase plot
+
+
+def turn_step(motion: Motion) -> int:
+    """Return one turn in how many the phase plot draws: the less the amplitude falls, the fewer turns."""
+    amplitude = motion.demodulated.amplitude
+    wanted = 32.0 * float(np.ptp(amplitude) / np.max(amplitude))
+    return max(1, int(np.ceil(motion.cycles.count / min(max(wanted, LEAST_TURNS), MOST_TURNS))))
+
+
+def phase_figure(analysis: Analysis) -> Figure:
+    """Draw the fitted velocity against the fitted displacement, and faintly what the samples say.
+
+    Of many turns evenly spaced ones are drawn: see :func:`turn_step`.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of a record that oscillates.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    motion, track = moving(analysis), analysis.track
+    period = 2.0 * np.pi / motion.phase.angular_frequency.value
+    first, end = motion.damping.t0, float(np.nanmax(track.t))
+    starts = np.arange(first, end, period * turn_step(motion))
+    # The map's pale end would drown in the paper.
+    colours = ListedColormap(colormaps["cividis"](np.linspace(0.0, 0.88, 64)))
+    scale = Normalize(first, end)
+    with style():
+        figure, (panel,) = panels([(4.0, 0.0)], width=5.6, right=1.05)
+        displacement, velocity, label = _measured_phase(analysis, motion)
+        turn = np.floor((track.t - first) / period)
+        drawn = np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, turn_step(motion)) == 0)
+        dots: dict[str, Any] = {
+            "ms": 2.8,
+            "mew": 0,
+            "color": "#a0a0a0",
+            "rasterized": np.count_nonzero(drawn) > DENSE_POINTS // 5,
+        }
+        fastest = 1.3 * float(np.nanmax(np.abs(motion.waveform.velocity)))
+        beyond = int(np.count_nonzero(np.abs(velocity[drawn]) > fastest))
+        label += f" ({beyond} off the axis)" if beyond else ""
+        panel.plot(displacement[drawn] * 1e3, velocity[drawn], ".", label=label, **dots)
+        panel.set_ylim(-fastest, fastest)
+        for i, start in enumerate(starts):
+            t = np.linspace(start, min(start + period, end), 73)
+            x, v = model_phase(motion, t)
+            panel.plot(x * 1e3, v, color=colours(scale(start)), lw=1.0, label=None if i else "fitted motion")
+        panel.set_xlabel("displacement / mm")
+        panel.set_ylabel("velocity / (m/s)")
+        legend_above(panel)
+        beside = panel.get_position()
+        bar = figure.colorbar(
+            ScalarMappable(scale, colours),
+            cax=figure.add_axes((beside.x1 + 0.03, beside.y0, 0.025, beside.height)),
+        )
+        bar.set_label("time / s")
+        bar.solids.set_rasterized(True)  # type: ignore[union-attr]  # a bar without lines always has them
+        return figure
+
+
+def _measured_phase(analysis: Analysis, motion: Motion) -> tuple[F8, F8, str]:
+    """Displacement and velocity of the samples used, NaN elsewhere: as recorded, or from both neighbours."""
+    track = analysis.track
+    used: NDArray[np.bool_] = (analysis.flags & UNUSABLE) == 0
+    displacement = np.where(used, track.y - motion.rest.at(track.t), np.nan)
+    if track.velocity is not None and np.isfinite(track.velocity).any():
+        return displacement, np.where(used, track.velocity, np.nan), "samples, velocity as recorded"
+    # Wider differences carry less noise; what they take from a sine is known and put back.
+    omega = motion.phase.angular_frequency.value
+    apart = max(1, round(2.0 * np.pi / omega * track.rate_hz / 16.0))
+    velocity = np.full(track.t.size, np.nan)
+    if track.t.size > 2 * apart:
+        step = track.t[2 * apart :] - track.t[: -2 * apart]
+        near = used[2 * apart :] & used[: -2 * apart] & (np.abs(step * track.rate_hz - 2 * apart) < 0.5)
+        rise = (track.y[2 * apart :] - track.y[: -2 * apart])[near]
+        velocity[apart:-apart][near] = rise * omega / (2.0 * np.sin(0.5 * omega * step[near]))
+    return displacement, velocity, "samples, velocity from those around"

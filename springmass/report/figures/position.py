@@ -1,0 +1,166 @@
+"""Position against time with the fit, and what the fit leaves."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline.analyse import Analysis, Motion
+from pipeline.cycles import NoOscillation
+from pipeline.track import F8, UNUSABLE, Quality
+from springmass.report.figures.canvas import (
+    BLUE,
+    DENSE_POINTS,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    finish_residual,
+    legend_above,
+    model_phase,
+    panels,
+    share,
+    style,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["ZOOM_PERIODS", "has_error_bars", "is_long", "position_figure"]
+
+# Bits of a sample, the gravest first; what they are called, and marker and colour.
+_FLAGGED: tuple[tuple[int, str, str, str], ...] = (
+    (int(Quality.CLIPPED), "clipped", "s", ORANGE),
+    (int(Quality.FALSE_ECHO), "false echo", "x", VERMILLION),
+    (int(UNUSABLE), "otherwise unusable", "+", GREEN),
+)
+ZOOM_PERIODS = 8
+LONG_PERIODS = 14  # more than these are drawn whole and as a detail
+DENSE_PERIODS = 40  # more than these are a band to the eye
+VISIBLE_NOISE = 0.005  # of the panel's height; error bars of less vanish in the points
+
+
+def is_long(analysis: Analysis) -> bool:
+    """Return whether the position is drawn twice, whole and as a detail of the first periods."""
+    return isinstance(analysis.motion, Motion) and analysis.motion.cycles.count > LONG_PERIODS
+
+
+def has_error_bars(analysis: Analysis) -> bool:
+    """Return whether the samples' error bars are large enough to be seen, and drawn."""
+    y = analysis.track.y[(analysis.flags & UNUSABLE) == 0]
+    return isinstance(analysis.motion, Motion) and bool(analysis.conditioned.noise_m > VISIBLE_NOISE * np.ptp(y))
+
+
+def position_figure(analysis: Analysis) -> Figure:
+    """Draw the distance with its fit, and beneath it the residual over the noise of one sample.
+
+    Flagged samples have markers of their own; those off the axis stand at its edge. A long record is followed
+    by a detail of its first periods. Where nothing oscillates the distance stands alone.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    """
+    track, motion = analysis.track, analysis.motion
+    start, end = float(np.nanmin(track.t)), float(np.nanmax(track.t))
+    with style():
+        if isinstance(motion, NoOscillation):
+            figure, (only,) = panels([(2.6, 0.0)])
+            _draw_distance(only, analysis, start, end)
+            legend_above(only)
+            only.set_xlabel("time / s")
+            return figure
+        long = is_long(analysis)
+        rows = [(1.75, 0.0), (0.85, 0.08)]
+        figure, axes = panels([*rows, (1.9, 0.58), (0.85, 0.08)] if long else [(2.3, 0.0), (1.0, 0.08)])
+        _draw_pair(axes[:2], analysis, motion, start, end)
+        legend_above(axes[0])
+        if long:
+            first = float(track.t[analysis.conditioned.used][0])
+            last = first + ZOOM_PERIODS / motion.cycles.frequency_hz
+            _draw_pair(axes[2:], analysis, motion, first, last)
+            for panel in axes[:2]:
+                panel.axvspan(first, last, color="#000000", alpha=0.07, lw=0)
+            axes[2].set_title(f"the first {ZOOM_PERIODS} periods", loc="left", fontsize=8.5, pad=3)
+        axes[-1].set_xlabel("time / s")
+        return figure
+
+
+def _draw_pair(axes: Sequence[Axes], analysis: Analysis, motion: Motion, start: float, end: float) -> None:
+    """Draw distance and fit above, residual over noise beneath, between two times."""
+    above, below = axes
+    t = analysis.track.t
+    _draw_distance(above, analysis, start, end)
+    law, rest = motion.damping.best, motion.rest
+    if (end - start) * motion.cycles.frequency_hz > DENSE_PERIODS:
+        grid = np.linspace(start, end, 400)
+        reach = law.amplitude(grid - motion.damping.t0)
+        for sign, label in ((1, "fit: rest ± amplitude"), (-1, None)):
+            above.plot(grid, (rest.at(grid) + sign * reach) * 1e3, color="#000000", lw=1.0, label=label)
+    else:
+        grid = np.linspace(start, end, int(50 * (end - start) * motion.cycles.frequency_hz) + 2)
+        position = rest.at(grid) + model_phase(motion, grid)[0]
+        above.plot(grid, position * 1e3, color="#000000", lw=0.8, label="fit", zorder=2.5)
+    noise = analysis.estimates["noise"].value or 1.0
+    inside = ((analysis.flags & UNUSABLE) == 0) & (t >= start) & (t <= end)
+    residual = motion.waveform.residual[inside] / noise
+    dense = residual.size > DENSE_POINTS
+    size, alpha = (1.6, 0.5) if dense else (2.6, 1.0)
+    below.plot(t[inside], residual, ".", ms=size, mew=0, color=BLUE, alpha=alpha, rasterized=dense)
+    finish_residual(below, residual, "residual / σ")
+    share(above, below, start, end)
+
+
+def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) -> None:
+    """Draw the samples between two times, the flagged ones on top with markers of their own."""
+    track, flags = analysis.track, analysis.flags
+    inside = (track.t >= start) & (track.t <= end)
+    y = track.y * 1e3
+    used = inside & ((flags & UNUSABLE) == 0) & np.isfinite(y)
+    if np.count_nonzero(used) > DENSE_POINTS:
+        panel.plot(*_thinned(track.t[used], y[used], 900), color=SKY, lw=0.5, label="samples used")
+    else:
+        panel.plot(track.t[used], y[used], ".", ms=4.0, mew=0, color=SKY, label="samples used")
+        if has_error_bars(analysis):
+            u = analysis.conditioned.noise_m * 1e3
+            panel.vlines(track.t[used], y[used] - u, y[used] + u, color=SKY, lw=0.6, alpha=0.6)
+    # What was clipped off is part of the motion: the axis holds the fit as well as the samples.
+    fit = analysis.motion.waveform.position[inside] * 1e3 if isinstance(analysis.motion, Motion) else y[used]
+    shown = np.concatenate([y[used], fit[np.isfinite(fit)]])
+    low, high = (float(np.min(shown)), float(np.max(shown))) if shown.size else (0.0, 1.0)
+    margin = 0.1 * max(high - low, 6e3 * analysis.conditioned.noise_m, 1e-3)
+    low, high = low - margin, high + margin
+    rest = inside & ~used
+    for bit, name, marker, colour in _FLAGGED:
+        chosen = rest & np.isfinite(y) & ((flags & np.uint8(bit)) != 0)
+        rest &= ~chosen
+        if chosen.any():
+            beyond = int(np.count_nonzero((y[chosen] < low) | (y[chosen] > high)))
+            label = f"{name} ({np.count_nonzero(chosen)}" + (f"; {beyond} off the axis)" if beyond else ")")
+            _mark(panel, track.t[chosen], np.clip(y[chosen], low, high), marker, colour, label)
+    missing = rest & ~np.isfinite(y)
+    if missing.any():
+        count = int(np.count_nonzero(missing))
+        _mark(panel, track.t[missing], np.full(count, low), "|", PURPLE, f"missing ({count})")
+    panel.set_ylim(low, high)
+    panel.set_xlim(start, end)
+    panel.set_ylabel("position / mm")
+
+
+def _mark(panel: Axes, t: F8, y: F8, marker: str, colour: str, label: str) -> None:
+    """Set markers on top of everything, whole also at the edge."""
+    look: dict[str, Any] = {"ms": 7 if marker == "|" else 3.2, "mew": 0.8, "color": colour, "ls": ""}
+    panel.plot(t, y, marker, mfc="none", label=label, clip_on=False, zorder=4, **look)
+
+
+def _thinned(t: F8, y: F8, bins: int) -> tuple[F8, F8]:
+    """Keep the least and the greatest of every bin: on paper of that many pixels nothing is lost."""
+    edges = np.linspace(0, t.size, bins + 1).astype(np.int64)
+    keep = [at + f(y[at:to]) for at, to in itertools.pairwise(edges) if to > at for f in (np.argmin, np.argmax)]
+    rows = np.unique(np.array(keep, np.int64))
+    return t[rows], y[rows]
