@@ -101,6 +101,7 @@ def check_schema(result: Mapping[str, Any]) -> None:
         "input",
         "quality",
         "estimates",
+        "budget",
         "damping",
         "effects",
         "findings",

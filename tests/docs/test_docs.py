@@ -32,6 +32,10 @@ PACKAGES = ("acquisition", "pipeline", "storage", "springmass")
 PLANNED = ("stale_header",)
 
 
+# Objects of the JSON whose keys are names, and what the page calls them.
+NAMED = {"estimates": "NAME", "budget": "NAME", "damping.laws": "LAW", "damping.laws.LAW.parameters": "NAME"}
+
+
 def without_code(text: str) -> str:
     """Return a page without its fenced blocks, where brackets mean something else."""
     return re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
@@ -163,12 +167,7 @@ def paths(value: Any, above: str = "") -> Iterator[str]:
     if not isinstance(value, dict) or above == "provenance.parameters":
         return
     for key, inner in value.items():
-        shown = {
-            "estimates": "NAME",
-            "budget": "NAME",
-            "damping.laws": "LAW",
-            "damping.laws.LAW.parameters": "NAME",
-        }.get(above, key)
+        shown = NAMED.get(above, key)
         path = f"{above}.{shown}" if above else shown
         if not isinstance(inner, list) or not inner or not isinstance(inner[0], dict):
             yield path
