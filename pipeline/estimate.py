@@ -3,16 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from pipeline.track import F8
-
-if TYPE_CHECKING:
-    from uncertainties.core import AffineScalarFunc
 
 __all__ = ["Estimate", "Joint", "format_value"]
 
@@ -66,13 +59,6 @@ class Joint:
         """Return every parameter by name."""
         return {name: self[name] for name in self.names}
 
-    def correlated(self) -> Mapping[str, AffineScalarFunc]:
-        """Return the parameters as correlated variables of the ``uncertainties`` package."""
-        from uncertainties import correlated_values
-
-        variables: Sequence[Any] = correlated_values(self.values, self.covariance)
-        return dict(zip(self.names, variables, strict=True))
-
 
 def format_value(value: float, u: float, unit: str = "") -> str:
     """Write a value to the digits that its uncertainty allows: two digits of u, the value to match.
@@ -103,19 +89,3 @@ def format_value(value: float, u: float, unit: str = "") -> str:
         step = 10.0 ** (exponent - 1)
         return f"{round(value / step) * step:.0f} +- {round(u / step) * step:.0f}{tail}"
     return f"{value:.{digits}f} +- {u:.{digits}f}{tail}"
-
-
-def stack(joints: Sequence[Joint]) -> Joint:
-    """Join independent groups of parameters into one with a block-diagonal covariance."""
-    size = sum(j.values.size for j in joints)
-    covariance = np.zeros((size, size))
-    at = 0
-    for joint in joints:
-        covariance[at : at + joint.values.size, at : at + joint.values.size] = joint.covariance
-        at += joint.values.size
-    return Joint(
-        tuple(name for j in joints for name in j.names),
-        np.concatenate([j.values for j in joints]),
-        covariance,
-        tuple(unit for j in joints for unit in j.units),
-    )

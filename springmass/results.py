@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pipeline.judge import Finding
     from springmass.loading import Loaded
 
-__all__ = ["SCHEMA", "all_findings", "input_of", "result_of"]
+__all__ = ["SCHEMA", "all_findings", "estimate_json", "finding_json", "finite", "input_of", "result_of"]
 
 SCHEMA = 1
 # How grave it is that a reader saw this; what is not named here is for information.
@@ -64,14 +64,14 @@ def result_of(
         "schema": SCHEMA,
         "input": input_of(loaded),
         "quality": _quality(loaded, analysis),
-        "estimates": {name: _estimate(e) for name, e in estimates.items()},
+        "estimates": {name: estimate_json(e) for name, e in estimates.items()},
         "budget": _budgets(analysis) if classic is None else {},
         "damping": _damping(analysis) if classic is None else _no_damping(),
         "effects": [
             {
                 "name": e.name,
-                "predicted": _finite(e.predicted),
-                "measured": _finite(e.measured),
+                "predicted": finite(e.predicted),
+                "measured": finite(e.measured),
                 "unit": e.unit,
                 "included": e.included,
                 "why": e.why,
@@ -79,7 +79,7 @@ def result_of(
             for e in analysis.effects
         ],
         "findings": [
-            {"code": f.code, "severity": f.severity, "message": f.message} for f in all_findings(loaded, analysis)
+            finding_json(f) for f in all_findings(loaded, analysis)
         ],
         "provenance": {
             "version": __version__,
@@ -101,7 +101,7 @@ def input_of(loaded: Loaded) -> dict[str, Any]:
         "channel": loaded.channel,
         "samples": len(track),
         "rate_hz": track.rate_hz,
-        "duration_s": _finite(float(track.t[-1] - track.t[0])) if len(track) else 0.0,
+        "duration_s": finite(float(track.t[-1] - track.t[0])) if len(track) else 0.0,
     }
 
 
@@ -131,7 +131,7 @@ def _budgets(analysis: Analysis) -> dict[str, Any]:
     if not isinstance(analysis.motion, Motion):
         return {}
     return {
-        name: {**_estimate(budget.estimate), "inputs": [_contribution(c) for c in budget.contributions]}
+        name: {**estimate_json(budget.estimate), "inputs": [_contribution(c) for c in budget.contributions]}
         for name, budget in analysis.motion.derived.budgets.items()
     }
 
@@ -141,12 +141,12 @@ def _contribution(c: Contribution) -> dict[str, Any]:
     return {
         "name": c.name,
         "type": c.kind,
-        "value": None if given is None else _finite(given.value),
-        "u": None if given is None else _finite(given.u),
+        "value": None if given is None else finite(given.value),
+        "u": None if given is None else finite(given.u),
         "unit": "" if given is None else given.unit,
-        "sensitivity": _finite(c.sensitivity),
-        "contribution": _finite(c.u),
-        "share": _finite(c.share),
+        "sensitivity": finite(c.sensitivity),
+        "contribution": finite(c.u),
+        "share": finite(c.share),
     }
 
 
@@ -169,17 +169,24 @@ def _no_damping() -> dict[str, Any]:
 
 def _law(fit: LawFit) -> dict[str, Any]:
     return {
-        "parameters": {name: _estimate(e) for name, e in fit.joint.estimates().items()},
-        "reduced_chi2": _finite(fit.reduced_chi2),
-        "dof": _finite(fit.dof),
-        "bic": _finite(fit.bic),
+        "parameters": {name: estimate_json(e) for name, e in fit.joint.estimates().items()},
+        "reduced_chi2": finite(fit.reduced_chi2),
+        "dof": finite(fit.dof),
+        "bic": finite(fit.bic),
         "rejected": fit.rejected,
     }
 
 
-def _estimate(estimate: Estimate) -> dict[str, Any]:
-    return {"value": _finite(estimate.value), "u": _finite(estimate.u), "unit": estimate.unit}
+def finding_json(finding: Finding) -> dict[str, str]:
+    """Return a finding as the JSON holds it."""
+    return {"code": finding.code, "severity": finding.severity, "message": finding.message}
 
 
-def _finite(value: float | None) -> float | None:
+def estimate_json(estimate: Estimate) -> dict[str, Any]:
+    """Return an estimate as the JSON holds it."""
+    return {"value": finite(estimate.value), "u": finite(estimate.u), "unit": estimate.unit}
+
+
+def finite(value: float | None) -> float | None:
+    """Return a number as the JSON holds it: None for what is no number."""
     return None if value is None or not math.isfinite(value) else float(value)

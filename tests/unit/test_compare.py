@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipeline.compare import SpringRun, compare_springs
+from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate
 
 BARE_OMEGA = Estimate(2 * math.pi * 7 / 5.27, 2 * math.pi * 7 / 5.27**2 * 0.01, "rad/s")
@@ -75,7 +77,7 @@ def test_mean_is_weighted() -> None:
 def test_common_clock_widens_the_mean_and_not_the_test() -> None:
     """A clock that all runs share shifts all constants alike."""
     runs = [spring("a", 14.0, 0.2), spring("b", 14.005, 0.22)]
-    free, shared = compare_springs(runs), compare_springs(runs, u_clock=3e-5)
+    free, shared = compare_springs(runs), compare_springs([replace(run, u_clock=3e-5) for run in runs])
     assert shared.chi2 == pytest.approx(free.chi2, rel=1e-6)
     assert shared.largest_deviation == pytest.approx(free.largest_deviation, rel=1e-6)
     assert shared.spring_constant.u == pytest.approx(math.hypot(free.spring_constant.u, 6e-5 * 14.0), rel=1e-3)
@@ -155,6 +157,60 @@ def test_agreement_is_as_frequent_as_stated() -> None:
             runs.append(SpringRun(name, omega, Estimate(rng.normal(mass, 2e-5), 2e-5)))
         agreed += compare_springs(runs).agree
     assert agreed >= 990
+
+
+def test_clocks_of_two_sensors_do_not_cancel() -> None:
+    """Two clocks, each known to 30 ppm, part two constants by 2 sqrt(2) 30 ppm of k; one clock by nothing."""
+    runs = [spring("a", 14.0, 0.2, 1e-9), spring("b", 14.0, 0.2, 1e-9)]
+    runs = [replace(run, u_clock=3e-5, mass_kg=Estimate(run.mass_kg.value, 0.0)) for run in runs]
+    runs[1] = replace(runs[1], angular_frequency=Estimate(runs[1].angular_frequency.value * (1 + 3e-5), 1e-9))
+    apart = compare_springs([replace(runs[0], clock="device"), replace(runs[1], clock="nominal")])
+    assert apart.largest_deviation == pytest.approx(6e-5 / (6e-5 * math.sqrt(2)), rel=1e-3)
+    assert apart.agree
+    assert not compare_springs(runs).agree
+
+
+def test_one_balance_moves_all_masses_alike() -> None:
+    """With fully correlated masses their error cancels in the test, by as much as the masses are alike."""
+    runs = [replace(spring(name, 14.0, 0.2, 1e-5), mass_kg=Estimate(0.2, 1e-4)) for name in "ab"]
+    free, tied = compare_springs(runs), compare_springs(runs, mass_correlation=1.0)
+    assert free.each == tied.each
+    assert tied.own_u[0] == pytest.approx(14.0 * 2e-5, rel=1e-6)
+    assert tied.spring_constant.u > 1.3 * free.spring_constant.u
+    with pytest.raises(ValueError, match="must lie in 0 to 1"):
+        compare_springs(runs, mass_correlation=1.5)
+
+
+def test_pulls_are_differences_over_their_own_uncertainty() -> None:
+    """For two runs each pull is the deviation between them, one up and one down."""
+    result = compare_springs([spring("a", 14.0, 0.2), spring("b", 14.02, 0.22)])
+    assert result.pulls == pytest.approx((-result.largest_deviation, result.largest_deviation))
+
+
+def test_the_nearest_exchange_is_named() -> None:
+    """Where two exchanges help, the one that helps most is named, with its chi-square."""
+    result = compare_springs(REPORT)
+    assert result.exchanged_chi2 is not None
+    assert result.exchanged_chi2 < 0.01 * result.chi2
+    assert compare_springs(SWAPPED).exchanged_chi2 is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"mass_kg": Estimate(0.0, 5e-5, "kg")}, "its mass must be positive, got 0 kg"),
+        ({"mass_kg": Estimate(0.2, -5e-5, "kg")}, "uncertainty of its mass must not be negative"),
+        ({"mass_kg": Estimate(0.2, math.nan, "kg")}, "uncertainty of its mass must not be negative, got nan"),
+        ({"angular_frequency": Estimate(-8.0, 0.01, "rad/s")}, "its angular frequency must be positive"),
+        ({"u_clock": -1e-5}, "the clock's uncertainty must not be negative"),
+    ],
+)
+def test_impossible_inputs_are_refused(wrong: dict[str, Estimate], words: str) -> None:
+    """A mass of zero, a negative or a missing uncertainty: one line with the run's name."""
+    with pytest.raises(AnalysisError, match=f"damped: .*{words}"):
+        compare_springs([REPORT[0], replace(REPORT[1], **wrong)])
+    with pytest.raises(AnalysisError, match="the spring's share must not be negative"):
+        compare_springs(REPORT, shared_mass_kg=Estimate(0.003, -1e-4, "kg"))
 
 
 @pytest.mark.parametrize("count", [0, 1])

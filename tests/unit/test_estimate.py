@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from pipeline.estimate import Estimate, Joint, format_value, stack
+from pipeline.estimate import Estimate, Joint, format_value
 
 PLAIN = re.compile(r"^(-?[\d.]+) \+- ([\d.]+)( \S+)?$")
 SCALED = re.compile(r"^\((-?[\d.]+) \+- ([\d.]+)\)e([+-]\d+)( \S+)?$")
@@ -110,22 +110,3 @@ def test_unknown_parameter_is_an_error() -> None:
 def test_rounding_below_zero_variance_is_no_uncertainty() -> None:
     """A variance that rounding made negative counts as 0."""
     assert Joint(("x",), np.array([1.0]), np.array([[-1e-30]]), ("",))["x"].u == 0.0
-
-
-def test_correlation_is_carried() -> None:
-    """A product of correlated parameters has the uncertainty that their covariance says."""
-    variables = JOINT.correlated()
-    product = variables["A0"] * variables["gamma"]
-    gradient = np.array([0.01, 0.05])
-    assert product.std_dev == pytest.approx(math.sqrt(gradient @ JOINT.covariance @ gradient))
-
-
-def test_stacked_groups_are_independent() -> None:
-    """Stacking keeps every value and covariance, and puts zeros between the groups."""
-    other = Joint(("kappa",), np.array([-4.0]), np.array([[0.04]]), ("rad/(s m^2)",))
-    both = stack([JOINT, other])
-    assert both.names == ("A0", "gamma", "kappa")
-    assert both.units == ("m", "1/s", "rad/(s m^2)")
-    np.testing.assert_array_equal(both.values, [0.05, 0.01, -4.0])
-    np.testing.assert_array_equal(both.covariance[:2, :2], JOINT.covariance)
-    np.testing.assert_array_equal(both.covariance[2], [0.0, 0.0, 0.04])
