@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,7 +18,7 @@ from springmass.results import result_of
 if TYPE_CHECKING:
     from pipeline.classic import Classic
 
-__all__ = ["Analysed", "analyse_loaded", "make_folder", "now_utc"]
+__all__ = ["Analysed", "analyse_loaded", "distinct_names", "make_folder", "now_utc"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,6 +86,23 @@ def analyse_loaded(
         classic=classic,
     )
     return Analysed(loaded, analysis, classic, result)
+
+
+def distinct_names(paths: Sequence[str]) -> list[str]:
+    """Return a name for each input: its file's without the suffix, later ones of one name numbered.
+
+    Examples
+    --------
+    >>> distinct_names(["a/bob.txt", "b/bob.txt", "disc.h5"])
+    ['bob', 'bob-2', 'disc']
+    """
+    names: list[str] = []
+    for path in paths:
+        stem, count = Path(path).stem, 1
+        while (name := stem if count == 1 else f"{stem}-{count}") in names:
+            count += 1
+        names.append(name)
+    return names
 
 
 def make_folder(path: str | Path) -> Path:

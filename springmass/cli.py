@@ -22,6 +22,7 @@ __all__ = ["build_parser", "main"]
 COMMANDS = {
     "demo": "replay, analyse and compare the bundled recordings: Table 1 in one command",
     "analyse": "turn recordings into Table 1, findings and a report",
+    "compare": "several runs of one spring: do they agree, and does one damping law hold",
     "record": "record a run from the bench, so that nothing is lost",
     "recover": "build a run file from a wire log, however torn",
     "replay": "play a recording back through the interface of a live sensor",
@@ -48,6 +49,7 @@ def build_parser() -> argparse.ArgumentParser:
     adders = {
         "demo": _add_demo,
         "analyse": _add_analyse,
+        "compare": _add_compare,
         "record": _add_record,
         "recover": _add_recover,
         "replay": _add_replay,
@@ -127,6 +129,10 @@ def _exit_code(error: Exception) -> int | None:
 
 def _add_input_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--velocity", metavar="FILE", help="velocity file that belongs to the one position file given")
+    _add_completions(parser)
+
+
+def _add_completions(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--channel", metavar="NAME", help="which quantity of the file to take as distance")
     parser.add_argument(
         "--rate-hz", type=_positive, metavar="R", help="samples per second, where the file does not say"
@@ -137,12 +143,7 @@ def _add_input_options(parser: argparse.ArgumentParser) -> None:
 def _add_analyse(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", nargs="+", metavar="INPUT", help="recordings and run files")
     parser.add_argument("--scene", metavar="FILE", help="scene file (TOML): masses, disc, air, sensor")
-    parser.add_argument(
-        "--accuracy",
-        choices=("fast", "standard", "best"),
-        default="standard",
-        help="how much time to spend for how much accuracy",
-    )
+    _add_accuracy(parser)
     parser.add_argument("--method", choices=("classic",), help="the lab report's own method, to compare against")
     _add_input_options(parser)
     parser.add_argument("--from", dest="from_s", type=_finite, metavar="S", help="use samples from this second on")
@@ -150,6 +151,40 @@ def _add_analyse(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="folder for NAME.results (default: here; with --json: none)")
     parser.add_argument("--no-report", action="store_true", help="print, but write no files")
     parser.add_argument("--json", action="store_true", help="one JSON object per input on stdout")
+    parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
+
+
+def _add_accuracy(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--accuracy",
+        choices=("fast", "standard", "best"),
+        default="standard",
+        help="how much time to spend for how much accuracy",
+    )
+
+
+def _add_compare(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="+", metavar="RUN", help="two recordings or run files and more, of one spring")
+    parser.add_argument(
+        "--scene",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="scene file: one for all runs, or again for each in their order (default: what run files carry)",
+    )
+    _add_accuracy(parser)
+    parser.add_argument(
+        "--mass-correlation",
+        type=_share,
+        default=0.0,
+        metavar="R",
+        help="correlation of the masses' errors, 0 to 1: 1 for one balance whose calibration is the error (default 0)",
+    )
+    _add_completions(parser)
+    parser.add_argument("--from", dest="from_s", type=_finite, metavar="S", help="use samples from this second on")
+    parser.add_argument("--to", dest="to_s", type=_finite, metavar="S", help="use samples up to this second")
+    parser.add_argument("--out", metavar="DIR", help="folder for the report (default: none is written)")
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
 
 
@@ -240,6 +275,13 @@ def _finite(text: str) -> float:
     value = float(text)
     if value != value or value in (float("inf"), float("-inf")):
         raise argparse.ArgumentTypeError(f"must be a finite number, got {text!r}")
+    return value
+
+
+def _share(text: str) -> float:
+    value = _finite(text)
+    if not 0.0 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"must lie in 0 to 1, got {text!r}")
     return value
 
 

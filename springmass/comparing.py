@@ -118,7 +118,7 @@ def comparison_json(
         "schema": SCHEMA,
         "comparison": {
             "agree": found.agree,
-            "spring_constant": estimate_json(found.spring_constant),
+            "spring_constant": estimate_json(found.spring_constant) if found.agree else None,
             "chi2": finite(found.chi2),
             "dof": found.dof,
             "largest_deviation": finite(found.largest_deviation),

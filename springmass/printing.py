@@ -1,4 +1,4 @@
-"""Words for the terminal: findings and the classic method's numbers, wrapped to its width."""
+"""Words for the terminal: findings, a comparison, the classic method's numbers, wrapped to its width."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from pipeline.analyse import Analysis, Motion
+
 if TYPE_CHECKING:
     from pipeline.classic import Classic
+    from pipeline.compare import Comparison
 
-__all__ = ["classic_text", "findings_text"]
+__all__ = ["classic_text", "comparison_text", "findings_text"]
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
 
@@ -33,6 +36,30 @@ def classic_text(classic: Classic) -> str:
     lines = ["By the report's own method (biased, for comparison only; --help names the page on it):"]
     lines += [f"  {name.replace('_', ' '):<22} {estimate}" for name, estimate in classic.estimates.items()]
     return "\n".join([*lines, f"  {'chi-square of its fit':<22} {classic.chi2:.4g}"])
+
+
+def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str:
+    """Return a comparison as an aligned table in ASCII, and what it says in words.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    analyses : sequence of Analysis
+        Of its runs, in their order.
+    """
+    rows = [("run", "period", "mass that swings", "spring constant", "residual / u")]
+    for name, analysis, k, pull in zip(comparison.names, analyses, comparison.each, comparison.pulls, strict=True):
+        mass = analysis.motion.derived.effective_mass_kg if isinstance(analysis.motion, Motion) else None
+        period = str(analysis.estimates["period"])
+        rows.append((name.encode("ascii", "replace").decode(), period, str(mass), str(k), f"{pull:+.1f}"))
+    # Of constants that disagree there is no mean to give.
+    mean = str(comparison.spring_constant) if comparison.agree else "none"
+    rows.append(("together", "", "", mean, f"chi2 {comparison.chi2:.3g} / {comparison.dof}"))
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    lines = ["   ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+    lines.insert(1, "-" * (sum(widths) + 12))
+    width = min(shutil.get_terminal_size((100, 24)).columns, 100)
+    return "\n".join([*lines, "", textwrap.fill(comparison.message, width, break_on_hyphens=False)])
 
 
 def _entry(severity: str, code: str, message: str) -> str:

@@ -78,9 +78,7 @@ def result_of(
             }
             for e in analysis.effects
         ],
-        "findings": [
-            finding_json(f) for f in all_findings(loaded, analysis)
-        ],
+        "findings": [finding_json(f) for f in all_findings(loaded, analysis)],
         "provenance": {
             "version": __version__,
             "accuracy": accuracy,

@@ -12,7 +12,7 @@ from acquisition.errors import AcquisitionError
 from pipeline.analyse import Motion
 from pipeline.errors import PipelineError
 from pipeline.relaxation import Relaxation
-from springmass.analysing import Analysed, analyse_loaded, make_folder
+from springmass.analysing import Analysed, analyse_loaded, distinct_names, make_folder
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain
 from springmass.loading import load, read_scene
@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
     scene = None if options.scene is None else read_scene(options.scene)
     out = make_folder(options.out or ".") if _wants_report(options) else None
     codes: list[int] = []
-    for path, name in zip(options.input, _result_names(options.input), strict=True):
+    for path, name in zip(options.input, distinct_names(options.input), strict=True):
         try:
             loaded = load(path, **completions(options), from_s=options.from_s, to_s=options.to_s)
             analysed = analyse_loaded(
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
             complain(f"{path}: {error}")
             codes.append(UNREADABLE)
         else:
-            codes.append(_deliver(analysed, options, None if out is None else out / name))
+            codes.append(_deliver(analysed, options, None if out is None else out / f"{name}.results"))
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(codes)
@@ -59,17 +59,6 @@ def run(options: argparse.Namespace) -> int:
 
 def _wants_report(options: argparse.Namespace) -> bool:
     return not options.no_report and (options.out is not None or not options.json)
-
-
-def _result_names(paths: list[str]) -> list[str]:
-    """Name each input's results after its file; of several files of one name, the later ones are numbered."""
-    names: list[str] = []
-    for path in paths:
-        stem, count = Path(path).stem, 1
-        while (name := f"{stem}.results" if count == 1 else f"{stem}-{count}.results") in names:
-            count += 1
-        names.append(name)
-    return names
 
 
 def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | None) -> int:

@@ -7,11 +7,9 @@ from pathlib import Path
 
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
-from pipeline.analyse import Motion
-from pipeline.compare import Comparison, SpringRun, compare_springs
-from pipeline.errors import AnalysisError
 from springmass.analysing import Analysed, analyse_loaded, make_folder
 from springmass.commands.convert import write_loaded
+from springmass.comparing import compare_analysed
 from springmass.errors import OK
 from springmass.loading import load, read_scene, sample_data
 from springmass.printing import findings_text
@@ -30,17 +28,18 @@ def run(options: argparse.Namespace) -> int:
     reports = [
         ReportRun(name, a.analysis, a.result["input"], a.classic) for name, a in zip(RUNS, analysed, strict=True)
     ]
-    comparison = _compare(analysed)
+    compared = compare_analysed(list(zip(RUNS, analysed, strict=True)))
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")
     print(text_table(RUNS, [a.analysis for a in analysed]))
     for name, one in zip(RUNS, analysed, strict=True):
         print(f"\n{name.capitalize()}:")
         print(findings_text(one.result["findings"]))
-    print(f"\n{comparison.message}")
+    print(f"\n{compared.comparison.message}")
     report = write_report(
         out / "demo.results",
         reports,
-        comparison=comparison,
+        comparison=compared.comparison,
+        joint=compared.joint,
         provenance=analysed[0].result["provenance"],
         results=[a.result for a in analysed],
     )
@@ -57,15 +56,3 @@ def _one(name: str, out: Path) -> Analysed:
     with Replay(old.samples_in_blocks(), VirtualClock(), info=old.info, speed=None) as source:
         write_loaded(path, old, source, scene=scene.to_mapping(), overwrite=True)
     return analyse_loaded(load(path), None, parameters={"command": "demo"})
-
-
-def _compare(analysed: list[Analysed]) -> Comparison:
-    """Ask whether both runs hung on one spring; its mass and the clock are common to them."""
-    motions = [a.analysis.motion for a in analysed if isinstance(a.analysis.motion, Motion)]
-    if len(motions) < len(RUNS):
-        raise AnalysisError("the bundled recordings do not oscillate; install springmass again")
-    return compare_springs(
-        [SpringRun.of(name, motion.derived) for name, motion in zip(RUNS, motions, strict=True)],
-        shared_mass_kg=motions[0].derived.spring_share_kg,
-        u_clock=analysed[0].analysis.params.derive.u_clock_nominal,
-    )

@@ -12,6 +12,7 @@ from pipeline.classic import Classic
 from pipeline.compare import Comparison
 from pipeline.cycles import NoOscillation
 from pipeline.estimate import Estimate
+from pipeline.joint_damping import JointDamping
 from springmass.report.budgets import INPUTS, budgets_of
 from springmass.report.inline import inline_svg
 from springmass.report.tables import law_status, page_unit, pretty, pretty_number, table_rows
@@ -20,7 +21,7 @@ from springmass.report.words import LETTERS, caption, verdict
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-__all__ = ["ReportRun", "render_html"]
+__all__ = ["ComparedRuns", "ReportRun", "render_html"]
 
 _SEVERITIES = {"error": "Error", "warning": "Warning", "info": "Note"}
 _QUALITY = {
@@ -66,11 +67,28 @@ class ReportRun:
     classic: Classic | None = None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ComparedRuns:
+    """Several runs of one spring, compared.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    joint : tuple of JointDamping
+    picture : bytes
+        :func:`springmass.report.figures.comparison_figure` as SVG.
+    """
+
+    comparison: Comparison
+    joint: tuple[JointDamping, ...]
+    picture: bytes
+
+
 def render_html(
     runs: Sequence[ReportRun],
     pictures: Sequence[Mapping[str, bytes]],
     *,
-    comparison: Comparison | None = None,
+    compared: ComparedRuns | None = None,
     provenance: Mapping[str, Any],
     quality: Sequence[Mapping[str, int]] | None = None,
 ) -> str:
@@ -81,7 +99,7 @@ def render_html(
     runs : sequence of ReportRun
     pictures : sequence of mapping of str to bytes
         SVG files by figure name, one mapping a run.
-    comparison : Comparison, optional
+    compared : ComparedRuns, optional
     provenance : mapping
         Shown as it is, nested mappings flattened.
     quality : sequence of mapping of str to int, optional
@@ -105,8 +123,7 @@ def render_html(
         title=", ".join(run.name for run in runs),
         parts=parts,
         rows=table_rows([run.analysis for run in runs]),
-        comparison=comparison,
-        compared=_compared(runs, comparison),
+        compared=None if compared is None else _compared(compared),
         provenance=list(_flattened(provenance)),
     )
 
@@ -174,8 +191,7 @@ def _laws(motion: Motion) -> dict[str, Any]:
         }
         for law, fit in damping.fits.items()
     ]
-    heads = [LETTERS.get(name, name) + (f" / {page_unit(unit)}" if unit else "") for name, unit in units.items()]
-    return {"heads": heads, "rows": rows}
+    return {"heads": _heads(units), "rows": rows}
 
 
 def _bare(estimate: Estimate) -> Estimate:
@@ -201,14 +217,47 @@ def _classic_rows(run: ReportRun) -> list[dict[str, Any]] | None:
     ]
 
 
-def _compared(runs: Sequence[ReportRun], comparison: Comparison | None) -> list[tuple[str, Estimate]]:
-    """Pair the comparison's spring constants, in order, with the runs that have one."""
-    if comparison is None:
-        return []
-    names = [run.name for run in runs if "spring_constant" in run.analysis.estimates]
-    if len(names) != len(comparison.each):
-        names = [f"run {i + 1}" for i in range(len(comparison.each))]
-    return list(zip(names, comparison.each, strict=True))
+def _compared(compared: ComparedRuns) -> dict[str, Any]:
+    """Everything that the template says of the comparison."""
+    found = compared.comparison
+    return {
+        "found": found,
+        "rows": list(zip(found.names, found.each, found.pulls, strict=True)),
+        "figure": inline_svg(compared.picture, "comparison-"),
+        "joint": [_joint(joint) for joint in compared.joint],
+    }
+
+
+def _joint(joint: JointDamping) -> dict[str, Any]:
+    units = {
+        name: unit
+        for fit in joint.fits.values()
+        for name, unit in zip(fit.coefficients.names, fit.coefficients.units, strict=True)
+    }
+    rows = [
+        {
+            "name": law,
+            "verdict": _joint_status(joint, law),
+            "cells": [_bare(fit.coefficients[name]) if name in fit.coefficients.names else None for name in units],
+            "fit": fit,
+            "bic": _difference(fit.bic - joint.best.bic),
+        }
+        for law, fit in joint.fits.items()
+    ]
+    return {"message": joint.message, "heads": _heads(units), "rows": rows}
+
+
+def _joint_status(joint: JointDamping, law: str) -> str:
+    rejection = joint.fits[law].rejection
+    if rejection:
+        return {"differ": "coefficients differ"}.get(rejection, rejection)
+    if law == joint.selected:
+        return "selected"
+    return "admissible" if law in joint.admissible else "unlikely"
+
+
+def _heads(units: Mapping[str, str]) -> list[str]:
+    return [LETTERS.get(name, name) + (f" / {page_unit(unit)}" if unit else "") for name, unit in units.items()]
 
 
 def _flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:

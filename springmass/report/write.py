@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.compare import Comparison
+from pipeline.joint_damping import JointDamping
 from springmass.report.budgets import budget_csv
-from springmass.report.figures import MAKERS, draw, render
-from springmass.report.html import ReportRun, render_html
+from springmass.report.figures import MAKERS, comparison_figure, draw, render
+from springmass.report.html import ComparedRuns, ReportRun, render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.tables import results_csv
 
@@ -26,6 +27,8 @@ def write_report(
     runs: Sequence[ReportRun],
     *,
     comparison: Comparison | None = None,
+    joint: Sequence[JointDamping] = (),
+    summary: Mapping[str, Any] | None = None,
     provenance: Mapping[str, Any],
     results: Sequence[Mapping[str, Any]],
 ) -> Path:
@@ -38,7 +41,11 @@ def write_report(
     runs : sequence of ReportRun
         One at least.
     comparison : Comparison, optional
-        Of the runs' spring constants.
+        Of the runs' spring constants; drawn and tabulated.
+    joint : sequence of JointDamping
+        Damping laws fitted across runs.
+    summary : mapping, optional
+        What ``results.json`` holds in place of the results.
     provenance : mapping
         Version, parameters, command, time: whatever says how to make this report again.
     results : sequence of mapping
@@ -58,8 +65,9 @@ def write_report(
 
     Notes
     -----
-    Beside the page: ``results.json`` (one object for one run, else a list; what is no number is null),
-    ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, and ``figures/`` with every figure as SVG and PDF.
+    Beside the page: ``results.json`` (``summary``, else one object for one run and a list for several; what is no
+    number is null), ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, and ``figures/`` with every figure
+    as SVG and PDF.
     The same arguments give the same bytes.
     """
     from storage.atomic import write_whole
@@ -75,14 +83,20 @@ def write_report(
         _write_figures(directory / "figures", stem, drawn)
         pictures.append({name: files["svg"] for name, files in drawn.items()})
     plain = [_plain(result) for result in results]
-    content = plain[0] if len(plain) == 1 else plain
+    content = _plain(summary) if summary is not None else plain[0] if len(plain) == 1 else plain
     write_whole(directory / "results.json", json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
     write_whole(directory / "results.csv", results_csv(names, analyses))
     write_whole(directory / "table.tex", table_tex(names, analyses))
     write_whole(directory / "budget.csv", budget_csv(names, analyses))
     write_whole(directory / "budget.tex", budget_tex(names, analyses))
     counts = [{**run.analysis.quality, **result.get("quality", {})} for run, result in zip(runs, results, strict=True)]
-    page = render_html(runs, pictures, comparison=comparison, provenance=provenance, quality=counts)
+    compared = None
+    if comparison is not None:
+        overview = {kind: render(comparison_figure(comparison), kind) for kind in _KINDS}
+        for kind, data in overview.items():
+            write_whole(directory / "figures" / f"comparison.{kind}", data)
+        compared = ComparedRuns(comparison, tuple(joint), overview["svg"])
+    page = render_html(runs, pictures, compared=compared, provenance=provenance, quality=counts)
     return write_whole(directory / "report.html", page)
 
 

@@ -14,6 +14,7 @@ from pipeline.analyse import Analysis
 from pipeline.cycles import NoOscillation
 from springmass.report.figures.amplitude import amplitude_figure
 from springmass.report.figures.canvas import render
+from springmass.report.figures.comparison import comparison_figure
 from springmass.report.figures.curves import drag_figure, energy_figure
 from springmass.report.figures.phase import phase_figure
 from springmass.report.figures.position import position_figure
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = [
     "MAKERS",
     "amplitude_figure",
+    "comparison_figure",
     "drag_figure",
     "draw",
     "energy_figure",

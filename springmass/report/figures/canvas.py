@@ -23,13 +23,16 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BLUE",
+    "BOTTOM",
     "DENSE_POINTS",
     "GREEN",
     "GREY",
     "ORANGE",
     "PURPLE",
+    "RIGHT",
     "SKY",
     "VERMILLION",
+    "WIDTH",
     "error_bars",
     "finish_residual",
     "legend_above",
