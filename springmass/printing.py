@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pipeline.classic import Classic
     from pipeline.compare import Comparison
 
-__all__ = ["classic_text", "comparison_text", "findings_text"]
+__all__ = ["classic_text", "comparison_text", "findings_text", "wrapped"]
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
 
@@ -58,12 +58,14 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str
     widths = [max(len(row[i]) for row in rows) for i in range(5)]
     lines = ["   ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
     lines.insert(1, "-" * (sum(widths) + 12))
+    return "\n".join([*lines, "", wrapped(comparison.message)])
+
+
+def wrapped(text: str, indent: str = "") -> str:
+    """Return text wrapped to the terminal, at most a hundred columns, lines after the first indented."""
     width = min(shutil.get_terminal_size((100, 24)).columns, 100)
-    return "\n".join([*lines, "", textwrap.fill(comparison.message, width, break_on_hyphens=False)])
+    return textwrap.fill(text, width, subsequent_indent=indent, break_on_hyphens=False)
 
 
 def _entry(severity: str, code: str, message: str) -> str:
-    width = min(shutil.get_terminal_size((100, 24)).columns, 100)
-    return textwrap.fill(
-        f"{_MARKS[severity]} {code}: {message}", width, subsequent_indent=" " * 8, break_on_hyphens=False
-    )
+    return wrapped(f"{_MARKS[severity]} {code}: {message}", " " * 8)

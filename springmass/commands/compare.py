@@ -90,11 +90,11 @@ def _scene(loaded: Loaded, given: Scene | None) -> Scene:
 
 
 def _print_text(compared: Compared, named: list[tuple[str, Analysed]], result: dict[str, Any]) -> None:
-    from springmass.printing import comparison_text, findings_text
+    from springmass.printing import comparison_text, findings_text, wrapped
 
     print(comparison_text(compared.comparison, [analysed.analysis for _, analysed in named]))
     for joint in compared.joint:
-        print(f"\n{joint.message}")
+        print(f"\n{wrapped(joint.message)}")
     for (name, _), one in zip(named, result["runs"], strict=True):
         grave = [f for f in one["findings"] if f["severity"] != "info"]
         if grave:

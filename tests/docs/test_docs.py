@@ -34,6 +34,7 @@ PLANNED = ("stale_header",)
 
 # Objects of the JSON whose keys are names, and what the page calls them.
 NAMED = {"estimates": "NAME", "budget": "NAME", "damping.laws": "LAW", "damping.laws.LAW.parameters": "NAME"}
+NAMED |= {f"joint_damping[].{laws}": name for laws, name in (("laws", "LAW"), ("laws.LAW.parameters", "NAME"))}
 
 
 def without_code(text: str) -> str:
@@ -156,6 +157,18 @@ def test_every_field_of_the_json_is_documented() -> None:
     result = analyse_loaded(loaded, read_scene(data / "damped.scene.toml"), parameters={}, time_utc="now").result
     documented = rows("json.md")
     assert set(paths(json.loads(json.dumps(result)))) - documented == set()
+
+
+def test_every_field_of_a_comparison_is_documented(capsys: pytest.CaptureFixture[str]) -> None:
+    """Each key that a comparison has beside its runs' own results has a row in the same page."""
+    data = sample_data()
+    run, scene = str(data / "undamped_simulated_position.txt"), str(data / "undamped.scene.toml")
+    assert main(["compare", run, run, "--scene", scene, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["joint_damping"]
+    for known in ("runs", "provenance"):
+        del result[known]
+    assert set(paths(result)) - rows("json.md") == set()
 
 
 def paths(value: Any, above: str = "") -> Iterator[str]:

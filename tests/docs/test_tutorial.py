@@ -25,6 +25,7 @@ PAGES = (
     "docs/tutorial.md",
     "docs/how-to/add-a-format.md",
     "docs/how-to/add-a-law.md",
+    "docs/how-to/compare-runs.md",
     "docs/how-to/compare-with-the-classic-method.md",
     "docs/how-to/read-the-budget.md",
     "docs/how-to/record-at-the-bench.md",

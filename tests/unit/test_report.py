@@ -38,6 +38,7 @@ from springmass.report import (
     write_report,
 )
 from springmass.report.budgets import INPUTS
+from springmass.report.figures import comparison_figure
 from springmass.report.html import render_html
 from springmass.report.inline import inline_svg
 from springmass.report.tables import law_status, pretty, pretty_number
@@ -310,8 +311,25 @@ def test_several_runs_stand_side_by_side(tmp_path: Path) -> None:
     page = written(tmp_path, *runs, comparison=comparison)
     assert page.count("<th>same</th>") >= 2
     assert page.count("Phase plot") == 2
-    assert html.escape(comparison.message) in page
-    assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 10
+    assert html.escape(comparison.message.replace("+-", "±")) in page
+    assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 11
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.1])
+def test_a_comparison_is_drawn_with_every_run(factor: float) -> None:
+    """Every run has its bar and its pull; a mean is drawn where the runs agree, and only there."""
+    mass, omega = Estimate(0.2, 5e-5, "kg"), Estimate(8.0, 1e-4, "rad/s")
+    long = "a_run_with_a_name_that_no_column_holds_in_capitals_WMWMWMWM"
+    springs = [SpringRun("a", omega, mass), SpringRun(long, Estimate(8.0 * factor, 1e-4, "rad/s"), mass)]
+    found = compare_springs(springs)
+    figure = comparison_figure(found)
+    left, right = figure.axes
+    assert left.get_yticklabels()[0].get_text() == "a"
+    assert all(label.get_window_extent().x0 > 0 for label in left.get_yticklabels())
+    labels = left.get_legend_handles_labels()[1]
+    assert ("mean ± u" in labels) == found.agree == (factor == 1.0)
+    drawn = right.collections[-1].get_offsets()
+    np.testing.assert_allclose(np.asarray(drawn)[:, 0], found.pulls)
 
 
 def test_the_classic_method_is_set_beside_with_its_biases() -> None:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 __all__ = ["comparison_figure"]
 
-NAME_COLUMN, GAP, ROW, TOP = 2.0, 0.25, 0.34, 0.42  # inches
-LONGEST_NAME = 30
+NAME_COLUMN, GAP, ROW, TOP = 2.1, 0.25, 0.34, 0.42  # inches
+LONGEST_NAME, SHORTEST_NAME = 30, 8
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
@@ -53,7 +53,10 @@ def comparison_figure(comparison: Comparison) -> Figure:
         left.hlines(rows, k - u, k + u, colors=colours, lw=0.9, label="u of the run")
         left.hlines(rows, k - comparison.own_u, k + comparison.own_u, colors=colours, lw=3.2, label="not shared")
         left.scatter(k, rows, s=22, c=colours, zorder=3)
-        left.set_yticks(rows, [_short(name) for name in comparison.names])
+        for most in range(LONGEST_NAME, SHORTEST_NAME, -2):
+            left.set_yticks(rows, [_short(name, most) for name in comparison.names])
+            if min(label.get_window_extent().x0 for label in left.get_yticklabels()) > 0:
+                break
         left.set_xlabel("spring constant / (N/m)")
         left.ticklabel_format(axis="x", useOffset=False)
         left.locator_params(axis="x", nbins=5)
@@ -71,7 +74,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
         return figure
 
 
-def _short(name: str) -> str:
+def _short(name: str, most: int) -> str:
     # Names of one experiment differ at their ends as often as at their beginnings: keep both.
-    half = LONGEST_NAME // 2
-    return name if len(name) <= LONGEST_NAME else f"{name[: half - 1]}…{name[-half:]}"
+    half = most // 2
+    return name if len(name) <= most else f"{name[: half - 1]}…{name[-half:]}"

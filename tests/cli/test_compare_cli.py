@@ -1,0 +1,218 @@
+"""``springmass compare`` from the outside: what it says of runs of one spring, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springmass.cli import main
+from springmass.loading import sample_data
+
+DATA = sample_data()
+BARE, DISC = (str(DATA / f"{name}_simulated_position.txt") for name in ("undamped", "damped"))
+BARE_SCENE, DISC_SCENE = (str(DATA / f"{name}.scene.toml") for name in ("undamped", "damped"))
+RIGHT = [BARE, DISC, "--scene", BARE_SCENE, "--scene", DISC_SCENE]
+EXCHANGED = [BARE, DISC, "--scene", DISC_SCENE, "--scene", BARE_SCENE]
+
+
+def compared(arguments: list[str], capsys: pytest.CaptureFixture[str], code: int = 0) -> dict[str, Any]:
+    """Return the JSON object of a comparison; nothing but it stands on stdout."""
+    assert main(["compare", *arguments, "--json"]) == code
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 1
+    return dict(json.loads(lines[0]))
+
+
+def written_run(
+    path: Path,
+    *,
+    omega: float,
+    amplitude_m: float = 0.05,
+    gamma: float = 0.006,
+    beta: float = 0.2,
+    seconds: float = 60.0,
+    seed: int = 1,
+) -> str:
+    """Write a MotionSensor.vi position file of a damped oscillation by its closed form; return its name."""
+    t = np.arange(round(100 * seconds)) / 100
+    decay = np.exp(-gamma * t)
+    envelope = amplitude_m * decay / (1 + beta * amplitude_m * (1 - decay) / gamma)
+    y = 0.22 + envelope * np.cos(omega * t) + 1e-4 * np.random.default_rng(seed).standard_normal(t.size)
+    rows = "".join(f"{a:.3f}\t{100 * b:.3f}\t0.239\r\n" for a, b in zip(t, y, strict=True))
+    path.write_text(f"Motion Sensor Data File\r\nTime (s)\tDistance (cm)\tDist Error (cm)\r\n{rows}", "utf-8")
+    return str(path)
+
+
+def test_two_runs_of_one_spring_agree(capsys: pytest.CaptureFixture[str]) -> None:
+    """The bundled runs, each with its own scene, agree on the true 14 N/m; exit code 0 under --strict."""
+    assert main(["compare", *RIGHT, "--strict"]) == 0
+    told = capsys.readouterr().out
+    assert "One spring: undamped_simulated_position, damped_simulated_position agree on k = 14.000" in told
+    assert told.split()[:7] == ["run", "period", "mass", "that", "swings", "spring", "constant"]
+
+
+def test_the_reports_exchange_is_found_from_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    """With the two scenes exchanged the constants part as 14.0 and 16.3 N/m did, and the exchange is named."""
+    result = compared(EXCHANGED, capsys)
+    found = result["comparison"]
+    low, high = sorted(each["spring_constant"]["value"] for each in found["each"])
+    # (0.2214 / 0.2040)^2 between the two, as 16.3 / 14.0 between the report's.
+    assert high / low == pytest.approx(16.311 / 13.979, abs=0.02)
+    assert found["agree"] is False
+    assert found["spring_constant"] is None
+    assert found["largest_deviation"] > 28
+    assert found["exchanged"] == ["undamped_simulated_position", "damped_simulated_position"]
+    assert found["exchanged_chi2"] < 10
+    assert "exchanged they agree" in found["message"]
+    assert [(f["code"], f["severity"]) for f in result["findings"]] == [("runs_exchanged", "error")]
+
+
+def test_disagreement_is_an_error_under_strict(capsys: pytest.CaptureFixture[str]) -> None:
+    """Exit code 5, and one line that says why."""
+    assert main(["compare", *EXCHANGED, "--strict", "--json"]) == 5
+    assert capsys.readouterr().err == "springmass: rejected under --strict: runs_exchanged\n"
+
+
+def test_the_json_is_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    """One object: the comparison, the joint laws, the findings, each run's own result, and where it came from."""
+    result = compared(RIGHT, capsys)
+    assert list(result) == ["schema", "comparison", "joint_damping", "findings", "runs", "provenance"]
+    found, runs = result["comparison"], result["runs"]
+    assert found["spring_constant"]["value"] == pytest.approx(14.0, abs=3 * found["spring_constant"]["u"])
+    # Nine tenths of u come from the spring's mass, which both share: what is their own is far smaller.
+    for each, run in zip(found["each"], runs, strict=True):
+        assert each["spring_constant"]["value"] == pytest.approx(run["estimates"]["spring_constant"]["value"])
+        assert each["spring_constant"]["u"] == pytest.approx(run["estimates"]["spring_constant"]["u"], rel=1e-3)
+        assert 0 < each["u_own"] < 0.5 * each["spring_constant"]["u"]
+        assert abs(each["pull"]) < 3
+    assert result["joint_damping"] == []  # another bob hangs on the disc: their laws are not one
+
+
+def test_run_files_carry_their_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Runs that hold their scenes need no --scene."""
+    names = []
+    for path, scene in ((BARE, BARE_SCENE), (DISC, DISC_SCENE)):
+        names.append(str(tmp_path / f"{Path(path).stem}.h5"))
+        assert main(["convert", path, names[-1], "--scene", scene]) == 0
+    capsys.readouterr()
+    assert main(["compare", *names]) == 0
+    assert "agree on k = 14.000" in capsys.readouterr().out
+
+
+def test_one_law_across_runs_of_one_bob(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two releases of one bob, from 50 and from 25 mm, follow one law, fitted jointly; one scene serves both."""
+    omega = math.sqrt(14.0 / (0.2176 + 0.01 / 3 + 8 / 3 * 1.1999 * 0.051**3))
+    runs = [
+        written_run(tmp_path / f"{name}.txt", omega=omega, amplitude_m=a, seed=seed)
+        for name, a, seed in (("far", 0.05, 1), ("near", 0.025, 2))
+    ]
+    result = compared([*runs, "--scene", DISC_SCENE], capsys)
+    (joint,) = result["joint_damping"]
+    assert joint["runs"] == ["far", "near"]
+    assert joint["one_law"] is True
+    law = joint["laws"]["linear+quadratic"]["parameters"]
+    assert law["gamma"]["value"] == pytest.approx(0.006, abs=4 * law["gamma"]["u"])
+    assert law["beta"]["value"] == pytest.approx(0.2, abs=4 * law["beta"]["u"])
+
+
+def test_runs_of_one_bob_that_differ_in_damping_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Where two runs of one bob follow laws with other coefficients a warning says so, and k agrees all the same."""
+    omega = math.sqrt(14.0 / (0.2176 + 0.01 / 3 + 8 / 3 * 1.1999 * 0.051**3))
+    runs = [
+        written_run(tmp_path / f"{name}.txt", omega=omega, beta=beta, seed=seed)
+        for name, beta, seed in (("still_air", 0.2, 1), ("draught", 0.3, 2))
+    ]
+    result = compared([*runs, "--scene", DISC_SCENE], capsys)
+    assert result["comparison"]["agree"] is True
+    assert [f["code"] for f in result["findings"]] == ["laws_differ"]
+
+
+def test_another_spring_is_told_apart_from_an_exchange(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two springs under one bob differ, and nothing is said to be exchanged."""
+    runs = [written_run(tmp_path / f"{o}.txt", omega=o, seconds=20.0) for o in (8.0, 8.4)]
+    result = compared([*runs, "--scene", BARE_SCENE], capsys)
+    assert result["comparison"]["exchanged"] == []
+    assert [f["code"] for f in result["findings"]] == ["springs_differ"]
+
+
+def test_a_report_is_written_where_it_is_wanted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The folder holds the page with the figure of the constants, and the JSON as printed; without --out nothing."""
+    out = tmp_path / "both"
+    assert main(["compare", *RIGHT, "--out", str(out), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert json.loads((out / "results.json").read_text("utf-8")) == printed
+    assert (out / "figures" / "comparison.svg").stat().st_size > 1000
+    page = (out / "report.html").read_text("utf-8")
+    assert "<h2>Comparison</h2>" in page
+    assert page.index("<h2>Comparison</h2>") < page.index("<h3>Position</h3>")
+    assert "agree on k = 14.000 ± 0.011" in page
+
+
+def test_mass_correlation_and_accuracy_are_passed_on(capsys: pytest.CaptureFixture[str]) -> None:
+    """One balance behind both masses leaves less that is each run's own; the tier stands in the provenance."""
+    free = compared([*RIGHT, "--accuracy", "fast"], capsys)
+    tied = compared([*RIGHT, "--accuracy", "fast", "--mass-correlation", "1"], capsys)
+    for result in (free, tied):
+        assert result["provenance"]["accuracy"] == "fast"
+    own = [[each["u_own"] for each in r["comparison"]["each"]] for r in (free, tied)]
+    assert all(b < 0.5 * a for a, b in zip(*own, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([BARE], "compare needs two runs at least, got 1"),
+        ([BARE, DISC], "no [bob] mass_kg for undamped_simulated_position, damped_simulated_position: give --scene"),
+        ([BARE, DISC, BARE, *("--scene", BARE_SCENE) * 2], "--scene was given 2 times for 3 runs"),
+        ([BARE, DISC, "--scene", "nowhere.toml"], "nowhere.toml: a scene file was demanded"),
+    ],
+)
+def test_what_is_missing_is_named(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Too few runs, no mass, scenes that do not match the runs: exit code 2 and one line with what to do."""
+    assert main(["compare", *arguments]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert words in told.err
+    assert told.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ("[bob]\nmass_kg = 0.0\n", "[bob] mass_kg must be more than 0 kg, got 0"),
+        ("[bob]\nmass_kg = { value = 0.2, u = -1e-5 }\n", "its u must not be negative"),
+        ("[bob]\nmass_kg = { value = 0.2, u = nan }\n", "its u must be a finite number"),
+        ("[bob]\nmass_kg = { u = 1e-5 }\n", "must be a number or { value = ..., u = ... }"),
+        ("[spring]\nmass_kg = 0.01\n", "no [bob] mass_kg for damped_simulated_position"),
+        ("[bob]\nmass_kg = 0.2\n", "[spring] mass_kg is 0.01000 +- 0.00050 kg for undamped_simulated_position and not"),
+    ],
+)
+def test_impossible_scenes_are_refused(
+    scene: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A mass of zero or of none, a negative or missing uncertainty, two springs: exit code 2, one line, no number."""
+    path = tmp_path / "wrong.toml"
+    path.write_text(scene, "utf-8")
+    assert main(["compare", BARE, DISC, "--scene", BARE_SCENE, "--scene", str(path)]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert words in told.err
+    assert told.err.count("\n") == 1
+
+
+def test_a_run_that_does_not_oscillate_cannot_be_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A bob at rest has no spring constant: exit code 3 and its name."""
+    still = written_run(tmp_path / "still.txt", omega=8.0, amplitude_m=1e-9, seconds=10.0)
+    assert main(["compare", BARE, still, "--scene", BARE_SCENE]) == 3
+    assert "still: no oscillation to compare" in capsys.readouterr().err
+
+
+def test_an_unreadable_run_ends_the_comparison(capsys: pytest.CaptureFixture[str]) -> None:
+    """A comparison of what is left would answer another question: exit code 3."""
+    assert main(["compare", BARE, "nothing.txt", "--scene", BARE_SCENE]) == 3
+    assert "nothing.txt" in capsys.readouterr().err
