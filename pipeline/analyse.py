@@ -27,7 +27,8 @@ from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate
 from pipeline.fullfit import FullFit, fit_record
 from pipeline.instrument import Instrument
-from pipeline.judge import Finding, count_quality, judge, judge_samples, judge_still
+from pipeline.judge import Finding, by_severity, count_quality, judge, judge_samples, judge_still
+from pipeline.judge_scene import judge_scene
 from pipeline.phase import PhaseFit, fit_phase
 from pipeline.quick import condition_quickly, demodulate_quickly, find_cycles_quickly
 from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
@@ -218,9 +219,11 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         beside=beside,
     )
     derived = derive(demodulated, damping, phase, rest, scene, effects, instrument=instrument, params=params.derive)
-    findings = judge(conditioned, cycles, demodulated, damping, phase, rest, waveform, beside)
-    if full is not None and not full.converged:
-        findings = (*findings, _not_converged(full))
+    findings = by_severity(
+        judge(conditioned, cycles, demodulated, damping, phase, rest, waveform, beside),
+        judge_scene(scene, effects),
+        () if full is None or full.converged else (_not_converged(full),),
+    )
     motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived, beside, full)
     return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,7 +21,7 @@ from pipeline.rest import Rest
 from pipeline.track import U8, UNUSABLE, Quality
 from pipeline.waveform import Waveform
 
-__all__ = ["Finding", "Severity", "count_quality", "judge", "judge_samples", "judge_still"]
+__all__ = ["Finding", "Severity", "by_severity", "count_quality", "judge", "judge_samples", "judge_still"]
 
 GRAVITY_M_PER_S2 = 9.81
 
@@ -124,8 +124,13 @@ def judge(
         *_mode_findings(demodulated, phase, beside),
         *judge_samples(conditioned, demodulated.flags, demodulated.noise_m, clusters),
     ]
+    return by_severity(findings)
+
+
+def by_severity(*groups: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return all findings, the gravest first, else in their order."""
     rank = {"error": 0, "warning": 1, "info": 2}
-    return tuple(sorted(findings, key=lambda finding: rank[finding.severity]))
+    return tuple(sorted((one for group in groups for one in group), key=lambda finding: rank[finding.severity]))
 
 
 def _sample_findings(

@@ -105,7 +105,7 @@ def input_of(loaded: Loaded) -> dict[str, Any]:
 
 def all_findings(loaded: Loaded, analysis: Analysis) -> tuple[Finding, ...]:
     """Return the analysis's findings and those that reading the file gave, the gravest first."""
-    from pipeline.judge import Finding
+    from pipeline.judge import Finding, by_severity
 
     findings = list(analysis.findings)
     known = {f.code for f in findings}
@@ -113,8 +113,7 @@ def all_findings(loaded: Loaded, analysis: Analysis) -> tuple[Finding, ...]:
         if trap.code not in known:
             severity = _SEVERITY.get(trap.code, "info")
             findings.append(Finding(trap.code, severity, trap.message))  # type: ignore[arg-type]
-    rank = {"error": 0, "warning": 1, "info": 2}
-    return tuple(sorted(findings, key=lambda f: rank[f.severity]))
+    return by_severity(findings)
 
 
 def _quality(loaded: Loaded, analysis: Analysis) -> dict[str, int]:

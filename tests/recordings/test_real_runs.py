@@ -208,7 +208,7 @@ def compared(named: dict[str, dict[str, Any]]) -> Comparison:
 
 
 def test_bare_and_disc_agree_on_the_spring() -> None:
-    """With the masses of the report both runs of one bench give one k, to a part in a thousand; exchanged they do not."""
+    """With the masses of the report both runs of one bench give one k to a part in a thousand; exchanged not."""
     right = compared({BARE: REPORT_BARE, DISC: REPORT_DISC})
     assert right.agree
     low, high = (k.value for k in right.each)
