@@ -257,11 +257,15 @@ def _root_mean_square(fit: LawFit, demodulated: Demodulated, t0: float) -> float
 def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
     """The selected law's parameters in true seconds and metres."""
     joint = damping.best.joint
-    found = {}
+    found: dict[str, tuple[Any, str]] = {}
     for name, unit, x in zip(joint.names, joint.units, laws.variables, strict=True):
         if name in _DIMENSIONS and name != "A0":
             length, per_time = _DIMENSIONS[name]
             found[name] = (x * scale**length * rate**per_time, unit)
+    if "n" in joint.names:
+        c, n = (laws.variables[joint.names.index(name)] for name in ("c", "n"))
+        found["c"] = (c * rate * scale ** (1 - n), joint.units[joint.names.index("c")])
+        found["n"] = (n, "")
     return found
 
 

@@ -45,6 +45,8 @@ _QUANTITIES = (
     ("gamma", "linear damping", "gamma", "γ", r"\gamma"),
     ("beta", "quadratic damping", "beta", "β", r"\beta"),
     ("mu", "dry friction", "mu", "μ", r"\mu"),
+    ("c", "drag by a power of the amplitude", "c", "c", "c"),
+    ("n", "that power", "n", "n", "n"),
 )
 QUANTITIES = {name: quantity for name, quantity, *_ in _QUANTITIES}
 
@@ -60,7 +62,7 @@ class TableRow:
     Parameters
     ----------
     name : str
-        As in ``Analysis.estimates``; "gamma", "beta" and "mu" are the selected law's.
+        As in ``Analysis.estimates``; "gamma", "beta", "mu", "c" and "n" are the selected law's.
     quantity : str
         In words.
     symbol, page_symbol, tex_symbol : str

@@ -230,6 +230,23 @@ def test_choice_of_law_widens_by_what_admissible_laws_say(windows: Windows) -> N
     assert part(budget, "damping_law") == pytest.approx(damping.best.damping_rate().u, rel=1e-4)
 
 
+def test_a_power_law_has_its_budget_too(windows: Windows) -> None:
+    """c in m^(1-n)/s carries clock and scale to its power: 1 - 5/3 of the scale's; n carries neither."""
+    t = 0.4 + 0.785 * np.arange(150)
+    amplitude = (START ** (-2 / 3) + 2 / 3 * 0.08 * t) ** -1.5
+    noise = np.random.default_rng(4).normal(0.0, 2e-5, t.size)
+    points = windows(t, amplitude + noise, omega=OMEGA, phase=OMEGA * t, offset=0.22, u=(2e-5, 4e-4, 2e-5))
+    damping = fit_damping(points, 0.0)
+    assert damping.selected == "power"
+    scene = Scene.from_mapping(SCENE)
+    result = derive(points, damping, fit_phase(points, damping), fit_rest(points), scene, (), instrument=NOMINAL)
+    c, n = result.coefficients["c"], result.coefficients["n"]
+    assert (c.value, n.value) == (pytest.approx(0.08, abs=4 * c.u), pytest.approx(5 / 3, abs=4 * n.u))
+    assert part(result.budgets["c"], "clock_rate") == pytest.approx(c.value * U_CRYSTAL, rel=1e-6)
+    assert part(result.budgets["c"], "speed_of_sound_formula") == pytest.approx(c.value * (n.value - 1) * U_SOUND)
+    assert {line.name for line in result.budgets["n"].contributions} == {"damping_law"}
+
+
 def test_correlated_parameters_count_together() -> None:
     """x + y of two parameters with correlation -1/2 has u = 1 where u(x) = u(y) = 1, and one line in the budget."""
     inputs = Inputs()
