@@ -27,7 +27,8 @@ class SpringRun:
     ----------
     name : str
     angular_frequency : Estimate
-        rad/s, from the record's scatter alone: the clock's part is common to runs and stated apart.
+        Of the undamped motion, rad/s, from the record's scatter alone: the clock's part is common to runs and stated
+        apart.
     mass_kg : Estimate
         What swings in this run alone: bob, disc, air carried along, kg.
     u_clock : float
@@ -51,12 +52,15 @@ class SpringRun:
         AnalysisError
             If its scene gave no bob mass.
         """
-        if derived.own_mass_kg is None:
+        if derived.own_mass_kg is None or derived.effective_mass_kg is None:
             raise AnalysisError(f"{name}: a comparison of springs needs [bob] mass_kg in the scene")
         omega = derived.statistical["angular_frequency"]
         parts = derived.budgets["angular_frequency"].contributions
         u_clock = math.hypot(*(c.u for c in parts if c.name == "clock_rate")) / omega.value
-        return cls(name, omega, derived.own_mass_kg, u_clock, clock)
+        # Of the spring without damping, as the run's own constant has it.
+        k = derived.estimates["spring_constant"].value
+        natural = math.sqrt(k / derived.effective_mass_kg.value)
+        return cls(name, Estimate(natural, omega.u, "rad/s"), derived.own_mass_kg, u_clock, clock)
 
 
 @dataclass(frozen=True, slots=True)
