@@ -57,7 +57,7 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str
     rows.append(("together", "", "", mean, f"chi2 {comparison.chi2:.3g} / {comparison.dof}"))
     widths = [max(len(row[i]) for row in rows) for i in range(5)]
     lines = ["   ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
-    lines.insert(1, "-" * (sum(widths) + 12))
+    lines.insert(1, "-" * len(lines[0]))
     return "\n".join([*lines, "", wrapped(comparison.message)])
 
 
