@@ -118,12 +118,11 @@ def find_relaxation(conditioned: Conditioned, params: Params | None = None) -> R
 
     Notes
     -----
-    :math:`y = o + e^{-gt}(a\\cosh st + b\\sinh(st)/s)` covers all strengths of damping with one sign, that of
-    :math:`q = s^2`. Start values are the best of a grid of rates and frequencies, for each of which the other three
-    parameters are linear. A relaxation must leave no more than 1.5 times the noise, beat every polynomial to the third
-    degree, every step and every ramp by ten in BIC, and be over within the record (:math:`gT > 2`). The fit with q = 0
-    is the critical one; it, two rates, or an oscillation are told by the lower BIC, and either must beat a lone
-    exponential by six. A record
+    :class:`pipeline.decay_model.Decay` covers all strengths of damping. Start values are the best of a grid of rates
+    and frequencies, for each of which the other three parameters are linear. A relaxation must leave no more than 1.5
+    times the noise, in its moving part too, beat every polynomial to the third degree, every step and every ramp by
+    ten in BIC, and be over within the record (:math:`gT > 2`). Critical damping, two rates and an oscillation are told
+    apart by the lowest BIC, which must be lower than a lone exponential's by six. A record
     that begins before the release is followed from where the displacement begins to fall.
     """
     params = params or Params()
@@ -181,9 +180,7 @@ def _starts(y: F8, noise: float) -> Iterator[int]:
 def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params) -> Relaxation | NoOscillation | None:
     tau = t - t[0]
     fit = _best(tau, y, noise, conditioned.track.rate_hz, None)
-    if fit is None or fit.chi2 > params.misfit**2 * (t.size - 5):
-        return None
-    if not fit.rate * tau[-1] > 2.0:
+    if fit is None or not fit.rate * tau[-1] > 2.0 or _misses(tau, y, fit, params.misfit):
         return None
     if not _beats_other_shapes(tau, y, fit, noise, params.evidence):
         return None
@@ -196,6 +193,17 @@ def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params
     u_clock = params.u_clock if conditioned.track.clock == "nominal" else 0.0
     found = _describe(fit, kind, float(t[0]), t.size, u_clock)
     return None if kind == "strong" and found.damping_ratio.value < params.least_damping else found
+
+
+def _misses(tau: F8, y: F8, fit: _Fit, misfit: float) -> bool:
+    """Whether the fit leaves too much of the record, or of the part in which it moves."""
+    values = Decay(tau, np.ones((1, 5), np.bool_), critical=fit.critical).evaluate(
+        np.zeros(1, np.int64), fit.theta[None, :]
+    )[0][0]
+    squares = ((y - values) / fit.noise) ** 2
+    slowest = fit.stiffness / (fit.rate + math.sqrt(fit.square)) if fit.square > 0.0 else fit.rate
+    count = max(int(np.searchsorted(tau, 4.0 / slowest)), 12)
+    return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > misfit**2)
 
 
 def _best(tau: F8, y: F8, noise: float, rate_hz: float, near: F8 | None) -> _Fit | None:

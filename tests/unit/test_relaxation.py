@@ -45,52 +45,52 @@ def relaxed(y: np.ndarray, sigma_m: float, seed: int) -> Relaxation:
 
 @pytest.mark.parametrize("ratio", [1.1, 1.5, 2.0])
 def test_overdamped_records_give_both_rates(ratio: float) -> None:
-    """Over 60 runs both rates lie within their intervals as often as these say, and so does the spring constant."""
+    """Over 25 runs both rates lie within their intervals as often as these say, and so does the spring constant."""
     root = math.sqrt(ratio**2 - 1.0)
     true = np.array([(ratio - root) * OMEGA, (ratio + root) * OMEGA, OMEGA**2])
     clean, pulls = released(ratio), []
-    for seed in range(60):
+    for seed in range(25):
         found = relaxed(clean, 3e-4, seed)
         assert found.kind == "overdamped"
         each = [found.estimates[f"relaxation_rate_{n}"] for n in ("slow", "fast")] + [found.squared_frequency]
         pulls.append([(e.value - x) / e.u for e, x in zip(each, true, strict=True)])
         assert [e.unit for e in each[:2]] == ["1/s", "1/s"]
     inside = np.mean(np.abs(pulls) <= 1.0, axis=0)
-    assert np.all(np.abs(inside - 0.683) < 3.3 * math.sqrt(0.683 * 0.317 / 60))
+    assert np.all(np.abs(inside - 0.683) < 3.3 * math.sqrt(0.683 * 0.317 / 25))
     assert np.all(np.mean(np.abs(pulls) <= 1.96, axis=0) > 0.85)
 
 
 @pytest.mark.parametrize("sigma_m", [3e-4, 2.39e-3])
 def test_critical_records_give_one_rate(sigma_m: float) -> None:
-    """At critical damping the one rate is that of the undamped oscillation, in most of 40 runs within its interval."""
+    """At critical damping the one rate is that of the undamped oscillation, in most of 15 runs within its interval."""
     clean, pulls, kinds = released(1.0), [], []
-    for seed in range(40):
+    for seed in range(15):
         found = relaxed(clean, sigma_m, seed)
         kinds.append(found.kind)
         if found.kind == "critical":
             rate = found.estimates["relaxation_rate"]
             pulls.append((rate.value - OMEGA) / rate.u)
             assert "relaxation_rate_slow" not in found.estimates
-    assert kinds.count("critical") >= 36
-    assert np.std(pulls) < 1.4
-    assert abs(np.mean(pulls)) < 0.6
+    assert kinds.count("critical") >= 13
+    assert np.std(pulls) < 1.6
+    assert abs(np.mean(pulls)) < 1.0
 
 
 @pytest.mark.parametrize("ratio", [0.06, 0.1, 0.3, 0.5, 0.7])
 def test_strongly_damped_oscillations_give_frequency_and_rate(ratio: float) -> None:
-    """Few cycles are enough: damping rate, damped and undamped frequency and amplitude lie within 4 u, in 20 runs."""
+    """Few cycles are enough: damping rate, damped and undamped frequency and amplitude lie within 4 u, in 8 runs."""
     damped = OMEGA * math.sqrt(1.0 - ratio**2)
     true = {"damping_rate": ratio * OMEGA, "angular_frequency": damped, "period": 2 * math.pi / damped}
     true |= {"amplitude": 0.05 * OMEGA / damped, "phase": -math.asin(ratio), "quality_factor": 0.5 / ratio}
     clean, pulls = released(ratio), []
-    for seed in range(20):
+    for seed in range(8):
         found = relaxed(clean, 1e-3, seed)
         assert found.kind == "strong"
         each = [(found.estimates[name], x) for name, x in true.items()]
         each += [(found.squared_frequency, OMEGA**2), (found.damping_ratio, ratio)]
         pulls.append([(e.value - x) / e.u for e, x in each])
     assert np.max(np.abs(pulls)) < 4.0
-    np.testing.assert_allclose(np.std(pulls, axis=0), 1.0, atol=0.55)
+    assert 0.5 < np.std(pulls) < 1.5
 
 
 def test_a_push_and_a_hold_do_not_disturb() -> None:
@@ -122,13 +122,12 @@ SHAPES = {
 @pytest.mark.parametrize("name", SHAPES)
 def test_other_motions_are_no_relaxation(name: str, sigma_m: float) -> None:
     """Noise, steps, drifts, ramps and moves are never called overdamped, and give no rate."""
-    for seed in range(4):
-        found = find_relaxation(condition(track(SHAPES[name], sigma_m, seed)))
-        assert not isinstance(found, Relaxation)
-        if name != "weakly damped":
-            result = analyse(track(SHAPES[name], sigma_m, seed))
-            assert not any(name.startswith("relaxation") for name in result.estimates)
-            assert "overdamped" not in {finding.code for finding in result.findings}
+    for seed in range(2):
+        assert not isinstance(find_relaxation(condition(track(SHAPES[name], sigma_m, seed))), Relaxation)
+    if name != "weakly damped":
+        result = analyse(track(SHAPES[name], sigma_m, 5))
+        assert not any(name.startswith("relaxation") for name in result.estimates)
+        assert "overdamped" not in {finding.code for finding in result.findings}
 
 
 def test_a_lone_exponential_is_named_but_not_believed() -> None:
