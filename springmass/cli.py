@@ -27,6 +27,7 @@ COMMANDS = {
     "recover": "build a run file from a wire log, however torn",
     "replay": "play a recording back through the interface of a live sensor",
     "convert": "write a recording as a run file, or give back the original inside one",
+    "trade": "measure what accuracy costs on this machine: error over the bound against time",
     "formats": "list the families of recordings, or say what a file is",
     "sensors": "list the families of rangefinders with their rate, resolution, range and limits",
     "ports": "list the serial ports and what speaks on them",
@@ -54,6 +55,7 @@ def build_parser() -> argparse.ArgumentParser:
         "recover": _add_recover,
         "replay": _add_replay,
         "convert": _add_convert,
+        "trade": _add_trade,
         "formats": _add_formats,
         "sensors": _add_sensors,
         "ports": _add_ports,
@@ -213,6 +215,18 @@ def _add_convert(parser: argparse.ArgumentParser) -> None:
     _add_input_options(parser)
 
 
+def _add_trade(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="?", metavar="INPUT", help="put this record before all methods instead")
+    parser.add_argument("--seeds", type=_count, metavar="N", help="simulated records (default 100)")
+    parser.add_argument("--noise-m", type=_positive, metavar="S", help="their noise, m (default 0.0003)")
+    parser.add_argument("--seconds", type=_positive, metavar="N", help="their length, s (default 120)")
+    parser.add_argument("--damping", type=_finite, metavar="G", help="their linear damping, 1/s (default 0.01463)")
+    parser.add_argument("--echoes", type=_share, metavar="X", help="share of false echoes, 0 to 0.4 (default 0)")
+    parser.add_argument("--out", metavar="DIR", help="folder for trade.svg, trade.pdf and trade.json")
+    parser.add_argument("--json", action="store_true", help="as one JSON object on stdout")
+    _add_input_options(parser)
+
+
 def _add_formats(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", nargs="?", metavar="FILE", help="say what this file is")
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
@@ -289,6 +303,20 @@ def _positive(text: str) -> float:
     value = _finite(text)
     if value <= 0:
         raise argparse.ArgumentTypeError(f"must be positive, got {text!r}")
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"must be 1 or more, got {text!r}")
+    return value
+
+
+def _share(text: str) -> float:
+    value = _finite(text)
+    if not 0.0 <= value <= 0.4:
+        raise argparse.ArgumentTypeError(f"must lie between 0 and 0.4, got {text!r}")
     return value
 
 

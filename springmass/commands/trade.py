@@ -1,0 +1,103 @@
+"""``springmass trade``: what accuracy costs on this machine, measured, in a table and drawn."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+
+from springmass import __version__
+from springmass.analysing import make_folder
+from springmass.commands import completions
+from springmass.errors import OK, USAGE, ProgramError
+
+__all__ = ["run"]
+
+SIMULATED = ("seeds", "noise_m", "seconds", "damping", "echoes", "out")
+LABELS = {
+    "frequency": "frequency: error / bound",
+    "amplitude": "amplitude: error / bound",
+    "damping_rate": "damping: error / bound",
+}
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure estimators on simulated records, or put one record before all of them."""
+    if options.input is None:
+        return _simulated(options)
+    given = [
+        name for name in ("seeds", "noise_m", "seconds", "damping", "echoes") if getattr(options, name) is not None
+    ]
+    if given or options.out is not None:
+        flags = ", ".join("--" + name.replace("_", "-") for name in [*given, *(["out"] if options.out else [])])
+        raise ProgramError(
+            f"{flags}: describes simulated records, got the record {options.input}; give one of both", USAGE
+        )
+    return _own(options)
+
+
+def _simulated(options: argparse.Namespace) -> int:
+    from springmass.trade.measure import measure
+    from springmass.trade.methods import methods
+    from springmass.trade.tables import trade_json, trade_text
+    from springmass.trade.truth import Truth
+
+    asked = {
+        "noise_m": options.noise_m,
+        "seconds": options.seconds,
+        "damping_per_s": options.damping,
+        "echoes": options.echoes,
+    }
+    truth = Truth(**{name: value for name, value in asked.items() if value is not None})
+    if truth.seconds * truth.frequency_hz < 2.0:
+        raise ProgramError(
+            f"--seconds: two periods of {1 / truth.frequency_hz:.3g} s are needed, got {truth.seconds:g} s", USAGE
+        )
+    seeds = 100 if options.seeds is None else options.seeds
+    out = None if options.out is None else make_folder(options.out)
+    found, absent = methods()
+    trade = measure(truth, found, seeds, timer=time.perf_counter, progress=_Progress(seeds))
+    content = trade_json(trade, absent, __version__)
+    if out is not None:
+        from springmass.report.figures import render
+        from springmass.trade.figure import trade_figure
+        from storage.atomic import write_whole
+
+        figure = trade_figure({q: trade.points(q) for q in trade.bound}, labels=LABELS)
+        write_whole(out / "trade.svg", render(figure, "svg"))
+        write_whole(out / "trade.pdf", render(figure, "pdf"))
+        write_whole(out / "trade.json", json.dumps(content, indent=2) + "\n")
+        print(f"figure and numbers: {out}", file=sys.stderr)
+    print(json.dumps(content) if options.json else trade_text(trade, absent))
+    return OK
+
+
+def _own(options: argparse.Namespace) -> int:
+    from springmass.loading import load
+    from springmass.trade.measure import own_record
+    from springmass.trade.methods import methods
+    from springmass.trade.tables import own_json, own_text
+
+    loaded = load(options.input, **completions(options))
+    found, absent = methods()
+    results = own_record(loaded.track, found, timer=time.perf_counter)
+    if options.json:
+        print(json.dumps(own_json(options.input, results, absent, __version__)))
+    else:
+        print(own_text(options.input, results))
+        for each in absent:
+            print(f"Not measured: {each.name}, {each.needs} is not installed.")
+    return OK
+
+
+class _Progress:
+    """A counter on a terminal's stderr; nothing where stderr is a file."""
+
+    def __init__(self, total: int) -> None:
+        self._total = total
+
+    def __call__(self, done: int) -> None:
+        if sys.stderr.isatty():
+            end = "\r" if done < self._total else "\n"
+            print(f"trade: record {done} of {self._total}", end=end, file=sys.stderr, flush=True)

@@ -1,0 +1,1 @@
+"""What accuracy costs: estimators against each other on simulated records, or on one of the user's own."""
