@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
+    from matplotlib.transforms import Bbox
 
 __all__ = ["trade_figure"]
 
@@ -23,6 +25,9 @@ BESIDE = [(7, 0, "left"), (-7, 0, "right")] + [
     for up in (far, -far)
     for right, side in ((0, "center"), (7, "left"), (-7, "right"), (22, "left"), (-22, "right"))
 ]
+
+# A name that stands off points to its mark.
+_POINTER: dict[str, Any] = {"arrowstyle": "-", "lw": 0.5, "color": GREY, "shrinkA": 0, "shrinkB": 3}
 
 
 def trade_figure(
@@ -67,14 +72,14 @@ def trade_figure(
         _keys(axes[0])
         figure.canvas.draw()
         for axis, points in zip(axes, quantities.values(), strict=True):
-            _Names(axis, points, cost_factor).write()
+            _Names(axis, points, cost_factor, floor).write()
         return figure
 
 
 def _limit(axis: Axes, points: Sequence[Point], floor: float | None, ceiling: float | None) -> None:
     errors = [point.error for point in points] + ([] if floor is None else [floor])
     top = max(errors) if ceiling is None else min(max(errors), ceiling)
-    axis.set_ylim(min(errors) / 1.5, top * 1.8)
+    axis.set_ylim(min(errors) / 2.5, top * 1.8)
 
 
 def _seen(axis: Axes, point: Point, factor: float) -> tuple[float, float]:
@@ -119,37 +124,49 @@ def _keys(axis: Axes) -> None:
 class _Names:
     """Names beside points, each where it covers no mark, no line and no other name, or the least of them."""
 
-    def __init__(self, axis: Axes, points: Sequence[Point], factor: float) -> None:
-        from matplotlib.transforms import Bbox
+    def __init__(self, axis: Axes, points: Sequence[Point], factor: float, floor: float | None) -> None:
+        from matplotlib import transforms
 
         figure = axis.get_figure(root=True)
         assert figure is not None
         self._axis, self._points, self._factor = axis, points, factor
         reach = 4.0 * figure.dpi / 72.0
         marks = [axis.transData.transform(_seen(axis, point, factor)) for point in points]
-        self._taken = [Bbox.from_bounds(x - reach, y - reach, 2 * reach, 2 * reach) for x, y in marks]
+        self._taken = [transforms.Bbox.from_bounds(x - reach, y - reach, 2 * reach, 2 * reach) for x, y in marks]
+        if floor is not None:
+            height, room = axis.transData.transform((1.0, floor))[1], axis.get_window_extent()
+            self._taken.append(transforms.Bbox([[room.x0, height - 1], [room.x1, height + 1]]))
         edge = [axis.transData.transform(_seen(axis, point, factor)) for point in front(points)]
-        for (x0, y0), (x1, y1) in zip(edge[:-1], edge[1:], strict=True):
-            self._taken += [Bbox([[x0, y0 - 1], [x1, y0 + 1]]), Bbox([[x1 - 1, min(y0, y1)], [x1 + 1, max(y0, y1)]])]
+        for (x0, y0), (x1, y1) in itertools.pairwise(edge):
+            lines = [[x0, y0 - 1], [x1, y0 + 1]], [[x1 - 1, min(y0, y1)], [x1 + 1, max(y0, y1)]]
+            self._taken += [transforms.Bbox(line) for line in lines]
 
     def write(self) -> None:
         """Write all, from the top downwards."""
         for point in sorted(self._points, key=lambda each: -each.error):
             best = min(range(len(BESIDE)), key=lambda rank: (self._covered(point, rank), rank))
-            self._taken.append(self._write(point, best).get_window_extent())
+            self._taken.append(self._extent(self._write(point, best)))
 
     def _covered(self, point: Point, rank: int) -> int:
         """Return how many things a name would cover at one of the places; far too many outside the panel."""
         text = self._write(point, rank)
-        box, room = text.get_window_extent(), self._axis.get_window_extent()
+        box, room = self._extent(text), self._axis.get_window_extent()
         text.remove()
         inside = room.x0 <= box.x0 and box.x1 <= room.x1 and room.y0 <= box.y0 and box.y1 <= room.y1
         return sum(bool(box.overlaps(other)) for other in self._taken) + (0 if inside else 1000)
 
+    @staticmethod
+    def _extent(text: Annotation) -> Bbox:
+        """Return where the letters stand, without the pointer."""
+        from matplotlib.text import Text
+
+        text.get_window_extent()  # puts it in its place
+        return Text.get_window_extent(text)
+
     def _write(self, point: Point, rank: int) -> Annotation:
         right, up, side = BESIDE[rank]
         place = _seen(self._axis, point, self._factor)
-        beyond = f" ({point.error:.3g})" if point.error > place[1] else ""
+        beyond = f" ({point.error:.0f})" if point.error > place[1] else ""
         return self._axis.annotate(
             point.name + beyond,
             place,
@@ -159,5 +176,9 @@ class _Names:
             va="center",
             fontsize=8,
             color=VERMILLION if point.group == "tier" else "#000000",
+            # A name that stands off points to its mark.
+            arrowprops={"arrowstyle": "-", "lw": 0.5, "color": GREY, "shrinkA": 0, "shrinkB": 3}
+            if abs(up) > 8
+            else None,
             annotation_clip=False,
         )

@@ -81,7 +81,7 @@ class Trade:
         return 1.0 + 2.0 / math.sqrt(2.0 * self.seeds)
 
     def beaten(self, row: Row) -> str | None:
-        """Return which method is quicker, estimates as much and is nowhere worse, the most exact of them; None if none."""
+        """Return which method is quicker, estimates as much and is nowhere worse: the most exact such, or None."""
         better = [
             other
             for other in self.rows
