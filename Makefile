@@ -6,11 +6,12 @@ PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constr
 # Short linear algebra on small matrices: one thread is faster than several, and it makes timings mean something.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test trials bench lint docs-figures clean
+.PHONY: help demo test trials accuracy bench lint docs-figures clean
 
 help:
 	@echo "make demo     from two old recordings to Table 1 and a report"
 	@echo "make test     the tests (make trials: thousands of seeds)"
+	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
 	@echo "make bench    speed, as ratios to named references"
 	@echo "make lint     ruff, mypy, import contracts"
 
@@ -36,6 +37,9 @@ test: $(VENV)/.installed-dev
 
 trials: $(VENV)/.installed-dev
 	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=200 $(BIN)/python -m pytest -m trials -s
+
+accuracy: $(VENV)/.installed-dev
+	$(BIN)/python benchmarks/accuracy --seeds $(or $(SEEDS),2000)
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ratios.py

@@ -1,0 +1,156 @@
+"""One simulated record, evaluated: what the checks count over many seeds."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from pipeline.accuracy import params_for
+from pipeline.analyse import Motion, analyse
+from pipeline.errors import PipelineError
+from pipeline.track import Track
+
+__all__ = ["QUANTITIES", "Case", "Outcome", "bounds", "evaluate"]
+
+QUANTITIES = ("frequency", "amplitude", "phase", "gamma")
+SYNTHETIC = Path(__file__).resolve().parents[2] / "tests" / "synthetic.py"
+
+
+def _load(path: Path) -> ModuleType:
+    """Import the tests' generator of records, which shares no code with what is judged."""
+    if path.stem in sys.modules:
+        return sys.modules[path.stem]
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+synthetic = _load(SYNTHETIC)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A kind of record.
+
+    Parameters
+    ----------
+    seconds, rate_hz, noise_m : float
+    truth : dict
+        Of ``synthetic.Truth``; the phase is drawn from the seed.
+    echoes : float
+        Share of the samples that are false echoes.
+    clustered : bool
+        Whether these come in runs of 3 to 18 about the turning points, some millimetres off and moving with the bob, or
+        singly, anywhere up to 2 m.
+    origin_s : float
+        Time of the first sample.
+    """
+
+    seconds: float = 120.0
+    rate_hz: float = 100.0
+    noise_m: float = 3e-4
+    truth: dict[str, float] = field(default_factory=lambda: {"gamma": 0.01463})
+    echoes: float = 0.0
+    clustered: bool = False
+    origin_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the analysis made of one record.
+
+    Parameters
+    ----------
+    why : str
+        Why nothing was estimated; "" where something was.
+    error, u : (4,) float64
+        Of frequency (Hz), amplitude (m), phase (rad) and gamma (1/s), the last three of the exponential; u without the
+        clock, which no simulated noise uses up. Frequency and phase alone where the exponential was not fitted.
+    selected : str
+    admissible, rejected : tuple of str
+        Names of laws.
+    """
+
+    why: str
+    error: np.ndarray
+    u: np.ndarray
+    selected: str = ""
+    admissible: tuple[str, ...] = ()
+    rejected: tuple[str, ...] = ()
+
+
+def evaluate(job: tuple[Case, str, int]) -> Outcome:
+    """Make a record from its seed and analyse it with a tier."""
+    case, tier, seed = job
+    truth, track = record(case, seed)
+    nothing = np.full(4, np.nan)
+    try:
+        analysis = analyse(track, params=params_for(tier))
+    except PipelineError as error:
+        return Outcome(str(error), nothing, nothing)
+    motion = analysis.motion
+    if not isinstance(motion, Motion):
+        return Outcome(motion.why, nothing, nothing)
+    period, phase = motion.derived.statistical["period"], analysis.estimates["phase"]
+    pairs = {
+        "frequency": (1 / period.value - 1 / truth.period, period.u / period.value**2),
+        "phase": (math.remainder(phase.value - truth.phase, 2 * math.pi), phase.u),
+    }
+    linear = motion.damping.fits.get("linear")
+    if linear is not None:
+        start, gamma = linear.joint["A0"], linear.joint["gamma"]
+        pairs["amplitude"] = (start.value - truth.amplitude, start.u)
+        pairs["gamma"] = (gamma.value - truth.gamma, gamma.u)
+    error, u = (np.array([pairs.get(name, (np.nan, np.nan))[i] for name in QUANTITIES]) for i in (0, 1))
+    damping = motion.damping
+    rejected = tuple(name for name, fit in damping.fits.items() if fit.rejected)
+    return Outcome("", error, u, damping.selected, tuple(damping.admissible), rejected)
+
+
+def record(case: Case, seed: int) -> tuple[object, Track]:
+    """Return the truth of a seed and its track."""
+    rng = np.random.default_rng((seed, 1))
+    truth = synthetic.Truth(**{"phase": float(rng.uniform(-math.pi, math.pi)), **case.truth})
+    t = synthetic.times(case.seconds, case.rate_hz)
+    y = synthetic.noisy(truth, t, case.noise_m, seed)
+    if case.clustered:
+        _clusters(truth, t, y, case.echoes, rng)
+    else:
+        false = rng.random(t.size) < case.echoes
+        y[false] = rng.uniform(0.0, 2.0, np.count_nonzero(false))
+    return truth, Track.from_arrays(t + case.origin_s, y, rate_hz=case.rate_hz, kind="simulated")
+
+
+def _clusters(truth: object, t: np.ndarray, y: np.ndarray, share: float, rng: np.random.Generator) -> None:
+    """Shift runs of samples about turning points by 3 to 12 mm, until the share is reached."""
+    moves = np.diff(truth.position(t))  # type: ignore[attr-defined]
+    turns = np.flatnonzero(moves[:-1] * moves[1:] <= 0) + 1
+    done = 0
+    for turn in rng.permutation(turns):
+        if done >= share * t.size:
+            break
+        length = int(rng.integers(3, 19))
+        first = max(int(turn) - int(rng.integers(0, length)), 0)
+        y[first : first + length] += rng.choice([-1.0, 1.0]) * rng.uniform(0.003, 0.012)
+        done += length
+
+
+def bounds(case: Case) -> np.ndarray:
+    """Return the Cramér-Rao bounds of the quantities, (4,), averaged over the phase; false echoes counted out."""
+    t = synthetic.times(case.seconds, case.rate_hz)
+    found = []
+    for phase in np.linspace(-math.pi, math.pi, 9)[:-1]:
+        truth = synthetic.Truth(**{**case.truth, "phase": float(phase)})
+        each = synthetic.fisher_bounds(truth, t, case.noise_m)
+        found.append([each["omega"] / (2 * math.pi), each["amplitude"], each["phase"], each["gamma"]])
+    return np.sqrt(np.mean(np.square(found), axis=0) / (1.0 - case.echoes))

@@ -1,0 +1,74 @@
+"""The accuracy benchmark in its short form: every requirement is measured, and none is missed by a wide margin."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+FOLDER = Path(__file__).with_name("accuracy")
+SEEDS = 12
+# What is measured; the names are those of `--only`.
+PARTS = ("efficiency", "damping", "laws", "echoes", "weak", "invariance", "ranges")
+
+
+@pytest.fixture(scope="module")
+def checks():
+    """The module of the checks, with its neighbour beside it."""
+    loaded = []
+    for name in ("trials", "checks"):
+        spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        spec.loader.exec_module(module)
+        loaded.append(name)
+    yield sys.modules["checks"]
+    for name in loaded:
+        del sys.modules[name]
+
+
+def test_every_part_is_tested(checks: ModuleType) -> None:
+    """The list here is that of the command."""
+    assert tuple(checks.CHECKS) == PARTS
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_requirements_hold_in_short_form(checks: ModuleType, part: str) -> None:
+    """With few seeds no limit is exceeded by more than their scatter allows."""
+    lines = list(checks.CHECKS[part](checks.Bench(SEEDS, map)))
+    assert lines
+    missed = [f"{line.what}: {line.measured}, {line.limit}" for line in lines if not line.ok]
+    assert not missed, "\n".join(missed)
+
+
+@pytest.mark.parametrize(
+    ("share", "count", "low", "high", "ok"),
+    [
+        (0.68, 2000, 0.66, 0.70, True),
+        (0.64, 2000, 0.66, 0.70, True),
+        (0.62, 2000, 0.66, 0.70, False),
+        (0.75, 2000, 0.66, 0.70, False),
+        (0.93, 2000, 0.95, 1.0, False),
+        (0.0, 20, 0.95, 1.0, False),
+        (1.0, 20, 0.0, 0.02, False),
+    ],
+)
+def test_a_share_beyond_its_scatter_fails(
+    checks: ModuleType, share: float, count: int, low: float, high: float, ok: bool
+) -> None:
+    """Three standard errors are allowed beyond a limit, not more."""
+    assert checks.share_line("share", share, count, low, high).ok is ok
+
+
+def test_errors_beyond_the_limit_fail(checks: ModuleType) -> None:
+    """Errors of 1.3 bounds with a bias of a quarter and intervals half as wide break every limit of a tier."""
+    rng = np.random.default_rng(1)
+    error = 1.3 * rng.standard_normal(2000) + 0.25
+    lines = list(checks.quantity_lines("", error, np.full(2000, 0.5), "best"))
+    assert [line.ok for line in lines] == [False] * 4
+    fair = list(checks.quantity_lines("", rng.standard_normal(2000), np.ones(2000), "best"))
+    assert [line.ok for line in fair] == [True] * 4
