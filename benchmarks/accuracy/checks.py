@@ -24,12 +24,12 @@ EFFICIENCY = {"standard": 1.10, "best": 1.05}
 SIGMAS = 3.0
 LAWS = {
     "linear": {"gamma": 0.01463},
-    "quadratic": {"beta": 0.4},
-    "friction": {"mu": 3e-4},
+    "quadratic": {"beta": 0.45},
+    "friction": {"mu": 2e-4},
     "linear+quadratic": {"gamma": 0.0073, "beta": 0.235},
     "linear+friction": {"gamma": 0.0073, "mu": 1.5e-4},
-    "quadratic+friction": {"beta": 0.2, "mu": 1.5e-4},
-    "power": {"c": 0.06, "n": 1.5},
+    "quadratic+friction": {"beta": 0.3, "mu": 1e-4},
+    "power": {"c": 0.07, "n": 1.5},
 }
 SINGLE = ("linear", "quadratic", "friction")
 
@@ -164,9 +164,13 @@ def laws(bench: Bench) -> Iterator[Line]:
         for law, truth in LAWS.items():
             case = Case(noise_m=noise, truth=truth)
             outcomes = bench.run(case, "standard")
-            least = 0.95 if law in SINGLE or noise < 1e-3 else 0.70
             picked = float(np.mean([o.selected == law for o in outcomes]))
-            yield share_line(f"{name_of(case)}, {law}: picked", picked, len(outcomes), least)
+            # The power 1.5 lies between two laws of the closed form: in coarse noise it need be admissible only.
+            if law != "power" or noise < 1e-3:
+                least = 0.95 if law in SINGLE or noise < 1e-3 else 0.70
+                yield share_line(f"{name_of(case)}, {law}: picked", picked, len(outcomes), least)
+            inside = float(np.mean([law in o.admissible for o in outcomes]))
+            yield share_line(f"{name_of(case)}, {law}: admissible", inside, len(outcomes), 0.95)
             if noise > 1e-3 and law in ("linear", "quadratic"):
                 share = float(np.mean(["linear" in o.rejected for o in outcomes]))
                 low, high = (0.99, 1.0) if law == "quadratic" else (0.0, 0.02)
