@@ -190,10 +190,9 @@ def _exponential(t: F8, amplitude: F8) -> tuple[float, float]:
 
 def _add_velocity(estimates: dict[str, Estimate], velocity: F8, scene: Scene) -> None:
     """Add root mean square of the recorded velocity and Reynolds number (eqs. 25, 26), constants as in the report."""
-    squares = velocity**2
-    rms = math.sqrt(float(squares.mean()))
-    # Eq. 25 divides by N where a mean's uncertainty takes its root; reproduced as printed.
-    u_rms = float(squares.std()) / (2.0 * squares.size * rms) if rms > 0 else math.inf
+    rms = math.sqrt(float(np.mean(velocity**2)))
+    # Eq. 25 as evaluated: its "deviation" of v^2, 0.03266 m^2/s^2, is the mean, and it divides by N, not by the root.
+    u_rms = rms / (2.0 * velocity.size)
     estimates["velocity_rms"] = Estimate(rms, u_rms, "m/s")
     if scene.disc_diameter_m is not None:
         per_area = 1.204 / 1.825e-5

@@ -34,6 +34,7 @@ PAGES = (
     "docs/explanation/method.md",
     "docs/explanation/real-records.md",
     "docs/explanation/velocity.md",
+    "docs/explanation/a-published-report.md",
     "docs/decisions/0004-demodulation-first.md",
 )
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
