@@ -122,7 +122,7 @@ class Track:
         ------
         TrackError
             If the arrays are not one-dimensional or of different lengths, if fewer than two samples are
-            there, or if the rate is not positive.
+            there, or if the rate, sigma_m or quantum_m is not positive and finite.
 
         Examples
         --------
@@ -144,6 +144,9 @@ class Track:
             if not steps.size:
                 raise TrackError("time never increases, so no rate can be told: give rate_hz")
             rate_hz = float(np.round(1.0 / np.median(steps), 6))
-        if not (np.isfinite(rate_hz) and rate_hz > 0):
-            raise TrackError(f"rate_hz must be positive and finite, got {rate_hz}")
+        # An infinite time is as unknown as one that is no number; only the latter passes through a cosine in silence.
+        t_s[~np.isfinite(t_s)] = np.nan
+        for name, value in (("rate_hz", rate_hz), ("sigma_m", sigma_m), ("quantum_m", quantum_m)):
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise TrackError(f"{name} must be positive and finite, got {value}; leave it out where it is not known")
         return cls(t_s, y_m, bits, float(rate_hz), sigma_m, quantum_m, kind=kind)

@@ -1,0 +1,241 @@
+"""Bad and extreme records: a finding or a one-line error, never a confident wrong number."""
+
+from __future__ import annotations
+
+import math
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from pipeline.accuracy import TIERS, params_for
+from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.errors import PipelineError, SceneError, TrackError
+from pipeline.scene import Scene
+from pipeline.track import Track
+
+F8 = np.ndarray
+T = np.arange(2000) / 100
+PERIOD = 2 * math.pi / 8.3
+AMPLITUDE = 0.05
+
+
+def swing(seed: int = 3, sigma_m: float = 3e-4) -> F8:
+    """Return 20 s of a sound record."""
+    noise = sigma_m * np.random.default_rng(seed).standard_normal(T.size)
+    return 0.22 + AMPLITUDE * np.exp(-0.01 * T) * np.cos(8.3 * T) + noise
+
+
+def every(step: int, value: float) -> F8:
+    """Return the record with every so manieth distance replaced."""
+    y = swing()
+    y[::step] = value
+    return y
+
+
+def noise(size: int = 2000, sigma_m: float = 3e-4) -> F8:
+    """Return white noise, m."""
+    return sigma_m * np.random.default_rng(5).standard_normal(size)
+
+
+def outcome(t: F8, y: F8, tier: str, scene: Scene | None = None) -> Analysis | str:
+    """Return the analysis, or the one line that refuses the record."""
+    try:
+        return analyse(Track.from_arrays(t, y, kind="simulated"), scene, params_for(tier))
+    except PipelineError as error:
+        line = str(error)
+        assert line
+        assert "\n" not in line
+        return line
+
+
+def is_right(found: Analysis) -> bool:
+    """Whether period and amplitude agree with the truth within five of their own uncertainties."""
+    period, amplitude = found.estimates["period"], found.estimates["amplitude"]
+    return abs(period.value - PERIOD) <= 5 * period.u and abs(amplitude.value - AMPLITUDE) <= 5 * amplitude.u
+
+
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize(
+    "y",
+    [
+        pytest.param(every(7, math.nan), id="NaN"),
+        pytest.param(every(7, math.inf), id="infinite"),
+        pytest.param(every(9, -math.inf), id="minus infinite"),
+        pytest.param(every(50, 0.0), id="zeros"),
+        pytest.param(every(50, 10.0), id="ten metres"),
+        pytest.param(np.where((T > 3) & (T < 8), math.nan, swing()), id="five seconds missing"),
+        pytest.param(np.clip(swing(), 0.19, None), id="clipped below"),
+        pytest.param(np.clip(swing(), None, 0.25), id="clipped above"),
+    ],
+)
+def test_damaged_distances_cost_precision_not_truth(tier: str, y: F8) -> None:
+    """What cannot be a distance is flagged and counted, and the rest gives the truth within its uncertainty."""
+    found = outcome(T, y, tier)
+    assert isinstance(found, Analysis), found
+    assert is_right(found)
+    assert found.quality["used"] < T.size
+    assert sum(found.quality.values()) >= T.size
+
+
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_time_that_is_none_is_flagged(tier: str, value: float) -> None:
+    """One time that is no number or infinite leaves the estimates as they are and is counted."""
+    t = T.copy()
+    t[500] = value
+    found = outcome(t, swing(), tier)
+    assert isinstance(found, Analysis), found
+    assert is_right(found)
+    assert found.quality["used"] < T.size
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_a_time_far_ahead_is_told(tier: str) -> None:
+    """After one time of thirty years all others run back: that is said, and no period is given that is wrong."""
+    t = T.copy()
+    t[500] = 1e9
+    found = outcome(t, swing(), tier)
+    assert isinstance(found, Analysis), found
+    assert "non_monotonic_time" in {finding.code for finding in found.findings}
+    assert "period" not in found.estimates or is_right(found)
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_unsorted_times_are_refused_or_right(tier: str) -> None:
+    """Rows in random order, backwards, all at one time: refused in a line, or no number that is wrong."""
+    order = np.random.default_rng(1).permutation(T.size)
+    y = swing()
+    for t_s, y_m in ((T[order], y[order]), (T[::-1], y[::-1]), (np.zeros(T.size), y)):
+        found = outcome(t_s, y_m, tier)
+        assert isinstance(found, str), found.estimates
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_two_halves_in_the_wrong_order_are_told(tier: str) -> None:
+    """A record whose second half comes first is not taken for one run."""
+    t = np.concatenate([T[1000:], T[:1000]])
+    found = outcome(t, np.concatenate([swing()[1000:], swing()[:1000]]), tier)
+    if isinstance(found, Analysis):
+        assert "non_monotonic_time" in {finding.code for finding in found.findings}
+        period = found.estimates.get("period")
+        assert period is None or abs(period.value - PERIOD) <= 5 * period.u
+
+
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize("count", [2, 3, 7, 8, 20])
+def test_a_few_samples_are_no_record(tier: str, count: int) -> None:
+    """Two samples and a few more are refused, or give no period."""
+    found = outcome(T[:count], swing()[:count], tier)
+    assert isinstance(found, str) or "period" not in found.estimates
+
+
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize(
+    "y",
+    [
+        pytest.param(np.where(T < 10, 0.2, 0.3) + noise(), id="step"),
+        pytest.param(np.where(T < 10, 0.2, 0.3), id="step without noise"),
+        pytest.param(0.22 + noise(), id="white noise"),
+        pytest.param(0.22 + np.cumsum(noise()), id="random walk"),
+        pytest.param(np.full(T.size, 0.22), id="one value"),
+        pytest.param(0.2 + 0.01 * T, id="ramp"),
+        pytest.param(0.2 + 0.001 * T**2 + noise(), id="parabola"),
+        pytest.param(np.where(np.arange(T.size) == 7, 1.0, 0.22) + noise(), id="one spike"),
+        pytest.param(0.2 + 0.05 * np.exp(-T / 3) + noise(), id="creep"),
+        pytest.param(0.22 + 0.05 * np.cos(3 * T + 0.4 * T**2) + noise(), id="chirp"),
+        pytest.param(np.full(T.size, math.nan), id="nothing"),
+    ],
+)
+def test_what_does_not_oscillate_has_no_period(tier: str, y: F8) -> None:
+    """No period is given; the reason stands in a finding of severity error, or in the line that refuses."""
+    found = outcome(T, y, tier)
+    if isinstance(found, Analysis):
+        assert "period" not in found.estimates
+        assert found.findings[0].code in {"no_oscillation", "overdamped"}
+        assert found.findings[0].severity == "error" or found.findings[0].code == "overdamped"
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_white_noise_is_never_a_period(tier: str) -> None:
+    """Of a hundred records of noise none has a period."""
+    rng = np.random.default_rng(11)
+    for _ in range(100 if tier == "fast" else 30):
+        found = outcome(T[:1000], 0.22 + 3e-4 * rng.standard_normal(1000), tier)
+        assert isinstance(found, str) or "period" not in found.estimates
+
+
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize(("low", "high"), [(0.21, 0.23), (0.19, 0.25), (0.2195, 0.2205)])
+def test_a_saturated_sensor_is_told(tier: str, low: float, high: float) -> None:
+    """Both crests cut: either nothing is estimated, or clipping is told and the amplitude is not the plateau's."""
+    found = outcome(T, np.clip(swing(), low, high), tier)
+    if isinstance(found, Analysis) and "period" in found.estimates:
+        assert "clipped" in {finding.code for finding in found.findings}
+        assert is_right(found)
+
+
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e3])
+def test_size_does_not_matter(tier: str, scale: float) -> None:
+    """A nanometre's or a kilometre's swing has the same relative estimates."""
+    plain, other = outcome(T, swing(), tier), outcome(T, swing() * scale / AMPLITUDE, tier)
+    assert isinstance(plain, Analysis)
+    assert isinstance(other, Analysis), other
+    assert other.estimates["period"].value == pytest.approx(plain.estimates["period"].value, rel=1e-8)
+    ratio = other.estimates["amplitude"].value / plain.estimates["amplitude"].value
+    assert ratio == pytest.approx(scale / AMPLITUDE, rel=1e-6)
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_forty_percent_false_echoes_end_in_no_exception(tier: str) -> None:
+    """With 40 % of the samples anywhere up to 2 m the period still holds."""
+    rng = np.random.default_rng(8)
+    y = swing()
+    false = rng.random(T.size) < 0.4
+    y[false] = rng.uniform(0.0, 2.0, np.count_nonzero(false))
+    found = outcome(T, y, tier)
+    assert isinstance(found, Analysis), found
+    assert found.estimates["period"].value == pytest.approx(PERIOD, abs=5 * found.estimates["period"].u)
+
+
+@pytest.mark.parametrize("name", ["sigma_m", "quantum_m", "rate_hz"])
+@pytest.mark.parametrize("value", [0.0, -1e-3, math.nan, math.inf])
+def test_impossible_uncertainties_of_a_track_are_refused(name: str, value: float) -> None:
+    """A noise, a resolution or a rate that is zero, negative or no number is refused by name."""
+    with pytest.raises(TrackError, match=rf"{name} must be positive and finite"):
+        Track.from_arrays(T, swing(), **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ({"bob": {"mass_kg": 0}}, "more than 0 kg, got 0"),
+        ({"bob": {"mass_kg": -0.2}}, "more than 0 kg, got -0.2"),
+        ({"bob": {"mass_kg": math.nan}}, "finite"),
+        ({"bob": {"mass_kg": {"value": 0.2, "u": -1e-5}}}, "must not be negative"),
+        ({"bob": {"mass_kg": {"value": 0.2, "u": math.inf}}}, "finite"),
+        ({"bob": {"mass_kg": {"u": 1e-5}}}, "mass_kg"),
+        ({"spring": {"mass_kg": {"value": -0.01, "u": 1e-3}}}, "spring"),
+        ({"disc": {"diameter_m": 0}}, "more than 0 m"),
+        ({"air": {"temperature_c": -300}}, "more than -273.15"),
+        ({"sensor": {"sigma_m": 0}}, "more than 0 m"),
+    ],
+)
+def test_impossible_scenes_are_refused(scene: dict[str, dict[str, object]], words: str) -> None:
+    """A mass of zero, a negative uncertainty, one without a value: one line names the key and what is allowed."""
+    with pytest.raises(SceneError, match=words) as caught:
+        Scene.from_mapping(scene)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_fit_claims_more_than_it_knows(synthetic: ModuleType) -> None:
+    """Over all laws of a sound record, what did not converge is rejected, and no parameter is given as exact."""
+    truth = synthetic.Truth(gamma=0.0073, beta=0.235)
+    t = synthetic.times(60.0)
+    found = outcome(t, synthetic.noisy(truth, t, 3e-4, 1), "standard")
+    assert isinstance(found, Analysis)
+    assert isinstance(found.motion, Motion)
+    for fit in found.motion.damping.fits.values():
+        assert fit.converged or fit.rejected
+        assert fit.rejected or all(estimate.u > 0 for estimate in fit.joint.estimates().values())
