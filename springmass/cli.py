@@ -220,7 +220,9 @@ def _add_trade(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seeds", type=_count, metavar="N", help="simulated records (default 100)")
     parser.add_argument("--noise-m", type=_positive, metavar="S", help="their noise, m (default 0.0003)")
     parser.add_argument("--seconds", type=_positive, metavar="N", help="their length, s (default 120)")
-    parser.add_argument("--damping", type=_finite, metavar="G", help="their linear damping, 1/s (default 0.01463)")
+    parser.add_argument(
+        "--damping", type=_not_negative, metavar="G", help="their linear damping, 1/s (default 0.01463)"
+    )
     parser.add_argument("--echoes", type=_share, metavar="X", help="share of false echoes, 0 to 0.4 (default 0)")
     parser.add_argument("--out", metavar="DIR", help="folder for trade.svg, trade.pdf and trade.json")
     parser.add_argument("--json", action="store_true", help="as one JSON object on stdout")
@@ -303,6 +305,13 @@ def _positive(text: str) -> float:
     value = _finite(text)
     if value <= 0:
         raise argparse.ArgumentTypeError(f"must be positive, got {text!r}")
+    return value
+
+
+def _not_negative(text: str) -> float:
+    value = _finite(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"must not be negative, got {text!r}")
     return value
 
 

@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Callable
 
 from springmass import __version__
 from springmass.analysing import make_folder
@@ -57,7 +58,7 @@ def _simulated(options: argparse.Namespace) -> int:
     seeds = 100 if options.seeds is None else options.seeds
     out = None if options.out is None else make_folder(options.out)
     found, absent = methods()
-    trade = measure(truth, found, seeds, timer=time.perf_counter, progress=_Progress(seeds))
+    trade = measure(truth, found, seeds, timer=time.perf_counter, progress=_progress(seeds))
     content = trade_json(trade, absent, __version__)
     if out is not None:
         from springmass.report.figures import render
@@ -68,7 +69,6 @@ def _simulated(options: argparse.Namespace) -> int:
         write_whole(out / "trade.svg", render(figure, "svg"))
         write_whole(out / "trade.pdf", render(figure, "pdf"))
         write_whole(out / "trade.json", json.dumps(content, indent=2) + "\n")
-        print(f"figure and numbers: {out}", file=sys.stderr)
     print(json.dumps(content) if options.json else trade_text(trade, absent))
     return OK
 
@@ -91,13 +91,12 @@ def _own(options: argparse.Namespace) -> int:
     return OK
 
 
-class _Progress:
-    """A counter on a terminal's stderr; nothing where stderr is a file."""
+def _progress(total: int) -> Callable[[int], None]:
+    """Return a counter on a terminal's stderr, silent where stderr is a file."""
 
-    def __init__(self, total: int) -> None:
-        self._total = total
-
-    def __call__(self, done: int) -> None:
+    def tell(done: int) -> None:
         if sys.stderr.isatty():
-            end = "\r" if done < self._total else "\n"
-            print(f"trade: record {done} of {self._total}", end=end, file=sys.stderr, flush=True)
+            end = "\r" if done < total else "\n"
+            print(f"trade: record {done} of {total}", end=end, file=sys.stderr, flush=True)
+
+    return tell
