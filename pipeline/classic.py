@@ -12,8 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline import least_squares
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate
+from pipeline.least_squares import minimise
 from pipeline.scene import Scene
 from pipeline.track import F8, UNUSABLE, Track
 
@@ -172,20 +174,17 @@ def _period(t: F8, y: F8) -> Estimate:
 def _exponential(t: F8, amplitude: F8) -> tuple[float, float]:
     """Unweighted least squares for gamma alone, and the uncertainty that the fit's covariance states."""
     start = float(amplitude[0])
-    gamma = 0.0
-    for _ in range(50):
-        decay = start * np.exp(-gamma * t)
-        slope = -t * decay
-        power = float(slope @ slope)
-        if power == 0.0:
-            return 0.0, math.inf
-        step = float(slope @ (amplitude - decay)) / power
-        gamma += step
-        if abs(step) <= 1e-14 * max(abs(gamma), 1e-300):
-            break
-    decay = start * np.exp(-gamma * t)
-    variance = float(np.sum((amplitude - decay) ** 2)) / max(t.size - 1, 1)
-    return gamma, math.sqrt(variance / float(np.sum((t * decay) ** 2)))
+
+    def residuals(theta: F8) -> F8:
+        return np.asarray(start * np.exp(-theta[0] * t) - amplitude)
+
+    def jacobian(theta: F8) -> F8:
+        return np.asarray(-start * t * np.exp(-theta[0] * t))[:, None]
+
+    fit = minimise(residuals, [0.0], jacobian, least_squares.Params(precision=1e-9))
+    if not fit.converged:
+        return float(fit.values[0]), math.inf
+    return float(fit.values[0]), math.sqrt(fit.cost / max(t.size - 1, 1) * float(fit.covariance[0, 0]))
 
 
 def _add_velocity(estimates: dict[str, Estimate], velocity: F8, scene: Scene) -> None:

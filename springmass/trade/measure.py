@@ -30,7 +30,7 @@ class Row:
     ----------
     method : Method
     seconds : float
-        Median time of one record, s.
+        Least time of one record, s: what the method costs without the machine's other work.
     error, bias : mapping of str to float
         Root mean square error and mean error over the bound, by quantity; of the records that it could evaluate.
     failed : int
@@ -159,7 +159,7 @@ def _row(method: Method, times: list[float], errors: list[dict[str, float]]) -> 
     values = {q: np.array([each[q] for each in errors if q in each]) for q in quantities}
     return Row(
         method,
-        float(np.median(times)),
+        min(times),
         {q: float(np.sqrt(np.mean(value**2))) for q, value in values.items()},
         {q: float(np.mean(value)) for q, value in values.items()},
         len(times) - len(errors),

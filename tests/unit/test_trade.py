@@ -141,7 +141,7 @@ def test_the_quickest_tier_within_a_tenth_is_recommended() -> None:
 
 
 def test_a_method_that_gives_up_is_counted() -> None:
-    """Failures are counted, errors are over the bound, times are the median, and every record is told."""
+    """Failures are counted, errors are over the bound, times are the least, and every record is told."""
     truth = Truth(seconds=5.0)
 
     def moody(track: Track) -> dict[str, Estimate]:
