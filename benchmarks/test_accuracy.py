@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 FOLDER = Path(__file__).with_name("accuracy")
-SEEDS = 12
+SEEDS = 8
 # What is measured; the names are those of `--only`.
 PARTS = ("efficiency", "damping", "laws", "echoes", "weak", "invariance", "ranges")
 
