@@ -223,7 +223,7 @@ def _add_trade(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--damping", type=_not_negative, metavar="G", help="their linear damping, 1/s (default 0.01463)"
     )
-    parser.add_argument("--echoes", type=_share, metavar="X", help="share of false echoes, 0 to 0.4 (default 0)")
+    parser.add_argument("--echoes", type=_echo_share, metavar="X", help="share of false echoes, 0 to 0.4 (default 0)")
     parser.add_argument("--out", metavar="DIR", help="folder for trade.svg, trade.pdf and trade.json")
     parser.add_argument("--json", action="store_true", help="as one JSON object on stdout")
     _add_input_options(parser)
@@ -322,9 +322,9 @@ def _count(text: str) -> int:
     return value
 
 
-def _share(text: str) -> float:
-    value = _finite(text)
-    if not 0.0 <= value <= 0.4:
+def _echo_share(text: str) -> float:
+    value = _share(text)
+    if value > 0.4:
         raise argparse.ArgumentTypeError(f"must lie between 0 and 0.4, got {text!r}")
     return value
 

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from springmass.report.style import BLUE, GREY, VERMILLION, panels, report_style
+from springmass.report.figures.canvas import BLUE, GREY, VERMILLION, panels, style
 from springmass.trade.front import Point, front
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def trade_figure(
         Errors above stand at the upper edge, with their value.
     """
     costs = [point.cost * cost_factor for points in quantities.values() for point in points]
-    with report_style():
+    with style():
         figure, axes = panels([(TALL, GAP if i else 0.0) for i in range(len(quantities))], top=0.3)
         for axis, (name, points) in zip(axes, quantities.items(), strict=True):
             axis.set_xscale("log")
