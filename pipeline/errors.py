@@ -5,14 +5,15 @@
     PipelineError
     |-- SceneError      a scene says something impossible (file, key, value, what is allowed)
     |-- TrackError      arrays that are no track: lengths differ, no finite sample, not one-dimensional
-    `-- AnalysisError   a track that a stage cannot work on (too short, no motion)
+    |-- AnalysisError   a track that a stage cannot work on (too short, no motion)
+    `-- DynamicsError   a motion that cannot be computed: coefficient, start, step, tolerance or method
 
 Every message is one line: what was demanded, what was got, where, and what to do.
 """
 
 from __future__ import annotations
 
-__all__ = ["AnalysisError", "PipelineError", "SceneError", "TrackError"]
+__all__ = ["AnalysisError", "DynamicsError", "PipelineError", "SceneError", "TrackError"]
 
 
 class PipelineError(Exception):
@@ -29,3 +30,7 @@ class TrackError(PipelineError):
 
 class AnalysisError(PipelineError):
     """A track that a stage cannot work on; the message names the stage."""
+
+
+class DynamicsError(PipelineError):
+    """A motion that cannot be computed as asked: a coefficient, start, step, tolerance or method, or a blow-up."""

@@ -19,6 +19,7 @@ _QUANTITIES: dict[tuple[str, str], tuple[str, str, float, bool]] = {
     ("bob", "mass_kg"): ("bob_mass_kg", "kg", 0.0, True),
     ("spring", "mass_kg"): ("spring_mass_kg", "kg", 0.0, False),
     ("spring", "constant_n_per_m"): ("spring_constant_n_per_m", "N/m", 0.0, True),
+    ("spring", "cubic_n_per_m3"): ("spring_cubic_n_per_m3", "N/m3", -math.inf, False),
     ("disc", "diameter_m"): ("disc_diameter_m", "m", 0.0, True),
     ("air", "temperature_c"): ("air_temperature_c", "degC", -273.15, True),
     ("air", "pressure_pa"): ("air_pressure_pa", "Pa", 0.0, True),
@@ -38,13 +39,14 @@ class Scene:
     """The bench.
 
     Every quantity is an :class:`Estimate` or None where it is not known; a plain number in the scene file has
-    ``u`` = 0. The attributes ``spring_constant_n_per_m``, ``start_*`` and the damping coefficients are what a
+    ``u`` = 0. The attributes ``spring_constant_n_per_m``, ``spring_cubic_n_per_m3``, ``start_*`` and the damping coefficients are what a
     simulation needs; an analysis measures them instead.
     """
 
     bob_mass_kg: Estimate | None = None
     spring_mass_kg: Estimate | None = None
     spring_constant_n_per_m: Estimate | None = None
+    spring_cubic_n_per_m3: Estimate | None = None
     disc_diameter_m: Estimate | None = None
     air_temperature_c: Estimate | None = None
     air_pressure_pa: Estimate | None = None

@@ -1,0 +1,148 @@
+"""The averaged amplitude model: the amplitude by its own law, the phase beside it; no step at all.
+
+It is the motion that the analysis fits, and an approximation of the equation of motion: what drag does within a cycle
+is averaged away.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.dynamics.equation import Problem, Real
+from pipeline.dynamics.integrator import Trajectory, every_member, integrate
+from pipeline.track import F8
+
+__all__ = ["AVERAGED", "Averaged", "amplitude", "stopping_time"]
+
+WEAK = 0.3  # damping rate over frequency up to which a cycle can be averaged over
+
+
+def amplitude(start: Real, gamma: Real, beta: Real, mu: Real, t: F8) -> F8:
+    """Return A(t) of dA/dt = -(mu + gamma A + beta A^2), 0 once it has stopped.
+
+    Parameters
+    ----------
+    start : float or (m,) float64, m
+    gamma, beta, mu : float or (m,) float64
+        1/s, 1/(m s), m/s.
+    t : (n,) or (n, 1) float64, s
+
+    Notes
+    -----
+    A Riccati equation. With :math:`\\kappa^2 = \\gamma^2/4 - \\mu\\beta`, :math:`C = \\cosh\\kappa t`,
+    :math:`S = \\sinh(\\kappa t)/\\kappa` (cosine and sine where :math:`\\kappa^2 < 0`):
+    :math:`A = (A_0 (C - \\gamma S/2) - \\mu S)/(C + \\gamma S/2 + \\beta A_0 S)`.
+
+    Examples
+    --------
+    >>> amplitude(0.05, 0.0, 0.0, 0.01, np.array([0.0, 2.0, 6.0]))
+    array([0.05, 0.03, 0.  ])
+    """
+    square = 0.25 * np.square(gamma) - np.multiply(mu, beta)
+    kappa = np.sqrt(np.abs(square))
+    safe = np.where(kappa > 0, kappa, 1.0)
+    # Above zero both are multiplied by exp(-kappa t), which cancels in the ratio.
+    late = np.exp(-2.0 * kappa * t)
+    hyperbolic = np.where(kappa > 0, -np.expm1(-2.0 * kappa * t) / (2.0 * safe), t)
+    c = np.where(square >= 0, 0.5 * (1.0 + late), np.cos(kappa * t))
+    s = np.where(square >= 0, hyperbolic, np.sin(kappa * t) / safe)
+    going = t < stopping_time(start, gamma, beta, mu)
+    below = c + (0.5 * np.asarray(gamma) + np.multiply(beta, start)) * s
+    above = start * (c - 0.5 * np.asarray(gamma) * s) - mu * s
+    return np.where(going, np.maximum(above, 0.0) / np.where(going, below, 1.0), 0.0)
+
+
+def stopping_time(start: Real, gamma: Real, beta: Real, mu: Real) -> Real:
+    """Return when the amplitude reaches 0, s; inf without friction.
+
+    Examples
+    --------
+    >>> float(stopping_time(0.05, 0.0, 0.0, 0.01))
+    5.0
+    """
+    square = 0.25 * np.square(gamma) - np.multiply(mu, beta)
+    kappa = np.sqrt(np.abs(square))
+    # A negative rate, as of a method that adds energy, may outgrow friction: then it never stops.
+    pull = mu + 0.5 * np.asarray(gamma) * start
+    held = (np.asarray(mu) > 0) & (pull > 0) & (mu + (gamma + np.multiply(beta, start)) * start > 0)
+    ratio = np.asarray(start) / np.where(held, pull, 1.0)
+    x = kappa * ratio
+    # kappa < gamma / 2 keeps x below 1 where the hyperbolic form holds.
+    hyperbolic = np.arctanh(np.minimum(np.where(square > 0, x, 0.0), 1.0 - 1e-16))
+    angle = np.where(square > 0, hyperbolic, np.arctan(x))
+    time = np.where(kappa > 0, angle / np.where(kappa > 0, kappa, 1.0), ratio)
+    return np.where(held, time, np.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class Averaged:
+    """The averaged amplitude model."""
+
+    name: str = "averaged"
+    words: str = "the averaged amplitude model"
+    order: int = 0
+
+    def refusal(self, problem: Problem) -> str:
+        """Return why not, where a cycle changes the amplitude too much to be averaged over."""
+        if np.any(_weakness(problem) > WEAK):
+            return f"a cycle can be averaged over where damping takes less than {WEAK:g} per radian; take strang or auto"
+        return ""
+
+    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
+        """Evaluate the model at every kept time; see :class:`Integrator`."""
+        return integrate(self, problem, step_s, steps, every, _march)
+
+    def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - every integrator has the same signature
+        """Return inf: it takes no steps."""
+        return math.inf
+
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return what a pilot run over a few cycles shows, carried along the whole motion."""
+        from pipeline.dynamics.pilot import predicted_by_pilot
+        from pipeline.dynamics.strang import STRANG
+
+        def of(one: Problem) -> float:
+            return math.inf if self.refusal(one) else predicted_by_pilot(self, STRANG, one, step_s, seconds)
+
+        return every_member(problem, of, max)
+
+
+AVERAGED = Averaged()
+
+
+def _weakness(problem: Problem) -> Real:
+    """Damping per radian at the start."""
+    gamma, beta, mu = problem.equation.laws()
+    start = np.asarray(problem.amplitude_m())
+    held = np.where(start > 0, mu / np.where(start > 0, start, 1.0), 0.0)
+    return (gamma + beta * start + held) / problem.equation.angular_frequency_per_s
+
+
+def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+    eq = problem.equation
+    gamma, beta, mu = eq.laws()
+    t = (step_s * every * np.arange(steps // every + 1)).reshape(-1, *(1,) * np.ndim(problem.displacement_m))
+    damped = np.sqrt((eq.angular_frequency_per_s - gamma) * (eq.angular_frequency_per_s + gamma))
+    y, v = problem.displacement_m, problem.velocity_m_per_s
+    # Displacement and velocity tell amplitude and phase only together with the rate at which it falls.
+    start, rate = np.asarray(problem.amplitude_m()), np.asarray(gamma)
+    bend = 0.375 * np.asarray(eq.cubic_per_m2_s2) / eq.angular_frequency_per_s
+    turn = damped
+    for _ in range(8):
+        with_rate = np.where(start > 0, start, 1.0)
+        rate = gamma + beta * start + np.where(start > 0, mu / with_rate, 0.0)
+        turn = damped + bend * start**2
+        start = np.hypot(y, (v + rate * y) / turn)
+    phase = np.arctan2(-(v + rate * y) / turn, y)
+    a = amplitude(start, gamma, beta, mu, t)
+    falling = np.where(a > 0, mu + (gamma + beta * a) * a, 0.0)
+    angle = phase + damped * t
+    if np.any(bend):
+        squares = np.zeros(np.broadcast_shapes(t.shape, a.shape))
+        np.cumsum(0.5 * (a[1:] ** 2 + a[:-1] ** 2) * (step_s * every), axis=0, out=squares[1:])
+        angle = angle + bend * squares
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return a * cosine, -falling * cosine - a * (damped + bend * a**2) * sine

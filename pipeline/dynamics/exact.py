@@ -1,0 +1,77 @@
+"""The exact propagator: a linear scene needs no approximation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.dynamics.equation import Problem
+from pipeline.dynamics.flow import flows
+from pipeline.dynamics.integrator import Trajectory, integrate
+from pipeline.track import F8
+
+__all__ = ["Exact", "rounding_error"]
+
+BLOCK = 128  # states of a block from its first by one matrix each; a block's first by the closed form
+
+
+def rounding_error(problem: Problem, seconds: float) -> float:
+    """Return the error over the amplitude that rounding of the phase leaves at best.
+
+    Notes
+    -----
+    The phase :math:`\\omega t` is a product of rounded numbers: its error is its own size times the relative rounding.
+    """
+    phase = float(np.max(problem.equation.angular_frequency_per_s)) * seconds
+    return float(np.finfo(np.float64).eps) * (4.0 + phase)
+
+
+@dataclass(frozen=True, slots=True)
+class Exact:
+    """The linear oscillator's own solution, evaluated at each time."""
+
+    name: str = "exact"
+    words: str = "the exact propagator"
+    order: int = 0
+
+    def refusal(self, problem: Problem) -> str:
+        """Return why not, where anything but spring and viscous drag acts."""
+        if problem.equation.is_linear:
+            return ""
+        return "it knows spring and viscous drag only, this scene has more; take strang, taylor or auto"
+
+    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
+        """Evaluate the solution at every kept time; see :class:`Integrator`."""
+        return integrate(self, problem, step_s, steps, every, _march)
+
+    def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - every integrator has the same signature
+        """Return inf: it is exact for any step."""
+        return math.inf
+
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:  # noqa: ARG002
+        """Return the rounding of the phase."""
+        return rounding_error(problem, seconds)
+
+
+def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+    count, apart = steps // every + 1, step_s * every
+    omega, gamma = problem.equation.angular_frequency_per_s, problem.equation.gamma_per_s
+    blocks = -(-count // BLOCK)
+    shape = np.shape(problem.displacement_m)
+    # Times first, members after; a single trajectory has a column of one.
+    within = apart * np.arange(min(BLOCK, count)).reshape(-1, *(1,) * len(shape))
+    firsts = apart * BLOCK * np.arange(blocks).reshape(-1, *(1,) * len(shape))
+    a, b, c, d = flows(omega, gamma, firsts)
+    y = a * problem.displacement_m + b * problem.velocity_m_per_s
+    v = c * problem.displacement_m + d * problem.velocity_m_per_s
+    a, b, c, d = flows(omega, gamma, within)
+    if not shape:
+        starts = np.stack([y, v], axis=1)
+        both = starts @ np.stack([np.concatenate([a, c]), np.concatenate([b, d])])
+        size = within.size
+        return both[:, :size].reshape(-1)[:count], both[:, size:].reshape(-1)[:count]
+    ys = a[None] * y[:, None] + b[None] * v[:, None]
+    vs = c[None] * y[:, None] + d[None] * v[:, None]
+    return ys.reshape(-1, *shape)[:count], vs.reshape(-1, *shape)[:count]

@@ -1,0 +1,221 @@
+"""What every integrator is, what it returns, and what all of them demand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pipeline.dynamics.equation import Problem, Real
+from pipeline.errors import DynamicsError
+from pipeline.track import F8
+
+__all__ = ["Integrator", "March", "Step", "Trajectory", "every_member", "integrate", "march_steps"]
+
+Step = Callable[[Real, Real], tuple[Real, Real]]
+"""One step: displacement and velocity before it to those after it."""
+
+March = Callable[[Problem, float, int, int], tuple[F8, F8]]
+"""A run of a scaled problem: step, number of steps, every which is kept; to displacements and velocities (n, ...)."""
+
+
+class Integrator(Protocol):
+    """A way to solve the equation of motion.
+
+    ``name`` is what the command line takes, ``words`` name it in a sentence, ``order`` is the power of the step with
+    which the error falls; 0 where the step is only the spacing of what is kept.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name on the command line."""
+        ...
+
+    @property
+    def words(self) -> str:
+        """Name in a sentence."""
+        ...
+
+    @property
+    def order(self) -> int:
+        """Power of the step with which the error falls."""
+        ...
+
+    def refusal(self, problem: Problem) -> str:
+        """Return why it cannot solve this problem; empty where it can."""
+        ...
+
+    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
+        """Solve a problem, one or an ensemble.
+
+        Parameters
+        ----------
+        problem : Problem
+        step_s : float
+            Step, s.
+        steps : int
+            Number of steps.
+        every : int
+            Keep the state after each so many steps; divides ``steps``.
+
+        Raises
+        ------
+        DynamicsError
+            If step or number of steps cannot be, the method cannot solve this problem, or the numbers ran away.
+        """
+        ...
+
+    def stable_step(self, problem: Problem) -> float:
+        """Return the largest step that does not make a free motion grow, s; inf for any, 0 for none."""
+        ...
+
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return the expected largest error of the displacement over the starting amplitude, of the worst member."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """A solved motion.
+
+    Parameters
+    ----------
+    problem : Problem
+    t : (n,) float64, s
+        Each the product of its number and the step: nothing accumulates.
+    y : (n,) or (n, m) float64, m
+        Displacement from rest.
+    v : (n,) or (n, m) float64, m/s
+        Velocity.
+    """
+
+    problem: Problem
+    t: F8
+    y: F8
+    v: F8
+
+    def relative_energy(self) -> F8:
+        """Return the mechanical energy over that of the start, (n,) or (n, m); 1 where there was none.
+
+        Scaled before it is squared, so that it is right for every amplitude that a number can hold.
+        """
+        scaled, unit = self.problem.scaled()
+        with np.errstate(over="ignore", invalid="ignore"):
+            now = _energy(scaled, self.y / unit, self.v / unit)
+        start = _energy(scaled, np.asarray(scaled.displacement_m), np.asarray(scaled.velocity_m_per_s))
+        relative = np.divide(now, start, out=np.ones_like(now), where=np.broadcast_to(start > 0, now.shape))
+        if not np.all(np.isfinite(relative)):
+            raise DynamicsError("the energy grew beyond the range of numbers; take fewer steps or another method")
+        return relative
+
+    def energy_j_per_kg(self) -> F8:
+        """Return the mechanical energy per mass, J/kg, (n,) or (n, m).
+
+        Raises
+        ------
+        DynamicsError
+            If it leaves the range in which numbers keep their digits; :meth:`relative_energy` does not.
+        """
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            energy = _energy(self.problem, self.y, self.v)
+        moving = (np.abs(self.y) > 0) | (np.abs(self.v) > 0)
+        if not np.all(np.isfinite(energy)) or np.any(moving & (energy < np.finfo(np.float64).tiny)):
+            raise DynamicsError(
+                f"an energy between {np.finfo(np.float64).tiny:.2g} and {np.finfo(np.float64).max:.2g} J/kg was "
+                "demanded, the amplitude makes it leave that range; ask for the relative energy"
+            )
+        return energy
+
+
+def _energy(problem: Problem, y: F8, v: F8) -> F8:
+    eq = problem.equation
+    energy = 0.5 * (v**2 + (eq.angular_frequency_per_s * y) ** 2)
+    return np.asarray(energy + 0.25 * eq.cubic_per_m2_s2 * y**4 if np.any(eq.cubic_per_m2_s2) else energy)
+
+
+def integrate(
+    integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int, march: March
+) -> Trajectory:
+    """Check what is asked, run the march in units of the amplitude, and check what came.
+
+    Raises
+    ------
+    DynamicsError
+    """
+    demand_step(step_s)
+    if steps < 1 or every < 1 or steps % every:
+        raise DynamicsError(
+            f"the number of steps must be a positive multiple of {max(every, 1)}, of which one is kept, got {steps}"
+        )
+    why = integrator.refusal(problem)
+    if why:
+        raise DynamicsError(f"{integrator.name} cannot solve this: {why}")
+    scaled, unit = problem.scaled()
+    t = step_s * every * np.arange(steps // every + 1)
+    with np.errstate(all="ignore"):
+        try:
+            y, v = march(scaled, step_s, steps, every)
+        except (OverflowError, ZeroDivisionError) as error:
+            raise DynamicsError(
+                f"{integrator.name} ran beyond the range of numbers ({error}); {_remedy(integrator, problem)}"
+            ) from error
+        y, v = y * unit, v * unit
+    fine = np.isfinite(y) & np.isfinite(v)
+    if not fine.all():
+        first = int(np.argmin(fine.reshape(len(t), -1).all(axis=1)))
+        raise DynamicsError(
+            f"{integrator.name} with a step of {step_s:g} s ran beyond the range of numbers by t = {t[first]:g} s; "
+            + _remedy(integrator, problem)
+        )
+    return Trajectory(problem, t, y, v)
+
+
+def every_member(problem: Problem, of: Callable[[Problem], float], worst: Callable[..., float]) -> float:
+    """Return the worst of a number over an ensemble's members.
+
+    Raises
+    ------
+    DynamicsError
+        If there is no member.
+    """
+    if not problem.size:
+        raise DynamicsError("an ensemble has at least one member, got none")
+    return worst(of(one) for one in problem.members())
+
+
+def demand_step(step_s: float) -> None:
+    """Refuse a step that is none.
+
+    Raises
+    ------
+    DynamicsError
+    """
+    if not (np.isfinite(step_s) and 0 < step_s):
+        raise DynamicsError(f"the step must be more than 0 s and finite, got {step_s!r}")
+
+
+def march_steps(make: Callable[[Problem, float], Step]) -> March:
+    """Return the march that applies one step again and again."""
+
+    def march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        step = make(problem, step_s)
+        y, v = problem.displacement_m, problem.velocity_m_per_s
+        ys = np.empty((steps // every + 1, *np.shape(y)))
+        vs = np.empty_like(ys)
+        ys[0], vs[0] = y, v
+        for row in range(1, len(ys)):
+            for _ in range(every):
+                y, v = step(y, v)
+            ys[row], vs[row] = y, v
+        return ys, vs
+
+    return march
+
+
+def _remedy(integrator: Integrator, problem: Problem) -> str:
+    limit = integrator.stable_step(problem)
+    if 0 < limit < np.inf:
+        return f"take a step of at most {limit:.3g} s, or strang"
+    return "take a shorter run, or strang or auto"

@@ -1,0 +1,88 @@
+"""How large a step may be: the step's matrix on the linear oscillator, its limits, and the map of them.
+
+A method that repeats a linear map grows without bound where an eigenvalue of that map leaves the unit circle. Lengths
+of time are in units of the undamped radian, 1 / omega: ``x`` is omega h, ``ratio`` is gamma / omega.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline.dynamics.equation import Equation
+from pipeline.track import F8
+
+if TYPE_CHECKING:
+    from pipeline.dynamics.one_step import OneStep
+
+__all__ = ["growth_per_step", "limit_by_search", "step_matrix"]
+
+GREATEST = 20.0  # largest x that is looked at
+_ROUNDING = 1e-12
+
+
+def step_matrix(method: OneStep, x: float, ratio: float) -> F8:
+    """Return the (2, 2) matrix of one step of x = omega h on (y, v / omega) at a damping ratio.
+
+    Parameters
+    ----------
+    method : OneStep
+    x : float
+        Step in radians.
+    ratio : float
+        gamma / omega.
+
+    Examples
+    --------
+    >>> from pipeline.dynamics.euler import FORWARD_EULER
+    >>> step_matrix(FORWARD_EULER, 0.5, 0.0)
+    array([[ 1. ,  0.5],
+           [-0.5,  1. ]])
+    """
+    with np.errstate(all="ignore"):
+        step = method.make(Equation(angular_frequency_per_s=1.0, gamma_per_s=ratio), x)
+        return np.array([step(1.0, 0.0), step(0.0, 1.0)]).T
+
+
+def growth_per_step(method: OneStep, x: float, ratio: float) -> float:
+    """Return the spectral radius of a step: above 1 the motion grows.
+
+    Examples
+    --------
+    >>> from pipeline.dynamics.euler import FORWARD_EULER
+    >>> growth_per_step(FORWARD_EULER, 0.75, 0.0)
+    1.25
+    """
+    (a, b), (c, d) = step_matrix(method, x, ratio)
+    with np.errstate(all="ignore"):
+        under = 0.25 * (a - d) ** 2 + b * c
+        growth = np.sqrt(abs(a * d - b * c)) if under < 0 else abs(0.5 * (a + d)) + np.sqrt(under)
+    return float(growth) if np.isfinite(growth) else math.inf
+
+
+@functools.lru_cache(maxsize=4096)
+def limit_by_search(method: OneStep, ratio: float) -> float:
+    """Return the largest stable x = omega h at a damping ratio: the end of the first stable interval.
+
+    Examples
+    --------
+    >>> from pipeline.dynamics.runge_kutta import RK4
+    >>> round(limit_by_search(RK4, 0.0), 4)
+    2.8284
+    """
+
+    def grows(x: float) -> bool:
+        return growth_per_step(method, x, ratio) > 1.0 + _ROUNDING
+
+    steps = np.geomspace(1e-3 / max(ratio, 1.0), GREATEST, 2000)
+    bad = next((i for i, x in enumerate(steps) if grows(float(x))), None)
+    if bad is None:
+        return math.inf
+    low, high = float(steps[bad - 1]) if bad else 0.0, float(steps[bad])
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    return low

@@ -1,0 +1,184 @@
+"""Strang splitting with exact sub-flows: half an oscillator, all of the quadratic drag, half an oscillator.
+
+The linear part, spring and viscous drag, moves by its own exact flow, so that no step is unstable and a linear scene
+is exact. Quadratic drag has an exact flow too, :math:`v/(1 + b|v|h)`, which no speed can overflow. Between turning
+points friction is a constant force: it shifts the rest position of the oscillator. The turning points themselves are
+located; there the bob sticks where the spring pulls with less than friction holds.
+
+References
+----------
+.. [1] G. Strang, SIAM J. Numer. Anal. 5 (1968) 506, doi:10.1137/0705041.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.dynamics.equation import Equation, Problem
+from pipeline.dynamics.exact import rounding_error
+from pipeline.dynamics.flow import flow, flows
+from pipeline.dynamics.integrator import Trajectory, every_member, integrate
+from pipeline.dynamics.turning import Friction, Frictions
+from pipeline.track import F8
+
+__all__ = ["STRANG", "Strang"]
+
+
+@dataclass(frozen=True, slots=True)
+class Strang:
+    """Strang splitting."""
+
+    name: str = "strang"
+    words: str = "Strang splitting with exact sub-flows"
+    order: int = 2
+
+    def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - every integrator has the same signature
+        """Return nothing: it takes every problem."""
+        return ""
+
+    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
+        """Solve a problem; see :class:`Integrator`."""
+        return integrate(self, problem, step_s, steps, every, _march)
+
+    def stable_step(self, problem: Problem) -> float:
+        """Return inf, as both sub-flows only ever lose energy; with a cubic term, whose kick can add some, its limit."""
+        eq = problem.equation
+        if not np.any(eq.cubic_per_m2_s2):
+            return math.inf
+        added = 3.0 * np.abs(eq.cubic_per_m2_s2) * np.asarray(problem.amplitude_m()) ** 2
+        return float(np.min(1.0 / np.sqrt(added + eq.angular_frequency_per_s**2)))
+
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return what a pilot run over a period at several amplitudes shows, carried along the whole motion."""
+        from pipeline.dynamics.pilot import predicted_by_pilot
+
+        def of(one: Problem) -> float:
+            rounding = rounding_error(one, seconds)
+            return rounding if one.equation.is_linear else rounding + predicted_by_pilot(self, self, one, step_s, seconds)
+
+        return every_member(problem, of, max)
+
+
+def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+    eq = problem.equation
+    if eq.has_friction:
+        return _march_with_friction(problem, step_s, steps, every)
+    if problem.is_ensemble:
+        return _march_ensemble(problem, step_s, steps, every)
+    if eq.cubic_per_m2_s2:
+        return _march_cubic(problem, step_s, steps, every)
+    return _march_one(problem, step_s, steps, every)
+
+
+def _march_one(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
+    """Join the half steps of neighbours into whole ones; what is kept is turned by the missing half at once."""
+    eq = problem.equation
+    half = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
+    a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, h)
+    slow = eq.drag_per_m * h
+    y, v = _turned(half, problem.displacement_m, problem.velocity_m_per_s)
+    kept: list[float] = []
+    keep = kept.append
+    rest = range(every - 1)
+    for _ in range(steps // every):
+        for _ in rest:
+            v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+            y, v = a * y + b * v, c * y + d * v
+        v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+        keep(y)
+        keep(v)
+        y, v = a * y + b * v, c * y + d * v
+    states = np.array(kept).reshape(-1, 2)
+    return _with_start(problem, *_turned(half, states[:, 0], states[:, 1]))
+
+
+def _march_cubic(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
+    """The same with the cubic force as a kick before and after the drag."""
+    eq = problem.equation
+    half = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
+    a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, h)
+    slow, kick = eq.drag_per_m * h, 0.5 * h * eq.cubic_per_m2_s2
+    y, v = _turned(half, problem.displacement_m, problem.velocity_m_per_s)
+    kept: list[float] = []
+    keep = kept.append
+    for number in range(1, steps + 1):
+        push = kick * y * y * y
+        v -= push
+        v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+        v -= push
+        if number % every == 0:
+            keep(y)
+            keep(v)
+        y, v = a * y + b * v, c * y + d * v
+    states = np.array(kept).reshape(-1, 2)
+    return _with_start(problem, *_turned(half, states[:, 0], states[:, 1]))
+
+
+def _march_ensemble(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
+    """Every member at once, in place: no array is made within a step."""
+    eq = problem.equation
+    half = flows(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
+    a, b, c, d = flows(eq.angular_frequency_per_s, eq.gamma_per_s, h)
+    slow, kick = eq.drag_per_m * h, 0.5 * h * eq.cubic_per_m2_s2
+    with_cubic = bool(np.any(kick))
+    ys = np.empty((steps // every, problem.size))
+    vs = np.empty_like(ys)
+    y, v = _turned(half, problem.displacement_m, problem.velocity_m_per_s)
+    one, other, push = np.empty_like(y), np.empty_like(y), np.empty_like(y)
+    for number in range(1, steps + 1):
+        if with_cubic:
+            np.multiply(y, y, out=push)
+            push *= y
+            push *= kick
+            v -= push
+        np.abs(v, out=one)
+        one *= slow
+        one += 1.0
+        v /= one
+        if with_cubic:
+            v -= push
+        if number % every == 0:
+            ys[number // every - 1], vs[number // every - 1] = y, v
+        np.multiply(b, v, out=one)
+        np.multiply(c, y, out=other)
+        y *= a
+        y += one
+        v *= d
+        v += other
+    return _with_start(problem, *_turned(half, ys, vs))
+
+
+def _march_with_friction(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
+    # Within a step a bob may turn once: no step longer than a radian.
+    parts = _parts(problem.equation, h)
+    motion = (Frictions if problem.is_ensemble else Friction)(problem, h / parts)
+    ys = np.empty((steps // every + 1, *np.shape(problem.displacement_m)))
+    vs = np.empty_like(ys)
+    ys[0], vs[0] = problem.displacement_m, problem.velocity_m_per_s
+    for row in range(1, len(ys)):
+        for _ in range(every * parts):
+            motion.step()
+        ys[row], vs[row] = motion.y, motion.v
+    return ys, vs
+
+
+def _parts(eq: Equation, h: float) -> int:
+    return max(1, math.ceil(float(np.max(eq.angular_frequency_per_s)) * h))
+
+
+def _turned(matrix: tuple[float, float, float, float] | tuple[F8, F8, F8, F8], y: F8, v: F8) -> tuple[F8, F8]:
+    a, b, c, d = matrix
+    return a * y + b * v, c * y + d * v
+
+
+def _with_start(problem: Problem, y: F8, v: F8) -> tuple[F8, F8]:
+    return (
+        np.concatenate([np.asarray(problem.displacement_m)[None], y]),
+        np.concatenate([np.asarray(problem.velocity_m_per_s)[None], v]),
+    )
+
+
+STRANG = Strang()
