@@ -68,12 +68,12 @@ class Equation:
     @property
     def is_linear(self) -> bool:
         """Whether spring and viscous drag are all there is, for every member."""
-        return not (np.any(self.drag_per_m) or np.any(self.friction_m_per_s2) or np.any(self.cubic_per_m2_s2))
+        return not any(map(_any, (self.drag_per_m, self.friction_m_per_s2, self.cubic_per_m2_s2)))
 
     @property
     def has_friction(self) -> bool:
         """Whether any member has friction."""
-        return bool(np.any(self.friction_m_per_s2))
+        return _any(self.friction_m_per_s2)
 
     def spring(self, y: Real) -> Real:
         """Return the spring's pull per mass at displacement y, m/s^2, positive towards positive y."""
@@ -214,31 +214,36 @@ class Problem:
 
         The length is a power of two, so that nothing is rounded; squares then neither overflow nor vanish.
         """
-        amplitude = np.maximum(
-            np.abs(self.displacement_m), np.abs(self.velocity_m_per_s / self.equation.angular_frequency_per_s)
-        )
+        eq = self.equation
+        amplitude = np.maximum(np.abs(self.displacement_m), np.abs(self.velocity_m_per_s / eq.angular_frequency_per_s))
         unit = np.ldexp(1.0, np.clip(np.frexp(amplitude)[1], -1021, 1022))
         if not self.is_ensemble:
             unit = float(unit)
-        eq = self.equation
+        if eq.is_linear:
+            return self._replaced(eq, unit), unit
         with np.errstate(over="ignore"):
-            parts = {
-                "drag_per_m": np.multiply(eq.drag_per_m, unit),
-                "friction_m_per_s2": np.divide(eq.friction_m_per_s2, unit),
-                "cubic_per_m2_s2": np.multiply(np.multiply(eq.cubic_per_m2_s2, unit), unit),
-            }
-        for name, part in parts.items():
+            drag = np.multiply(eq.drag_per_m, unit)
             # Friction beyond all bounds holds whatever it touches, and a bound that large does too.
-            if name == "friction_m_per_s2":
-                parts[name] = np.minimum(part, 1e300)
-            elif not np.all(np.isfinite(part)):
+            friction = np.minimum(np.divide(eq.friction_m_per_s2, unit), 1e300)
+            cubic = np.multiply(np.multiply(eq.cubic_per_m2_s2, unit), unit)
+        for name, part in (("drag_per_m", drag), ("cubic_per_m2_s2", cubic)):
+            if not np.all(np.isfinite(part)):
                 raise DynamicsError(
                     f"{name} {_shown(getattr(eq, name))} at an amplitude of {_shown(amplitude)} m leaves the range of "
                     "numbers; take a smaller amplitude or coefficient"
                 )
+        parts = {"drag_per_m": drag, "friction_m_per_s2": friction, "cubic_per_m2_s2": cubic}
         if not self.is_ensemble:
             parts = {name: float(part) for name, part in parts.items()}
-        return Problem(replace(eq, **parts), self.displacement_m / unit, self.velocity_m_per_s / unit), unit
+        return self._replaced(replace(eq, **parts), unit), unit
+
+    def _replaced(self, equation: Equation, unit: Real) -> Problem:
+        """The same with another equation and unit of length; it was checked before."""
+        other = object.__new__(Problem)
+        object.__setattr__(other, "equation", equation)
+        object.__setattr__(other, "displacement_m", self.displacement_m / unit)
+        object.__setattr__(other, "velocity_m_per_s", self.velocity_m_per_s / unit)
+        return other
 
     @classmethod
     def from_scene(cls, scene: Scene, *, where: str = "scene") -> Problem:
@@ -320,12 +325,18 @@ def effective_mass_kg(scene: Scene) -> float:
     return scene.bob_mass_kg.value + _value(scene.spring_mass_kg) / 3.0 + added_mass_kg(scene)
 
 
+def _any(value: Real) -> bool:
+    return value != 0.0 if type(value) is float else bool(np.any(value))
+
+
 def _value(estimate: Estimate | None) -> float:
     return 0.0 if estimate is None else estimate.value
 
 
 def _double(given: ArrayLike, name: str) -> Real:
     """A float or a float64 array of finite numbers; narrower floats are refused, as their rounding shows."""
+    if type(given) is float and math.isfinite(given):
+        return given
     array = np.asarray(given)
     if array.dtype.kind == "f" and array.dtype.itemsize < 8:
         raise DynamicsError(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pipeline.dynamics.equation import Real
 from pipeline.track import F8
 
 __all__ = ["Entries", "flow", "flows"]
@@ -48,27 +47,30 @@ def flow(omega: float, gamma: float, t: float) -> Entries:
 
 def flows(omega: ArrayLike, gamma: ArrayLike, t: ArrayLike) -> tuple[F8, F8, F8, F8]:
     """Return the entries of :func:`flow` for arrays that broadcast."""
+    if type(omega) is float and type(gamma) is float:
+        apart = math.sqrt(abs((gamma - omega) * (gamma + omega)))
+        return (_underdamped if gamma < omega else _overdamped)(omega, gamma, apart, np.asarray(t))
     omega, gamma, t = (np.asarray(x, np.float64) for x in (omega, gamma, t))
     under = gamma < omega
-    apart = np.sqrt(np.abs((gamma - omega) * (gamma + omega)))
+    between = np.sqrt(np.abs((gamma - omega) * (gamma + omega)))
     if under.all():
-        return _underdamped(omega, gamma, apart, t)
+        return _underdamped(omega, gamma, between, t)
     if not under.any():
-        return _overdamped(omega, gamma, apart, t)
+        return _overdamped(omega, gamma, between, t)
     # Each branch sees only values that it can hold.
-    below = _underdamped(omega, np.where(under, gamma, 0.0), np.where(under, apart, omega), t)
-    above = _overdamped(omega, np.where(under, omega, gamma), np.where(under, 0.0, apart), t)
-    parts: Any = tuple(np.where(under, one, other) for one, other in zip(below, above, strict=True))
-    return parts  # type: ignore[no-any-return]
+    below = _underdamped(omega, np.where(under, gamma, 0.0), np.where(under, between, omega), t)
+    above = _overdamped(omega, np.where(under, omega, gamma), np.where(under, 0.0, between), t)
+    a, b, c, d = (np.where(under, one, other) for one, other in zip(below, above, strict=True))
+    return a, b, c, d
 
 
-def _underdamped(omega: F8, gamma: F8, damped: F8, t: F8) -> tuple[F8, F8, F8, F8]:
+def _underdamped(omega: Real, gamma: Real, damped: Real, t: F8) -> tuple[F8, F8, F8, F8]:
     shrink = np.exp(-gamma * t)
     cosine, b = shrink * np.cos(damped * t), shrink * np.sin(damped * t) / damped
     return cosine + gamma * b, b, -omega * omega * b, cosine - gamma * b
 
 
-def _overdamped(omega: F8, gamma: F8, kappa: F8, t: F8) -> tuple[F8, F8, F8, F8]:
+def _overdamped(omega: Real, gamma: Real, kappa: Real, t: F8) -> tuple[F8, F8, F8, F8]:
     fast = gamma + kappa
     slow = omega * (omega / fast)
     late, soon = np.exp(-slow * t), np.exp(-fast * t)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -12,7 +13,7 @@ from pipeline.dynamics.equation import Problem, Real
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
-__all__ = ["Integrator", "March", "Step", "Trajectory", "every_member", "integrate", "march_steps"]
+__all__ = ["Integrator", "March", "Step", "Trajectory", "demand_run", "every_member", "integrate", "march_steps", "solved"]
 
 Step = Callable[[Real, Real], tuple[Real, Real]]
 """One step: displacement and velocity before it to those after it."""
@@ -83,8 +84,8 @@ class Trajectory:
     Parameters
     ----------
     problem : Problem
-    t : (n,) float64, s
-        Each the product of its number and the step: nothing accumulates.
+    spacing_s : float
+        Time from one kept state to the next, s.
     y : (n,) or (n, m) float64, m
         Displacement from rest.
     v : (n,) or (n, m) float64, m/s
@@ -92,9 +93,14 @@ class Trajectory:
     """
 
     problem: Problem
-    t: F8
+    spacing_s: float
     y: F8
     v: F8
+
+    @property
+    def t(self) -> F8:
+        """Times (n,) float64, s: each the product of its number and the spacing, so that nothing accumulates."""
+        return np.asarray(self.spacing_s * np.arange(len(self.y), dtype=np.float64))
 
     def relative_energy(self) -> F8:
         """Return the mechanical energy over that of the start, (n,) or (n, m); 1 where there was none.
@@ -144,16 +150,8 @@ def integrate(
     ------
     DynamicsError
     """
-    demand_step(step_s)
-    if steps < 1 or every < 1 or steps % every:
-        raise DynamicsError(
-            f"the number of steps must be a positive multiple of {max(every, 1)}, of which one is kept, got {steps}"
-        )
-    why = integrator.refusal(problem)
-    if why:
-        raise DynamicsError(f"{integrator.name} cannot solve this: {why}")
+    demand_run(integrator, problem, step_s, steps, every)
     scaled, unit = problem.scaled()
-    t = step_s * every * np.arange(steps // every + 1)
     with np.errstate(all="ignore"):
         try:
             y, v = march(scaled, step_s, steps, every)
@@ -161,15 +159,47 @@ def integrate(
             raise DynamicsError(
                 f"{integrator.name} ran beyond the range of numbers ({error}); {_remedy(integrator, problem)}"
             ) from error
-        y, v = y * unit, v * unit
-    fine = np.isfinite(y) & np.isfinite(v)
-    if not fine.all():
-        first = int(np.argmin(fine.reshape(len(t), -1).all(axis=1)))
+        y *= unit
+        v *= unit
+    return solved(integrator, problem, step_s * every, y, v)
+
+
+def demand_run(integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int) -> None:
+    """Refuse a run that cannot be.
+
+    Raises
+    ------
+    DynamicsError
+    """
+    if not (math.isfinite(step_s) and step_s > 0):
+        raise DynamicsError(f"the step must be more than 0 s and finite, got {step_s!r}")
+    if steps < 1 or every < 1 or steps % every:
         raise DynamicsError(
-            f"{integrator.name} with a step of {step_s:g} s ran beyond the range of numbers by t = {t[first]:g} s; "
-            + _remedy(integrator, problem)
+            f"the number of steps must be a positive multiple of {max(every, 1)}, of which one is kept, got {steps}"
         )
-    return Trajectory(problem, t, y, v)
+    why = integrator.refusal(problem)
+    if why:
+        raise DynamicsError(f"{integrator.name} cannot solve this: {why}")
+
+
+def solved(integrator: Integrator, problem: Problem, spacing_s: float, y: F8, v: F8) -> Trajectory:
+    """Return the trajectory of these states if every number is finite.
+
+    Raises
+    ------
+    DynamicsError
+    """
+    with np.errstate(all="ignore"):
+        # A sum of squares is finite only if every number is; where it is not, look closer.
+        size = np.vdot(y, y) + np.vdot(v, v)
+    if not math.isfinite(size):
+        fine = np.isfinite(y) & np.isfinite(v)
+        if not fine.all():
+            first = spacing_s * int(np.argmin(fine.reshape(len(y), -1).all(axis=1)))
+            raise DynamicsError(
+                f"{integrator.name} ran beyond the range of numbers by t = {first:g} s; {_remedy(integrator, problem)}"
+            )
+    return Trajectory(problem, spacing_s, y, v)
 
 
 def every_member(problem: Problem, of: Callable[[Problem], float], worst: Callable[..., float]) -> float:
@@ -183,17 +213,6 @@ def every_member(problem: Problem, of: Callable[[Problem], float], worst: Callab
     if not problem.size:
         raise DynamicsError("an ensemble has at least one member, got none")
     return worst(of(one) for one in problem.members())
-
-
-def demand_step(step_s: float) -> None:
-    """Refuse a step that is none.
-
-    Raises
-    ------
-    DynamicsError
-    """
-    if not (np.isfinite(step_s) and 0 < step_s):
-        raise DynamicsError(f"the step must be more than 0 s and finite, got {step_s!r}")
 
 
 def march_steps(make: Callable[[Problem, float], Step]) -> March:

@@ -114,12 +114,12 @@ def _carried(problem: Problem, defects: tuple[F8, F8], seconds: float) -> float:
     t = np.linspace(0.0, seconds, POINTS)
     size = amplitude(problem.amplitude_m(), gamma, beta, mu, t)
     # Beyond the smallest node quadratic drag fades, and with it what it adds.
-    grow = np.interp(size, sizes, np.abs(rates.real))
-    turn = np.interp(size, sizes, np.abs(rates.imag))
+    grow = np.interp(size, sizes, rates.real)
+    turn = np.interp(size, sizes, rates.imag)
     off, phase, worst = 0.0, 0.0, 0.0
     for i in range(POINTS):
         worst = max(worst, math.hypot(off, size[i] * phase))
-        phase += t[1] * (turn[i] + abs(bend) * size[i] * off)
+        phase += t[1] * (turn[i] + bend * size[i] * off)
         shrink = gamma + 2.0 * beta * size[i]
         off = (off + t[1] * size[i] * grow[i]) / (1.0 + t[1] * shrink)
     return worst

@@ -13,6 +13,7 @@ References
 from __future__ import annotations
 
 import math
+from array import array
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,9 @@ from pipeline.dynamics.turning import Friction, Frictions
 from pipeline.track import F8
 
 __all__ = ["STRANG", "Strang"]
+
+
+SHORT = 1e-3  # radians: between nearer displacements the velocity would be lost in rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,35 +72,37 @@ def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8,
         return _march_with_friction(problem, step_s, steps, every)
     if problem.is_ensemble:
         return _march_ensemble(problem, step_s, steps, every)
-    if eq.cubic_per_m2_s2:
-        return _march_cubic(problem, step_s, steps, every)
-    return _march_one(problem, step_s, steps, every)
+    _, b, _, _ = flow(eq.angular_frequency_per_s, eq.gamma_per_s, step_s)
+    if every == 1 and not eq.cubic_per_m2_s2 and b > 0.1 * step_s and b * eq.angular_frequency_per_s > SHORT:
+        return _march_one(problem, step_s, steps)
+    return _march_kicked(problem, step_s, steps, every)
 
 
-def _march_one(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
-    """Join the half steps of neighbours into whole ones; what is kept is turned by the missing half at once."""
+def _march_one(problem: Problem, h: float, steps: int) -> tuple[F8, F8]:
+    """Join the half steps of neighbours into whole ones, and keep only the displacement before each.
+
+    With the velocity in units that make the matrix's second entry 1 a step has three products; two displacements in a
+    row tell the velocity between them afterwards, and what is kept is turned by the missing half at once.
+    """
     eq = problem.equation
     half = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
     a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, h)
-    slow = eq.drag_per_m * h
+    slow, back = eq.drag_per_m * h / b, b * c
     y, v = _turned(half, problem.displacement_m, problem.velocity_m_per_s)
+    u = b * v
     kept: list[float] = []
     keep = kept.append
-    rest = range(every - 1)
-    for _ in range(steps // every):
-        for _ in rest:
-            v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
-            y, v = a * y + b * v, c * y + d * v
-        v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+    for _ in range(steps):
+        u = u / (1.0 + slow * u) if u > 0.0 else u / (1.0 - slow * u)
         keep(y)
-        keep(v)
-        y, v = a * y + b * v, c * y + d * v
-    states = np.array(kept).reshape(-1, 2)
-    return _with_start(problem, *_turned(half, states[:, 0], states[:, 1]))
+        y, u = a * y + u, back * y + d * u
+    keep(y)
+    found: F8 = np.frombuffer(array("d", kept))
+    return _with_start(problem, *_turned(half, found[:-1], (found[1:] - a * found[:-1]) / b))
 
 
-def _march_cubic(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
-    """The same with the cubic force as a kick before and after the drag."""
+def _march_kicked(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
+    """Step with the cubic force as a kick before and after the drag, at any step and keeping any of them."""
     eq = problem.equation
     half = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
     a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, h)
@@ -104,16 +110,19 @@ def _march_cubic(problem: Problem, h: float, steps: int, every: int) -> tuple[F8
     y, v = _turned(half, problem.displacement_m, problem.velocity_m_per_s)
     kept: list[float] = []
     keep = kept.append
-    for number in range(1, steps + 1):
-        push = kick * y * y * y
-        v -= push
-        v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
-        v -= push
-        if number % every == 0:
-            keep(y)
-            keep(v)
-        y, v = a * y + b * v, c * y + d * v
-    states = np.array(kept).reshape(-1, 2)
+    push = 0.0
+    for _ in range(steps // every):
+        for number in range(every, 0, -1):
+            if kick:
+                push = kick * y * y * y
+                v -= push
+            v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+            v -= push
+            if number == 1:
+                keep(y)
+                keep(v)
+            y, v = a * y + b * v, c * y + d * v
+    states = np.frombuffer(array("d", kept)).reshape(-1, 2)
     return _with_start(problem, *_turned(half, states[:, 0], states[:, 1]))
 
 
@@ -153,20 +162,12 @@ def _march_ensemble(problem: Problem, h: float, steps: int, every: int) -> tuple
 
 def _march_with_friction(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
     # Within a step a bob may turn once: no step longer than a radian.
-    parts = _parts(problem.equation, h)
-    motion = (Frictions if problem.is_ensemble else Friction)(problem, h / parts)
-    ys = np.empty((steps // every + 1, *np.shape(problem.displacement_m)))
-    vs = np.empty_like(ys)
-    ys[0], vs[0] = problem.displacement_m, problem.velocity_m_per_s
-    for row in range(1, len(ys)):
-        for _ in range(every * parts):
-            motion.step()
-        ys[row], vs[row] = motion.y, motion.v
-    return ys, vs
-
-
-def _parts(eq: Equation, h: float) -> int:
-    return max(1, math.ceil(float(np.max(eq.angular_frequency_per_s)) * h))
+    parts = max(1, math.ceil(float(np.max(problem.equation.angular_frequency_per_s)) * h))
+    if problem.is_ensemble:
+        ys, vs = Frictions(problem, h / parts).run(steps * parts, every * parts)
+        return _with_start(problem, ys, vs)
+    states = Friction(problem, h / parts).run(steps * parts)[every * parts - 1 :: every * parts]
+    return _with_start(problem, states[:, 0], states[:, 1])
 
 
 def _turned(matrix: tuple[float, float, float, float] | tuple[F8, F8, F8, F8], y: F8, v: F8) -> tuple[F8, F8]:

@@ -25,7 +25,7 @@ from pipeline.track import F8
 
 __all__ = ["TAYLOR", "Taylor"]
 
-LONGEST = 1.2  # radians a step; turning points lie three apart
+LONGEST = 1.6  # radians a step; turning points lie twice as far apart
 MOST_STEPS = 200_000
 
 
@@ -83,7 +83,7 @@ def _solve(problem: Problem, apart: float, count: int, tolerance: float) -> F8:
     y, v = problem.displacement_m, problem.velocity_m_per_s
     states[0] = y, v
     fast = math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * problem.amplitude_m() ** 2)
-    local = max(0.1 * tolerance / (1.0 + fast * apart * count), 1e-18)
+    local = max(tolerance / (1.0 + fast * apart * count), 1e-18)
     order = next(p for p in range(6, 60) if LONGEST**p / math.factorial(p) < local)
     kinked = eq.drag_per_m > 0 or eq.friction_m_per_s2 > 0
     row, since = 0, 0.0  # the last state kept, and the time since: a sum of short times rounds little

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.dynamics.equation import Problem
+from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.flow import flow, flows
 from pipeline.track import F8
 
 __all__ = ["Friction", "Frictions"]
 
 OVERWHELMING = 1e9  # friction over every other force: it stops the bob before anything else acts
-_NEWTON = 8
+_CLOSE = 1e-12  # of a step: the displacement does not feel it where the velocity is 0
+_MOST = 40
 
 
 class Friction:
@@ -38,15 +40,48 @@ class Friction:
         if self._hold > OVERWHELMING * (abs(eq.spring(self.y)) + (self._omega + self._gamma) * abs(self.v)):
             self.v, self._way = 0.0, 0
 
-    def step(self) -> None:
-        """Go on by one step, around a turning point if one lies within it."""
-        if not self._way:
-            return
+    def run(self, steps: int) -> F8:
+        """Go on by so many steps, around the turning points that lie within them; return the states (steps, 2)."""
+        kept: list[float] = []
+        left = steps
+        while left and self._way:
+            left = self._straight(left, kept)
+            if left:
+                self._around()
+                kept += (self.y, self.v)
+                left -= 1
+        states = np.empty((steps, 2))
+        states[: steps - left] = np.array(kept).reshape(-1, 2)
+        states[steps - left :] = self.y, self.v
+        return states
+
+    def _straight(self, steps: int, kept: list[float]) -> int:
+        """Step until a turning point lies within the next step; return how many steps are left."""
+        a, b, c, d = self._half
+        way, keep = self._way, kept.append
+        slow, rest = self._eq.drag_per_m * self._h, -way * self._shift
+        kick, push = 0.5 * self._h * self._eq.cubic_per_m2_s2, 0.0
+        y, v = self.y - rest, self.v
+        while steps:
+            y1, v1 = a * y + b * v, c * y + d * v
+            if kick:
+                push = kick * (y1 + rest) ** 3
+                v1 -= push
+            v1 = v1 / (1.0 + slow * v1) - push if v1 > 0.0 else v1 / (1.0 - slow * v1) - push
+            v2 = c * y1 + d * v1
+            if v2 * way <= 0.0:
+                break
+            y, v = a * y1 + b * v1, v2
+            keep(y + rest)
+            keep(v)
+            steps -= 1
+        self.y, self.v = y + rest, v
+        return steps
+
+    def _around(self) -> None:
+        """Make one step that holds a turning point."""
         y, v = self._moved(self._half, self._h)
-        if v * self._way > 0.0:
-            self.y, self.v = y, v
-            return
-        spent = self._turning(v)
+        spent = self._turning(y, v)
         y, _ = self._moved(flow(self._omega, self._gamma, 0.5 * spent), spent)
         self.y, self.v = y, 0.0
         self._way = self._eq.direction(y, 0.0)
@@ -66,24 +101,41 @@ class Friction:
         v = v / (1.0 + self._eq.drag_per_m * h * abs(v)) - push
         return a * y + b * v + rest, c * y + d * v
 
-    def _turning(self, after: float) -> float:
-        """Return the time within the step at which the velocity passes zero: Newton's method between bounds."""
+    def _turning(self, y: float, after: float) -> float:
+        """Return the time within the step at which the velocity passes zero: Hermite's guess, then secants."""
         low, high = 0.0, self._h
-        t = self._h * self.v / (self.v - after) if self.v != after else 0.5 * self._h
-        for _ in range(_NEWTON):
-            y, v = self._moved(flow(self._omega, self._gamma, 0.5 * t), t)
+        before, since = self.v, 0.0
+        t = _guess(self._h, before, after, self._slope(self.y, before), self._slope(y, after))
+        if not low < t < high:
+            t = 0.5 * high
+        for _ in range(_MOST):
+            _, v = self._moved(flow(self._omega, self._gamma, 0.5 * t), t)
             if v * self._way > 0.0:
                 low = t
             else:
                 high = t
-            slope = -(self._eq.spring(y) + self._way * self._hold + 2.0 * self._gamma * v)
-            better = t - v / slope if slope else 0.5 * (low + high)
+            better = t - v * (t - since) / (v - before) if v != before else t
+            before, since = v, t
             if not low <= better <= high:
                 better = 0.5 * (low + high)
-            if abs(better - t) <= 1e-15 * self._h:
+            if abs(better - t) <= _CLOSE * self._h:
                 return better
             t = better
         return t
+
+    def _slope(self, y: float, v: float) -> float:
+        """Return the acceleration if it keeps its way."""
+        eq = self._eq
+        drag = (2.0 * self._gamma + eq.drag_per_m * v * self._way) * v
+        return -(eq.spring(y) + drag + self._way * self._hold)
+
+
+def _guess(h: float, v0: float, v1: float, a0: float, a1: float) -> float:
+    """Return where a cubic through (v0, 0) and (v1, h) with slopes 1 / a0 and 1 / a1 says that v is 0."""
+    if a0 == 0.0 or a1 == 0.0 or v0 == v1:
+        return 0.5 * h
+    s = v0 / (v0 - v1)
+    return h * s * s * (3.0 - 2.0 * s) + (v1 - v0) * s * (1.0 - s) * ((1.0 - s) / a0 - s / a1)
 
 
 class Frictions:
@@ -98,68 +150,115 @@ class Frictions:
     """
 
     def __init__(self, problem: Problem, step_s: float) -> None:
-        eq = problem.equation
         self.y: F8 = np.array(problem.displacement_m)
         self.v: F8 = np.array(problem.velocity_m_per_s)
         self._h = step_s
-        self._omega, self._gamma, self._drag = eq.angular_frequency_per_s, eq.gamma_per_s, eq.drag_per_m
-        self._hold, self._cubic = eq.friction_m_per_s2, eq.cubic_per_m2_s2
-        self._shift = eq.friction_m_per_s2 / eq.angular_frequency_per_s**2
-        self._half = np.array(flows(self._omega, self._gamma, 0.5 * step_s))
-        self._all = np.arange(problem.size)
-        others = np.abs(eq.spring(self.y)) + (self._omega + self._gamma) * np.abs(self.v)
-        held = self._hold > OVERWHELMING * others
-        self.v[held] = 0.0
-        self._way = self._directions(self._all)
+        self._all = _Members(problem.equation)
+        self._half = flows(problem.equation.angular_frequency_per_s, problem.equation.gamma_per_s, 0.5 * step_s)
+        others = np.abs(self._all.pull(self.y)) + self._all.fastest * np.abs(self.v)
+        self.v[self._all.hold > OVERWHELMING * others] = 0.0
+        self._way = np.where(self.v != 0.0, np.sign(self.v), self._all.released(self.y))
 
-    def step(self) -> None:
-        """Go on by one step."""
-        y, v = self._moved(self._all, self._half, self._h)
-        turns = np.flatnonzero((v * self._way <= 0.0) & (self._way != 0.0))
-        held = self._way == 0.0
-        y[held], v[held] = self.y[held], 0.0
+    def run(self, steps: int, every: int) -> F8:
+        """Go on by so many steps; return every so many states, displacements and velocities (2, n, m)."""
+        states = np.empty((2, steps // every, self.y.size))
+        for number in range(1, steps + 1):
+            self._step()
+            if number % every == 0:
+                states[:, number // every - 1] = self.y, self.v
+        return states
+
+    def _step(self) -> None:
+        way = self._way
+        y, v = self._all.moved(self.y, self.v, way, self._half, self._h)
+        turns = np.flatnonzero(v * way <= 0.0)
         if turns.size:
-            spent = self._turning(turns, v[turns])
-            self.y[turns], _ = self._moved(turns, self._flows(turns, spent), spent)
-            self.v[turns] = 0.0
-            self._way[turns] = self._directions(turns)
-            left = self._h - spent
-            after = self._moved(turns, self._flows(turns, left), left)
-            going = self._way[turns] != 0.0
-            y[turns] = np.where(going, after[0], self.y[turns])
-            v[turns] = np.where(going, after[1], 0.0)
+            held = way[turns] == 0.0
+            y[turns[held]], v[turns[held]] = self.y[turns[held]], 0.0
+            turns = turns[~held]
+        if turns.size:
+            y[turns], v[turns] = self._around(turns, y[turns], v[turns])
         self.y, self.v = y, v
 
-    def _flows(self, which: F8, t: F8) -> F8:
-        return np.array(flows(self._omega[which], self._gamma[which], 0.5 * t))
+    def _around(self, turns: NDArray[np.intp], y: F8, v: F8) -> tuple[F8, F8]:
+        """Return the states after a step that holds a turning point."""
+        some, way = self._all[turns], self._way[turns]
+        spent = self._turning(some, self.y[turns], self.v[turns], way, y, v)
+        y, _ = some.moved(self.y[turns], self.v[turns], way, some.half(spent), spent)
+        self._way[turns] = way = some.released(y)
+        left = self._h - spent
+        after = some.moved(y, np.zeros_like(y), way, some.half(left), left)
+        return np.where(way != 0.0, after[0], y), np.where(way != 0.0, after[1], 0.0)
 
-    def _pull(self, which: F8, y: F8) -> F8:
-        return np.asarray(self._omega[which] ** 2 * y + self._cubic[which] * y**3)
-
-    def _directions(self, which: F8) -> F8:
-        pull = self._pull(which, self.y[which])
-        released = np.where(np.abs(pull) <= self._hold[which], 0.0, -np.sign(pull))
-        return np.where(self.v[which] != 0.0, np.sign(self.v[which]), released)
-
-    def _moved(self, which: F8, half: F8, h: float | F8) -> tuple[F8, F8]:
-        a, b, c, d = half
-        rest = -self._way[which] * self._shift[which]
-        y, v = self.y[which] - rest, self.v[which]
-        y, v = a * y + b * v, c * y + d * v
-        push = 0.5 * h * self._cubic[which] * (y + rest) ** 3
-        v = v - push
-        v = v / (1.0 + self._drag[which] * h * np.abs(v)) - push
-        return a * y + b * v + rest, c * y + d * v
-
-    def _turning(self, which: F8, after: F8) -> F8:
-        before, way = self.v[which], self._way[which]
-        low, high = np.zeros(which.size), np.full(which.size, self._h)
-        t = self._h * np.clip(before / np.where(before == after, 1.0, before - after), 0.0, 1.0)
-        for _ in range(_NEWTON):
-            y, v = self._moved(which, self._flows(which, t), t)
-            ahead = v * way > 0.0
+    def _turning(self, some: _Members, y: F8, v: F8, way: F8, y_after: F8, v_after: F8) -> F8:
+        low, high = np.zeros(y.size), np.full(y.size, self._h)
+        before, since = v, np.zeros(y.size)
+        slopes = (some.slope(y, v, way), some.slope(y_after, v_after, way))
+        safe = [np.where(slope == 0.0, 1.0, slope) for slope in slopes]
+        share = v / np.where(v == v_after, 1.0, v - v_after)
+        t = self._h * share**2 * (3.0 - 2.0 * share) + (v_after - v) * share * (1.0 - share) * (
+            (1.0 - share) / safe[0] - share / safe[1]
+        )
+        t = np.where((t > low) & (t < high), t, 0.5 * high)
+        for _ in range(_MOST):
+            _, now = some.moved(y, v, way, some.half(t), t)
+            ahead = now * way > 0.0
             low, high = np.where(ahead, t, low), np.where(ahead, high, t)
-            slope = -(self._pull(which, y) + way * self._hold[which] + 2.0 * self._gamma[which] * v)
-            better = t - v / np.where(slope == 0.0, 1.0, slope)
-            t = np.where((slope != 0.0) & (better >= low) & (better <= high), better, 0.5 * (low + high))
+            better = t - np.where(now == before, 0.0, now * (t - since) / np.where(now == before, 1.0, now - before))
+            better = np.where((better >= low) & (better <= high), better, 0.5 * (low + high))
+            before, since = now, t
+            change, t = np.abs(better - t), better
+            if np.max(change) <= _CLOSE * self._h:
+                break
         return t
+
+
+class _Members:
+    """The coefficients of an ensemble, or of some of its members, as arrays."""
+
+    def __init__(self, equation: Equation) -> None:
+        self._equation = equation
+        self.omega, self.gamma, self.drag = (
+            equation.angular_frequency_per_s,
+            equation.gamma_per_s,
+            equation.drag_per_m,
+        )
+        self.hold, self.cubic = equation.friction_m_per_s2, equation.cubic_per_m2_s2
+        self.shift = self.hold / self.omega**2
+        self.fastest = self.omega + self.gamma
+        self._with_cubic = bool(np.any(self.cubic))
+
+    def __getitem__(self, which: NDArray[np.intp]) -> _Members:
+        eq = self._equation
+        return _Members(Equation(**{name: getattr(eq, name)[which] for name in eq.__slots__}))
+
+    def half(self, t: F8) -> tuple[F8, F8, F8, F8]:
+        """Return the matrix of half a step of each its own length."""
+        return flows(self.omega, self.gamma, 0.5 * t)
+
+    def pull(self, y: F8) -> F8:
+        """Return the spring's pull per mass."""
+        return np.asarray(self.omega**2 * y + self.cubic * y**3 if self._with_cubic else self.omega**2 * y)
+
+    def released(self, y: F8) -> F8:
+        """Return which way each moves from rest, 0 where friction holds it."""
+        pull = self.pull(y)
+        return np.where(np.abs(pull) <= self.hold, 0.0, -np.sign(pull))
+
+    def slope(self, y: F8, v: F8, way: F8) -> F8:
+        """Return the acceleration of each if it keeps its way."""
+        return np.asarray(-(self.pull(y) + (2.0 * self.gamma + self.drag * v * way) * v + way * self.hold))
+
+    def moved(self, y: F8, v: F8, way: F8, half: tuple[F8, F8, F8, F8], h: float | F8) -> tuple[F8, F8]:
+        """Return the states after a step if none turns."""
+        a, b, c, d = half
+        rest = -way * self.shift
+        y = y - rest
+        y, v = a * y + b * v, c * y + d * v
+        if not self._with_cubic:
+            v = v / (1.0 + self.drag * h * np.abs(v))
+        else:
+            push = 0.5 * h * self.cubic * (y + rest) ** 3
+            v = v - push
+            v = v / (1.0 + self.drag * h * np.abs(v)) - push
+        return a * y + b * v + rest, c * y + d * v
