@@ -1,1 +1,64 @@
-"""Dynamics."""
+"""The equation of motion, the integrators that solve it, their limits, and the cheapest one for a tolerance.
+
+Examples
+--------
+>>> from pipeline.dynamics import Equation, Problem, get_integrator
+>>> problem = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
+>>> trajectory = get_integrator("strang").run(problem, 0.01, 12000)
+>>> trajectory.y.shape, f"{trajectory.relative_energy()[-1]:.4f}"
+((12001,), '0.0292')
+"""
+
+from __future__ import annotations
+
+from pipeline.dynamics.averaged import AVERAGED
+from pipeline.dynamics.equation import Equation, Problem, effective_mass_kg
+from pipeline.dynamics.euler import FORWARD_EULER, SYMPLECTIC_EULER
+from pipeline.dynamics.exact import EXACT
+from pipeline.dynamics.integrator import Integrator, Trajectory
+from pipeline.dynamics.runge_kutta import RK4
+from pipeline.dynamics.solve_ivp import DOP853, LSODA
+from pipeline.dynamics.strang import STRANG
+from pipeline.dynamics.taylor import TAYLOR
+from pipeline.dynamics.verlet import VERLET, YOSHIDA4
+from pipeline.errors import DynamicsError
+
+__all__ = [
+    "INTEGRATORS",
+    "Equation",
+    "Integrator",
+    "Problem",
+    "Trajectory",
+    "effective_mass_kg",
+    "get_integrator",
+]
+
+INTEGRATORS: dict[str, Integrator] = {
+    each.name: each
+    for each in (
+        FORWARD_EULER,
+        SYMPLECTIC_EULER,
+        VERLET,
+        YOSHIDA4,
+        RK4,
+        EXACT,
+        STRANG,
+        TAYLOR,
+        LSODA,
+        DOP853,
+        AVERAGED,
+    )
+}
+
+
+def get_integrator(name: str) -> Integrator:
+    """Return an integrator by name.
+
+    Raises
+    ------
+    DynamicsError
+        For a name that none has; the message lists them.
+    """
+    if name not in INTEGRATORS:
+        raise DynamicsError(f"unknown method {name!r}; allowed are auto, {', '.join(INTEGRATORS)}")
+    return INTEGRATORS[name]

@@ -78,7 +78,7 @@ class Equation:
     def spring(self, y: Real) -> Real:
         """Return the spring's pull per mass at displacement y, m/s^2, positive towards positive y."""
         pull = self.angular_frequency_per_s**2 * y
-        return pull + self.cubic_per_m2_s2 * y * y * y if np.any(self.cubic_per_m2_s2) else pull
+        return pull + self.cubic_per_m2_s2 * y * y * y if _any(self.cubic_per_m2_s2) else pull
 
     def direction(self, y: float, v: float) -> int:
         """Return which way a single bob moves, or would from rest: 1, -1, or 0 where friction holds it."""

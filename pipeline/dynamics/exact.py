@@ -12,7 +12,7 @@ from pipeline.dynamics.flow import flows
 from pipeline.dynamics.integrator import Trajectory, demand_run, solved
 from pipeline.track import F8
 
-__all__ = ["Exact", "rounding_error"]
+__all__ = ["EXACT", "Exact", "rounding_error"]
 
 BLOCK = 128  # states of a block from its first by one matrix each; a block's first by the closed form
 
@@ -56,6 +56,9 @@ class Exact:
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:  # noqa: ARG002
         """Return the rounding of the phase."""
         return rounding_error(problem, seconds)
+
+
+EXACT = Exact()
 
 
 def _states(problem: Problem, apart: float, count: int) -> tuple[F8, F8]:

@@ -11,6 +11,7 @@ from pipeline.dynamics.averaged import amplitude
 from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.exact import rounding_error
 from pipeline.dynamics.flow import flows
+from pipeline.dynamics.pilot import predicted_by_pilot
 from pipeline.dynamics.stability import step_matrix
 from pipeline.track import F8
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["predicted_by_average"]
 
 POINTS = 1500
+STRONG = 0.02  # damping a radian beyond which the linear oscillator is no measure of the error
 
 
 def predicted_by_average(method: OneStep, problem: Problem, step_s: float, seconds: float) -> float:
@@ -77,8 +79,9 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     omega = eq.angular_frequency_per_s
     # The spring as stiff as it is on average at this amplitude.
     omega = math.sqrt(max(omega**2 + 0.75 * eq.cubic_per_m2_s2 * start**2, 0.1 * omega**2))
-    if gamma + beta * start > 0.5 * omega:
-        return _strongly_damped(method, problem, h, omega)
+    friction = eq.friction_m_per_s2 * h / (omega * start) * math.sqrt(1.0 + omega * h * steps / math.pi) if mu else 0.0
+    if gamma + beta * start > STRONG * omega:
+        return predicted_by_pilot(method, method, problem, h, h * steps) + friction
     values = np.linalg.eigvals(step_matrix(method, omega * h, gamma / omega).astype(np.complex128))
     turning = np.log(values[np.argmax(values.imag)]) / h
     if turning.imag <= 0.0:
@@ -94,13 +97,4 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     cycle = max(1, min(steps, math.ceil(2.0 * math.pi / (omega * h))))
     short = _linear(method, problem, h, cycle)
     within = max(0.0, short - abs(np.expm1((turning + gamma - 1j * math.sqrt(omega**2 - gamma**2)) * h * cycle)))
-    turns = omega * h * steps / math.pi
-    friction = eq.friction_m_per_s2 * h / (omega * start) * math.sqrt(turns) if mu else 0.0
     return secular + within + friction
-
-
-def _strongly_damped(method: OneStep, problem: Problem, h: float, omega: float) -> float:
-    """No oscillation to speak of: the local error over the motion's own time, to the method's order."""
-    eq, start = problem.equation, problem.amplitude_m()
-    stiff = 2.0 * eq.gamma_per_s + 2.0 * eq.drag_per_m * (omega * start + abs(problem.velocity_m_per_s)) + omega
-    return min((h * stiff) ** method.order, 1.0) + eq.friction_m_per_s2 * h / (omega * start)

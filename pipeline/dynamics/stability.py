@@ -77,7 +77,7 @@ def limit_by_search(method: OneStep, ratio: float) -> float:
     def grows(x: float) -> bool:
         return growth_per_step(method, x, ratio) > 1.0 + _ROUNDING
 
-    steps = np.geomspace(1e-3 / max(ratio, 1.0), GREATEST, 2000)
+    steps = np.geomspace(1e-3 / max(ratio, 1.0), GREATEST, 250)
     bad = next((i for i, x in enumerate(steps) if grows(float(x))), None)
     if bad is None:
         return math.inf
