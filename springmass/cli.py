@@ -26,6 +26,7 @@ COMMANDS = {
     "record": "record a run from the bench, so that nothing is lost",
     "recover": "build a run file from a wire log, however torn",
     "replay": "play a recording back through the interface of a live sensor",
+    "simulate": "solve the equation of motion of a scene, to a tolerance or by a method of your choice",
     "convert": "write a recording as a run file, or give back the original inside one",
     "trade": "measure what accuracy costs on this machine: error over the bound against time",
     "formats": "list the families of recordings, or say what a file is",
@@ -54,6 +55,7 @@ def build_parser() -> argparse.ArgumentParser:
         "record": _add_record,
         "recover": _add_recover,
         "replay": _add_replay,
+        "simulate": _add_simulate,
         "convert": _add_convert,
         "trade": _add_trade,
         "formats": _add_formats,
@@ -118,13 +120,13 @@ def _exit_code(error: Exception) -> int | None:
     if isinstance(error, ProgramError):
         return error.exit_code
     from acquisition.errors import AcquisitionError, CalibrationError, PortError, SensorError
-    from pipeline.errors import PipelineError, SceneError
+    from pipeline.errors import DynamicsError, PipelineError, SceneError
     from storage.disk import DiskNearlyFull
     from storage.errors import StorageError, WriteFailed
 
     if isinstance(error, PortError | CalibrationError | DiskNearlyFull):
         return SENSOR
-    if isinstance(error, SceneError | WriteFailed | SensorError):
+    if isinstance(error, SceneError | DynamicsError | WriteFailed | SensorError):
         return USAGE
     return UNREADABLE if isinstance(error, AcquisitionError | PipelineError | StorageError) else None
 
@@ -203,6 +205,18 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
     parser.add_argument("-o", "--output", metavar="RUN.h5", help="write the samples to a run file instead of stdout")
     _add_input_options(parser)
+
+
+def _add_simulate(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scene", required=True, metavar="S.toml", help="scene file: masses, spring, start, damping")
+    parser.add_argument("--method", default="auto", metavar="NAME", help="integrator, or auto (default)")
+    parser.add_argument("--dt", type=_finite, default=0.01, metavar="S", help="time between samples, and step (0.01)")
+    parser.add_argument("--seconds", type=_positive, default=10.0, metavar="N", help="how long (default 10)")
+    parser.add_argument("--tolerance", type=_finite, metavar="E", help="largest error over the amplitude (auto: 1e-6)")
+    parser.add_argument("--force", action="store_true", help="run a step that is unstable")
+    parser.add_argument("--against", metavar="RUN", help="measured run to lay the prediction over")
+    parser.add_argument("--out", metavar="DIR", help="folder for NAME.simulated (default: here; with --json: none)")
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
 
 
 def _add_convert(parser: argparse.ArgumentParser) -> None:

@@ -23,7 +23,7 @@ AUTO: tuple[Integrator, ...] = (EXACT, AVERAGED, STRANG, RK4, TAYLOR)
 
 MOST_PARTS = 100_000
 MOST_TRIES = 12
-SAFETY = 1.3  # what a prediction may be short of the truth
+SAFETY = 1.2  # what a prediction may be short of the truth
 
 # Nanoseconds on the machine of the notes: of a step, and of a kept state where that is what counts.
 _STEP_NS = {

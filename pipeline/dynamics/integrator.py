@@ -102,6 +102,19 @@ class Trajectory:
         """Times (n,) float64, s: each the product of its number and the spacing, so that nothing accumulates."""
         return np.asarray(self.spacing_s * np.arange(len(self.y), dtype=np.float64))
 
+    def at(self, t: F8) -> F8:
+        """Return displacements (k,) at times between, (k,) in s, of one trajectory; held before and after.
+
+        A cubic through displacements and velocities: it errs by at most (omega spacing)^4 / 384 of the amplitude.
+        """
+        place = np.clip(np.asarray(t) / self.spacing_s, 0.0, len(self.y) - 1.0)
+        row = np.minimum(place.astype(np.intp), len(self.y) - 2)
+        x = place - row
+        y, v = self.y, self.v * self.spacing_s
+        rise = x * x * (3.0 - 2.0 * x)
+        bends = x * (1.0 - x) * ((1.0 - x) * v[row] - x * v[row + 1])
+        return np.asarray((1.0 - rise) * y[row] + rise * y[row + 1] + bends)
+
     def relative_energy(self) -> F8:
         """Return the mechanical energy over that of the start, (n,) or (n, m); 1 where there was none.
 

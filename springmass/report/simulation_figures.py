@@ -1,0 +1,200 @@
+"""Figures of a simulation: what the lab report draws of forward and symplectic Euler, beside the exact answer.
+
+Position, velocity, energy and phase plot of both methods at the step of the run, the error of each against time, and a
+measured run under its prediction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline.dynamics import Trajectory, get_integrator
+from pipeline.errors import DynamicsError
+from pipeline.track import F8
+from springmass.report.figures import BLUE, GREEN, GREY, VERMILLION, blank_figure, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from springmass.simulation import Against, Simulation
+
+__all__ = ["EULERS", "SIMULATION_FIGURES", "against_figure", "draw_simulation"]
+
+SIMULATION_FIGURES = ("position", "velocity", "energy", "phase", "error")
+EULERS = (("forward-euler", "forward Euler", VERMILLION), ("symplectic-euler", "symplectic Euler", BLUE))
+PERIODS = 14  # drawn of a position, a velocity and a phase plot
+POINTS = 1500
+GROWN = 1e6  # times the starting amplitude: beyond it a curve says nothing more
+WIDTH, LEFT, GAP, RIGHT, BOTTOM, TOP = 7.2, 0.68, 0.72, 0.12, 0.45, 0.62
+
+
+def draw_simulation(simulation: Simulation, mass_kg: float | None) -> dict[str, Figure]:
+    """Return every figure of a simulation by name.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    mass_kg : float or None
+        For the energy; without it that of one kilogram is drawn.
+    """
+    runs = [_euler(simulation, name) for name, *_ in EULERS]
+    with style():
+        return {
+            "position": _against_time(simulation, runs, "y", 1e3, "displacement / mm"),
+            "velocity": _against_time(simulation, runs, "v", 1.0, "velocity / (m/s)"),
+            "energy": _energy(simulation, runs, mass_kg),
+            "phase": _phase(simulation, runs),
+            "error": _error(simulation, runs),
+        }
+
+
+def against_figure(against: Against) -> Figure:
+    """Draw a measured run with the prediction over it, and beneath it what is left.
+
+    Parameters
+    ----------
+    against : Against
+    """
+    with style():
+        figure = blank_figure(WIDTH, 4.0)
+        above = figure.add_axes((LEFT / WIDTH, 0.42, (WIDTH - LEFT - RIGHT) / WIDTH, 0.47))
+        below = figure.add_axes((LEFT / WIDTH, 0.12, (WIDTH - LEFT - RIGHT) / WIDTH, 0.27), sharex=above)
+        dense: dict[str, Any] = {"rasterized": against.t.size > POINTS}
+        above.plot(against.t, against.measured * 1e3, ".", ms=2.2, mew=0, color=GREY, label="measured", **dense)
+        above.plot(against.t, against.predicted * 1e3, color="#000000", lw=0.6, label="predicted", **dense)
+        above.set_ylabel("distance / mm")
+        above.tick_params(labelbottom=False)
+        above.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+        left = (against.measured - against.predicted) * 1e3
+        below.plot(against.t, left, ".", ms=1.8, mew=0, color=BLUE, **dense)
+        below.axhline(0.0, color="#000000", lw=0.8)
+        below.set_ylabel("residual / mm")
+        below.set_xlabel("time / s")
+        below.set_xlim(float(against.t[0]), float(against.t[-1]))
+        return figure
+
+
+def _euler(simulation: Simulation, name: str) -> Trajectory:
+    """Run a method at the run's spacing, and if it runs away, as far as numbers go."""
+    spacing, count = simulation.truth.spacing_s, len(simulation.truth.y) - 1
+    while True:
+        try:
+            return get_integrator(name).run(simulation.problem, spacing, count)
+        except DynamicsError:
+            if count < 2:
+                raise
+            count //= 2
+
+
+def _periods(simulation: Simulation) -> float:
+    return 2.0 * math.pi / simulation.problem.equation.angular_frequency_per_s
+
+
+def _shown(simulation: Simulation, run: Trajectory) -> slice:
+    """Return the rows of the first periods."""
+    return slice(0, min(len(run.y), int(PERIODS * _periods(simulation) / run.spacing_s) + 1))
+
+
+def _pair(height: float, labels: tuple[str, str], *, share: bool = False) -> tuple[Figure, list[Axes]]:
+    """Make two panels beside each other, each under its method's name."""
+    figure = blank_figure(WIDTH, height + BOTTOM + TOP)
+    wide = (WIDTH - LEFT - GAP - RIGHT) / 2.0
+    axes: list[Axes] = []
+    for i, (_, words, _) in enumerate(EULERS):
+        at = (LEFT + i * (wide + GAP)) / WIDTH
+        panel = figure.add_axes(
+            (at, BOTTOM / (height + BOTTOM + TOP), wide / WIDTH, height / (height + BOTTOM + TOP)),
+            sharey=axes[0] if share and axes else None,
+        )
+        panel.set_title(words, loc="left", fontsize=9.0, pad=18)
+        panel.set_xlabel(labels[0])
+        axes.append(panel)
+    axes[0].set_ylabel(labels[1])
+    return figure, axes
+
+
+def _legend(panel: Axes) -> None:
+    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.15, columnspacing=1.2)
+
+
+def _against_time(
+    simulation: Simulation, runs: Sequence[Trajectory], what: str, factor: float, label: str
+) -> Figure:
+    figure, axes = _pair(2.3, ("time / s", label))
+    for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
+        rows = _shown(simulation, run)
+        t = run.t[rows]
+        panel.plot(t, getattr(run, what)[rows] * factor, color=colour, lw=1.0, label=words)
+        panel.plot(t, getattr(simulation.truth, what)[rows] * factor, color="#000000", lw=0.9, ls=(0, (2, 1.5)), label="exact")
+        panel.set_xlim(float(t[0]), float(t[-1]))
+        _legend(panel)
+    return figure
+
+
+def _energy(simulation: Simulation, runs: Sequence[Trajectory], mass_kg: float | None) -> Figure:
+    label = "energy / mJ" if mass_kg is not None else "energy per mass / (mJ/kg)"
+    figure, axes = _pair(2.3, ("time / s", label))
+    for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
+        for each, shade, dashes, name in ((run, colour, "-", words), (simulation.truth, "#000000", (0, (2, 1.5)), "exact")):
+            t, energy = _energies(each, run, mass_kg)
+            panel.plot(t, energy, color=shade, lw=1.0 if dashes == "-" else 0.9, ls=dashes, label=name)
+        low, high = (float(f(energy[energy > 0])) if np.any(energy > 0) else 1.0 for f in (np.min, np.max))
+        top = float(np.max(panel.lines[0].get_ydata()))
+        if top > 20.0 * high or (low > 0 and high > 20.0 * low):
+            panel.set_yscale("log")
+        else:
+            panel.set_ylim(0.0, 1.08 * max(top, high))
+        panel.set_xlim(0.0, float(t[-1]))
+        _legend(panel)
+    return figure
+
+
+def _energies(of: Trajectory, run: Trajectory, mass_kg: float | None) -> tuple[F8, F8]:
+    """Times and energies, mJ, as far as a run went and before it grew beyond what can be drawn."""
+    relative = of.relative_energy()[: len(run.y)]
+    limit = np.flatnonzero(run.relative_energy() > GROWN**2)
+    end = int(limit[0]) if limit.size else len(run.y)
+    rows = np.unique(np.linspace(0, end - 1, min(end, POINTS)).astype(np.intp))
+    start = run.problem.amplitude_m() * run.problem.equation.angular_frequency_per_s
+    return of.t[rows], 0.5e3 * (1.0 if mass_kg is None else mass_kg) * start * start * relative[rows]
+
+
+def _phase(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
+    figure, axes = _pair(2.7, ("displacement / mm", "velocity / (m/s)"))
+    for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
+        rows = _shown(simulation, run)
+        panel.plot(run.y[rows] * 1e3, run.v[rows], color=colour, lw=0.9, label=words)
+        exact = simulation.truth
+        panel.plot(exact.y[rows] * 1e3, exact.v[rows], color="#000000", lw=0.9, ls=(0, (2, 1.5)), label="exact")
+        panel.plot(run.y[:1] * 1e3, run.v[:1], "o", ms=4.0, color="#000000", label="start")
+        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.15, columnspacing=1.0)
+    return figure
+
+
+def _error(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
+    """Running maxima: an error crosses zero twice a period."""
+    figure = blank_figure(WIDTH, 3.2)
+    panel = figure.add_axes((LEFT / WIDTH, 0.14, (WIDTH - LEFT - RIGHT) / WIDTH, 0.74))
+    start = simulation.problem.amplitude_m() or 1.0
+    choice = simulation.choice
+    curves = [(run, words, colour, "-") for run, (_, words, colour) in zip(runs, EULERS, strict=True)]
+    if choice.integrator.name not in [name for name, *_ in EULERS]:
+        curves.append((simulation.trajectory, choice.integrator.words, GREEN, "-"))
+    for run, words, colour, dashes in curves:
+        error = np.maximum.accumulate(np.abs(run.y - simulation.truth.y[: len(run.y)])) / start
+        drawn = np.flatnonzero((error > 0) & (error < GROWN))
+        rows = drawn[np.unique(np.linspace(0, drawn.size - 1, min(drawn.size, POINTS)).astype(np.intp))] if drawn.size else []
+        panel.plot(run.t[rows], error[rows], color=colour, ls=dashes, label=words)
+    if 0.0 < choice.predicted_error < GROWN:
+        panel.axhline(choice.predicted_error, color="#000000", lw=0.8, ls=(0, (2, 1.5)), label="predicted")
+    panel.set_yscale("log")
+    panel.set_xlim(0.0, float(simulation.truth.t[-1]))
+    panel.set_ylabel("largest error so far / amplitude")
+    panel.set_xlabel("time / s")
+    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.15, columnspacing=1.2)
+    return figure
