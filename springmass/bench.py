@@ -62,6 +62,6 @@ def bench_position(scene: Scene, *, where: str = "scene") -> Callable[[float], f
         x = place - row
         rise = x * x * (3.0 - 2.0 * x)
         bends = x * (1.0 - x) * ((1.0 - x) * rises[row] - x * rises[row + 1])
-        return REST_M + (1.0 - rise) * ys[row] + rise * ys[row + 1] + bends
+        return float(REST_M + (1.0 - rise) * ys[row] + rise * ys[row + 1] + bends)
 
     return position

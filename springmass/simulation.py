@@ -23,7 +23,18 @@ from springmass.errors import UNREADABLE, USAGE, ProgramError
 if TYPE_CHECKING:
     from pipeline.analyse import Analysis
 
-__all__ = ["Against", "Simulation", "compare_with", "completed", "count_of", "demand_stable", "plan", "simulate", "summary", "truth"]
+__all__ = [
+    "Against",
+    "Simulation",
+    "compare_with",
+    "completed",
+    "count_of",
+    "demand_stable",
+    "plan",
+    "simulate",
+    "summary",
+    "truth",
+]
 
 DEFAULT_TOLERANCE = 1e-6
 MOST_SAMPLES = 20_000_000
@@ -143,8 +154,8 @@ def demand_stable(choice: Choice, *, where: str) -> None:
     told = f"its limit here is {_rounded_down(limit)} s" if limit > 0.0 else "it grows at any step without damping"
     remedy = f"take --dt {_rounded_down(limit)} or less, " if limit > 0.0 else "take "
     raise ProgramError(
-        f"{where}: {words} is unstable with a step of {choice.step_s:g} s: {told}; {remedy}--method strang, which has no "
-        "limit, or --force to run it all the same",
+        f"{where}: {words} is unstable with a step of {choice.step_s:g} s: {told}; {remedy}--method strang, which "
+        "has no limit, or --force to run it all the same",
         USAGE,
     )
 

@@ -88,7 +88,9 @@ class Averaged:
     def refusal(self, problem: Problem) -> str:
         """Return why not, where a cycle changes the amplitude too much to be averaged over."""
         if np.any(_weakness(problem) > WEAK):
-            return f"a cycle can be averaged over where damping takes less than {WEAK:g} per radian; take strang or auto"
+            return (
+                f"a cycle can be averaged over where damping takes less than {WEAK:g} per radian; take strang or auto"
+            )
         return ""
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
@@ -124,7 +126,8 @@ def _weakness(problem: Problem) -> Real:
 def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
     eq = problem.equation
     gamma, beta, mu = eq.laws()
-    t = (step_s * every * np.arange(steps // every + 1)).reshape(-1, *(1,) * np.ndim(problem.displacement_m))
+    t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
+    t = t.reshape(-1, *(1,) * np.ndim(problem.displacement_m))
     damped = np.sqrt((eq.angular_frequency_per_s - gamma) * (eq.angular_frequency_per_s + gamma))
     y, v = problem.displacement_m, problem.velocity_m_per_s
     # Displacement and velocity tell amplitude and phase only together with the rate at which it falls.

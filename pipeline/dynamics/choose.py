@@ -142,9 +142,7 @@ def demand_tolerance(problem: Problem, seconds: float, tolerance: float) -> None
         )
 
 
-def fit_step(
-    integrator: Integrator, problem: Problem, spacing_s: float, count: int, tolerance: float
-) -> Choice | None:
+def fit_step(integrator: Integrator, problem: Problem, spacing_s: float, count: int, tolerance: float) -> Choice | None:
     """Return an integrator with the largest step that is predicted to keep a tolerance; None where none does.
 
     The step divides the spacing of the kept states.
@@ -191,14 +189,12 @@ def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, se
     if isinstance(integrator, Taylor):
         kinked = eq.drag_per_m > 0 or eq.friction_m_per_s2 > 0
         steps = radians * (0.65 if kinked else 0.62)
-        return 1e5 + steps * (6e4 + 6e4 * bool(eq.cubic_per_m2_s2)) + 100.0 * count
+        return float(1e5 + steps * (6e4 + 6e4 * bool(eq.cubic_per_m2_s2)) + 100.0 * count)
     if isinstance(integrator, SolveIvp):
-        return 3e5 * radians * (integrator.rtol(problem, seconds) / 1e-9) ** -0.1
+        return float(3e5 * radians * (integrator.rtol(problem, seconds) / 1e-9) ** -0.1)
     step = _STEP_NS[integrator.name]
     turns = 0.0
     if integrator.name == "strang":
         step += 150.0 * bool(eq.cubic_per_m2_s2) + 200.0 * bool(eq.friction_m_per_s2)
         turns = radians / math.pi * 1.5e4 if eq.friction_m_per_s2 else 0.0
-    return 1e5 + step * parts * count + turns
-
-
+    return float(1e5 + step * parts * count + turns)

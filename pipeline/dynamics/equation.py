@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pipeline.effects import added_mass_kg
 from pipeline.errors import DynamicsError, SceneError
@@ -333,7 +332,7 @@ def _value(estimate: Estimate | None) -> float:
     return 0.0 if estimate is None else estimate.value
 
 
-def _double(given: ArrayLike, name: str) -> Real:
+def _double(given: Any, name: str) -> Real:
     """A float or a float64 array of finite numbers; narrower floats are refused, as their rounding shows."""
     if type(given) is float and math.isfinite(given):
         return given

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pipeline.dynamics.equation import Real
 from pipeline.track import F8
@@ -20,8 +20,8 @@ def flow(omega: float, gamma: float, t: float) -> Entries:
 
     Notes
     -----
-    :math:`e^{-\\gamma t}(C + \\gamma S,\\ S;\\ -\\omega^2 S,\\ C - \\gamma S)` with :math:`S = \\sin(\\omega_d t)/\\omega_d`
-    below critical damping. Above it, :math:`\\kappa = \\sqrt{(\\gamma-\\omega)(\\gamma+\\omega)}`, the fast rate
+    :math:`e^{-\\gamma t}(C + \\gamma S,\\ S;\\ -\\omega^2 S,\\ C - \\gamma S)` with
+    :math:`S = \\sin(\\omega_d t)/\\omega_d` below critical damping. Above it, :math:`\\kappa = \\sqrt{(\\gamma-\\omega)(\\gamma+\\omega)}`, the fast rate
     :math:`\\gamma + \\kappa` and the slow rate :math:`\\omega^2/(\\gamma+\\kappa)`: no difference of near numbers, no
     product of a huge and a tiny one.
 
@@ -45,7 +45,7 @@ def flow(omega: float, gamma: float, t: float) -> Entries:
     return middle + gamma * b, b, -omega * omega * b, d
 
 
-def flows(omega: ArrayLike, gamma: ArrayLike, t: ArrayLike) -> tuple[F8, F8, F8, F8]:
+def flows(omega: Real, gamma: Real, t: Real) -> tuple[F8, F8, F8, F8]:
     """Return the entries of :func:`flow` for arrays that broadcast."""
     if type(omega) is float and type(gamma) is float:
         apart = math.sqrt(abs((gamma - omega) * (gamma + omega)))

@@ -13,7 +13,17 @@ from pipeline.dynamics.equation import Problem, Real
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
-__all__ = ["Integrator", "March", "Step", "Trajectory", "demand_run", "every_member", "integrate", "march_steps", "solved"]
+__all__ = [
+    "Integrator",
+    "March",
+    "Step",
+    "Trajectory",
+    "demand_run",
+    "every_member",
+    "integrate",
+    "march_steps",
+    "solved",
+]
 
 Step = Callable[[Real, Real], tuple[Real, Real]]
 """One step: displacement and velocity before it to those after it."""

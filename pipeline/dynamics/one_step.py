@@ -63,7 +63,7 @@ class OneStep:
             return 0.0
         if self.closed_limit is not None:
             return min(self.closed_limit(omega, gamma) for omega, gamma in pairs)
-        return min(limit_by_search(self, gamma / omega) / omega for omega, gamma in pairs)
+        return float(min(limit_by_search(self, gamma / omega) / omega for omega, gamma in pairs))
 
 
 def drag_force(eq: Equation) -> Callable[[Real], Real]:

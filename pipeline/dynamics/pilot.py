@@ -62,15 +62,17 @@ def predicted_by_pilot(
     coarse, fine = _both(integrator, truth, problem, step, stretch)
     early = share * float(np.max(np.abs(coarse.real - fine.real))) / start
     if seconds <= 1.5 * period or eq.gamma_per_s > 0.9 * eq.angular_frequency_per_s:
-        return early
-    return early + share * _carried(problem, _defects(integrator, truth, problem, step), seconds) / start
+        return float(early)
+    return float(early + share * _carried(problem, _defects(integrator, truth, problem, step), seconds) / start)
 
 
 def _pilot_step(integrator: Integrator, problem: Problem, step_s: float, period: float) -> tuple[float, float]:
     """Return the pilot's step, s, and how much finer the planned one is."""
     eq = problem.equation
     fastest = max(abs(problem.velocity_m_per_s), eq.angular_frequency_per_s * problem.amplitude_m())
-    wanted = min(2.0 * math.pi / eq.angular_frequency_per_s / STEPS_A_PERIOD, 0.2 / max(eq.drag_per_m * fastest, 1e-300))
+    wanted = min(
+        2.0 * math.pi / eq.angular_frequency_per_s / STEPS_A_PERIOD, 0.2 / max(eq.drag_per_m * fastest, 1e-300)
+    )
     wanted = max(wanted, period / MOST_STEPS)
     if not integrator.order:
         return wanted, 1.0
@@ -88,9 +90,7 @@ def _both(integrator: Integrator, truth: Integrator, problem: Problem, step: flo
     return first, second
 
 
-def _defects(
-    integrator: Integrator, truth: Integrator, problem: Problem, step: float
-) -> tuple[F8, F8]:
+def _defects(integrator: Integrator, truth: Integrator, problem: Problem, step: float) -> tuple[F8, F8]:
     """Return amplitudes, rising, and what a second adds to amplitude (real) and phase (imaginary) there."""
     eq = problem.equation
     steps = max(round(2.0 * math.pi / eq.angular_frequency_per_s / step), LEAST_STEPS)

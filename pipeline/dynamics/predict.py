@@ -51,8 +51,8 @@ def _linear(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     """Largest difference between powers of the step's matrix and the flow, on a grid of times."""
     stride = max(1, steps // POINTS)
     grown = _orbit(method, problem, h, stride, steps // stride)
-    exact = _exact(problem, h * stride * np.arange(steps // stride + 1))
-    return float(np.max(np.abs(grown - exact))) / problem.amplitude_m()
+    exact = _exact(problem, h * stride * np.arange(steps // stride + 1, dtype=np.float64))
+    return float(np.max(np.abs(grown - exact)) / problem.amplitude_m())
 
 
 def _orbit(method: OneStep, problem: Problem, h: float, stride: int, count: int) -> F8:
@@ -81,7 +81,7 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     omega = math.sqrt(max(omega**2 + 0.75 * eq.cubic_per_m2_s2 * start**2, 0.1 * omega**2))
     friction = eq.friction_m_per_s2 * h / (omega * start) * math.sqrt(1.0 + omega * h * steps / math.pi) if mu else 0.0
     if gamma + beta * start > STRONG * omega:
-        return predicted_by_pilot(method, method, problem, h, h * steps) + friction
+        return predicted_by_pilot(method, method, problem, h, h * steps) + float(friction)
     values = np.linalg.eigvals(step_matrix(method, omega * h, gamma / omega).astype(np.complex128))
     turning = np.log(values[np.argmax(values.imag)]) / h
     if turning.imag <= 0.0:
@@ -97,4 +97,4 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     cycle = max(1, min(steps, math.ceil(2.0 * math.pi / (omega * h))))
     short = _linear(method, problem, h, cycle)
     within = max(0.0, short - abs(np.expm1((turning + gamma - 1j * math.sqrt(omega**2 - gamma**2)) * h * cycle)))
-    return secular + within + friction
+    return float(secular + within + friction)

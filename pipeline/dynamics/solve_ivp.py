@@ -60,17 +60,17 @@ class SolveIvp:
 
         def of(one: Problem) -> float:
             radians = 1.0 + one.equation.angular_frequency_per_s * seconds
-            return rounding_error(one, seconds) + self.grows * radians * self.rtol(one, seconds)
+            return float(rounding_error(one, seconds) + self.grows * radians * self.rtol(one, seconds))
 
         return every_member(problem, of, max)
 
     def rtol(self, problem: Problem, seconds: float) -> float:
         """Return the local tolerance that leads to the one at the end."""
         radians = 1.0 + float(np.max(problem.equation.angular_frequency_per_s)) * seconds
-        return min(max(self.tolerance / (self.grows * radians), LEAST_RTOL), 1e-2)
+        return float(min(max(self.tolerance / (self.grows * radians), LEAST_RTOL), 1e-2))
 
     def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        t = step_s * every * np.arange(steps // every + 1)
+        t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
         rtol = self.rtol(problem, float(t[-1]))
         solved = [self._solve(one, t, rtol) for one in problem.members()]
         if not problem.is_ensemble:

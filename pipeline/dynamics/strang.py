@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics.equation import Equation, Problem
+from pipeline.dynamics.equation import Problem, Real
 from pipeline.dynamics.exact import rounding_error
 from pipeline.dynamics.flow import flow, flows
 from pipeline.dynamics.integrator import Trajectory, every_member, integrate
@@ -48,7 +48,7 @@ class Strang:
         return integrate(self, problem, step_s, steps, every, _march)
 
     def stable_step(self, problem: Problem) -> float:
-        """Return inf, as both sub-flows only ever lose energy; with a cubic term, whose kick can add some, its limit."""
+        """Return inf, as both sub-flows only lose energy; with a cubic term, whose kick can add some, its limit, s."""
         eq = problem.equation
         if not np.any(eq.cubic_per_m2_s2):
             return math.inf
@@ -61,7 +61,9 @@ class Strang:
 
         def of(one: Problem) -> float:
             rounding = rounding_error(one, seconds)
-            return rounding if one.equation.is_linear else rounding + predicted_by_pilot(self, self, one, step_s, seconds)
+            return (
+                rounding if one.equation.is_linear else rounding + predicted_by_pilot(self, self, one, step_s, seconds)
+            )
 
         return every_member(problem, of, max)
 
@@ -170,7 +172,7 @@ def _march_with_friction(problem: Problem, h: float, steps: int, every: int) -> 
     return _with_start(problem, states[:, 0], states[:, 1])
 
 
-def _turned(matrix: tuple[float, float, float, float] | tuple[F8, F8, F8, F8], y: F8, v: F8) -> tuple[F8, F8]:
+def _turned(matrix: tuple[Real, Real, Real, Real], y: Real, v: Real) -> tuple[Real, Real]:
     a, b, c, d = matrix
     return a * y + b * v, c * y + d * v
 

@@ -48,8 +48,8 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
 
     Notes
     -----
-    With :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)`, leaving a term out changes the displacement over the starting
-    amplitude by at most :math:`\\gamma T + \\gamma^2 T/2\\omega`, :math:`\\beta A_0 T`, :math:`\\mu T/A_0` and, through
+    With :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)`, leaving a term out changes the displacement over the
+    starting amplitude by at most :math:`\\gamma T + \\gamma^2 T/2\\omega`, :math:`\\beta A_0 T`, :math:`\\mu T/A_0` and, through
     the phase, :math:`3|c|A_0^2T/8\\omega`, and within a cycle by about a radian's worth more.
 
     Examples
@@ -85,7 +85,9 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
             dropped[attribute] = 0.0
         terms.append(Term(name, min(size, 1.0), kept, _why(acts, kept, size, tolerance)))
     order = list(sizes)
-    return replace(problem, equation=replace(eq, **dropped)), tuple(sorted(terms, key=lambda term: order.index(term.name)))
+    return replace(problem, equation=replace(eq, **dropped)), tuple(
+        sorted(terms, key=lambda term: order.index(term.name))
+    )
 
 
 def _why(acts: bool, kept: bool, size: float, tolerance: float) -> str:

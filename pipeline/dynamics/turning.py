@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -127,7 +126,7 @@ class Friction:
         """Return the acceleration if it keeps its way."""
         eq = self._eq
         drag = (2.0 * self._gamma + eq.drag_per_m * v * self._way) * v
-        return -(eq.spring(y) + drag + self._way * self._hold)
+        return float(-(eq.spring(y) + drag + self._way * self._hold))
 
 
 def _guess(h: float, v0: float, v1: float, a0: float, a1: float) -> float:

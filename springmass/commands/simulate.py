@@ -76,11 +76,17 @@ def run(options: argparse.Namespace) -> int:
 
 def _before(choice: Choice, count: int) -> str:
     """What is about to run, and what to expect of it."""
-    error = f"{choice.predicted_error:.2g} of the amplitude" if math.isfinite(choice.predicted_error) else "beyond all bounds"
+    error = (
+        f"{choice.predicted_error:.2g} of the amplitude"
+        if math.isfinite(choice.predicted_error)
+        else "beyond all bounds"
+    )
     lines = [f"method           {choice.integrator.words}"]
     if choice.integrator.order:
         lines.append(f"step             {choice.step_s:.6g} s, {choice.parts * count} steps")
-    lines += [f"left out         {term.name}: {term.why}" for term in choice.terms if term.size > 0 and not term.included]
+    lines += [
+        f"left out         {term.name}: {term.why}" for term in choice.terms if term.size > 0 and not term.included
+    ]
     return "\n".join([*lines, f"predicted error  {error}"])
 
 

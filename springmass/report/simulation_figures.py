@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.dynamics import Trajectory, get_integrator
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
-from springmass.report.figures import BLUE, GREEN, GREY, VERMILLION, blank_figure, style
+from springmass.report.figures import BLUE, GREEN, GREY, VERMILLION, blank_figure, report_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,7 @@ __all__ = ["EULERS", "SIMULATION_FIGURES", "against_figure", "draw_simulation"]
 
 SIMULATION_FIGURES = ("position", "velocity", "energy", "phase", "error")
 EULERS = (("forward-euler", "forward Euler", VERMILLION), ("symplectic-euler", "symplectic Euler", BLUE))
-PERIODS = 14  # drawn of a position, a velocity and a phase plot
+PERIODS, TURNS = 14, 6  # drawn against time, and in a phase plot
 POINTS = 1500
 GROWN = 1e6  # times the starting amplitude: beyond it a curve says nothing more
 WIDTH, LEFT, GAP, RIGHT, BOTTOM, TOP = 7.2, 0.68, 0.72, 0.12, 0.45, 0.62
@@ -43,7 +43,7 @@ def draw_simulation(simulation: Simulation, mass_kg: float | None) -> dict[str, 
         For the energy; without it that of one kilogram is drawn.
     """
     runs = [_euler(simulation, name) for name, *_ in EULERS]
-    with style():
+    with report_style():
         return {
             "position": _against_time(simulation, runs, "y", 1e3, "displacement / mm"),
             "velocity": _against_time(simulation, runs, "v", 1.0, "velocity / (m/s)"),
@@ -60,7 +60,7 @@ def against_figure(against: Against) -> Figure:
     ----------
     against : Against
     """
-    with style():
+    with report_style():
         figure = blank_figure(WIDTH, 4.0)
         above = figure.add_axes((LEFT / WIDTH, 0.42, (WIDTH - LEFT - RIGHT) / WIDTH, 0.47))
         below = figure.add_axes((LEFT / WIDTH, 0.12, (WIDTH - LEFT - RIGHT) / WIDTH, 0.27), sharex=above)
@@ -92,12 +92,12 @@ def _euler(simulation: Simulation, name: str) -> Trajectory:
 
 
 def _periods(simulation: Simulation) -> float:
-    return 2.0 * math.pi / simulation.problem.equation.angular_frequency_per_s
+    return float(2.0 * math.pi / simulation.problem.equation.angular_frequency_per_s)
 
 
-def _shown(simulation: Simulation, run: Trajectory) -> slice:
+def _shown(simulation: Simulation, run: Trajectory, periods: int) -> slice:
     """Return the rows of the first periods."""
-    return slice(0, min(len(run.y), int(PERIODS * _periods(simulation) / run.spacing_s) + 1))
+    return slice(0, min(len(run.y), int(periods * _periods(simulation) / run.spacing_s) + 1))
 
 
 def _pair(height: float, labels: tuple[str, str], *, share: bool = False) -> tuple[Figure, list[Axes]]:
@@ -122,15 +122,15 @@ def _legend(panel: Axes) -> None:
     panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.15, columnspacing=1.2)
 
 
-def _against_time(
-    simulation: Simulation, runs: Sequence[Trajectory], what: str, factor: float, label: str
-) -> Figure:
+def _against_time(simulation: Simulation, runs: Sequence[Trajectory], what: str, factor: float, label: str) -> Figure:
     figure, axes = _pair(2.3, ("time / s", label))
     for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
-        rows = _shown(simulation, run)
+        rows = _shown(simulation, run, PERIODS)
         t = run.t[rows]
         panel.plot(t, getattr(run, what)[rows] * factor, color=colour, lw=1.0, label=words)
-        panel.plot(t, getattr(simulation.truth, what)[rows] * factor, color="#000000", lw=0.9, ls=(0, (2, 1.5)), label="exact")
+        panel.plot(
+            t, getattr(simulation.truth, what)[rows] * factor, color="#000000", lw=0.9, ls=(0, (2, 1.5)), label="exact"
+        )
         panel.set_xlim(float(t[0]), float(t[-1]))
         _legend(panel)
     return figure
@@ -140,7 +140,10 @@ def _energy(simulation: Simulation, runs: Sequence[Trajectory], mass_kg: float |
     label = "energy / mJ" if mass_kg is not None else "energy per mass / (mJ/kg)"
     figure, axes = _pair(2.3, ("time / s", label))
     for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
-        for each, shade, dashes, name in ((run, colour, "-", words), (simulation.truth, "#000000", (0, (2, 1.5)), "exact")):
+        for each, shade, dashes, name in (
+            (run, colour, "-", words),
+            (simulation.truth, "#000000", (0, (2, 1.5)), "exact"),
+        ):
             t, energy = _energies(each, run, mass_kg)
             panel.plot(t, energy, color=shade, lw=1.0 if dashes == "-" else 0.9, ls=dashes, label=name)
         low, high = (float(f(energy[energy > 0])) if np.any(energy > 0) else 1.0 for f in (np.min, np.max))
@@ -166,12 +169,12 @@ def _energies(of: Trajectory, run: Trajectory, mass_kg: float | None) -> tuple[F
 
 def _phase(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
     figure, axes = _pair(2.7, ("displacement / mm", "velocity / (m/s)"))
-    for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
-        rows = _shown(simulation, run)
-        panel.plot(run.y[rows] * 1e3, run.v[rows], color=colour, lw=0.9, label=words)
+    for panel, run, (*_, colour) in zip(axes, runs, EULERS, strict=True):
+        rows = _shown(simulation, run, TURNS)
         exact = simulation.truth
-        panel.plot(exact.y[rows] * 1e3, exact.v[rows], color="#000000", lw=0.9, ls=(0, (2, 1.5)), label="exact")
-        panel.plot(run.y[:1] * 1e3, run.v[:1], "o", ms=4.0, color="#000000", label="start")
+        panel.plot(run.y[rows] * 1e3, run.v[rows], color=colour, lw=1.2, label="computed")
+        panel.plot(exact.y[rows] * 1e3, exact.v[rows], color="#000000", lw=0.6, label="exact")
+        panel.plot(run.y[:1] * 1e3, run.v[:1], "o", ms=3.0, color="#000000", label="start")
         panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.15, columnspacing=1.0)
     return figure
 
@@ -188,7 +191,8 @@ def _error(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
     for run, words, colour, dashes in curves:
         error = np.maximum.accumulate(np.abs(run.y - simulation.truth.y[: len(run.y)])) / start
         drawn = np.flatnonzero((error > 0) & (error < GROWN))
-        rows = drawn[np.unique(np.linspace(0, drawn.size - 1, min(drawn.size, POINTS)).astype(np.intp))] if drawn.size else []
+        thinned = np.linspace(0, drawn.size - 1, min(drawn.size, POINTS)).astype(np.intp)
+        rows = drawn[np.unique(thinned)]
         panel.plot(run.t[rows], error[rows], color=colour, ls=dashes, label=words)
     if 0.0 < choice.predicted_error < GROWN:
         panel.axhline(choice.predicted_error, color="#000000", lw=0.8, ls=(0, (2, 1.5)), label="predicted")

@@ -20,7 +20,35 @@ PARTS = Decimal("0.4")  # radians a step at most
 
 
 W = 8.66
-LONG = [1, 2, 3, 7, 18, 36, 37, 73, 181, 363, 700, 1000, 1451, 2222, 3333, 4321, 5000, 6000, 7001, 8128, 9000, 9999, 11000, 11963, 11999, 12000]
+STEP = 0.01  # s; the double, not the decimal
+LONG = [
+    1,
+    2,
+    3,
+    7,
+    18,
+    36,
+    37,
+    73,
+    181,
+    363,
+    700,
+    1000,
+    1451,
+    2222,
+    3333,
+    4321,
+    5000,
+    6000,
+    7001,
+    8128,
+    9000,
+    9999,
+    11000,
+    11963,
+    11999,
+    12000,
+]
 SHORT = [1, 2, 3, 5, 8, 13, 21, 34, 55, 89, 120, 144, 180, 233, 290, 300]
 MIXED = {"gamma": 0.0073, "drag": 0.0639}
 
@@ -59,7 +87,7 @@ def main() -> None:
             apart = max(abs(Decimal(a) - Decimal(b)) for a, b in zip(now["y"], stored[name]["y"], strict=True))
             print(f"{name}: {apart:.1e} m")
         return
-    STORED.write_text(json.dumps({"step_s": 0.01, "cases": found}, indent=1) + "\n")
+    STORED.write_text(json.dumps({"step_s": STEP, "cases": found}, indent=1) + "\n")
 
 
 def case(
@@ -74,7 +102,7 @@ def case(
 ) -> dict[str, Any]:
     """Return one case as stored: coefficients as the doubles they are, states as decimals."""
     numbers = [Decimal(x) for x in (W, gamma, drag, friction, cubic)]
-    times = [Decimal(0.01) * row for row in rows]
+    times = [Decimal(STEP) * row for row in rows]
     start = (Decimal(y), Decimal(v))
     plain = not (drag or friction or cubic)
     states = closed(numbers, start, times) if plain and gamma >= W else series(numbers, start, times)
