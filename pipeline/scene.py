@@ -39,8 +39,8 @@ class Scene:
     """The bench.
 
     Every quantity is an :class:`Estimate` or None where it is not known; a plain number in the scene file has
-    ``u`` = 0. The attributes ``spring_constant_n_per_m``, ``spring_cubic_n_per_m3``, ``start_*`` and the damping coefficients are
-    what a simulation needs; an analysis measures them instead.
+    ``u`` = 0. The attributes ``spring_constant_n_per_m``, ``spring_cubic_n_per_m3``, ``start_*`` and the damping
+    coefficients are what a simulation needs; an analysis measures them instead.
     """
 
     bob_mass_kg: Estimate | None = None

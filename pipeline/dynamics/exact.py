@@ -17,15 +17,16 @@ __all__ = ["EXACT", "Exact", "rounding_error"]
 BLOCK = 128  # states of a block from its first by one matrix each; a block's first by the closed form
 
 
-def rounding_error(problem: Problem, seconds: float) -> float:
-    """Return the error over the amplitude that rounding of the phase leaves at best.
+def rounding_error(problem: Problem, seconds: float, steps: float = 0.0) -> float:
+    """Return the error over the amplitude that rounding leaves at best: of the phase, and of steps that repeat.
 
     Notes
     -----
     The phase :math:`\\omega t` is a product of rounded numbers: its error is its own size times the relative rounding.
+    A step that is repeated repeats the rounding of its coefficients: a fifth of the relative rounding each.
     """
     phase = float(np.max(problem.equation.angular_frequency_per_s)) * seconds
-    return float(np.finfo(np.float64).eps) * (4.0 + phase)
+    return float(np.finfo(np.float64).eps) * (4.0 + phase + 0.2 * steps)
 
 
 @dataclass(frozen=True, slots=True)

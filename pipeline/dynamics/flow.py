@@ -21,9 +21,9 @@ def flow(omega: float, gamma: float, t: float) -> Entries:
     Notes
     -----
     :math:`e^{-\\gamma t}(C + \\gamma S,\\ S;\\ -\\omega^2 S,\\ C - \\gamma S)` with
-    :math:`S = \\sin(\\omega_d t)/\\omega_d` below critical damping. Above it, :math:`\\kappa = \\sqrt{(\\gamma-\\omega)(\\gamma+\\omega)}`, the fast rate
-    :math:`\\gamma + \\kappa` and the slow rate :math:`\\omega^2/(\\gamma+\\kappa)`: no difference of near numbers, no
-    product of a huge and a tiny one.
+    :math:`S = \\sin(\\omega_d t)/\\omega_d` below critical damping. Above it,
+    :math:`\\kappa = \\sqrt{(\\gamma-\\omega)(\\gamma+\\omega)}`, the fast rate :math:`\\gamma + \\kappa` and the slow
+    rate :math:`\\omega^2/(\\gamma+\\kappa)`: no difference of near numbers, no product of a huge and a tiny one.
 
     Examples
     --------

@@ -56,10 +56,11 @@ class OneStep:
         eq = problem.equation
         start = problem.amplitude_m()
         # As stiff as it gets: drag at the greatest speed, the spring at the greatest reach.
-        hard = float(np.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * start**2))
+        stiffer = 3.0 * eq.cubic_per_m2_s2 * start * start if eq.cubic_per_m2_s2 > 0 else 0.0
+        hard = float(np.sqrt(eq.angular_frequency_per_s**2 + stiffer))
         fast = eq.gamma_per_s + eq.drag_per_m * hard * start
         pairs = {(eq.angular_frequency_per_s, eq.gamma_per_s), (hard, eq.gamma_per_s), (hard, fast)}
-        if not np.isfinite(fast) or fast > 1e12 * hard:
+        if not (np.isfinite(hard) and np.isfinite(fast)) or fast > 1e12 * hard:
             return 0.0
         if self.closed_limit is not None:
             return min(self.closed_limit(omega, gamma) for omega, gamma in pairs)

@@ -37,8 +37,8 @@ def predicted_by_average(method: OneStep, problem: Problem, step_s: float, secon
     start = problem.amplitude_m()
     if start == 0.0:
         return 0.0
-    floor = rounding_error(problem, seconds)
     steps = max(1, round(seconds / step_s))
+    floor = rounding_error(problem, seconds, steps)
     with np.errstate(all="ignore"):
         if problem.equation.is_linear:
             error = _linear(method, problem, step_s, steps)

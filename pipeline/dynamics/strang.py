@@ -52,7 +52,8 @@ class Strang:
         eq = problem.equation
         if not np.any(eq.cubic_per_m2_s2):
             return math.inf
-        added = 3.0 * np.abs(eq.cubic_per_m2_s2) * np.asarray(problem.amplitude_m()) ** 2
+        with np.errstate(over="ignore"):
+            added = 3.0 * np.abs(eq.cubic_per_m2_s2) * np.square(problem.amplitude_m())
         return float(np.min(1.0 / np.sqrt(added + eq.angular_frequency_per_s**2)))
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
@@ -60,7 +61,7 @@ class Strang:
         from pipeline.dynamics.pilot import predicted_by_pilot
 
         def of(one: Problem) -> float:
-            rounding = rounding_error(one, seconds)
+            rounding = rounding_error(one, seconds, seconds / step_s)
             return (
                 rounding if one.equation.is_linear else rounding + predicted_by_pilot(self, self, one, step_s, seconds)
             )

@@ -49,8 +49,8 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
     Notes
     -----
     With :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)`, leaving a term out changes the displacement over the
-    starting amplitude by at most :math:`\\gamma T + \\gamma^2 T/2\\omega`, :math:`\\beta A_0 T`, :math:`\\mu T/A_0` and, through
-    the phase, :math:`3|c|A_0^2T/8\\omega`, and within a cycle by about a radian's worth more.
+    starting amplitude by at most :math:`\\gamma T + \\gamma^2 T/2\\omega`, :math:`\\beta A_0 T`, :math:`\\mu T/A_0`
+    and, through the phase, :math:`3|c|A_0^2T/8\\omega`, and within a cycle by about a radian's worth more.
 
     Examples
     --------

@@ -1,0 +1,175 @@
+"""The rules that every integrator keeps; a new one passes by standing in ``INTEGRATORS``."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem, Trajectory, get_integrator
+from pipeline.errors import DynamicsError
+
+STORED = json.loads((Path(__file__).resolve().parents[1] / "reference" / "dynamics.json").read_text())
+STEP = STORED["step_s"]
+FIXED = [name for name, each in INTEGRATORS.items() if each.order]
+LOCATED = ("exact", "strang", "taylor", "lsoda", "dop853", "averaged")  # those that find turning points, or need none
+# What a prediction may be short of the truth: a kink that is not located scatters, scipy's tolerance is a wish.
+SHORT = {"lsoda": 20.0, "dop853": 5.0}
+BENCH = Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235)
+
+
+@pytest.fixture(params=INTEGRATORS)
+def integrator(request: pytest.FixtureRequest) -> Integrator:
+    """Return each integrator by its name."""
+    return get_integrator(request.param)
+
+
+def problem_of(case: dict[str, Any]) -> Problem:
+    """Return the problem of a stored case."""
+    return Problem(Equation(**case["equation"]), case["displacement_m"], case["velocity_m_per_s"])
+
+
+def error_of(case: dict[str, Any], trajectory: Trajectory) -> float:
+    """Return the largest error over the amplitude at the stored times."""
+    truth = np.array([float(y) for y in case["y"]])
+    return float(np.max(np.abs(trajectory.y[case["rows"]] - truth))) / trajectory.problem.amplitude_m()
+
+
+@pytest.mark.parametrize("name", STORED["cases"])
+def test_the_error_against_forty_digits_is_the_predicted_one(integrator: Integrator, name: str) -> None:
+    """Against a reference that shares no code, the error is no larger than predicted, up to a stated factor."""
+    case = STORED["cases"][name]
+    problem, steps = problem_of(case), case["rows"][-1]
+    if integrator.refusal(problem):
+        with pytest.raises(DynamicsError, match=integrator.name):
+            integrator.run(problem, STEP, steps)
+        return
+    if integrator.stable_step(problem) < STEP:
+        pytest.skip("the stored step is beyond this method's limit, which another test holds")
+    parts = 4 if integrator.order else 1
+    predicted = integrator.predicted_error(problem, STEP / parts, STEP * steps)
+    found = error_of(case, integrator.run(problem, STEP / parts, steps * parts, every=parts))
+    located = integrator.name in LOCATED or not problem.equation.has_friction
+    assert found <= SHORT.get(integrator.name, 1.3 if located else 12.0) * predicted
+
+
+@pytest.mark.parametrize("name", STORED["cases"])
+def test_the_reference_among_them_reaches_rounding(name: str) -> None:
+    """The Taylor series with turning points located errs by at most 1e-13 of the amplitude over up to 120 s."""
+    case = STORED["cases"][name]
+    assert error_of(case, get_integrator("taylor").run(problem_of(case), STEP, case["rows"][-1])) <= 1e-13
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_the_order_is_what_the_slope_says(name: str) -> None:
+    """A line through log error against log step has the order as its slope."""
+    integrator = get_integrator(name)
+    case = STORED["cases"]["mixed"]
+    rows = [row for row in case["rows"] if row <= 1000]
+    truth = np.array([float(y) for y in case["y"]][: len(rows)])
+    parts = np.array({1: [16, 32, 64, 128], 2: [2, 4, 8, 16], 4: [1, 2, 4, 8]}[integrator.order])
+    errors = []
+    for k in parts.tolist():
+        run = integrator.run(problem_of(case), STEP / k, rows[-1] * k, every=k)
+        errors.append(np.max(np.abs(run.y[rows] - truth)))
+    slope = np.polyfit(np.log(1.0 / parts), np.log(errors), 1)[0]
+    assert slope == pytest.approx(integrator.order, abs=0.12)
+
+
+@pytest.mark.parametrize("name", sorted(set(INTEGRATORS) - set(FIXED)))
+def test_without_an_order_the_spacing_changes_nothing(name: str) -> None:
+    """Where the step is only the spacing of what is kept, a wider one gives the same states."""
+    integrator = get_integrator(name)
+    problem = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.0073), 0.05)
+    fine, coarse = integrator.run(problem, 0.01, 400), integrator.run(problem, 0.08, 50)
+    tolerance = 1e-12 if name not in ("lsoda", "dop853") else 1e-5
+    np.testing.assert_allclose(fine.y[::8], coarse.y, atol=0.05 * tolerance)
+
+
+def test_an_ensemble_is_its_members(integrator: Integrator) -> None:
+    """Every member of an ensemble moves as it does alone."""
+    rng = np.random.default_rng(2)
+    size = 5
+    drag = 0.0 if integrator.name == "exact" else rng.uniform(0.0, 0.3, size)
+    equation = Equation.from_laws(
+        rng.uniform(5.0, 12.0, size), gamma_per_s=rng.uniform(0.0, 0.5, size), beta_per_m_s=drag
+    )
+    problem = Problem(equation, rng.uniform(0.01, 0.1, size), rng.uniform(-0.2, 0.2, size))
+    together = integrator.run(problem, 0.01, 200, every=10)
+    assert together.y.shape == together.v.shape == (21, size)
+    for i, one in enumerate(problem.members()):
+        alone = integrator.run(one, 0.01, 200, every=10)
+        tolerance = {"lsoda": 1e-5, "dop853": 1e-5}.get(integrator.name, 1e-12)
+        np.testing.assert_allclose(together.y[:, i], alone.y, rtol=0, atol=0.1 * tolerance)
+        np.testing.assert_allclose(together.v[:, i], alone.v, rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("name", [name for name in INTEGRATORS if name != "exact"])
+def test_an_ensemble_with_friction_and_a_cubic_spring_is_its_members(name: str) -> None:
+    """Turning points within one step of many members are treated as those of one."""
+    integrator = get_integrator(name)
+    rng = np.random.default_rng(3)
+    equation = Equation.from_laws(
+        rng.uniform(6.0, 10.0, 4), beta_per_m_s=0.2, mu_m_per_s=rng.uniform(1e-3, 1e-2, 4), cubic_per_m2_s2=50.0
+    )
+    problem = Problem(equation, 0.05)
+    together = integrator.run(problem, 0.01, 300, every=5)
+    for i, one in enumerate(problem.members()):
+        alone = integrator.run(one, 0.01, 300, every=5)
+        tolerance = {"lsoda": 1e-4, "dop853": 1e-4}.get(name, 1e-9)
+        np.testing.assert_allclose(together.y[:, i], alone.y, rtol=0, atol=0.05 * tolerance)
+
+
+def test_keeping_fewer_states_changes_none(integrator: Integrator) -> None:
+    """``every`` chooses among the same steps."""
+    problem = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.05), 0.05)
+    all_, some = integrator.run(problem, 0.01, 120), integrator.run(problem, 0.01, 120, every=12)
+    atol = 1e-7 if integrator.name in ("lsoda", "dop853") else 1e-15
+    np.testing.assert_allclose(some.y, all_.y[::12], rtol=0, atol=atol)
+    np.testing.assert_allclose(some.t, all_.t[::12], rtol=1e-15)
+
+
+def test_a_bob_at_rest_stays(integrator: Integrator) -> None:
+    """From the rest position without speed nothing happens, and nothing is divided by zero."""
+    equation = Equation(angular_frequency_per_s=8.66) if integrator.name == "exact" else BENCH
+    run = integrator.run(Problem(equation, 0.0), 0.01, 50)
+    assert not run.y.any()
+    assert not run.v.any()
+    assert np.all(run.relative_energy() == 1.0)
+
+
+def test_bad_input_is_one_line(integrator: Integrator) -> None:
+    """A step or a number of steps that cannot be is refused in one line."""
+    problem = Problem(Equation(angular_frequency_per_s=8.66), 0.05)
+    bad = ((0.0, 10, 1), (-0.01, 10, 1), (math.nan, 10, 1), (0.01, 0, 1), (0.01, 10, 3), (0.01, 10, 0))
+    for step, steps, every in bad:
+        with pytest.raises(DynamicsError) as caught:
+            integrator.run(problem, step, steps, every=every)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_inside_the_limit_nothing_grows_and_beyond_it_all_does(name: str) -> None:
+    """Free linear motion stays bounded at 0.99 of the limit; at 1.02 of it the energy grows without end."""
+    integrator = get_integrator(name)
+    for ratio in (0.05, 1.0, 30.0):
+        problem = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=8.66 * ratio), 0.05)
+        limit = integrator.stable_step(problem)
+        if math.isinf(limit):
+            run = integrator.run(problem, 10.0 / 8.66, 500)
+            assert np.all(np.abs(run.y) <= 0.05 * (1.0 + 1e-12))
+            continue
+        inside = integrator.run(problem, 0.99 * limit, 20_000, every=20_000)
+        assert inside.relative_energy()[-1] < 0.5
+        grown = integrator.run(problem, 1.02 * limit, 3000, every=3000)
+        assert grown.relative_energy()[-1] > 1.5
+
+
+def test_names_are_told() -> None:
+    """An unknown name gives one line with the allowed ones."""
+    with pytest.raises(DynamicsError, match=r"unknown method 'leapfrog'; allowed are auto, forward-euler, .*averaged"):
+        get_integrator("leapfrog")

@@ -1,0 +1,292 @@
+"""What breaks a trajectory, and how: each case with the figure that it must show, and none of them quiet."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.dynamics import INTEGRATORS, Equation, Problem, get_integrator
+from pipeline.dynamics.flow import flow
+from pipeline.dynamics.stability import growth_per_step, step_matrix
+from pipeline.errors import DynamicsError
+
+STORED = json.loads((Path(__file__).resolve().parents[1] / "reference" / "dynamics.json").read_text())["cases"]
+OMEGA = 8.66
+FREE = Equation(angular_frequency_per_s=OMEGA)
+MIXED = Equation.from_laws(OMEGA, gamma_per_s=0.0073, beta_per_m_s=0.235)
+EXPLICIT = ("forward-euler", "symplectic-euler", "verlet", "yoshida4", "rk4")
+UNBOUNDED = ("exact", "strang")
+
+
+def limit(name: str, ratio: float) -> float:
+    """Return the largest stable omega h at a damping ratio."""
+    equation = Equation(angular_frequency_per_s=OMEGA, gamma_per_s=ratio * OMEGA)
+    return OMEGA * get_integrator(name).stable_step(Problem(equation, 0.05))
+
+
+@pytest.mark.parametrize("x", [1e-3, 1e-2, 0.0866, 1.0, 3.0])
+def test_forward_euler_grows_by_the_root_of_one_plus_x_squared(x: float) -> None:
+    """An undamped step of x = omega h multiplies the amplitude by sqrt(1 + x^2), run and matrix alike."""
+    method = get_integrator("forward-euler")
+    run = method.run(Problem(FREE, 0.05), x / OMEGA, 100)
+    grown = math.sqrt(run.relative_energy()[-1])
+    assert grown == pytest.approx((1.0 + x * x) ** 50, rel=1e-12)
+    assert growth_per_step(method, x, 0.0) == pytest.approx(math.sqrt(1.0 + x * x), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [("symplectic-euler", 2.0), ("verlet", 2.0), ("rk4", 2.8284), ("yoshida4", 1.5734)]
+)
+def test_undamped_limits(name: str, expected: float) -> None:
+    """Undamped, omega h may be 2.000, 2.000, 2.828 and 1.573."""
+    assert limit(name, 0.0) == pytest.approx(expected, abs=5e-4)
+
+
+@pytest.mark.parametrize("name", UNBOUNDED)
+@pytest.mark.parametrize("x", [0.1, 1.0, 2.0, 5.0, 10.0])
+def test_exact_flows_have_no_limit(name: str, x: float) -> None:
+    """Strang and the exact propagator keep the energy to 1e-11 up to omega h = 10."""
+    run = get_integrator(name).run(Problem(FREE, 0.05), x / OMEGA, 10_000)
+    assert math.isinf(limit(name, 0.0))
+    np.testing.assert_allclose(run.relative_energy(), 1.0, atol=1e-11)
+
+
+@pytest.mark.parametrize("ratio", [1e-4, 0.01, 0.3])
+def test_damped_forward_euler_is_stable_below_two_gamma_over_omega_squared(ratio: float) -> None:
+    """The limit is 2 gamma / omega^2: just inside the amplitude falls, just outside it grows."""
+    method = get_integrator("forward-euler")
+    assert limit("forward-euler", ratio) == pytest.approx(2.0 * ratio, rel=1e-12)
+    assert (
+        growth_per_step(method, 2.0 * ratio * 0.999, ratio) < 1.0 < growth_per_step(method, 2.0 * ratio * 1.001, ratio)
+    )
+
+
+def test_undamped_forward_euler_has_no_stable_step() -> None:
+    """Its limit is 0."""
+    assert limit("forward-euler", 0.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [("symplectic-euler", 0.828), ("verlet", 1.0), ("yoshida4", 0.978), ("rk4", 2.785)]
+)
+def test_limits_at_critical_damping(name: str, expected: float) -> None:
+    """At gamma = omega: 0.83, 1.0, 0.98 and 2.79."""
+    assert limit(name, 1.0) == pytest.approx(expected, abs=2e-3)
+
+
+@pytest.mark.parametrize(("name", "expected"), [("symplectic-euler", 1e-3), ("verlet", 1e-3), ("rk4", 1.393e-3)])
+def test_limits_where_damping_is_stiff(name: str, expected: float) -> None:
+    """At gamma / omega = 1000: 0.001, 0.001 and 0.0014."""
+    assert limit(name, 1000.0) == pytest.approx(expected, rel=2e-3)
+
+
+def test_energy_of_rk4_after_ten_million_steps() -> None:
+    """At omega h = 0.0866 RK4 loses 5.7 %: 1e5 steps as run, 1e7 as the power of the same step."""
+    method = get_integrator("rk4")
+    run = method.run(Problem(FREE, 0.05), 0.01, 100_000, every=100_000)
+    each = growth_per_step(method, 0.0866, 0.0)
+    assert run.relative_energy()[-1] == pytest.approx(each**200_000, rel=1e-9)
+    assert each**20_000_000 - 1.0 == pytest.approx(-0.057, abs=0.001)
+
+
+@pytest.mark.parametrize(("name", "drift"), [("exact", 4e-15), ("strang", 2e-9)])
+def test_energy_of_exact_flows_after_ten_million_steps(name: str, drift: float) -> None:
+    """Evaluated at each time the exact flow keeps the energy to 4e-15; stepped, Strang to 2e-9."""
+    run = get_integrator(name).run(Problem(FREE, 0.05), 0.01, 10_000_000, every=1_000_000)
+    assert np.max(np.abs(run.relative_energy() - 1.0)) <= drift
+
+
+def test_single_precision_would_lose_two_fifths_and_is_refused() -> None:
+    """The exact step rounded to float32 changes the energy by tens of per cent in 1e7 steps; float32 is an error."""
+    a, b, c, d = (np.float32(entry) for entry in flow(OMEGA, 0.0, 0.01))
+    det = float(a) * float(d) - float(b) * float(c)
+    assert abs(det**10_000_000 - 1.0) > 0.2
+    for given in (np.float32(0.05), np.full(3, 0.05, np.float32), np.full(3, 0.05, np.float16)):
+        with pytest.raises(DynamicsError, match="double precision"):
+            Problem(FREE, given)
+        with pytest.raises(DynamicsError, match="double precision"):
+            Equation(angular_frequency_per_s=given)
+
+
+def test_times_do_not_accumulate() -> None:
+    """A sum of 1e7 hundredths is off by 1.4e-5 s (in float32 by 4319 s); the times of a run are not off at all."""
+    count = 10_000_000
+    assert np.cumsum(np.full(count, 0.01))[-1] - 1e5 == pytest.approx(-1.4e-5, abs=0.2e-5)
+    narrow = np.cumsum(np.full(count, 0.01, np.float32), dtype=np.float32)
+    assert float(narrow[-1]) - 1e5 == pytest.approx(-4319.0, abs=5.0)
+    run = get_integrator("exact").run(Problem(FREE, 0.05), 0.01, count, every=1000)
+    assert run.t[-1] == 1e5
+    np.testing.assert_array_equal(run.t, 10.0 * np.arange(count // 1000 + 1))
+
+
+@pytest.mark.parametrize("size", [1e4, 1e8, 1e100, 1e300])
+def test_drag_beyond_all_steps(size: float) -> None:
+    """With beta |v| h >> 1 Strang is finite up to 1e300 m; an explicit method says that it ran away, or is right."""
+    problem = Problem(MIXED, size)
+    run = get_integrator("strang").run(problem, 0.01, 1000)
+    assert np.all(np.isfinite(run.y))
+    assert np.all(np.abs(run.y) <= size)
+    for name in EXPLICIT:
+        method = get_integrator(name)
+        assert method.stable_step(problem) < 0.01
+        if name == "yoshida4":
+            continue  # its drag is an exact flow as well, if not forwards only: wrong there, but finite
+        with pytest.raises(DynamicsError, match=f"{name} .*beyond the range of numbers.*strang"):
+            method.run(problem, 0.01, 1000)
+
+
+@pytest.mark.parametrize("size", [1e4, 1e8])
+def test_the_series_shortens_its_step_where_drag_is_huge(size: float) -> None:
+    """The adaptive series stays with Strang in fine steps, though the drag's own time is 1e-5 s and less."""
+    problem = Problem(MIXED, size)
+    series = get_integrator("taylor").run(problem, 0.01, 50)
+    fine = get_integrator("strang").run(problem, 1e-2 / 4096, 50 * 4096, every=4096)
+    np.testing.assert_allclose(series.y, fine.y, rtol=0, atol=1e-4 * size)
+
+
+@pytest.mark.parametrize("size", [1e-310, 1e-160, 1e-100, 1.0, 1e155, 1e300])
+@pytest.mark.parametrize("name", [*EXPLICIT[1:], "exact", "strang", "taylor", "averaged", "dop853"])
+def test_every_amplitude_moves_alike(name: str, size: float) -> None:
+    """From 1e-310 to 1e300 m a linear motion is the one at 1 m, scaled; so is its relative energy."""
+    equation = Equation(angular_frequency_per_s=OMEGA, gamma_per_s=0.1)
+    method = get_integrator(name)
+    one = method.run(Problem(equation, 1.0), 0.01, 300)
+    run = method.run(Problem(equation, size), 0.01, 300)
+    # At 1e-310 a number has five digits left.
+    tolerance = 1e-4 if size < 1e-300 else 1e-5 if name == "dop853" else 1e-12
+    np.testing.assert_allclose(run.y / size, one.y, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(run.relative_energy(), one.relative_energy(), rtol=10 * tolerance)
+
+
+def test_an_energy_that_no_number_holds_is_refused() -> None:
+    """At 1e155 m it is infinite, at 1e-160 m it has no digits left, at 1e-310 m it is 0: an error, not that number."""
+    for size in (1e155, 1e-160, 1e-310):
+        run = get_integrator("exact").run(Problem(FREE, size), 0.01, 100)
+        with pytest.raises(DynamicsError, match="relative energy"):
+            run.energy_j_per_kg()
+        np.testing.assert_allclose(run.relative_energy(), 1.0, rtol=1e-4)
+    fine = get_integrator("exact").run(Problem(FREE, 0.05), 0.01, 100).energy_j_per_kg()
+    np.testing.assert_allclose(fine, 0.5 * (OMEGA * 0.05) ** 2, rtol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["critical", "nearly critical", "overdamped", "a thousand times overdamped"])
+def test_every_damping_keeps_its_digits(name: str) -> None:
+    """At gamma = omega, a hair beside it, and at 1000 omega the exact flow errs by at most 8e-15."""
+    case = STORED[name]
+    problem = Problem(Equation(**case["equation"]), case["displacement_m"], case["velocity_m_per_s"])
+    run = get_integrator("exact").run(problem, 0.01, case["rows"][-1])
+    truth = np.array([float(y) for y in case["y"]])
+    assert np.max(np.abs(run.y[case["rows"]] - truth)) / 0.05 <= 8e-15
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1e-8, 0.5, 1.0 - 2.0**-53, 1.0, 1.0 + 2.0**-52, 2.0, 1e3, 1e6])
+@pytest.mark.parametrize("x", [1e-8, 1e-3, 1.0, 10.0])
+@pytest.mark.parametrize("name", UNBOUNDED)
+def test_no_damping_and_no_step_is_too_much(name: str, ratio: float, x: float) -> None:
+    """gamma / omega from 0 through exactly 1 to 1e6, omega h from 1e-8 to 10: finite, bounded, without a warning.
+
+    Over a time in which gamma t passes 710 too, where an exponential alone overflows.
+    """
+    equation = Equation(angular_frequency_per_s=OMEGA, gamma_per_s=ratio * OMEGA)
+    run = get_integrator(name).run(Problem(equation, 0.05), x / OMEGA, 2000, every=10)
+    assert np.all(np.isfinite(run.y))
+    assert np.all(np.abs(run.y) <= 0.05 * (1.0 + 1e-11))
+    assert np.all(np.diff(run.relative_energy()) <= 1e-11)
+
+
+@pytest.mark.parametrize("x", [1e-8, 1e-6, 1e-3])
+@pytest.mark.parametrize("name", [*EXPLICIT, "strang"])
+def test_tiny_steps_lose_nothing(name: str, x: float) -> None:
+    """1000 steps of omega h down to 1e-8 are within rounding and the method's own error of the exact answer."""
+    method = get_integrator(name)
+    problem = Problem(FREE, 0.05, 0.1)
+    run, truth = method.run(problem, x / OMEGA, 1000), get_integrator("exact").run(problem, x / OMEGA, 1000)
+    assert np.max(np.abs(run.y - truth.y)) / problem.amplitude_m() <= 1e-12 + 1.2 * x * x * 1000
+
+
+def test_friction_stops_the_bob_where_it_must() -> None:
+    """With f = 0.5 m/s^2 it rests at -3.336 mm and does not creep: located turning points, and the latch."""
+    problem = Problem(Equation(angular_frequency_per_s=OMEGA, friction_m_per_s2=0.5), 0.05)
+    for name in ("strang", "taylor", "dop853"):
+        run = get_integrator(name).run(problem, 0.01, 1000)
+        assert run.y[-1] == pytest.approx(-3.336e-3, abs=1e-6)
+        assert np.ptp(run.y[-500:]) == 0.0
+        assert not run.v[-500:].any()
+
+
+@pytest.mark.parametrize("name", EXPLICIT)
+def test_without_located_turning_points_the_bob_creeps(name: str) -> None:
+    """A fixed step ends 0.1 to 4 mm off, and goes on moving."""
+    problem = Problem(Equation(angular_frequency_per_s=OMEGA, friction_m_per_s2=0.5), 0.05)
+    run = get_integrator(name).run(problem, 0.01, 1000)
+    assert 1e-4 < abs(run.y[-1] + 3.336e-3) < 4e-3
+    assert np.ptp(run.y[-500:]) > 0.0 or np.any(run.v[-500:])
+
+
+@pytest.mark.parametrize("name", ["strang", "taylor"])
+@pytest.mark.parametrize("friction", [1e-12, 1.0, 1e6, 1e300])
+def test_any_friction_ends_at_rest(name: str, friction: float) -> None:
+    """From next to none to overwhelming, from speed as well: finite, and held where the spring cannot pull."""
+    problem = Problem(Equation(angular_frequency_per_s=OMEGA, friction_m_per_s2=friction), 0.05, 0.2)
+    run = get_integrator(name).run(problem, 0.01, 500)
+    assert np.all(np.isfinite(run.y))
+    if friction >= 1.0:
+        assert run.v[-1] == 0.0
+        assert abs(OMEGA**2 * run.y[-1]) <= friction
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_state_that_is_no_number_is_refused(name: str, bad: float) -> None:
+    """NaN and infinity in a state or a coefficient are one line before anything runs."""
+    for make in (
+        lambda: Problem(FREE, bad),
+        lambda: Problem(FREE, 0.05, bad),
+        lambda: Equation(angular_frequency_per_s=bad),
+    ):
+        with pytest.raises(DynamicsError, match="must be") as caught:
+            get_integrator(name).run(make(), 0.01, 10)
+        assert "\n" not in str(caught.value)
+
+
+def test_negative_and_senseless_coefficients_are_refused() -> None:
+    """Each names itself and what is allowed."""
+    with pytest.raises(DynamicsError, match="gamma_per_s must be 0 or more, got -1"):
+        Equation(angular_frequency_per_s=OMEGA, gamma_per_s=-1.0)
+    with pytest.raises(DynamicsError, match="angular_frequency_per_s must be between"):
+        Equation(angular_frequency_per_s=0.0)
+    with pytest.raises(DynamicsError, match="one number, got shapes"):
+        Problem(Equation(angular_frequency_per_s=np.ones(3)), np.ones(2))
+    with pytest.raises(DynamicsError, match="one dimension"):
+        Problem(FREE, np.ones((2, 2)))
+    with pytest.raises(DynamicsError, match="number of double precision"):
+        Problem(FREE, "far")
+    with pytest.raises(DynamicsError, match="at least one member"):
+        get_integrator("strang").predicted_error(Problem(FREE, np.ones(0)), 0.01, 1.0)
+
+
+def test_a_softening_spring_lets_nothing_escape() -> None:
+    """A start beyond the point where the spring would pull is refused; just inside it stays bounded."""
+    equation = Equation(angular_frequency_per_s=OMEGA, cubic_per_m2_s2=-(OMEGA**2) / 0.1**2)
+    for start in ((0.1, 0.0), (0.2, 0.0), (0.0, OMEGA * 0.0708)):
+        with pytest.raises(DynamicsError, match="softening"):
+            Problem(equation, *start)
+    run = get_integrator("taylor").run(Problem(equation, 0.099), 0.01, 1000)
+    assert np.all(np.abs(run.y) <= 0.099 * (1.0 + 1e-10))
+
+
+def test_growth_beyond_numbers_is_an_error_with_its_time() -> None:
+    """Undamped forward Euler in giant steps says when it left the range, and what to take instead."""
+    with pytest.raises(DynamicsError, match=r"forward-euler ran beyond the range of numbers by t = .* s; take"):
+        get_integrator("forward-euler").run(Problem(FREE, 0.05), 1.0, 2000)
+
+
+def test_a_step_matrix_is_the_step() -> None:
+    """The matrix that limits are read from does what the run does."""
+    method = get_integrator("verlet")
+    run = method.run(Problem(Equation(angular_frequency_per_s=1.0, gamma_per_s=0.2), 0.3, 0.7), 0.4, 1)
+    np.testing.assert_allclose(step_matrix(method, 0.4, 0.2) @ [0.3, 0.7], [run.y[1], run.v[1]], rtol=1e-14)
