@@ -165,8 +165,8 @@ def test_inside_the_limit_nothing_grows_and_beyond_it_all_does(name: str) -> Non
             continue
         inside = integrator.run(problem, 0.99 * limit, 20_000, every=20_000)
         assert inside.relative_energy()[-1] < 0.5
-        grown = integrator.run(problem, 1.02 * limit, 3000, every=3000)
-        assert grown.relative_energy()[-1] > 1.5
+        grown = integrator.run(problem, 1.02 * limit, 500, every=500)
+        assert grown.relative_energy()[-1] > 1.05
 
 
 def test_names_are_told() -> None:
