@@ -25,6 +25,8 @@ LABELS = {
 
 def run(options: argparse.Namespace) -> int:
     """Measure estimators on simulated records, or put one record before all of them."""
+    if options.integrators:
+        return _integrators(options)
     if options.input is None:
         return _simulated(options)
     given = [
@@ -70,6 +72,28 @@ def _simulated(options: argparse.Namespace) -> int:
         write_whole(out / "trade.pdf", render(figure, "pdf"))
         write_whole(out / "trade.json", json.dumps(content, indent=2) + "\n")
     print(json.dumps(content) if options.json else trade_text(trade, absent))
+    return OK
+
+
+def _integrators(options: argparse.Namespace) -> int:
+    given = [name for name in ("input", *SIMULATED[:-1]) if getattr(options, name) is not None]
+    if given:
+        names = ", ".join(name.replace("_", "-") for name in given)
+        raise ProgramError(f"--integrators measures trajectories and takes only --out and --json; got {names}", USAGE)
+    from springmass.trade.integrators import integrators_figure, integrators_json, integrators_text, measure_integrators
+
+    out = None if options.out is None else make_folder(options.out)
+    rows = measure_integrators(time.perf_counter, progress=lambda scene: print(f"trade: {scene}", file=sys.stderr))
+    content = integrators_json(rows, __version__)
+    if out is not None:
+        from springmass.report.figures import render
+        from storage.atomic import write_whole
+
+        figure = integrators_figure(rows)
+        write_whole(out / "integrators.svg", render(figure, "svg"))
+        write_whole(out / "integrators.pdf", render(figure, "pdf"))
+        write_whole(out / "integrators.json", json.dumps(content, indent=2) + "\n")
+    print(json.dumps(content) if options.json else integrators_text(rows))
     return OK
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.dynamics import Trajectory, get_integrator
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
-from springmass.report.figures import BLUE, GREEN, GREY, VERMILLION, blank_figure, report_style
+from springmass.report.style import BLUE, GREEN, GREY, VERMILLION, report_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,7 +61,7 @@ def against_figure(against: Against) -> Figure:
     against : Against
     """
     with report_style():
-        figure = blank_figure(WIDTH, 4.0)
+        figure = _blank(WIDTH, 4.0)
         above = figure.add_axes((LEFT / WIDTH, 0.42, (WIDTH - LEFT - RIGHT) / WIDTH, 0.47))
         below = figure.add_axes((LEFT / WIDTH, 0.12, (WIDTH - LEFT - RIGHT) / WIDTH, 0.27), sharex=above)
         dense: dict[str, Any] = {"rasterized": against.t.size > POINTS}
@@ -102,7 +102,7 @@ def _shown(simulation: Simulation, run: Trajectory, periods: int) -> slice:
 
 def _pair(height: float, labels: tuple[str, str], *, share: bool = False) -> tuple[Figure, list[Axes]]:
     """Make two panels beside each other, each under its method's name."""
-    figure = blank_figure(WIDTH, height + BOTTOM + TOP)
+    figure = _blank(WIDTH, height + BOTTOM + TOP)
     wide = (WIDTH - LEFT - GAP - RIGHT) / 2.0
     axes: list[Axes] = []
     for i, (_, words, _) in enumerate(EULERS):
@@ -120,6 +120,16 @@ def _pair(height: float, labels: tuple[str, str], *, share: bool = False) -> tup
 
 def _legend(panel: Axes) -> None:
     panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.15, columnspacing=1.2)
+
+
+def _blank(width: float, height: float) -> Figure:
+    """Return a figure of this size, inches, that belongs to no window."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    return figure
 
 
 def _against_time(simulation: Simulation, runs: Sequence[Trajectory], what: str, factor: float, label: str) -> Figure:
@@ -181,7 +191,7 @@ def _phase(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
 
 def _error(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
     """Running maxima: an error crosses zero twice a period."""
-    figure = blank_figure(WIDTH, 3.2)
+    figure = _blank(WIDTH, 3.2)
     panel = figure.add_axes((LEFT / WIDTH, 0.14, (WIDTH - LEFT - RIGHT) / WIDTH, 0.74))
     start = simulation.problem.amplitude_m() or 1.0
     choice = simulation.choice

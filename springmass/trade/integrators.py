@@ -1,0 +1,222 @@
+"""What a trajectory costs: every integrator's error against its time on this machine, and what ``auto`` takes.
+
+Times are the least of several runs; errors are against the adaptive Taylor series, whose own is below 1e-13.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem
+from pipeline.dynamics.choose import choose
+from pipeline.dynamics.solve_ivp import SolveIvp
+from pipeline.dynamics.taylor import TAYLOR, Taylor
+from pipeline.errors import DynamicsError
+from springmass.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, panels, report_style
+from springmass.trade.front import Point
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["SCENES", "Work", "integrators_figure", "integrators_json", "integrators_text", "measure_integrators"]
+
+SPACING_S, COUNT = 0.01, 12_000
+ROUNDS = 3
+PARTS = (1, 2, 4, 8, 16)
+TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+ROUNDING = 1e-13
+SCENES = {
+    "linear": Equation.from_laws(8.66, gamma_per_s=0.0073),
+    "mixed drag": Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235),
+    "mixed drag and friction": Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235, mu_m_per_s=1e-4),
+}
+START_M = 0.05
+_LOOKS = {
+    "forward-euler": (GREY, "o"),
+    "symplectic-euler": (SKY, "s"),
+    "verlet": (BLUE, "^"),
+    "yoshida4": (GREEN, "v"),
+    "rk4": (VERMILLION, "D"),
+    "exact": ("#000000", "P"),
+    "strang": (ORANGE, "o"),
+    "taylor": (PURPLE, "s"),
+    "lsoda": (GREY, "x"),
+    "dop853": ("#000000", "+"),
+    "averaged": (SKY, "*"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """One integrator at one setting.
+
+    Parameters
+    ----------
+    scene : str
+    method : str
+    setting : str
+        Its step or its tolerance.
+    error : float
+        Largest, over the amplitude.
+    seconds : float
+        Least time of the run, s.
+    tolerance : float or None
+        For which ``auto`` took it; None where it was not asked.
+    """
+
+    scene: str
+    method: str
+    setting: str
+    error: float
+    seconds: float
+    tolerance: float | None = None
+
+    @property
+    def point(self) -> Point:
+        """Time and error as a point of the trade."""
+        return Point(self.method, self.seconds, self.error, "tier" if self.tolerance is not None else "reference")
+
+
+def measure_integrators(
+    timer: Callable[[], float],
+    *,
+    count: int = COUNT,
+    rounds: int = ROUNDS,
+    progress: Callable[[str], None] | None = None,
+) -> list[Work]:
+    """Measure every integrator on every scene, and what ``auto`` takes at each tolerance.
+
+    Parameters
+    ----------
+    timer : callable
+        To seconds; the difference of two calls is a time.
+    count : int
+        Samples of each trajectory, a hundredth of a second apart.
+    rounds : int
+        Runs of which the quickest counts.
+    progress : callable, optional
+        Told each scene before it is measured.
+    """
+    rows: list[Work] = []
+    for scene, equation in SCENES.items():
+        if progress is not None:
+            progress(scene)
+        problem = Problem(equation, START_M)
+        truth = TAYLOR.run(problem, SPACING_S, count).y
+        for integrator, parts, setting in _settings(problem):
+            found = _measured(integrator, problem, parts, count, truth, timer, rounds)
+            if found is not None:
+                rows.append(Work(scene, integrator.name, setting, *found))
+        for tolerance in TOLERANCES:
+            choice = choose(problem, SPACING_S, count, tolerance)
+            found = _measured(choice.integrator, choice.problem, choice.parts, count, truth, timer, rounds)
+            if found is not None:
+                rows.append(Work(scene, choice.integrator.name, f"step {choice.step_s:.3g} s", *found, tolerance))
+    return rows
+
+
+def integrators_text(rows: Sequence[Work]) -> str:
+    """Return the measurement as a table, the choices of auto beneath each scene."""
+    lines: list[str] = []
+    for scene, group in itertools.groupby(rows, key=lambda row: row.scene):
+        lines += ["", scene, "-" * 66]
+        lines.append(f"{'method':<18} {'setting':<18} {'error / amplitude':>17} {'time':>10}")
+        for row in group:
+            name = row.method if row.tolerance is None else f"auto {row.tolerance:g}"
+            setting = row.setting if row.tolerance is None else f"{row.method}, {row.setting}"
+            lines.append(f"{name:<18} {setting:<26.26} {row.error:>9.1e} {row.seconds * 1e3:>7.2f} ms")
+    return "\n".join(lines[1:])
+
+
+def integrators_json(rows: Sequence[Work], version: str) -> dict[str, Any]:
+    """Return the measurement as the JSON of ``springmass trade --integrators``."""
+    keys = ("scene", "method", "setting", "error", "seconds", "tolerance")
+    return {"schema": 1, "version": version, "integrators": [{key: getattr(row, key) for key in keys} for row in rows]}
+
+
+def integrators_figure(rows: Sequence[Work]) -> Figure:
+    """Draw error against time of every integrator, a panel a scene, and a ring around what auto takes."""
+    scenes = list(dict.fromkeys(row.scene for row in rows))
+    with report_style():
+        figure, axes = panels([(2.1, 0.3 if i else 0.0) for i in range(len(scenes))], top=0.75)
+        for axis, scene in zip(axes, scenes, strict=True):
+            axis.set_xscale("log")
+            axis.set_yscale("log")
+            axis.set_title(scene, loc="right", fontsize=8.5, pad=3)
+            axis.set_ylabel("error / amplitude")
+            for name, (colour, marker) in _LOOKS.items():
+                own = [row for row in rows if row.scene == scene and row.method == name and row.tolerance is None]
+                drawn = sorted((row.seconds * 1e3, _within(row.error)) for row in own)
+                if drawn:
+                    x, y = zip(*drawn, strict=True)
+                    axis.plot(x, y, marker=marker, color=colour, ms=4.0, lw=0.8, label=name)
+            chosen = [row for row in rows if row.scene == scene and row.tolerance is not None]
+            for row in chosen:
+                assert row.tolerance is not None
+                axis.plot([row.seconds * 1e3], [_within(row.error)], "o", ms=9.5, mfc="none", mew=1.2, color="#000000")
+            axis.set_ylim(ROUNDING / 100.0, 1e3)
+        axes[-1].set_xlabel("time for 120 s at 100 Hz / ms")
+        known: dict[str, Any] = {}
+        for axis in axes:
+            for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+                known.setdefault(label, handle)
+        from matplotlib.lines import Line2D
+
+        known["taken by auto"] = Line2D([], [], marker="o", ls="", ms=8.0, mfc="none", mew=1.2, color="#000000")
+        axes[0].legend(
+            known.values(),
+            known.keys(),
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.08),
+            ncols=6,
+            markerscale=1.0,
+            columnspacing=1.2,
+            handlelength=1.6,
+            borderaxespad=0.0,
+        )
+        return figure
+
+
+def _within(error: float) -> float:
+    return min(max(error, ROUNDING / 30.0), 5e2)
+
+
+def _settings(problem: Problem) -> list[tuple[Integrator, int, str]]:
+    found: list[tuple[Integrator, int, str]] = []
+    for integrator in INTEGRATORS.values():
+        if integrator.refusal(problem):
+            continue
+        if integrator.order:
+            found += [(integrator, parts, f"step {SPACING_S / parts:.3g} s") for parts in PARTS]
+        elif isinstance(integrator, Taylor | SolveIvp):
+            aims = (1e-3, 1e-6, 1e-9) if isinstance(integrator, SolveIvp) else (1e-4, 1e-8, 1e-13)
+            found += [(replace(integrator, tolerance=aim), 1, f"tolerance {aim:g}") for aim in aims]
+        else:
+            found.append((integrator, 1, "no step"))
+    return found
+
+
+def _measured(
+    integrator: Integrator,
+    problem: Problem,
+    parts: int,
+    count: int,
+    truth: np.ndarray[Any, np.dtype[np.float64]],
+    timer: Callable[[], float],
+    rounds: int,
+) -> tuple[float, float] | None:
+    """Return error and least time; None where the method ran away."""
+    least = float("inf")
+    for _ in range(rounds):
+        start = timer()
+        try:
+            run = integrator.run(problem, SPACING_S / parts, count * parts, every=parts)
+        except DynamicsError:
+            return None
+        least = min(least, timer() - start)
+    return float(np.max(np.abs(run.y - truth))) / START_M, least
