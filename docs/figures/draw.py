@@ -1,4 +1,4 @@
-"""Draw the figures of the documentation from the sample data, through the report's own figures: `make docs-figures`."""
+"""Draw the figures of the documentation through the report's own: `make docs-figures`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 
 from springmass import analyse, load, read_scene, sample_data
 from springmass.report.figures import amplitude_figure, render
+from springmass.report.simulation_figures import stability_figure
 
 HERE = Path(__file__).resolve().parent
 
@@ -17,7 +18,9 @@ def main(folder: Path = HERE) -> list[Path]:
     analysis = analyse(loaded.track, read_scene(data / "damped.scene.toml"))
     target = folder / "amplitude.svg"
     target.write_bytes(render(amplitude_figure(analysis), "svg"))
-    return [target]
+    stability = folder / "stability.svg"
+    stability.write_bytes(render(stability_figure(), "svg"))
+    return [target, stability]
 
 
 if __name__ == "__main__":

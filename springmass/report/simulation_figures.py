@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.dynamics import Trajectory, get_integrator
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
-from springmass.report.style import BLUE, GREEN, GREY, VERMILLION, report_style
+from springmass.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, report_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from springmass.simulation import Against, Simulation
 
-__all__ = ["EULERS", "SIMULATION_FIGURES", "against_figure", "draw_simulation"]
+__all__ = ["EULERS", "SIMULATION_FIGURES", "against_figure", "draw_simulation", "stability_figure"]
 
 SIMULATION_FIGURES = ("position", "velocity", "energy", "phase", "error")
 EULERS = (("forward-euler", "forward Euler", VERMILLION), ("symplectic-euler", "symplectic Euler", BLUE))
@@ -212,3 +212,44 @@ def _error(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
     panel.set_xlabel("time / s")
     panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.15, columnspacing=1.2)
     return figure
+
+
+def stability_figure() -> Figure:
+    """Draw the stability map: the largest stable step against damping as theory has it, and runs on both sides.
+
+    Raises
+    ------
+    ValueError
+        If a run contradicts its line.
+    """
+    from pipeline.dynamics.stability_map import limits, runs_bounded
+
+    ratios = np.geomspace(0.01, 100.0, 161)
+    asked = np.geomspace(0.02, 60.0, 8)
+    looks = (
+        ("forward-euler", VERMILLION),
+        ("symplectic-euler", BLUE),
+        ("verlet", GREEN),
+        ("yoshida4", PURPLE),
+        ("rk4", ORANGE),
+    )
+    with report_style():
+        figure = _blank(WIDTH, 3.8)
+        panel = figure.add_axes((LEFT / WIDTH, 0.13, (WIDTH - LEFT - RIGHT) / WIDTH, 0.76))
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        for name, colour in looks:
+            method = get_integrator(name)
+            panel.plot(ratios, limits(method, ratios), color=colour, label=name)
+            for ratio, limit in zip(asked.tolist(), limits(method, asked).tolist(), strict=True):
+                for share, bounded, marker in ((0.97, True, "o"), (1.03, False, "x")):
+                    if runs_bounded(method, share * limit, ratio) != bounded:
+                        raise ValueError(f"{name} at gamma/omega {ratio:g}: a run contradicts its limit {limit:g}")
+                    # Drawn farther from the line than it was run, to be seen apart.
+                    at = limit * (0.9 if bounded else 1.11)
+                    panel.plot([ratio], [at], marker, ms=3.2 if bounded else 4.0, color=colour, mew=1.0)
+        panel.set_xlabel("damping ratio gamma / omega")
+        panel.set_ylabel("largest stable step / radians")
+        panel.set_xlim(ratios[0], ratios[-1])
+        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.2, columnspacing=1.2)
+        return figure
