@@ -58,6 +58,8 @@ def predicted_by_pilot(
     step, finer = _pilot_step(integrator, problem, step_s, min(seconds, period))
     # The kink of drag at a turning point keeps a high order from what its power promises.
     share = finer ** min(integrator.order, 3) / (1.0 - float(REFINED) ** -integrator.order if integrator.order else 1.0)
+    if period / step > 20 * MOST_STEPS:
+        return math.inf  # far too stiff for a method with a limit
     stretch = min(max(round(min(seconds, 1.5 * period) / step), LEAST_STEPS), max(1, round(seconds / step)))
     coarse, fine = _both(integrator, truth, problem, step, stretch)
     early = share * float(np.max(np.abs(coarse.real - fine.real))) / start
@@ -73,7 +75,7 @@ def _pilot_step(integrator: Integrator, problem: Problem, step_s: float, period:
     wanted = min(
         2.0 * math.pi / eq.angular_frequency_per_s / STEPS_A_PERIOD, 0.2 / max(eq.drag_per_m * fastest, 1e-300)
     )
-    wanted = max(wanted, period / MOST_STEPS)
+    wanted = min(max(wanted, period / MOST_STEPS), 0.5 * integrator.stable_step(problem))
     if not integrator.order:
         return wanted, 1.0
     return (step_s, 1.0) if step_s >= wanted else (wanted, step_s / wanted)

@@ -81,6 +81,8 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     omega = math.sqrt(max(omega**2 + 0.75 * eq.cubic_per_m2_s2 * start**2, 0.1 * omega**2))
     friction = eq.friction_m_per_s2 * h / (omega * start) * math.sqrt(1.0 + omega * h * steps / math.pi) if mu else 0.0
     if gamma + beta * start > STRONG * omega:
+        if h > method.stable_step(problem):
+            return math.inf
         return predicted_by_pilot(method, method, problem, h, h * steps) + float(friction)
     values = np.linalg.eigvals(step_matrix(method, omega * h, gamma / omega).astype(np.complex128))
     turning = np.log(values[np.argmax(values.imag)]) / h

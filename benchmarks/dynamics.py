@@ -1,0 +1,105 @@
+"""Speed of trajectories as ratios to named references: `python benchmarks/dynamics.py`."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import lfilter
+
+from pipeline.dynamics import Equation, Problem, get_integrator
+from pipeline.dynamics.flow import flow
+from pipeline.dynamics.solve_ivp import LSODA
+from pipeline.dynamics.taylor import TAYLOR
+
+MIXED = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
+LINEAR = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.0073), 0.05)
+STEP_S, COUNT = 0.01, 12_000
+MEMBERS, SHORT = 4096, 1200
+
+
+def main() -> int:
+    """Print each ratio, its reference and its limit; exit with 1 where a limit is broken."""
+    alternate = _ratios().alternate
+    bad = 0
+    for name, reference, limit, share, ours, theirs, rounds in cases():
+        mine, other = alternate(ours, theirs, rounds)
+        ratio = share * mine / other
+        bad += ratio > limit
+        print(
+            f"{'ok' if ratio <= limit else 'OVER':4}  {ratio:7.4f} x  (limit {limit:g}, so {1 / ratio:.0f} times faster)  "
+            f"{name}: {mine * 1e3:.2f} ms; {reference}: {other * 1e3:.2f} ms"
+        )
+    for name, error in errors().items():
+        print(f"      {error:.2g}  error over the amplitude of {name}")
+    return int(bad > 0)
+
+
+def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable[[], object], int]]:
+    """Return name, reference, limit, share of our time that counts, the two to be timed, and how often."""
+    strang, exact = get_integrator("strang"), get_integrator("exact")
+    rng = np.random.default_rng(1)
+    laws = {"gamma_per_s": rng.uniform(0.0, 0.01, MEMBERS), "beta_per_m_s": rng.uniform(0.0, 0.4, MEMBERS)}
+    ensemble = Problem(Equation.from_laws(rng.uniform(7.0, 10.0, MEMBERS), **laws), 0.05)
+    a, b, c, d = flow(8.66, 0.0073, STEP_S)
+    pulse = np.zeros(COUNT + 1)
+    pulse[0] = 0.05
+    lsoda = equal_lsoda()
+    return [
+        (
+            "Strang, mixed drag, 120 s",
+            "solve_ivp LSODA at equal error",
+            0.01,
+            1.0,
+            lambda: strang.run(MIXED, STEP_S, COUNT),
+            lambda: lsoda.run(MIXED, STEP_S, COUNT),
+            7,
+        ),
+        (
+            "exact propagator, linear, 120 s",
+            "scipy lfilter, the same recurrence",
+            1.0,
+            1.0,
+            lambda: exact.run(LINEAR, STEP_S, COUNT),
+            lambda: lfilter([1.0, -d], [1.0, -(a + d), a * d - b * c], pulse),
+            200,
+        ),
+        (
+            f"a trajectory of {MEMBERS} together",
+            "one alone",
+            0.05,
+            1.0 / MEMBERS,
+            lambda: strang.run(ensemble, STEP_S, SHORT, every=100),
+            lambda: strang.run(MIXED, STEP_S, SHORT, every=100),
+            15,
+        ),
+    ]
+
+
+def equal_lsoda() -> object:
+    """Return LSODA at the tolerance at which it errs no less than Strang at the step of the samples."""
+    return replace(LSODA, tolerance=0.75e-6)
+
+
+def errors() -> dict[str, float]:
+    """Return the errors of the compared runs over the amplitude."""
+    truth = TAYLOR.run(MIXED, STEP_S, COUNT).y
+    runs = {"strang": get_integrator("strang"), "LSODA": equal_lsoda()}
+    return {name: float(np.max(np.abs(each.run(MIXED, STEP_S, COUNT).y - truth))) / 0.05 for name, each in runs.items()}  # type: ignore[attr-defined]
+
+
+def _ratios() -> object:
+    path = Path(__file__).with_name("ratios.py")
+    spec = importlib.util.spec_from_file_location("springmass_ratios", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,180 @@
+"""``springmass simulate``: what it prints, writes and refuses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.block import Block
+from acquisition.source import SourceInfo
+from springmass import analyse, load
+from springmass.loading import read_scene
+from storage.write import write_run
+
+LINEAR = """
+[bob]
+mass_kg = 0.2
+[spring]
+constant_n_per_m = 20.0
+[start]
+displacement_m = 0.05
+"""
+MIXED = LINEAR + "[damping]\ngamma_per_s = 0.0073\nbeta_per_m_s = 0.235\n"
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    """Return a scene of mixed drag."""
+    path = tmp_path / "bench.scene.toml"
+    path.write_text(MIXED)
+    return path
+
+
+def test_auto_keeps_the_tolerance_and_says_so(cli: Callable, scene: Path) -> None:
+    """The object holds method, step, predicted and measured error, both below the tolerance."""
+    done = cli("simulate", "--scene", scene, "--seconds", "30", "--tolerance", "1e-7", "--json")
+    assert done.code == 0
+    (found,) = done.results
+    assert found["measured_error"] <= found["predicted_error"] <= 1e-7
+    assert found["method"] == "strang"
+    assert found["samples"] == 3001
+    assert {t["name"]: t["included"] for t in found["terms"]} == {
+        "viscous_drag": True,
+        "quadratic_drag": True,
+        "friction": False,
+        "amplitude_dependent_frequency": False,
+    }
+    assert done.err.index("predicted error") < done.err.index("measured error")
+
+
+def test_a_linear_scene_is_solved_exactly(cli: Callable, tmp_path: Path) -> None:
+    """Nothing but a spring: the exact propagator, and no term left in."""
+    path = tmp_path / "linear.toml"
+    path.write_text(LINEAR)
+    (found,) = cli("simulate", "--scene", path, "--json").results
+    assert found["method"] == "exact"
+    assert found["measured_error"] == 0.0
+    assert found["equation"]["angular_frequency_per_s"] == 10.0
+
+
+def test_run_file_and_figures_are_written(cli: Callable, scene: Path, tmp_path: Path) -> None:
+    """NAME.simulated holds a run of kind simulated whose analysis finds the scene, and every figure twice."""
+    done = cli("simulate", "--scene", scene, "--seconds", "20", "--out", tmp_path / "out")
+    assert done.code == 0
+    folder = tmp_path / "out" / "bench.simulated"
+    loaded = load(folder / "run.h5")
+    assert loaded.info.kind == "simulated"
+    found = analyse(loaded.track, read_scene(scene))
+    assert found.estimates["spring_constant"].value == pytest.approx(20.0, rel=1e-4)
+    assert found.estimates["amplitude"].value == pytest.approx(0.05, rel=1e-3)
+    figures = {path.name for path in (folder / "figures").iterdir()}
+    names = ("position", "velocity", "energy", "phase", "error")
+    assert figures == {f"{name}.{kind}" for name in names for kind in ("svg", "pdf")}
+    for name in names[:4]:
+        text = (folder / "figures" / f"{name}.svg").read_text(encoding="utf-8")
+        assert all(word in text for word in ("forward Euler", "symplectic Euler", "exact"))
+    told = json.loads((folder / "simulation.json").read_text())
+    assert told["method"] in done.out or "Strang" in done.out
+
+
+def test_an_unstable_step_is_refused_with_limit_and_remedy(cli: Callable, scene: Path, tmp_path: Path) -> None:
+    """One line, exit code 2, nothing written; --force runs it and measures how wrong it is."""
+    arguments = ("simulate", "--scene", scene, "--method", "forward-euler", "--out", tmp_path / "out")
+    done = cli(*arguments)
+    assert done.code == 2
+    assert "unstable" in done.complaint
+    limit = float(done.complaint.split("--dt ")[1].split()[0])
+    assert limit == pytest.approx(2 * 0.0073 / 100.0, rel=0.01)
+    assert limit <= 2 * 0.0073 / 100.0
+    assert "--method strang" in done.complaint
+    assert "--force" in done.complaint
+    assert not (tmp_path / "out").exists()
+    forced = cli(*arguments, "--force", "--json")
+    assert forced.results[0]["measured_error"] > 1.0
+    assert cli(*arguments[:-2], "--dt", str(limit), "--seconds", "1", "--json").code == 0
+
+
+def test_a_method_by_name_takes_the_step_its_tolerance_needs(cli: Callable, scene: Path) -> None:
+    """rk4 to 1e-7: steps finer than the samples, and the error is kept."""
+    (found,) = cli("simulate", "--scene", scene, "--method", "rk4", "--tolerance", "1e-7", "--json").results
+    assert found["step_s"] < found["spacing_s"] == 0.01
+    assert found["measured_error"] <= 1e-7
+
+
+def test_a_prediction_is_laid_over_a_run(cli: Callable, scene: Path, tmp_path: Path) -> None:
+    """The start is the run's, what the scene leaves out its analysis's; what is left is small, and drawn."""
+    assert cli("simulate", "--scene", scene, "--seconds", "20", "--out", tmp_path).code == 0
+    bare = tmp_path / "bare.toml"
+    bare.write_text("[bob]\nmass_kg = 0.2\n")
+    run = tmp_path / "bench.simulated" / "run.h5"
+    done = cli("simulate", "--scene", bare, "--against", run, "--out", tmp_path, "--json")
+    assert done.code == 0
+    assert "spring_constant_n_per_m" in done.err
+    assert done.results[0]["against"]["rms_m"] < 2e-4
+    assert (tmp_path / "bare.simulated" / "figures" / "against.svg").is_file()
+    assert cli("simulate", "--scene", scene, "--out", tmp_path).code == 0
+    assert not (tmp_path / "bench.simulated" / "figures" / "against.svg").exists()
+
+
+def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path: Path) -> None:
+    """Exit code 3, one line."""
+    noise = np.random.default_rng(1).normal(0.25, 1e-4, 1000)
+    samples = Block(0, np.arange(1000) / 100.0, noise, np.zeros(1000, np.uint8))
+    still = write_run(tmp_path / "still.h5", [samples], SourceInfo("simulated", "still", 100.0))
+    done = cli("simulate", "--scene", scene, "--against", still, "--json")
+    assert done.code == 3
+    assert "nothing to lay a prediction over" in done.complaint
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("--method", "leapfrog"), "allowed are auto, forward-euler"),
+        (("--dt", "0"), "--dt must be more than 0 s"),
+        (("--dt", "-0.01"), "--dt must be more than 0 s"),
+        (("--tolerance", "1e-17"), "must be finite and at least"),
+        (("--tolerance", "0"), "must be finite and at least"),
+        (("--tolerance", "-1"), "must be finite and at least"),
+        (("--method", "averaged", "--tolerance", "1e-12"), "averaged cannot keep a tolerance of 1e-12"),
+        (("--method", "exact"), "exact cannot solve this"),
+        (("--seconds", "1e9"), "makes 100000000000 steps"),
+        (("--seconds", "0.001"), "makes 0 steps"),
+    ],
+)
+def test_bad_input_is_one_line_with_code_two(cli: Callable, scene: Path, arguments: tuple[str, ...], told: str) -> None:
+    """What cannot be is said before anything is written."""
+    done = cli("simulate", "--scene", scene, "--json", *arguments)
+    assert (done.code, done.out) == (2, "")
+    assert told in done.complaint
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("mass_kg = 0.2", "mass_kg = -0.2", "mass_kg must be more than 0 kg"),
+        ("displacement_m = 0.05", "displacement_m = nan", "finite number"),
+        ("constant_n_per_m = 20.0", "mass_kg = 0.01", "constant_n_per_m"),
+        ("constant_n_per_m = 20.0", "constant_n_per_m = 20.0\ncubic_n_per_m3 = -9000.0", "softening spring"),
+    ],
+)
+def test_a_scene_that_cannot_move_is_one_line(cli: Callable, tmp_path: Path, old: str, new: str, told: str) -> None:
+    """Negative mass, a start that is no number, no spring, a spring that lets go: exit code 2."""
+    path = tmp_path / "bad.toml"
+    path.write_text(MIXED.replace(old, new))
+    done = cli("simulate", "--scene", path, "--json")
+    assert (done.code, done.out) == (2, "")
+    assert told in done.complaint
+
+
+def test_friction_stops_the_simulated_bob(cli: Callable, tmp_path: Path) -> None:
+    """A scene with friction ends at rest, in the run file too."""
+    path = tmp_path / "friction.toml"
+    path.write_text(LINEAR + "[damping]\nmu_m_per_s = 0.02\n")
+    assert cli("simulate", "--scene", path, "--out", tmp_path).code == 0
+    samples = load(tmp_path / "friction.simulated" / "run.h5").samples
+    assert np.ptp(samples.distance[-400:]) == 0.0
+    assert np.all(samples.velocity[-400:] == 0.0)
