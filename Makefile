@@ -43,6 +43,7 @@ accuracy: $(VENV)/.installed-dev
 
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ratios.py
+	$(BIN)/python benchmarks/dynamics.py
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,7 +45,9 @@ class SolveIvp:
     order: int = 0
 
     def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - every integrator has the same signature
-        """Return nothing: it takes every problem."""
+        """Return why not, where scipy is not installed: nothing else here needs it."""
+        if importlib.util.find_spec("scipy") is None:
+            return "scipy is not installed; install it (pip install scipy), or take strang, taylor or auto"
         return ""
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:

@@ -144,8 +144,10 @@ def integrators_figure(rows: Sequence[Work]) -> Figure:
     scenes = list(dict.fromkeys(row.scene for row in rows))
     with report_style():
         figure, axes = panels([(2.1, 0.3 if i else 0.0) for i in range(len(scenes))], top=0.75)
+        times = [row.seconds * 1e3 for row in rows]
         for axis, scene in zip(axes, scenes, strict=True):
             axis.set_xscale("log")
+            axis.set_xlim(min(times) / 2.0, max(times) * 2.0)
             axis.set_yscale("log")
             axis.set_title(scene, loc="right", fontsize=8.5, pad=3)
             axis.set_ylabel("error / amplitude")
@@ -189,7 +191,7 @@ def _within(error: float) -> float:
 def _settings(problem: Problem) -> list[tuple[Integrator, int, str]]:
     found: list[tuple[Integrator, int, str]] = []
     for integrator in INTEGRATORS.values():
-        if integrator.refusal(problem):
+        if integrator.refusal(problem):  # of another kind of scene, or of a package that is not installed
             continue
         if integrator.order:
             found += [(integrator, parts, f"step {SPACING_S / parts:.3g} s") for parts in PARTS]

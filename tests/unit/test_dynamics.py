@@ -168,3 +168,15 @@ def test_a_trajectory_between_its_states() -> None:
     coarse, fine = (get_integrator("exact").run(problem, h, round(2 / h)) for h in (0.01, 0.0007))
     np.testing.assert_allclose(coarse.at(fine.t[:2000]), fine.y[:2000], rtol=0, atol=0.05e-6)
     assert coarse.at(np.array([-1.0, 99.0])).tolist() == [coarse.y[0], coarse.y[-1]]
+
+
+def test_without_scipy_its_methods_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line that names the package and what runs without it; everything else runs."""
+    import importlib.util
+
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    problem = Problem(Equation.from_laws(8.66, beta_per_m_s=0.2), 0.05)
+    for name in ("lsoda", "dop853"):
+        with pytest.raises(DynamicsError, match="scipy is not installed"):
+            get_integrator(name).run(problem, 0.01, 10)
+    assert choose(problem, 0.01, 1000, 1e-6).integrator.name == "strang"
