@@ -174,7 +174,7 @@ def test_without_scipy_its_methods_say_so(monkeypatch: pytest.MonkeyPatch) -> No
     """One line that names the package and what runs without it; everything else runs."""
     import importlib.util
 
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     problem = Problem(Equation.from_laws(8.66, beta_per_m_s=0.2), 0.05)
     for name in ("lsoda", "dop853"):
         with pytest.raises(DynamicsError, match="scipy is not installed"):
