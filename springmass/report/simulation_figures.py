@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.dynamics import Trajectory, get_integrator
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
-from springmass.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, report_style
+from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +43,7 @@ def draw_simulation(simulation: Simulation, mass_kg: float | None) -> dict[str, 
         For the energy; without it that of one kilogram is drawn.
     """
     runs = [_euler(simulation, name) for name, *_ in EULERS]
-    with report_style():
+    with style():
         return {
             "position": _against_time(simulation, runs, "y", 1e3, "displacement / mm"),
             "velocity": _against_time(simulation, runs, "v", 1.0, "velocity / (m/s)"),
@@ -60,7 +60,7 @@ def against_figure(against: Against) -> Figure:
     ----------
     against : Against
     """
-    with report_style():
+    with style():
         figure = _blank(WIDTH, 4.0)
         above = figure.add_axes((LEFT / WIDTH, 0.42, (WIDTH - LEFT - RIGHT) / WIDTH, 0.47))
         below = figure.add_axes((LEFT / WIDTH, 0.12, (WIDTH - LEFT - RIGHT) / WIDTH, 0.27), sharex=above)
@@ -233,7 +233,7 @@ def stability_figure() -> Figure:
         ("yoshida4", PURPLE),
         ("rk4", ORANGE),
     )
-    with report_style():
+    with style():
         figure = _blank(WIDTH, 3.8)
         panel = figure.add_axes((LEFT / WIDTH, 0.13, (WIDTH - LEFT - RIGHT) / WIDTH, 0.76))
         panel.set_xscale("log")

@@ -17,7 +17,7 @@ from pipeline.dynamics.choose import choose
 from pipeline.dynamics.solve_ivp import SolveIvp
 from pipeline.dynamics.taylor import TAYLOR, Taylor
 from pipeline.errors import DynamicsError
-from springmass.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, panels, report_style
+from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, panels, style
 from springmass.trade.front import Point
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def integrators_json(rows: Sequence[Work], version: str) -> dict[str, Any]:
 def integrators_figure(rows: Sequence[Work]) -> Figure:
     """Draw error against time of every integrator, a panel a scene, and a ring around what auto takes."""
     scenes = list(dict.fromkeys(row.scene for row in rows))
-    with report_style():
+    with style():
         figure, axes = panels([(2.1, 0.3 if i else 0.0) for i in range(len(scenes))], top=0.75)
         times = [row.seconds * 1e3 for row in rows]
         for axis, scene in zip(axes, scenes, strict=True):
