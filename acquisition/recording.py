@@ -80,6 +80,10 @@ class Recording:
         The bytes of the file, or of the two files of a position and velocity pair.
     title : str
         The file's own title line, if any.
+    run : str
+        Name of the run inside the file; empty where it holds one without a name.
+    start_time : str
+        ISO 8601, as the file states it; empty where it does not.
     """
 
     format: str
@@ -91,6 +95,8 @@ class Recording:
     malformed_rows: int = 0
     originals: tuple[Original, ...] = ()
     title: str = ""
+    run: str = ""
+    start_time: str = ""
 
     def blocks(self, size: int = 1024) -> Iterator[Block]:
         """Yield the samples in blocks of at most ``size``."""

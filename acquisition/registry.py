@@ -25,6 +25,16 @@ GROUP = "springmass.formats"
 
 _TABLE: dict[str, tuple[str, str]] = {
     "motion-sensor": ("acquisition.formats.motion_sensor", "FORMAT"),
+    "lvm": ("acquisition.formats.lvm", "FORMAT"),
+    "tdms": ("acquisition.formats.tdms", "FORMAT"),
+    "capstone": ("acquisition.formats.capstone", "FORMAT"),
+    "datastudio": ("acquisition.formats.datastudio", "FORMAT"),
+    "vernier": ("acquisition.formats.vernier", "FORMAT"),
+    "logger-pro": ("acquisition.formats.logger_pro", "FORMAT"),
+    "phyphox": ("acquisition.formats.phyphox", "FORMAT"),
+    "tracker": ("acquisition.formats.tracker", "FORMAT"),
+    "csv": ("acquisition.formats.csv_units", "FORMAT"),
+    "bare": ("acquisition.formats.bare", "FORMAT"),
 }
 
 

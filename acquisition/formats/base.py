@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
 from acquisition.errors import FormatError
+from acquisition.formats.text import is_text
 from acquisition.recording import Recording
 
 __all__ = ["HEAD_BYTES", "Format", "PairFormat", "read_bytes", "read_head"]
@@ -16,6 +17,7 @@ HEAD_BYTES = 8192
 """How much of a file a format sees to recognise it."""
 
 _LONGEST_LINE = 1 << 20
+_MARKUP = b"\xef\xbb\xbf \t\r\n"  # XML may well stand in one line
 
 
 class Format(Protocol):
@@ -51,8 +53,9 @@ class Format(Protocol):
         channel: str | None = None,
         rate_hz: float | None = None,
         unit: str | None = None,
+        run: str | None = None,
     ) -> Recording:
-        """Read a file whole.
+        """Read one channel of one run of a file.
 
         Parameters
         ----------
@@ -66,6 +69,8 @@ class Format(Protocol):
             The rate where the file does not say it, Hz. It is an error where the file contradicts it.
         unit : str, optional
             The unit of distance where the file does not say it.
+        run : str, optional
+            Which run, where the file holds several. It is passed only where it was asked for.
 
         Raises
         ------
@@ -97,12 +102,12 @@ def read_head(path: str | os.PathLike[str]) -> bytes:
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return a file's content, but give up at the first MiB that holds no line end.
+    """Return a file's content; of a text give up at the first MiB that holds no line end.
 
     Raises
     ------
     FormatError
-        If it is absent, empty, unreadable, no regular file, or has a line of more than 1 MiB.
+        If it is absent, empty, unreadable, no regular file, or a text with a line of more than 1 MiB.
     """
     return _read(path, None)
 
@@ -116,12 +121,15 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
         if not stat.S_ISREG(mode):
             raise FormatError(name, "expected a regular file, got a device or pipe", "save it to a file first")
         with Path(name).open("rb") as file:
-            data = file.read(_LONGEST_LINE if limit is None else limit)
-            if not data:
+            head = file.read(HEAD_BYTES)
+            if not head:
                 raise FormatError(name, "expected a recording, got an empty file", "check that the export ended")
-            if limit is None and len(data) == _LONGEST_LINE:
-                data = _read_on(name, data, file.read)
-            return data
+            if limit is not None:
+                return head[:limit]
+            if is_text(head) and not head.lstrip(_MARKUP).startswith(b"<"):
+                _demand_lines(name, file)
+            file.seek(0)
+            return file.read()
     except OSError as error:
         raise FormatError(
             name, f"cannot be opened ({error.strerror or error})", "check its name and permissions"
@@ -130,18 +138,12 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
         raise FormatError(repr(name), f"is no file name ({error})", "check its name") from error
 
 
-def _read_on(name: str, first: bytes, read: _Read) -> bytes:
-    parts = [first]
+def _demand_lines(name: str, file: BinaryIO) -> None:
+    """Give up at the first MiB that holds no line end, before a file of any size is read into memory."""
     line = 1
-    while parts[-1]:
-        part = parts[-1]
-        if len(part) == _LONGEST_LINE and b"\n" not in part and b"\r" not in part:
+    file.seek(0)
+    while len(part := file.read(_LONGEST_LINE)) == _LONGEST_LINE:
+        if b"\n" not in part and b"\r" not in part:
             demand = "expected lines of text, got a line of more than 1 MiB"
             raise FormatError(name, demand, "this is no text recording; export it again", line=line)
         line += part.count(b"\n") or part.count(b"\r")
-        parts.append(read(_LONGEST_LINE))
-    return b"".join(parts)
-
-
-class _Read(Protocol):
-    def __call__(self, size: int, /) -> bytes: ...

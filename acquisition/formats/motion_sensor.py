@@ -18,10 +18,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from acquisition.block import I8, Block, Flag
-from acquisition.errors import FormatError
-from acquisition.formats.motion_sensor_column import IRREGULAR, UNREAD, Column, read_column
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.formats.motion_sensor_column import Column, read_column
 from acquisition.formats.motion_sensor_layout import recognises
 from acquisition.formats.nominal import time_flags
+from acquisition.formats.samples import IRREGULAR, UNREAD_FLAGS
 from acquisition.formats.text import decode, is_text, unify
 from acquisition.formats.velocity import find_quantum, integrate, outer_join
 from acquisition.recording import Original, Recording, Trap
@@ -48,6 +49,7 @@ class MotionSensor:
         channel: str | None = None,
         rate_hz: float | None = None,
         unit: str | None = None,
+        run: str | None = None,
     ) -> Recording:
         """Read one file, of position or of velocity alone; see :class:`acquisition.formats.base.Format`.
 
@@ -58,6 +60,8 @@ class MotionSensor:
         >>> recording.info.rate_hz, recording.samples.distance.tolist()
         (100.0, [0.165, 0.16509, 0.16565])
         """
+        if run is not None:
+            raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds one run', "leave --run out")
         column = read_column(path, data, channel, rate_hz, unit)
         return _position_alone(column) if column.layout.quantity == "distance" else _velocity_alone(column)
 
@@ -104,7 +108,7 @@ def _recording(column: Column, samples: Block, quantum_m: float, traps: Iterable
 
 
 def _position_alone(column: Column) -> Recording:
-    return _recording(column, Block(0, column.t, column.value, column.flags), column.resolution, ())
+    return _recording(column, Block(0, column.t, column.value, column.flags), column.quantum, ())
 
 
 def _velocity_alone(column: Column) -> Recording:
@@ -147,13 +151,13 @@ def _join(position: Column, velocity: Column) -> Recording:
     distance = np.where(in_p, position.value[from_p], np.nan)
     speed = np.where(in_v, velocity.value[from_v], np.nan)
     flags = time_flags(t, 1.0 / rate_hz)
-    flags |= np.where(in_p, position.flags[from_p], velocity.flags[from_v]) & UNREAD
+    flags |= np.where(in_p, position.flags[from_p], velocity.flags[from_v]) & UNREAD_FLAGS
     flags[~in_p] |= Flag.MISSING.value
     tick = velocity.tick()
     joined = _recording(
         position,
         Block(0, t, distance, flags, None, speed),
-        find_quantum(velocity.value, tick) / rate_hz if tick else position.resolution,
+        find_quantum(velocity.value, tick) / rate_hz if tick else position.quantum,
         (*_velocity_traps(velocity), *_join_traps(position, velocity, from_p, from_v)),
     )
     return Recording(

@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import F8, U8, Flag
-from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.errors import FormatError
 from acquisition.formats.motion_sensor_layout import Layout, ask_columns, find_layout
-from acquisition.formats.nominal import Grid, find_rate, place_unread, snap, time_flags
-from acquisition.formats.text import Table, decode, is_text, read_table, unify
+from acquisition.formats.samples import Rows, flags_of, place, row_traps, sample_traps, value_traps
+from acquisition.formats.table import Table, read_table
+from acquisition.formats.text import text_of
+from acquisition.formats.timing import Timing, check_rate, clock_traps, time_by_column
 from acquisition.formats.velocity import find_tick
 from acquisition.recording import Trap
 
-__all__ = ["IRREGULAR", "UNREAD", "Column", "read_column"]
+__all__ = ["Column", "read_column"]
 
-IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
-UNREAD = np.uint8(Flag.MALFORMED | Flag.MISSING)
 _LONGEST_S = 1e7
 _CONSTANT = 0.95
 
@@ -43,6 +43,8 @@ class Column:
     timing : Timing
     resolution : float
         Last printed digit of the quantity, m or m/s.
+    quantum : float
+        Step that all distances are multiples of, m: the last printed digit or a multiple of it.
     stated_error_m : float or None
     malformed : int
         Rows that could not be read.
@@ -57,6 +59,7 @@ class Column:
     flags: U8
     timing: Timing
     resolution: float
+    quantum: float
     stated_error_m: float | None
     malformed: int
     traps: tuple[Trap, ...]
@@ -77,102 +80,80 @@ class Column:
         return find_tick(self.value, self.resolution)
 
 
-@dataclass(frozen=True, slots=True)
-class Timing:
-    """Rate and grid of a file's times.
-
-    Parameters
-    ----------
-    rate_hz : float
-    grid : Grid or None
-        None where the times fit no grid and stand as printed.
-    resolution_s : float
-        Last printed digit, s.
-    certain : bool
-        Whether the times settle the rate.
-    """
-
-    rate_hz: float
-    grid: Grid | None
-    resolution_s: float
-    certain: bool
-
-
-def read_column(
-    path: str, data: bytes, channel: str | None, rate_hz: float | None, unit: str | None, *, fast: bool = True
-) -> Column:
+def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | None, unit: str | None) -> Column:
     """Read one file; for the arguments and errors see :class:`acquisition.formats.base.Format`."""
-    if not is_text(data):
-        raise FormatError(path, "expected rows of text, got binary data", "export the run as text again")
-    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise NeedsAnswer(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
-    whole = unify(decode(data))
-    text = whole.rstrip("\0\x1a")
+    check_rate(path, rate_hz)
+    text = text_of(path, data)
     layout = find_layout(path, text, channel, unit)
-    table = read_table(text[layout.body :], layout.columns, layout.delimiter, layout.first_line, fast=fast)
-    printed = table.values[:, 0]
-    bad = table.bad | ~(np.abs(printed) < _LONGEST_S)
+    power = -round(math.log10(layout.per_si))
+    table = read_table(
+        text,
+        range(layout.columns),
+        layout.delimiter,
+        width=layout.columns,
+        start=layout.body,
+        first_line=layout.first_line,
+        shifts=(0, power, power)[: layout.columns],
+    )
+    printed = table.values[0]
+    unread = ~(np.abs(printed) < _LONGEST_S)
+    bad = table.bad | unread if unread.any() else table.bad
+    any_bad = bool(bad.any())
     _demand_rows(path, layout, table, bad)
-    timing = _timing(path, printed[~bad], 10.0 ** -table.decimals[0], rate_hz)
-    t = np.where(np.abs(printed) < _LONGEST_S, printed, np.nan)
-    if timing.grid is not None:
-        t[~bad] = snap(t[~bad], timing.grid, timing.resolution_s)[0]
-    t = place_unread(t, bad, timing.grid, table.unread, table.decimals[0])
+    timing = time_by_column(path, printed[~bad] if any_bad else printed, 10.0 ** -table.decimals[0], rate_hz)
+    rows = Rows(bad, table.line, table.cut, table.last_cell, table.decimals[0])
+    t = place(np.where(unread, np.nan, printed) if any_bad else printed, rows, timing)
     told = np.isfinite(t)
-    value = np.where(bad, np.nan, _to_si(table.values[:, 1], table.decimals[1], layout.per_si))[told]
-    if np.isnan(value).all():
+    value = table.values[1]
+    if any_bad:
+        value = np.where(bad, np.nan, value)
+    where = None if told.all() else np.flatnonzero(told)
+    if where is not None:
+        t, value = t[where], value[where]
+    if np.isnan(np.fmax.reduce(value)):
         demand = f"expected numbers as {layout.quantity}, got NaN in all {value.size} rows"
-        raise FormatError(path, demand, "record the run again", line=int(table.line[0]))
-    flags = _flags(t[told], value, bad[told], layout, timing)
+        raise FormatError(path, demand, "record the run again", line=table.line(0))
+
+    def line(row: int) -> int:
+        return table.line(row if where is None else int(where[row]))
+
+    flags = flags_of(t, value, bad if where is None else bad[where], timing.rate_hz)
+    if layout.quantity == "velocity" and not bad[0] and np.isnan(value[0]):
+        flags[0] &= ~np.uint8(Flag.MISSING)  # the first velocity has nothing to differ from: NaN is right there
+    resolution = 10.0 ** -table.decimals[1] / layout.per_si
+    quantum = resolution
+    found: tuple[Trap, ...] = ()
+    if layout.quantity == "distance":
+        quantum, found = value_traps(value, flags, resolution, line)
     stated, constant = _stated_error(path, layout, table, bad)
     traps = (
-        *_layout_traps(layout, timing, stated, constant, rate_hz),
-        *_row_traps(table, bad, told, ended=text.endswith("\n"), zeros=len(whole) - len(text)),
-        *_sample_traps(flags, table.line[told], t[told], timing),
+        *_layout_traps(layout, stated, constant),
+        *clock_traps(timing),
+        *row_traps(rows, told, text.zeros),
+        *sample_traps(flags, t, timing.rate_hz, line),
+        *found,
     )
-    malformed = int(np.count_nonzero(bad))
-    resolution = 10.0 ** -table.decimals[1] / layout.per_si
-    return Column(path, data, layout, t[told], value, flags, timing, resolution, stated, malformed, traps)
+    malformed = int(np.count_nonzero(bad)) if any_bad else 0
+    return Column(path, data, layout, t, value, flags, timing, resolution, quantum, stated, malformed, traps)
 
 
 def _demand_rows(path: str, layout: Layout, table: Table, bad: NDArray[np.bool_]) -> None:
-    good = int(np.count_nonzero(~bad))
-    if good == 0:
+    if bad.all():
         demand = f"expected rows of {layout.columns} numbers, got none in {bad.size} lines"
         remedy = "check that rows and column line belong together"
-        raise FormatError(path, demand, remedy, line=int(table.line[0]) if bad.size else layout.first_line)
-
-
-def _timing(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
-    rate = find_rate(printed, resolution, rate_hz=rate_hz)
-    if rate is None:
-        if rate_hz is None:
-            demand = f"expected times to tell the rate, got {printed.size} rows at one time"
-            raise NeedsAnswer(path, demand, "record longer, or give rate_hz (--rate-hz)")
-        return Timing(rate_hz, Grid(rate_hz, float(printed[0])), resolution, certain=False)
-    if rate_hz is not None:
-        if abs(rate.rate_hz - rate_hz) > rate_hz * (1.5 * rate.relative_u + 1e-6):
-            demand = f"rate_hz {rate_hz:g} was given, but the times say {rate.rate_hz:.6g} Hz"
-            raise FormatError(path, demand, "leave the rate out or correct it")
-        return Timing(rate_hz, rate.grid, resolution, certain=True)
-    return Timing(rate.rate_hz, rate.grid, resolution, rate.certain)
-
-
-def _flags(t: F8, value: F8, bad: NDArray[np.bool_], layout: Layout, timing: Timing) -> U8:
-    flags = time_flags(t, 1.0 / timing.rate_hz)
-    missing = np.isnan(value)
-    if layout.quantity == "velocity" and not bad[0]:
-        missing[0] = False  # the first velocity has nothing to differ from: NaN is right there
-    flags[missing] |= Flag.MISSING.value
-    flags[bad] |= UNREAD
-    return flags
+        raise FormatError(path, demand, remedy, line=table.line(0) if bad.size else layout.first_line)
 
 
 def _stated_error(path: str, layout: Layout, table: Table, bad: NDArray[np.bool_]) -> tuple[float | None, bool]:
     """Return the usual error of the file, m, and whether it is constant."""
     if layout.columns < 3:
         return None, False
-    stated = table.values[~bad, 2]
+    stated = table.values[2]
+    if bad.any():
+        stated = stated[~bad]
+    first = float(stated[0])
+    if (stated == first).all():
+        return first, True
     stated = stated[np.isfinite(stated)]
     if stated.size == 0:
         return None, False
@@ -180,79 +161,15 @@ def _stated_error(path: str, layout: Layout, table: Table, bad: NDArray[np.bool_
     constant = bool(np.mean(stated == median) >= _CONSTANT)
     if layout.assumed and not constant:
         raise ask_columns(path, "three columns that all vary", layout.first_line)
-    return float(_to_si(np.array([median]), table.decimals[2], layout.per_si)[0]), constant
+    return median, constant
 
 
-def _to_si(printed: F8, decimals: int, per_si: float) -> F8:
-    """Convert as a decimal fraction: 16.509 cm is the float 0.16509, which 16.509 / 100 is not."""
-    digits = np.rint(printed * 10.0**decimals)
-    exact = (digits / 10.0**decimals == printed) & (np.abs(digits) < 2.0**53)
-    return np.where(exact, digits / (10.0**decimals * per_si), printed / per_si)
-
-
-def _layout_traps(
-    layout: Layout, timing: Timing, stated: float | None, constant: bool, rate_hz: float | None
-) -> Iterator[Trap]:
+def _layout_traps(layout: Layout, stated: float | None, constant: bool) -> Iterator[Trap]:
     if layout.assumed:
         yield Trap("unit_assumed", f"no column line: read as time (s) and {layout.assumed}, in {layout.unit}")
-    if timing.grid is not None:
-        message = f"times are row numbers over a nominal {timing.rate_hz:g} Hz, not measured times"
-        yield Trap("nominal_clock", message)
-    if rate_hz is not None:
-        yield Trap("rate_assumed", f"the rate of {rate_hz:g} Hz was given by the user")
-    elif not timing.certain:
-        why = (
-            "too few rows settle it"
-            if timing.grid is not None
-            else "the times fit no regular grid and stand as printed"
-        )
-        yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the likeliest: {why}")
     if stated is not None and constant:
         figure = f"{stated * layout.per_si:g} {layout.unit}"
         yield Trap(
             "stated_error_is_not_noise",
             f"the error column is a constant {figure}: a stated figure, not the noise",
         )
-
-
-def _row_traps(
-    table: Table, bad: NDArray[np.bool_], told: NDArray[np.bool_], *, ended: bool, zeros: int
-) -> Iterator[Trap]:
-    if zeros:
-        yield Trap("zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted")
-    last = bad.size - 1
-    cut = bool(bad[last]) and not ended
-    if cut:
-        kept = "kept as a missing sample" if told[last] else "its time is not told, so no sample stands for it"
-        yield Trap("truncated_row", f"the last row stops midway; {kept}", 1, int(table.line[last]))
-    rows = np.flatnonzero(bad[:-1] if cut else bad)
-    if rows.size:
-        first = int(table.line[rows[0]])
-        kept_rows = int(np.count_nonzero(told[rows]))
-        message = (
-            f"{rows.size} rows could not be read, the first in line {first}; {kept_rows} of them are kept as "
-            "missing samples, the others show no sign of having been samples"
-        )
-        yield Trap("malformed_rows", message, int(rows.size), first)
-
-
-def _sample_traps(flags: U8, line: NDArray[np.int64], t: F8, timing: Timing) -> Iterator[Trap]:
-    found = (
-        ("duplicate_time", Flag.DUPLICATE_TIME, "samples repeat a time"),
-        (
-            "non_monotonic_time",
-            Flag.NON_MONOTONIC_TIME,
-            "samples run back in time or ahead of those around them",
-        ),
-        ("missing_samples", Flag.MISSING, "samples have no value"),
-    )
-    for code, flag, what in found:
-        rows = np.flatnonzero(flags & flag.value)
-        if rows.size:
-            yield Trap(code, f"{rows.size} {what}; kept and flagged", int(rows.size), int(line[rows[0]]))
-    gaps = np.flatnonzero(flags & Flag.GAP_BEFORE.value)
-    if gaps.size:
-        reached = np.maximum.accumulate(np.where(flags & IRREGULAR, -np.inf, t))
-        lost = int(np.sum(np.rint((t[gaps] - reached[gaps - 1]) * timing.rate_hz) - 1))
-        message = f"about {lost} samples are missing in {gaps.size} gaps of time; the sample after each is flagged"
-        yield Trap("missing_samples", message, lost, int(line[gaps[0]]))

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Literal
 
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.formats.text import guess_delimiter, parse_number, split_cells
+from acquisition.formats.text import Text, guess_delimiter, parse_number, split_cells
 
 __all__ = ["Layout", "Quantity", "ask_columns", "find_layout", "recognises"]
 
@@ -46,7 +46,7 @@ class Layout:
     first_line : int
         One-based line where the rows start.
     body : int
-        Character where they start.
+        Byte where they start.
     delimiter : str
     assumed : str
         What was concluded from the shape of the rows, because no column line says it; else empty.
@@ -72,7 +72,7 @@ def recognises(text: str) -> bool:
     return 0 <= start <= 1 and _shape(lines[start:]) is not None
 
 
-def find_layout(path: str, text: str, channel: str | None, unit: str | None) -> Layout:
+def find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> Layout:
     """Tell where the rows start and what they mean.
 
     Raises
@@ -82,7 +82,8 @@ def find_layout(path: str, text: str, channel: str | None, unit: str | None) -> 
     FormatError
         If there are no rows, or ``channel`` or ``unit`` contradict the file.
     """
-    lines = _head_lines(text)
+    head = text.head(_HEADER_LINES + _ROWS_OF_SHAPE)
+    lines = [line.text for line in head]
     asked = _asked_quantity(path, channel)
     found = _column_line(lines)
     if found:
@@ -106,7 +107,7 @@ def find_layout(path: str, text: str, channel: str | None, unit: str | None) -> 
     if not rows:
         raise _no_rows(path, lines, "rows of numbers below the column line")
     delimiter = next((guess_delimiter(row) for row in rows if _is_row(row)), guess_delimiter(rows[0]))
-    body = sum(len(line) + 1 for line in lines[:start])
+    body = head[start].start
     return replace(layout, title=title, first_line=start + 1, body=body, delimiter=delimiter)
 
 
@@ -116,7 +117,7 @@ def ask_columns(path: str, got: str, line: int | None = None) -> NeedsAnswer:
 
 
 def _no_rows(path: str, lines: Sequence[str], demand: str) -> FormatError:
-    last = len(lines) - (not lines[-1])
+    last = len(lines)
     return FormatError(path, f"expected {demand}, got none", "check that the export ended", line=max(last, 1))
 
 

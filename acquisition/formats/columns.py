@@ -1,0 +1,315 @@
+"""A format that is columns: what its files hold, which channel is the distance, and the recording of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.block import F8, Block
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.formats.cells import EMPTY, EXPONENT
+from acquisition.formats.contents import Arrays, Channel, Contents, Formula, Sheet, choose
+from acquisition.formats.samples import Rows, flags_of, place, row_traps, sample_traps, value_traps
+from acquisition.formats.table import read_table
+from acquisition.formats.timing import (
+    Timing,
+    check_rate,
+    clock_traps,
+    row_times,
+    time_by_column,
+    time_by_formula,
+    time_by_rate,
+    tolerance_of,
+)
+from acquisition.formats.units import LENGTHS, length_power, time_power, unit_words
+from acquisition.recording import Original, Recording, Trap
+from acquisition.source import SourceInfo
+
+__all__ = ["ColumnFormat", "Survey"]
+
+_LONGEST_S = 1e10
+_T = TypeVar("_T", bound=np.generic)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pulled:
+    """One channel's numbers as the file has them: times in s or None, values in their unit or in m."""
+
+    printed: F8 | None
+    tolerance: F8 | None
+    value: F8
+    rows: Rows
+    time_resolution: float
+    resolution: float
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """What one channel of a file is, as far as the file says it by itself.
+
+    Parameters
+    ----------
+    run, channel, unit : str
+        Empty where the file does not say.
+    samples : int
+    rate_hz : float or None
+        None where it must be given.
+    traps : tuple of Trap
+    """
+
+    run: str
+    channel: str
+    unit: str
+    samples: int
+    rate_hz: float | None
+    traps: tuple[Trap, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnFormat:
+    """A family of recordings that keeps channels in columns.
+
+    Parameters
+    ----------
+    name, title : str
+        See :class:`acquisition.formats.base.Format`.
+    evidence : callable
+        From the head of a file: why it is of this family, in a few words; empty where it is not. Never raises.
+    contents : callable
+        From path and content: what the file holds.
+    """
+
+    name: str
+    title: str
+    evidence: Callable[[bytes], str]
+    contents: Callable[[str, bytes], Contents]
+
+    def recognises(self, head: bytes) -> bool:
+        """Tell whether there is evidence for this family."""
+        return bool(self.evidence(head))
+
+    def read(
+        self,
+        path: str,
+        data: bytes,
+        *,
+        channel: str | None = None,
+        rate_hz: float | None = None,
+        unit: str | None = None,
+        run: str | None = None,
+    ) -> Recording:
+        """Read one channel of one run; see :class:`acquisition.formats.base.Format`."""
+        check_rate(path, rate_hz)
+        contents = self.contents(path, data)
+        chosen = choose(path, contents, channel, run)
+        power, told = _power(path, chosen, unit)
+        pulled = _pull(path, chosen, power)
+        timing, traps = _timing(path, chosen, pulled, rate_hz)
+        samples, found, line = _samples(path, chosen, pulled, timing, contents.zeros)
+        quantum, others = value_traps(samples.distance, samples.flags, pulled.resolution, line)
+        name = PurePath(path).name
+        clock = "nominal" if timing.grid is not None else chosen.clock
+        info = SourceInfo("replay", name, timing.rate_hz, quantum_m=quantum or None, clock=clock)
+        return Recording(
+            format=self.name,
+            path=path,
+            info=info,
+            channel=chosen.name,
+            samples=samples,
+            traps=(*contents.traps, *told, *traps, *found, *others),
+            malformed_rows=int(np.count_nonzero(pulled.rows.bad)),
+            originals=(Original(name, data),),
+            title=contents.title,
+            run=chosen.run,
+            start_time=chosen.start_time,
+        )
+
+    def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
+        """Tell of every channel what the file says by itself, with nothing chosen or given."""
+        return tuple(self._survey(path, each) for each in self.contents(path, data).channels)
+
+    def _survey(self, path: str, channel: Channel) -> Survey:
+        pulled = _pull(path, channel, length_power(channel.unit) or 0)
+        try:
+            timing, traps = _timing(path, channel, pulled, None)
+        except NeedsAnswer:
+            return Survey(channel.run, channel.name, channel.unit, pulled.value.size, None, ())
+        samples, found, _ = _samples(path, channel, pulled, timing, 0)
+        return Survey(channel.run, channel.name, channel.unit, len(samples), timing.rate_hz, (*traps, *found))
+
+
+def _power(path: str, channel: Channel, unit: str | None) -> tuple[int, tuple[Trap, ...]]:
+    """Return the power of ten from the channel's unit to metres, and what was assumed for it."""
+    stated = length_power(channel.unit)
+    if unit is not None and unit_words(unit) not in LENGTHS:
+        raise FormatError(path, f'unit must be one of {", ".join(LENGTHS)}, got "{unit}"', "name one of these")
+    if stated is not None:
+        if unit is not None and length_power(unit) != stated:
+            demand = f'unit "{unit}" was asked for, but "{channel.label}" says {unit_words(channel.unit)}'
+            raise FormatError(path, demand, "leave the unit out")
+        return stated, ()
+    if unit is None:
+        what = f'its unit is "{channel.unit}", no length' if channel.unit else "nothing says its unit"
+        demand = f'expected a distance, got channel "{channel.name}": {what}'
+        remedy = "say with --unit m, cm or mm what one unit of it is to count as"
+        raise NeedsAnswer(path, demand, f"{remedy}, or name another with --channel" if channel.unit else remedy)
+    power = LENGTHS[unit_words(unit)]
+    if not channel.unit:
+        return power, (Trap("unit_assumed", f'the unit of "{channel.name}", {unit}, was given by the user'),)
+    message = (
+        f'"{channel.label}" is no distance: one {channel.unit} counts as one {unit}, as the user asked; times, '
+        "frequencies and damping rates hold, everything in metres is in that unit"
+    )
+    return power, (Trap("unit_assumed", message),)
+
+
+def _pull(path: str, channel: Channel, power: int) -> _Pulled:
+    if isinstance(channel.source, Arrays):
+        return _from_arrays(channel.source, power)
+    return _from_sheet(path, channel, channel.source, power)
+
+
+def _from_arrays(arrays: Arrays, power: int) -> _Pulled:
+    scale = 10.0**-power
+    value = arrays.values / scale if power else arrays.values.copy()
+    rows = Rows(np.zeros(value.size, bool), _no_line)
+    t = arrays.t
+    resolution = 0.0 if t is None or not t.size else float(np.spacing(np.abs(t[np.isfinite(t)]).max(initial=0.0)))
+    return _Pulled(t, None, value, rows, max(resolution, 1e-12), 0.0)
+
+
+def _no_line(row: int) -> int:  # noqa: ARG001
+    """Return 0: binary files have no lines."""
+    return 0
+
+
+def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> _Pulled:
+    columns = [channel.column] if channel.time is None else [channel.time, channel.column]
+    shift = 0
+    if channel.time is not None and channel.time_unit:
+        told = time_power(channel.time_unit)
+        if told is None:
+            demand = f'expected times in s, ms or us, got "{channel.time_unit}"'
+            raise FormatError(path, demand, "export the times in seconds")
+        shift = told
+    table = read_table(
+        sheet.text,
+        columns,
+        sheet.delimiter,
+        start=sheet.start,
+        stop=sheet.stop,
+        first_line=sheet.first_line,
+        shifts=[power] if channel.time is None else [shift, power],
+    )
+    keep = _present(table.form, channel.ragged)
+    if not keep.any():
+        demand = f'expected rows of numbers for "{channel.name}", got none'
+        raise FormatError(path, demand, "check that the export ended", line=sheet.first_line)
+    kept = None if keep.all() else np.flatnonzero(keep)
+    bad, value = _kept(table.bad, kept), _kept(table.values[-1], kept)
+    printed = tolerance = None
+    time_resolution = 0.0
+    if channel.time is not None:
+        printed = _kept(table.values[0], kept)
+        time_resolution = _resolution(printed, table.decimals[0], table.exponents[0], shift)
+        if channel.formula is not None:
+            tolerance = tolerance_of(printed, _kept(table.form[0], kept), shift, EXPONENT)
+        unread = ~(np.abs(printed) < _LONGEST_S)
+        if unread.any():
+            bad = bad | unread
+    if bad.any():
+        value = np.where(bad, np.nan, value)
+
+    def line(row: int) -> int:
+        return table.line(row if kept is None else int(kept[row]))
+
+    if bad.all():
+        demand = f'expected rows of numbers for "{channel.name}", got none in {bad.size} lines'
+        raise FormatError(path, demand, "check that rows and headings belong together", line=line(0))
+    rows = Rows(bad, line, table.cut and bool(keep[-1]), table.last_cell, table.decimals[0])
+    resolution = _resolution(value, table.decimals[-1], table.exponents[-1], power)
+    return _Pulled(printed, tolerance, value, rows, time_resolution, resolution)
+
+
+def _kept(column: NDArray[_T], rows: NDArray[np.int64] | None) -> NDArray[_T]:
+    return column if rows is None else column[rows]
+
+
+def _present(form: tuple[NDArray[np.int8], ...], ragged: bool) -> NDArray[np.bool_]:
+    """Tell rows that hold something of the channel: others belong to a longer one beside it."""
+    empty = form[-1] == EMPTY
+    keep = ~(empty & (form[0] == EMPTY)) if len(form) == 2 else np.ones(empty.size, bool)
+    if ragged or len(form) == 1:
+        # Only empty cells at the end tell nothing: one in the middle is a sample that was lost.
+        some = np.flatnonzero(~empty)
+        keep[int(some[-1]) + 1 if some.size else 0 :] = False
+    return keep
+
+
+def _resolution(values: F8, decimals: int, exponents: bool, shift: int) -> float:
+    """Return the last printed digit; of numbers with exponents that of the largest."""
+    if exponents:
+        largest = float(np.fmax.reduce(np.abs(values), initial=0.0))
+        shift = int(np.floor(np.log10(largest))) if largest > 0 else shift
+    return float(f"1e{shift - decimals}")
+
+
+def _timing(path: str, channel: Channel, pulled: _Pulled, rate_hz: float | None) -> tuple[Timing, tuple[Trap, ...]]:
+    traps: list[Trap] = []
+    formula = channel.formula
+    count = pulled.value.size
+    if formula is not None and formula.samples is not None and formula.samples != count:
+        message = f"the header declares {formula.samples} samples, {count} rows are there; all are kept"
+        traps.append(Trap("stale_header", message, abs(formula.samples - count)))
+    timing = None
+    if formula is not None:
+        printed = None if pulled.printed is None else np.where(pulled.rows.bad, np.nan, pulled.printed)
+        timing = time_by_formula(path, formula.start_s, formula.step_s, printed, pulled.tolerance, rate_hz)
+        if timing is None:
+            traps.append(_stale(formula, pulled))
+    if timing is None and pulled.printed is not None:
+        sound = pulled.printed[~pulled.rows.bad] if pulled.rows.bad.any() else pulled.printed
+        timing = time_by_column(path, sound, pulled.time_resolution, rate_hz)
+        if not channel.time_unit and formula is None:
+            traps.append(Trap("unit_assumed", "the times have no unit: read as seconds"))
+    if timing is None:
+        timing = time_by_rate(path, rate_hz, "no column of times and no sampling interval")
+    return timing, (*traps, *clock_traps(timing))
+
+
+def _stale(formula: Formula, pulled: _Pulled) -> Trap:
+    said = f"the header says {formula.start_s:g} s + i * {formula.step_s:g} s"
+    if pulled.printed is None:
+        return Trap("stale_header", f"{said}, which makes no times")
+    return Trap("stale_header", f"{said}, the column of times says otherwise and is believed", pulled.value.size)
+
+
+def _samples(
+    path: str, channel: Channel, pulled: _Pulled, timing: Timing, zeros: int
+) -> tuple[Block, tuple[Trap, ...], Callable[[int], int | None]]:
+    """Return the samples, what was seen in them, and what gives the line of each."""
+    rows, value, bad = pulled.rows, pulled.value, pulled.rows.bad
+    if pulled.printed is None or timing.by_row:
+        t = row_times(timing, value.size)
+    else:
+        t = place(pulled.printed, rows, timing)
+    told = np.isfinite(t)
+    if np.isnan(value[told]).all():
+        demand = f'expected numbers as "{channel.name}", got NaN in all {value.size} rows'
+        raise FormatError(path, demand, "record the run again")
+    traps = tuple(row_traps(rows, told, zeros))
+    where = None
+    if not told.all():
+        where = np.flatnonzero(told)
+        t, value, bad = t[where], value[where], bad[where]
+
+    def line(row: int) -> int | None:
+        return rows.line(row if where is None else int(where[row])) or None
+
+    flags = flags_of(t, value, bad, timing.rate_hz)
+    return Block(0, t, value, flags), (*traps, *sample_traps(flags, t, timing.rate_hz, line)), line

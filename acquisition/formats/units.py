@@ -1,0 +1,76 @@
+"""Units as files print them: which are lengths, which are times, and the power of ten to SI."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["LENGTHS", "TIMES", "length_power", "time_power", "unit_words"]
+
+LENGTHS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
+"""Lengths by the power of ten that makes them metres."""
+TIMES = {"s": 0, "ms": -3, "us": -6}
+"""Times by the power of ten that makes them seconds."""
+
+_WORDS = {
+    "µm": "um",
+    "μm": "um",
+    "micrometer": "um",
+    "micrometre": "um",
+    "millimeter": "mm",
+    "millimetre": "mm",
+    "centimeter": "cm",
+    "centimetre": "cm",
+    "meter": "m",
+    "metre": "m",
+    "metri": "m",
+    "米": "m",
+    "厘米": "cm",
+    "毫米": "mm",
+    "sec": "s",
+    "second": "s",
+    "seconde": "s",
+    "sekunde": "s",
+    "sekunden": "s",
+    "segundo": "s",
+    "secondi": "s",
+    "secondo": "s",
+    "秒": "s",
+    "毫秒": "ms",
+    "msec": "ms",
+    "millisecond": "ms",
+    "µs": "us",
+    "μs": "us",
+    "microsecond": "us",
+}
+
+
+def unit_words(unit: str) -> str:
+    """Return a unit's symbol where it is spelled out; else as it is.
+
+    Examples
+    --------
+    >>> unit_words(" centimeters "), unit_words("m/s^2")
+    ('cm', 'm/s^2')
+    """
+    plain = re.sub(r"\s+", " ", unit).strip().strip(".")
+    lower = plain.lower()
+    found = _WORDS.get(lower) or _WORDS.get(lower.removesuffix("s"))
+    if found:
+        return found
+    return lower if lower in LENGTHS or lower in TIMES else plain
+
+
+def length_power(unit: str) -> int | None:
+    """Return the power of ten that makes a length metres; None for what is no length.
+
+    Examples
+    --------
+    >>> length_power("cm"), length_power("V")
+    (-2, None)
+    """
+    return LENGTHS.get(unit_words(unit))
+
+
+def time_power(unit: str) -> int | None:
+    """Return the power of ten that makes a time seconds; None for what is no time."""
+    return TIMES.get(unit_words(unit))
