@@ -13,13 +13,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
-from acquisition.formats.base import HEAD_BYTES, Format, PairFormat, read_bytes, read_head
-from acquisition.recording import Recording
+from acquisition.formats.base import HEAD_BYTES, Format, PairFormat, SurveyFormat, read_bytes, read_head
+from acquisition.recording import Inspection, Recording
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = ["formats", "get_format", "open_recording", "sniff"]
+__all__ = ["formats", "get_format", "inspect", "open_recording", "sniff"]
 
 GROUP = "springmass.formats"
 
@@ -72,8 +72,7 @@ def sniff(path: str | os.PathLike[str]) -> str:
     Raises
     ------
     FormatError
-        If it cannot be opened, or no format recognises it: :class:`UnknownFormat`, and :class:`NeedsAnswer`
-        for bare numbers.
+        If it cannot be opened, or no format recognises it.
     """
     return _recognise(os.fspath(path), read_head(path)).name
 
@@ -85,6 +84,7 @@ def open_recording(
     channel: str | None = None,
     rate_hz: float | None = None,
     unit: str | None = None,
+    run: str | None = None,
     velocity_path: str | os.PathLike[str] | None = None,
 ) -> Recording:
     """Read an old recording.
@@ -94,8 +94,8 @@ def open_recording(
     path : path
     format : str, optional
         Name of the format; told by content if left out.
-    channel, rate_hz, unit : optional
-        What the file leaves out; see :meth:`acquisition.formats.base.Format.read`.
+    channel, rate_hz, unit, run : optional
+        What the file leaves out or leaves open; see :meth:`acquisition.formats.base.Format.read`.
     velocity_path : path, optional
         The velocity file that belongs to a position file, joined to it by time.
 
@@ -111,13 +111,30 @@ def open_recording(
     name = os.fspath(path)
     reader = get_format(format) if format else _recognise(name, read_head(path))
     data = read_bytes(path)
+    of_run = {} if run is None else {"run": run}
     if velocity_path is None:
-        return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit)
+        return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **of_run)
     if not hasattr(reader, "read_pair"):
         demand = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
         raise UnknownFormat(name, demand, "leave the velocity file out")
     velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
     return cast("PairFormat", reader).read_pair((name, data), velocity, rate_hz=rate_hz)
+
+
+def inspect(path: str | os.PathLike[str]) -> Inspection:
+    """Tell what a file is and what it holds, with nothing chosen and nothing given.
+
+    Raises
+    ------
+    FormatError
+        If it cannot be opened, no format recognises it, or its content cannot be read.
+    """
+    name = os.fspath(path)
+    head = read_head(path)
+    reader = _recognise(name, head)
+    why = getattr(reader, "evidence", lambda _: "")(head)
+    surveys = reader.survey(name, read_bytes(path)) if isinstance(reader, SurveyFormat) else ()
+    return Inspection(reader.name, reader.title, why, surveys)
 
 
 def _recognise(path: str, head: bytes) -> Format:

@@ -137,7 +137,8 @@ def _add_input_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_completions(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--channel", metavar="NAME", help="which quantity of the file to take as distance")
+    parser.add_argument("--channel", metavar="NAME", help="which channel of the file to take as distance")
+    parser.add_argument("--run", metavar="NAME", help="which run of the file to take, where it holds several")
     parser.add_argument(
         "--rate-hz", type=_positive, metavar="R", help="samples per second, where the file does not say"
     )
@@ -204,6 +205,7 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seek", type=_finite, metavar="S", help="start at this second of the record")
     parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
     parser.add_argument("-o", "--output", metavar="RUN.h5", help="write the samples to a run file instead of stdout")
+    parser.add_argument("--overwrite", action="store_true", help="replace RUN.h5 where it exists")
     _add_input_options(parser)
 
 
@@ -222,7 +224,9 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
 def _add_convert(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", metavar="IN", help="recording, or run file")
     parser.add_argument(
-        "output", metavar="OUT", help="RUN.h5, or for a run file the name or folder for the original inside it"
+        "output",
+        metavar="OUT",
+        help="by its suffix: .h5 run file, .txt MotionSensor.vi pair, .lvm, .csv; or a folder for the original",
     )
     parser.add_argument("--scene", metavar="FILE", help="scene file to put into the run file")
     parser.add_argument("--overwrite", action="store_true", help="replace OUT where it exists")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,8 +23,9 @@ from pipeline.scene import Scene
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, USAGE, ProgramError
 from storage.layout import MAGIC
+from storage.wire_layout import MAGIC as WIRE_MAGIC
 
-__all__ = ["Loaded", "load", "read_scene", "sample_data", "to_track"]
+__all__ = ["Loaded", "kind_of", "load", "read_scene", "sample_data", "to_track"]
 
 MOTION_SENSOR = "motion-sensor"  # fixes the speed of sound
 LINE_PROTOCOL = "line-protocol"  # sends echo times
@@ -37,7 +39,7 @@ class Loaded:
     ----------
     path : Path
     format : str
-        The family that read it, or "run" for a run file.
+        The family that read it, "run" for a run file, "wire" for a wire log.
     sha256 : str
         Of the file's bytes.
     info : SourceInfo
@@ -85,18 +87,20 @@ def load(
     channel: str | None = None,
     rate_hz: float | None = None,
     unit: str | None = None,
+    run: str | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
 ) -> Loaded:
-    """Read a recording or a run file.
+    """Read a recording, a run file or a wire log.
 
     Parameters
     ----------
     path : path
     velocity : path, optional
         The velocity file that belongs to a position file; joined by time.
-    channel, rate_hz, unit : optional
-        What the file leaves out.
+    channel, rate_hz, unit, run : optional
+        What the file leaves out or leaves open. Of a wire log of several sensors ``channel`` names one, by its number
+        or its port.
     from_s, to_s : float, optional
         Use samples of these seconds only; the rest stays in the file.
 
@@ -108,16 +112,16 @@ def load(
         If no sample lies within the seconds asked for.
     """
     where = Path(path)
-    if _is_hdf5(where):
-        if velocity is not None or channel is not None or rate_hz is not None or unit is not None:
-            raise ProgramError(
-                f"{where}: --velocity, --channel, --rate-hz and --unit complete text recordings; "
-                "a run file holds all of them, leave them out",
-                USAGE,
-            )
+    kind = kind_of(where)
+    answers = {"velocity": velocity, "rate-hz": rate_hz, "unit": unit, "run": run}
+    if kind == "run":
+        _refuse(where, "a run file", {**answers, "channel": channel})
         loaded = _load_run(where)
+    elif kind == "wire":
+        _refuse(where, "a wire log", answers)
+        loaded = _load_wire(where, channel)
     else:
-        recording = open_recording(where, channel=channel, rate_hz=rate_hz, unit=unit, velocity_path=velocity)
+        recording = open_recording(where, channel=channel, rate_hz=rate_hz, unit=unit, run=run, velocity_path=velocity)
         loaded = _from_recording(where, recording)
     if from_s is None and to_s is None:
         return loaded
@@ -211,12 +215,25 @@ def sample_data() -> Path:
     raise ProgramError(f"{here}: the bundled recordings are missing; install springmass again", UNREADABLE)
 
 
-def _is_hdf5(path: Path) -> bool:
+def kind_of(path: Path) -> Literal["run", "wire", "recording"]:
+    """Tell run files and wire logs from recordings, by their first bytes."""
     try:
         with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
+            head = file.read(len(MAGIC))
     except (OSError, ValueError):
-        return False  # the format registry says what is wrong with it
+        return "recording"  # the format registry says what is wrong with it
+    if head == MAGIC:
+        return "run"
+    return "wire" if head.startswith(WIRE_MAGIC) else "recording"
+
+
+def _refuse(path: Path, what: str, answers: Mapping[str, object]) -> None:
+    """Demand that nothing was said of a file that says it all."""
+    given = [f"--{name}" for name, value in answers.items() if value is not None]
+    if given:
+        raise ProgramError(
+            f"{path}: {', '.join(given)} complete old recordings; {what} holds all of them, leave them out", USAGE
+        )
 
 
 def _from_recording(path: Path, recording: Recording) -> Loaded:
@@ -233,8 +250,15 @@ def _from_recording(path: Path, recording: Recording) -> Loaded:
         recording.malformed_rows,
         recording.originals,
         None,
+        provenance=_origin(recording),
         recorded_format=recording.format,
     )
+
+
+def _origin(recording: Recording) -> dict[str, Any]:
+    """Return what an old recording says of where and when it comes from."""
+    told = {"start_time": recording.start_time, "recorded_run": recording.run}
+    return {name: value for name, value in told.items() if value}
 
 
 def _load_run(path: Path) -> Loaded:
@@ -258,6 +282,26 @@ def _load_run(path: Path) -> Loaded:
             run.provenance,
             run.format,
         )
+
+
+def _load_wire(path: Path, channel: str | None) -> Loaded:
+    """Recover a log into a run file that is thrown away, and take that; the log stays as it is."""
+    from storage.recover import recover
+
+    with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
+        report = recover(path, Path(folder) / "run.h5")
+        names = {str(each.sensor.channel): each for each in report.runs}
+        listed = ", ".join(f'"{number}" ({each.sensor.port})' for number, each in names.items())
+        if channel is None and len(names) > 1:
+            demand = f"the log holds {len(names)} sensors: {listed}; name the one to take with --channel"
+            raise ProgramError(f"{path}: {demand}", UNREADABLE)
+        wanted = [each for number, each in names.items() if channel in (None, number, each.sensor.port)]
+        if len(wanted) != 1:
+            demand = f'channel "{channel}" was asked for, the log holds {listed}; name one of these'
+            raise ProgramError(f"{path}: {demand}", UNREADABLE)
+        loaded = _load_run(wanted[0].path)
+    sha256 = loaded.originals[0].sha256 if loaded.originals else ""
+    return replace(loaded, path=path, format="wire", sha256=sha256, recorded_format="wire")
 
 
 def _between(loaded: Loaded, from_s: float | None, to_s: float | None) -> Track:

@@ -32,6 +32,12 @@ def _load(name: str) -> ModuleType:
 
 
 @pytest.fixture(scope="session")
+def rows_oracle() -> ModuleType:
+    """Return the reader of rows in plain Python, ``tests/rows_oracle.py``."""
+    return _load("rows_oracle")
+
+
+@pytest.fixture(scope="session")
 def synthetic() -> ModuleType:
     """Return the generator of synthetic runs, ``tests/synthetic.py``."""
     return _load("synthetic")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import BinaryIO, Protocol, runtime_checkable
 
 from acquisition.errors import FormatError
 from acquisition.formats.text import is_text
-from acquisition.recording import Recording
+from acquisition.recording import Recording, Survey
 
-__all__ = ["HEAD_BYTES", "Format", "PairFormat", "read_bytes", "read_head"]
+__all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "read_bytes", "read_head"]
 
 HEAD_BYTES = 8192
 """How much of a file a format sees to recognise it."""
@@ -77,6 +77,19 @@ class Format(Protocol):
         FormatError
             With one line for the user, whatever is wrong with the content.
         """
+        ...
+
+
+@runtime_checkable
+class SurveyFormat(Protocol):
+    """A family that says why a file is one of its own, and what the file holds before anything is chosen."""
+
+    def evidence(self, head: bytes) -> str:
+        """Say in a few words why the head of a file is of this family; empty where it is not."""
+        ...
+
+    def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
+        """Tell of every channel what the file says by itself."""
         ...
 
 

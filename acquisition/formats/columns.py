@@ -27,10 +27,10 @@ from acquisition.formats.timing import (
     tolerance_of,
 )
 from acquisition.formats.units import LENGTHS, length_power, time_power, unit_words
-from acquisition.recording import Original, Recording, Trap
+from acquisition.recording import Original, Recording, Survey, Trap
 from acquisition.source import SourceInfo
 
-__all__ = ["ColumnFormat", "Survey"]
+__all__ = ["ColumnFormat"]
 
 _LONGEST_S = 1e10
 _T = TypeVar("_T", bound=np.generic)
@@ -46,28 +46,6 @@ class _Pulled:
     rows: Rows
     time_resolution: float
     resolution: float
-
-
-@dataclass(frozen=True, slots=True)
-class Survey:
-    """What one channel of a file is, as far as the file says it by itself.
-
-    Parameters
-    ----------
-    run, channel, unit : str
-        Empty where the file does not say.
-    samples : int
-    rate_hz : float or None
-        None where it must be given.
-    traps : tuple of Trap
-    """
-
-    run: str
-    channel: str
-    unit: str
-    samples: int
-    rate_hz: float | None
-    traps: tuple[Trap, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +89,8 @@ class ColumnFormat:
         pulled = _pull(path, chosen, power)
         timing, traps = _timing(path, chosen, pulled, rate_hz)
         samples, found, line = _samples(path, chosen, pulled, timing, contents.zeros)
-        quantum, others = value_traps(samples.distance, samples.flags, pulled.resolution, line)
+        length = chosen.is_length or not chosen.unit
+        quantum, others = value_traps(samples.distance, samples.flags, pulled.resolution, line, length=length)
         name = PurePath(path).name
         clock = "nominal" if timing.grid is not None else chosen.clock
         info = SourceInfo("replay", name, timing.rate_hz, quantum_m=quantum or None, clock=clock)

@@ -1,42 +1,43 @@
-"""Families of recordings that are recognised but not read here, and what a user can do about each."""
+"""Files that are no recording of a family read here, and what a user can do about each."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from acquisition.errors import FormatError, NeedsAnswer, UnknownFormat
-from acquisition.formats.text import decode, guess_delimiter, is_text, parse_number, split_cells, unify
+from acquisition.errors import FormatError, UnknownFormat
+from acquisition.formats.text import decode, is_text, unify
 
 __all__ = ["refuse"]
 
 _TEXT = 'export time and position as text, tab separated, under a line "Time (s)<TAB>Distance (m)"'
-_PHYPHOX = re.compile(r'"Time \(s\)"[,\t;]|<phyphox')
-_CAPSTONE = re.compile(r'"[^"\n]*\([^"\n]*\) Run #\d+"|time;position;velocity')
-_DATASTUDIO = re.compile(r"[^\n]*, Ch[A-Z], Run #\d+")
+_AS_CSV = 'export the data as text: in phyphox "Export data", then "CSV (Comma, decimal point)"; in a spreadsheet "CSV"'
+_ZIP = b"PK\x03\x04"
 
 
 @dataclass(frozen=True, slots=True)
 class _Family:
     title: str
-    matches: Callable[[bytes, str], bool]
-    remedy: str = _TEXT
+    matches: Callable[[bytes], bool]
+    remedy: str
 
 
-def _is_hdf5(head: bytes, _: str) -> bool:
+def _is_hdf5(head: bytes) -> bool:
     return any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048, 4096))
 
 
+def _is_xlsx(head: bytes) -> bool:
+    return head.startswith(_ZIP) and (b"[Content_Types].xml" in head or b"xl/" in head)
+
+
 _FAMILIES = (
-    _Family("HDF5 file", _is_hdf5, "if it is a run file, open it as a run; it is not an old recording"),
-    _Family("TDMS file (LabVIEW)", lambda head, _: head[:4] in (b"TDSm", b"TDSh")),
-    _Family("LVM file (LabVIEW Measurement)", lambda _, text: text.startswith("LabVIEW Measurement")),
-    _Family("Vernier Format 2 file", lambda _, text: text.startswith("Vernier Format 2")),
-    _Family("Logger Pro CSV file", lambda _, text: "Latest: " in text.partition("\n")[0]),
-    _Family("phyphox export", lambda _, text: _PHYPHOX.match(text.lstrip()) is not None),
-    _Family("PASCO Capstone CSV file", lambda _, text: _CAPSTONE.match(text) is not None),
-    _Family("PASCO DataStudio file", lambda _, text: _DATASTUDIO.match(text) is not None),
+    _Family("an HDF5 file", _is_hdf5, "if it is a run file, open it as a run; it is not an old recording"),
+    _Family("an Excel workbook (xlsx)", _is_xlsx, _AS_CSV),
+    _Family("an Excel workbook (xls)", lambda head: head.startswith(bytes.fromhex("d0cf11e0a1b11ae1")), _AS_CSV),
+    _Family(
+        "a zip archive", lambda head: head.startswith(_ZIP), "unpack it and name a file inside, a CSV of phyphox say"
+    ),
+    _Family("a TDMS index", lambda head: head.startswith(b"TDSh"), "name the .tdms file beside it"),
 )
 
 
@@ -54,26 +55,14 @@ def refuse(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
     Returns
     -------
     UnknownFormat
-        Naming the family where it is a known one.
-    NeedsAnswer
-        For numbers without a word on what they are: that is never guessed.
+        Naming what the file is where that is known.
     """
-    text = unify(decode(head)) if is_text(head) else ""
     for family in _FAMILIES:
-        if family.matches(head, text):
-            return UnknownFormat(path, f"this is a {family.title}, which is not read by this version", family.remedy)
+        if family.matches(head):
+            return UnknownFormat(path, f"expected a recording, got {family.title}", family.remedy)
+    text = unify(decode(head)) if is_text(head) else ""
     if not text.strip("\0 \n\t"):
         return UnknownFormat(path, "expected a recording, got binary data or nothing", _TEXT)
-    if _bare_numbers(text):
-        demand = "bare numbers, and nothing says what quantity and unit they are"
-        remedy = 'put the line "Time (s)<TAB>Distance (cm)", with the unit that is right, above them'
-        return NeedsAnswer(path, demand, remedy, line=1)
     if head.count(b"\n") + head.count(b"\r") == 0 and len(head) > 4096:
         return UnknownFormat(path, "expected lines of text, got one line without end", _TEXT)
     return UnknownFormat(path, f"no format recognises it (tried {', '.join(names)})", _TEXT)
-
-
-def _bare_numbers(text: str) -> bool:
-    line = next((line for line in text.split("\n") if line.strip()), "")
-    cells = split_cells(line, guess_delimiter(line))
-    return bool(cells) and all(parse_number(cell) is not None for cell in cells)

@@ -20,12 +20,12 @@ import numpy as np
 from acquisition.block import I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.formats.motion_sensor_column import Column, read_column
-from acquisition.formats.motion_sensor_layout import recognises
+from acquisition.formats.motion_sensor_layout import evidence
 from acquisition.formats.nominal import time_flags
 from acquisition.formats.samples import IRREGULAR, UNREAD_FLAGS
 from acquisition.formats.text import decode, is_text, unify
 from acquisition.formats.velocity import find_quantum, integrate, outer_join
-from acquisition.recording import Original, Recording, Trap
+from acquisition.recording import Original, Recording, Survey, Trap
 from acquisition.source import SourceInfo
 
 __all__ = ["FORMAT", "MotionSensor"]
@@ -37,9 +37,23 @@ class MotionSensor:
     name = "motion-sensor"
     title = "MotionSensor.vi text: position, velocity, or one of each"
 
-    def recognises(self, head: bytes) -> bool:
+    def evidence(self, head: bytes) -> str:
         """Tell from the title, the column line, or the shape of rows without either."""
-        return is_text(head) and recognises(unify(decode(head)))
+        return evidence(unify(decode(head))) if is_text(head) else ""
+
+    def recognises(self, head: bytes) -> bool:
+        """Tell whether there is evidence for this family."""
+        return bool(self.evidence(head))
+
+    def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
+        """Tell what the one channel of a file is; nothing, where the user must say what the numbers are."""
+        try:
+            column = read_column(path, data, None, None, None)
+        except NeedsAnswer:
+            return ()
+        layout = column.layout
+        unit = layout.unit + ("/s" if layout.quantity == "velocity" else "")
+        return (Survey("", layout.quantity, unit, column.t.size, column.timing.rate_hz, column.traps),)
 
     def read(
         self,

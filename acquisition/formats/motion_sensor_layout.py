@@ -12,7 +12,7 @@ from typing import Literal
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.formats.text import Text, guess_delimiter, parse_number, split_cells
 
-__all__ = ["Layout", "Quantity", "ask_columns", "find_layout", "recognises"]
+__all__ = ["Layout", "Quantity", "ask_columns", "evidence", "find_layout"]
 
 Quantity = Literal["distance", "velocity"]
 
@@ -63,13 +63,17 @@ class Layout:
     assumed: str = ""
 
 
-def recognises(text: str) -> bool:
-    """Tell from the start of a text, lines ended by LF, whether it is a MotionSensor.vi file."""
+def evidence(text: str) -> str:
+    """Say why the start of a text, lines ended by LF, is a MotionSensor.vi file; empty where it is not."""
     lines = _head_lines(text)
-    if any(_TITLE.match(line) for line in lines[:_HEADER_LINES]) or _column_line(lines):
-        return True
+    for number, line in enumerate(lines[:_HEADER_LINES], 1):
+        if _TITLE.match(line):
+            return f'line {number} is the title "{line.strip()}"'
+    if found := _column_line(lines):
+        return f"line {found[0] + 1} is the column line of {found[1].quantity} in {found[1].unit}"
     start = _first_row(lines)
-    return 0 <= start <= 1 and _shape(lines[start:]) is not None
+    shape = _shape(lines[start:]) if 0 <= start <= 1 else None
+    return f"the rows have the shape of {shape.assumed}" if shape else ""
 
 
 def find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> Layout:

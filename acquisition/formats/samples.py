@@ -122,7 +122,7 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
 
 
 def value_traps(
-    distance: F8, flags: U8, resolution: float, line: Callable[[int], int | None]
+    distance: F8, flags: U8, resolution: float, line: Callable[[int], int | None], *, length: bool = True
 ) -> tuple[float, tuple[Trap, ...]]:
     """Look for distances that are rounded more coarsely than they are printed, and for a target that was lost.
 
@@ -135,6 +135,8 @@ def value_traps(
     resolution : float
         Last printed digit, m.
     line : callable
+    length : bool
+        Whether these are distances at all; of volts no target is lost.
 
     Returns
     -------
@@ -148,7 +150,7 @@ def value_traps(
         flags[tail:] |= Flag.MISSING.value
         message = f"the last {count} distances are exactly 0, which no rangefinder reads; kept as missing samples"
         traps.append(Trap("zero_filled_tail", message, count, line(tail)))
-    far = _far(distance)
+    far = _far(distance) if length else np.empty(0, np.int64)
     if far.size:
         flags[far] |= Flag.FALSE_ECHO.value
         low, high = float(np.min(distance[far])), float(np.max(distance[far]))
@@ -158,7 +160,7 @@ def value_traps(
         )
         traps.append(Trap("lost_target", message, int(far.size), line(int(far[0]))))
     quantum = _common_step(distance, resolution)
-    if quantum >= _COARSE_M * (1 - 1e-9) and quantum > 0:
+    if length and quantum >= _COARSE_M * (1 - 1e-9):
         message = f"distances are multiples of {quantum * 1e3:g} mm: finer motion is rounded away"
         traps.append(Trap("quantised", message, distance.size))
     return quantum, tuple(traps)

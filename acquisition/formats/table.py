@@ -237,7 +237,7 @@ def _blank(raw: NDArray[np.uint8], lines: _Lines) -> NDArray[np.bool_] | None:
     blank: NDArray[np.bool_] = lines.stop <= lines.start
     white = np.flatnonzero((raw.take(lines.start, mode="clip") <= _BLANK) & ~blank)
     if white.size:
-        seen = np.cumsum(raw > _BLANK)
+        seen = np.cumsum((raw != _BLANK) & (raw != _TAB))
         before = np.where(lines.start[white] > 0, seen[lines.start[white] - 1], 0)
         blank[white] = seen[lines.stop[white] - 1] == before
     return blank if blank.any() else None

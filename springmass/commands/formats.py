@@ -4,46 +4,43 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from acquisition.registry import formats
+from acquisition.errors import NeedsAnswer
+from acquisition.recording import Inspection, Survey, Trap
+from acquisition.registry import formats, inspect
 from springmass.commands import completions
 from springmass.errors import OK
-from springmass.loading import Loaded, load
+from springmass.loading import Loaded, kind_of, load
 
 __all__ = ["run"]
 
-RUN_TITLE = "springmass run file (HDF5, opens in xarray, h5py and NeXus tools)"
+OURS = {
+    "run": "springmass run file (HDF5, opens in xarray, h5py and NeXus tools)",
+    "wire": "springmass wire log: what was on disk while a run was recorded",
+}
+_WHY = {"run": "it begins with the signature of HDF5", "wire": "it begins with the mark of a log's record"}
 
 
 def run(options: argparse.Namespace) -> int:
     """List the formats, or describe a file."""
     if options.input is None:
         return _list(options)
-    loaded = load(options.input, **completions(options))
-    facts = _facts(loaded)
+    facts = _describe(Path(options.input), completions(options))
     if options.json:
         print(json.dumps(facts, allow_nan=False))
         return OK
-    for name, value in facts.items():
-        if name != "traps":
-            print(f"{name:<16} {_shown(value)}")
-    for trap in facts["traps"]:
-        where = f" (line {trap['line']})" if trap["line"] else ""
-        print(f"{'trap':<16} {trap['code']}: {trap['message']}{where}")
+    for line in _lines(facts):
+        print(line)
     return OK
 
 
-def _shown(value: object) -> str:
-    if value is None:
-        return "not stated"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
 def _list(options: argparse.Namespace) -> int:
-    table = {**{f.name: f.title for f in formats()}, "run": RUN_TITLE}
+    table = {**{f.name: f.title for f in formats()}, **OURS}
     if options.json:
         print(json.dumps([{"name": name, "title": title} for name, title in table.items()]))
         return OK
@@ -52,13 +49,49 @@ def _list(options: argparse.Namespace) -> int:
     return OK
 
 
+def _describe(path: Path, answers: dict[str, Any]) -> dict[str, Any]:
+    """Say what a file is; where one channel can be taken as distance, also what its samples are."""
+    kind = kind_of(path)
+    if kind != "recording":
+        loaded = load(path, **answers)
+        unit = "m"
+        survey = Survey("", loaded.channel, unit, len(loaded.samples), loaded.info.rate_hz, loaded.traps)
+        return {**_file(path, Inspection(kind, OURS[kind], _WHY[kind], (survey,))), **_facts(loaded)}
+    found = inspect(path)
+    facts = _file(path, found)
+    try:
+        return {**facts, **_facts(load(path, **answers))}
+    except NeedsAnswer as error:
+        traps = list(dict.fromkeys(trap for survey in found.surveys for trap in survey.traps))
+        return {**facts, "needs": str(error).removeprefix(f"{path}: "), "traps": [_trap(trap) for trap in traps]}
+
+
+def _file(path: Path, found: Inspection) -> dict[str, Any]:
+    return {
+        "path": str(path),
+        "format": found.format,
+        "family": found.title,
+        "why": found.why or None,
+        "channels": [
+            {
+                "run": each.run or None,
+                "name": each.channel,
+                "unit": each.unit or None,
+                "samples": each.samples,
+                "rate_hz": each.rate_hz,
+                "traps": [trap.code for trap in each.traps],
+            }
+            for each in found.surveys
+        ],
+    }
+
+
 def _facts(loaded: Loaded) -> dict[str, Any]:
     t = loaded.samples.t
     finite = t[np.isfinite(t)]
     return {
-        "path": str(loaded.path),
-        "format": loaded.format,
         "title": loaded.title or None,
+        "start_time": loaded.provenance.get("start_time"),
         "kind": loaded.info.kind,
         "channel": loaded.channel,
         "samples": len(loaded.samples),
@@ -71,5 +104,36 @@ def _facts(loaded: Loaded) -> dict[str, Any]:
         "quantum_m": loaded.info.quantum_m,
         "stated_error_m": loaded.info.stated_error_m,
         "sha256": loaded.sha256,
-        "traps": [{"code": x.code, "message": x.message, "count": x.count, "line": x.line} for x in loaded.traps],
+        "traps": [_trap(trap) for trap in loaded.traps],
     }
+
+
+def _trap(trap: Trap) -> dict[str, Any]:
+    return {"code": trap.code, "message": trap.message, "count": trap.count, "line": trap.line}
+
+
+def _lines(facts: dict[str, Any]) -> Iterator[str]:
+    for name, value in facts.items():
+        if name == "channels":
+            for each in value:
+                yield f"{'holds':<16} {_channel(each)}"
+        elif name == "traps":
+            for trap in value:
+                where = f" (line {trap['line']})" if trap["line"] else ""
+                yield f"{'trap':<16} {trap['code']}: {trap['message']}{where}"
+        else:
+            yield f"{name:<16} {_shown(value)}"
+
+
+def _channel(each: dict[str, Any]) -> str:
+    run_of = f"{each['run']}: " if each["run"] else ""
+    unit = f" ({each['unit']})" if each["unit"] else ", no unit stated"
+    rate = f"{each['rate_hz']:.6g} Hz" if each["rate_hz"] else "rate not stated"
+    traps = f"; {', '.join(dict.fromkeys(each['traps']))}" if each["traps"] else ""
+    return f"{run_of}{each['name']}{unit}, {each['samples']} samples, {rate}{traps}"
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "not stated"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -38,7 +38,9 @@ def run(options: argparse.Namespace) -> int:
         if options.seek is not None:
             source.seek(options.seek)
         if options.output is not None:
-            path = write_loaded(Path(options.output), replace(loaded, info=source.info), source)
+            path = write_loaded(
+                Path(options.output), replace(loaded, info=source.info), source, overwrite=options.overwrite
+            )
             print(f"{path}: replayed from {loaded.path}", file=sys.stderr)
             return OK
         print("time_s\tdistance_m\tflags")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
-from acquisition.errors import FormatError
-from acquisition.formats.motion_sensor_column import read_column
+from acquisition.formats.table import read_table
+from acquisition.formats.text import Text
 from acquisition.registry import open_recording, sniff
 
 PANDHI = "AyushPandhi__Pandhi_Ayush_PHY224"
@@ -57,18 +58,6 @@ PAIRS = [
     (f"{PANDHI}/damped position.txt", f"{PANDHI}/damped velocity.txt", 0.31433),
     ("kamjha__PHY224/position_osc.txt", "kamjha__PHY224/velocity_osc.txt", 0.32078),
 ]
-
-NOT_READ = [
-    ("EroSkulled__PHY224-324/Data2.csv", "no format recognises it"),
-    ("High-Rate-SHM-Working-Group__Dataset-5-Extended-Impact-Testing/Test_002.lvm", "LVM file"),
-    ("Mattia04__Smorzamento/Oscillazioni pretensionata_cd_5e7masse.csv", "PASCO Capstone"),
-    ("adamreeve__npTDMS/big_endian.tdms", "TDMS file"),
-    ("caspar__PhysicsLab/11mm damping.txt", "PASCO DataStudio"),
-    ("filo0509__smorzamento/molla_durissima_discopieno_14.91945_0.2016_1.csv", "PASCO Capstone"),
-    ("ladisk__lvm_read/short.lvm", "LVM file"),
-    ("ubsuny__data-analysis-final20/Raw Data.csv", "phyphox"),
-]
-
 
 @pytest.mark.parametrize("expected", POSITIONS, ids=lambda each: each.path)
 def test_a_position_file(recordings: Path, expected: Expected) -> None:
@@ -127,20 +116,14 @@ def test_files_of_two_runs_are_no_pair(recordings: Path) -> None:
     assert "pair_mismatch" in {trap.code for trap in pair.traps}
 
 
-@pytest.mark.parametrize(("path", "words"), NOT_READ)
-def test_files_of_other_families_are_refused_by_name(recordings: Path, path: str, words: str) -> None:
-    """One line says what the file is and how to bring it in."""
-    with pytest.raises(FormatError) as caught:
-        open_recording(recordings / path)
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize("path", [each.path for each in POSITIONS] + [pair[1] for pair in PAIRS])
-def test_fast_and_slow_readers_agree(recordings: Path, path: str) -> None:
-    """Both ways through a real file give the same bits."""
-    data = (recordings / path).read_bytes()
-    fast, slow = (read_column(path, data, None, None, None, fast=fast) for fast in (True, False))
-    for name in ("t", "value", "flags"):
-        assert getattr(fast, name).tobytes() == getattr(slow, name).tobytes()
-    assert fast.traps == slow.traps
+def test_every_cell_is_read_as_float_reads_it(recordings: Path, rows_oracle: ModuleType, path: str) -> None:
+    """The reader of whole pages gives the very bits that plain Python gives, row by row."""
+    lines = (recordings / path).read_text().splitlines()[2:]
+    text = Text.of((recordings / path).read_bytes())
+    columns = lines[0].count("\t") + 1
+    table = read_table(text, range(columns), "\t", width=columns, start=text.head(3)[2].start, first_line=3)
+    expected = rows_oracle.read_rows("\n".join(lines), columns, "\t", 3)
+    assert not table.bad.any()
+    for column, values in enumerate(table.values):
+        np.testing.assert_array_equal(values, [row[column] for row in expected.values])

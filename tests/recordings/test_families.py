@@ -1,0 +1,198 @@
+"""Every real file: family, rate, samples, units and values as counted by awk and npTDMS, not by the readers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.block import Flag, concatenate
+from acquisition.errors import NeedsAnswer
+from acquisition.registry import formats, inspect, open_recording, sniff
+
+PANDHI = "AyushPandhi__Pandhi_Ayush_PHY224"
+MATTIA = "Mattia04__Smorzamento/Oscillazioni pretensionata_cd_5e7masse.csv"
+FILO = "filo0509__smorzamento/molla_durissima_discopieno_14.91945_0.2016_1.csv"
+SHM = "High-Rate-SHM-Working-Group__Dataset-5-Extended-Impact-Testing/Test_002.lvm"
+TDMS = "adamreeve__npTDMS/big_endian.tdms"
+PHYPHOX = "ubsuny__data-analysis-final20/Raw Data.csv"
+TRACKER = "EroSkulled__PHY224-324/Data2.csv"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One channel of one file.
+
+    ``unit`` is what the file states; where that is no length the test counts one of it as one metre.
+    """
+
+    path: str
+    family: str
+    samples: int
+    rate_hz: float
+    t: tuple[float, float]
+    ends: tuple[float, float]
+    unit: str = "cm"
+    channel: str | None = None
+    run: str | None = None
+    given_hz: float | None = None
+    clock: str = "nominal"
+    traps: frozenset[str] = frozenset()
+
+
+STATED = frozenset({"nominal_clock", "stated_error_is_not_noise"})
+SUMMED = frozenset({"nominal_clock", "offset_unknown"})
+GRID = frozenset({"nominal_clock"})
+FORCED = GRID | {"unit_assumed"}
+
+TABLE = [
+    Row(f"{PANDHI}/position data.txt", "motion-sensor", 724, 100, (0.43, 7.66), (16.500, 16.647), traps=STATED),
+    Row(f"{PANDHI}/damped position.txt", "motion-sensor", 12172, 100, (0, 121.71), (25.334, 20.649), traps=STATED),
+    Row(f"{PANDHI}/velocity data.txt", "motion-sensor", 724, 100, (0.43, 7.66), (0, 0.147), "cm/s", traps=SUMMED),
+    Row(f"{PANDHI}/damped velocity.txt", "motion-sensor", 12172, 100, (0, 121.71), (0, -4.685), "cm/s", traps=SUMMED),
+    Row("kamjha__PHY224/position_osc.txt", "motion-sensor", 690, 100, (1.27, 8.16), (20.985, 21.006), traps=STATED),
+    Row("kamjha__PHY224/velocity_osc.txt", "motion-sensor", 690, 100, (1.27, 8.16), (0, 0.021), "cm/s", traps=SUMMED),
+    Row(
+        "pankaj9um__PHY224/undamped_point_data.txt",
+        "motion-sensor",
+        1451,
+        100,
+        (5.04, 19.54),
+        (17.797, 17.765),
+        traps=STATED,
+    ),
+    Row(
+        "pankaj9um__PHY224/undamped_point_data_set2.txt",
+        "motion-sensor",
+        978,
+        100,
+        (0.49, 10.26),
+        (20.688, 21.101),
+        traps=STATED,
+    ),
+    Row(FILO, "capstone", 11886, 100, (1.0, 119.85), (0.4788, 0.4182), "", "position", traps=FORCED),
+    Row(FILO, "capstone", 11886, 100, (1.0, 119.85), (0.29, np.nan), "", "velocity", traps=FORCED | {"missing_samples"}),
+    Row(MATTIA, "capstone", 1875, 50, (0, 37.48), (-19.6620, 3.2366), "mm", None, "Run #1", 50.0, traps=GRID | {"rate_assumed"}),
+    Row(MATTIA, "capstone", 2384, 50, (0, 47.66), (-14.9504, 1.8017), "mm", None, "2", 50.0, traps=GRID | {"rate_assumed"}),
+    Row("caspar__PhysicsLab/11mm damping.txt", "datastudio", 1873, 10, (0, 187.2), (0.019, -0.018), "V", traps=FORCED),
+    Row("caspar__PhysicsLab/Q1.txt", "datastudio", 618, 10, (0, 61.7), (-0.009, -0.004), "V", traps=FORCED),
+    Row(
+        PHYPHOX,
+        "phyphox",
+        1170,
+        100.3164,
+        (0, 11.65312625),
+        (1.419502217e-2, 3.322257698e-1),
+        "rad/s",
+        "Gyroscope x",
+        clock="device",
+        traps=frozenset({"jittered_time", "unit_assumed"}),
+    ),
+    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (36.81932105, 9.153431271), "", "x", traps=FORCED),
+    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (-3.838981342, -36.50951911), "", "y", traps=FORCED),
+    Row(SHM, "lvm", 51200, 51200, (46.8596458, 47.85962627), (0.04641, -0.772429), "m/s^2", "Acceleration_0", traps=FORCED),
+    Row(SHM, "lvm", 51200, 51200, (46.8596458, 47.85962627), (-2.739636, -3.968754), "m/s^2", "Acceleration_1", traps=FORCED),
+    Row(
+        SHM,
+        "lvm",
+        5,
+        51282,
+        (46.859646, 46.859724),
+        (100000.0, 100.0),
+        "",
+        "Untitled",
+        traps=FORCED | {"stale_header", "rate_assumed"},
+    ),
+    Row("ladisk__lvm_read/short.lvm", "lvm", 10, 25600, (0, 9 / 25600), (0.914018, 0.680572), "Newtons", "Excitation (Trigger)", traps=FORCED),
+    Row("ladisk__lvm_read/short_new_line_end.lvm", "lvm", 10, 25600, (0, 9 / 25600), (1.204792, 1.212775), "m/s^2", "Response (Trigger)", traps=FORCED),
+    Row("ladisk__lvm_read/no_decimal_separator.lvm", "lvm", 4, 4000, (0, 0.00075), (-0.028189, -0.021172), "g", "ay", traps=FORCED),
+    Row("ladisk__lvm_read/multi_time_column.lvm", "lvm", 3, 51200, (0, 3.90625e-5), (0.532608, 0.467541), "g", "Acceleration", traps=FORCED | {"stale_header"}),
+    Row(
+        "ladisk__lvm_read/with_comments.lvm",
+        "lvm",
+        9,
+        1.13,
+        (0, 9.723275),
+        (1.833787, 1.717152),
+        "MPa",
+        "Pressão ABS.",
+        clock="device",
+        traps=frozenset({"stale_header", "unit_assumed", "rate_assumed", "missing_samples"}),
+    ),
+    Row(TDMS, "tdms", 3500, 1000, (0, 3.499), (0, 5.067986572324634), "", "Amplitude sweep", traps=FORCED | {"stale_header"}),
+    Row(TDMS, "tdms", 3500, 1000, (0, 3.499), (0, 0.8446644287207723), "", "Phase sweep", traps=FORCED | {"stale_header"}),
+]  # fmt: skip
+
+PER_METRE = {"cm": 100.0, "mm": 1000.0, "cm/s": 100.0}
+
+
+@pytest.mark.parametrize("row", TABLE, ids=lambda row: f"{row.path}:{row.channel}:{row.run}")
+def test_a_real_file_is_read_as_it_was_counted(recordings: Path, row: Row) -> None:
+    """Family, rate, number of samples, unit, first and last value, traps, and the bytes it came from."""
+    path = recordings / row.path
+    unit = None if row.unit in PER_METRE else "m"
+    recording = open_recording(path, channel=row.channel, run=row.run, rate_hz=row.given_hz, unit=unit)
+    samples = recording.samples
+    assert sniff(path) == recording.format == row.family
+    assert len(samples) == row.samples
+    assert recording.info.rate_hz == pytest.approx(row.rate_hz, rel=2e-3 if row.clock == "device" else 1e-9)
+    assert (recording.info.clock, recording.info.kind) == (row.clock, "replay")
+    np.testing.assert_allclose((samples.t[0], samples.t[-1]), row.t, rtol=1e-9, atol=1e-12)
+    tolerance = 6e-6 if row.unit == "cm/s" else 1e-12
+    ends = np.array(row.ends) / PER_METRE.get(row.unit, 1.0)
+    np.testing.assert_allclose((samples.distance[0], samples.distance[-1]), ends, rtol=1e-12, atol=tolerance)
+    assert {trap.code for trap in recording.traps} == row.traps
+    assert recording.malformed_rows == 0
+    assert recording.originals[0].data == path.read_bytes()
+    joined = concatenate(recording.blocks(997))
+    assert joined.distance.tobytes() == samples.distance.tobytes()
+    stated = {(each.channel, each.unit) for each in inspect(path).surveys}
+    assert any(row.channel in (None, name) and unit == row.unit for name, unit in stated)
+
+
+def test_no_real_file_is_left_out(recordings: Path) -> None:
+    """The table names every file of the folder."""
+    there = {p.relative_to(recordings).as_posix() for p in recordings.rglob("*") if p.is_file() and p.suffix != ".md"}
+    assert there == {row.path for row in TABLE}
+
+
+@pytest.mark.parametrize("path", sorted({row.path for row in TABLE}))
+def test_a_real_file_is_of_one_family_alone(recordings: Path, path: str) -> None:
+    """No second format lays claim to it."""
+    head = (recordings / path).read_bytes()[:8192]
+    assert [each.name for each in formats() if each.recognises(head)] == [sniff(recordings / path)]
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        (MATTIA, 'the file holds 2 runs: "Run #1", "Run #2"; name the one to take with --run'),
+        (FILO, '"position", "velocity", "acceleration"; name the one to take with --channel'),
+        (SHM, '"Acceleration_0 (m/s^2)", "Acceleration_1 (m/s^2)", "Untitled"'),
+        (TDMS, '"Amplitude sweep", "Phase sweep"; name the one to take with --channel'),
+        (PHYPHOX, '"Gyroscope x (rad/s)", "Gyroscope y (rad/s)"'),
+        (TRACKER, '"x", "y", "rad"; name the one to take with --channel'),
+        ("caspar__PhysicsLab/Q1.txt", 'channel "Voltage": its unit is "V", no length; say with --unit'),
+    ],
+)
+def test_what_a_real_file_leaves_open_is_asked_for(recordings: Path, path: str, words: str) -> None:
+    """Several runs or channels, or a unit that is no length: one line that lists them."""
+    with pytest.raises(NeedsAnswer) as caught:
+        open_recording(recordings / path)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_rate_is_asked_for(recordings: Path) -> None:
+    """A Capstone export without times needs --rate-hz."""
+    with pytest.raises(NeedsAnswer, match=r"give the rate with --rate-hz"):
+        open_recording(recordings / MATTIA, run="1")
+
+
+def test_empty_edges_of_a_derived_column_are_missing_samples(recordings: Path) -> None:
+    """One velocity and three accelerations are not there at the end; positions all are."""
+    for channel, lost in (("position", 0), ("velocity", 1), ("acceleration", 3)):
+        samples = open_recording(recordings / FILO, channel=channel, unit="m").samples
+        assert np.flatnonzero(samples.flags & Flag.MISSING.value).tolist() == list(range(11886 - lost, 11886))
