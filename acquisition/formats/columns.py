@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.block import F8, Block
+from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.formats.cells import EMPTY, EXPONENT
-from acquisition.formats.contents import Arrays, Channel, Contents, Formula, Sheet, choose
-from acquisition.formats.samples import Rows, flags_of, place, row_traps, sample_traps, value_traps
-from acquisition.formats.table import read_table
+from acquisition.formats.contents import Channel, Contents, Formula, choose
+from acquisition.formats.pulled import Pulled, pull
+from acquisition.formats.samples import flags_of, place, row_traps, sample_traps, value_traps
 from acquisition.formats.timing import (
     Timing,
     check_rate,
@@ -24,28 +21,12 @@ from acquisition.formats.timing import (
     time_by_column,
     time_by_formula,
     time_by_rate,
-    tolerance_of,
 )
-from acquisition.formats.units import LENGTHS, length_power, time_power, unit_words
+from acquisition.formats.units import LENGTHS, length_power, unit_words
 from acquisition.recording import Original, Recording, Survey, Trap
 from acquisition.source import SourceInfo
 
 __all__ = ["ColumnFormat"]
-
-_LONGEST_S = 1e10
-_T = TypeVar("_T", bound=np.generic)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pulled:
-    """One channel's numbers as the file has them: times in s or None, values in their unit or in m."""
-
-    printed: F8 | None
-    tolerance: F8 | None
-    value: F8
-    rows: Rows
-    time_resolution: float
-    resolution: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +67,7 @@ class ColumnFormat:
         contents = self.contents(path, data)
         chosen = choose(path, contents, channel, run)
         power, told = _power(path, chosen, unit)
-        pulled = _pull(path, chosen, power)
+        pulled = pull(path, chosen, power)
         timing, traps = _timing(path, chosen, pulled, rate_hz)
         samples, found, line = _samples(path, chosen, pulled, timing, contents.zeros)
         length = chosen.is_length or not chosen.unit
@@ -113,7 +94,7 @@ class ColumnFormat:
         return tuple(self._survey(path, each) for each in self.contents(path, data).channels)
 
     def _survey(self, path: str, channel: Channel) -> Survey:
-        pulled = _pull(path, channel, length_power(channel.unit) or 0)
+        pulled = pull(path, channel, length_power(channel.unit) or 0)
         try:
             timing, traps = _timing(path, channel, pulled, None)
         except NeedsAnswer:
@@ -147,108 +128,18 @@ def _power(path: str, channel: Channel, unit: str | None) -> tuple[int, tuple[Tr
     return power, (Trap("unit_assumed", message),)
 
 
-def _pull(path: str, channel: Channel, power: int) -> _Pulled:
-    if isinstance(channel.source, Arrays):
-        return _from_arrays(channel.source, power)
-    return _from_sheet(path, channel, channel.source, power)
-
-
-def _from_arrays(arrays: Arrays, power: int) -> _Pulled:
-    scale = 10.0**-power
-    value = arrays.values / scale if power else arrays.values.copy()
-    rows = Rows(np.zeros(value.size, bool), _no_line)
-    t = arrays.t
-    resolution = 0.0 if t is None or not t.size else float(np.spacing(np.abs(t[np.isfinite(t)]).max(initial=0.0)))
-    return _Pulled(t, None, value, rows, max(resolution, 1e-12), 0.0)
-
-
-def _no_line(row: int) -> int:  # noqa: ARG001
-    """Return 0: binary files have no lines."""
-    return 0
-
-
-def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> _Pulled:
-    columns = [channel.column] if channel.time is None else [channel.time, channel.column]
-    shift = 0
-    if channel.time is not None and channel.time_unit:
-        told = time_power(channel.time_unit)
-        if told is None:
-            demand = f'expected times in s, ms or us, got "{channel.time_unit}"'
-            raise FormatError(path, demand, "export the times in seconds")
-        shift = told
-    table = read_table(
-        sheet.text,
-        columns,
-        sheet.delimiter,
-        start=sheet.start,
-        stop=sheet.stop,
-        first_line=sheet.first_line,
-        shifts=[power] if channel.time is None else [shift, power],
-    )
-    keep = _present(table.form, channel.ragged)
-    if not keep.any():
-        demand = f'expected rows of numbers for "{channel.name}", got none'
-        raise FormatError(path, demand, "check that the export ended", line=sheet.first_line)
-    kept = None if keep.all() else np.flatnonzero(keep)
-    bad, value = _kept(table.bad, kept), _kept(table.values[-1], kept)
-    printed = tolerance = None
-    time_resolution = 0.0
-    if channel.time is not None:
-        printed = _kept(table.values[0], kept)
-        time_resolution = _resolution(printed, table.decimals[0], table.exponents[0], shift)
-        if channel.formula is not None:
-            tolerance = tolerance_of(printed, _kept(table.form[0], kept), shift, EXPONENT)
-        unread = ~(np.abs(printed) < _LONGEST_S)
-        if unread.any():
-            bad = bad | unread
-    if bad.any():
-        value = np.where(bad, np.nan, value)
-
-    def line(row: int) -> int:
-        return table.line(row if kept is None else int(kept[row]))
-
-    if bad.all():
-        demand = f'expected rows of numbers for "{channel.name}", got none in {bad.size} lines'
-        raise FormatError(path, demand, "check that rows and headings belong together", line=line(0))
-    rows = Rows(bad, line, table.cut and bool(keep[-1]), table.last_cell, table.decimals[0])
-    resolution = _resolution(value, table.decimals[-1], table.exponents[-1], power)
-    return _Pulled(printed, tolerance, value, rows, time_resolution, resolution)
-
-
-def _kept(column: NDArray[_T], rows: NDArray[np.int64] | None) -> NDArray[_T]:
-    return column if rows is None else column[rows]
-
-
-def _present(form: tuple[NDArray[np.int8], ...], ragged: bool) -> NDArray[np.bool_]:
-    """Tell rows that hold something of the channel: others belong to a longer one beside it."""
-    empty = form[-1] == EMPTY
-    keep = ~(empty & (form[0] == EMPTY)) if len(form) == 2 else np.ones(empty.size, bool)
-    if ragged or len(form) == 1:
-        # Only empty cells at the end tell nothing: one in the middle is a sample that was lost.
-        some = np.flatnonzero(~empty)
-        keep[int(some[-1]) + 1 if some.size else 0 :] = False
-    return keep
-
-
-def _resolution(values: F8, decimals: int, exponents: bool, shift: int) -> float:
-    """Return the last printed digit; of numbers with exponents that of the largest."""
-    if exponents:
-        largest = float(np.fmax.reduce(np.abs(values), initial=0.0))
-        shift = int(np.floor(np.log10(largest))) if largest > 0 else shift
-    return float(f"1e{shift - decimals}")
-
-
-def _timing(path: str, channel: Channel, pulled: _Pulled, rate_hz: float | None) -> tuple[Timing, tuple[Trap, ...]]:
+def _timing(path: str, channel: Channel, pulled: Pulled, rate_hz: float | None) -> tuple[Timing, tuple[Trap, ...]]:
     traps: list[Trap] = []
     formula = channel.formula
-    count = pulled.value.size
+    count = pulled.value.size if pulled.rows.remark is None else int(np.count_nonzero(~pulled.rows.remark))
     if formula is not None and formula.samples is not None and formula.samples != count:
         message = f"the header declares {formula.samples} samples, {count} rows are there; all are kept"
         traps.append(Trap("stale_header", message, abs(formula.samples - count)))
     timing = None
     if formula is not None:
         printed = None if pulled.printed is None else np.where(pulled.rows.bad, np.nan, pulled.printed)
-        timing = time_by_formula(path, formula.start_s, formula.step_s, printed, pulled.tolerance, rate_hz)
+        number = pulled.rows.number()
+        timing = time_by_formula(path, formula.start_s, formula.step_s, printed, pulled.tolerance, number, rate_hz)
         if timing is None:
             traps.append(_stale(formula, pulled))
     if timing is None and pulled.printed is not None:
@@ -261,7 +152,7 @@ def _timing(path: str, channel: Channel, pulled: _Pulled, rate_hz: float | None)
     return timing, (*traps, *clock_traps(timing))
 
 
-def _stale(formula: Formula, pulled: _Pulled) -> Trap:
+def _stale(formula: Formula, pulled: Pulled) -> Trap:
     said = f"the header says {formula.start_s:g} s + i * {formula.step_s:g} s"
     if pulled.printed is None:
         return Trap("stale_header", f"{said}, which makes no times")
@@ -269,12 +160,14 @@ def _stale(formula: Formula, pulled: _Pulled) -> Trap:
 
 
 def _samples(
-    path: str, channel: Channel, pulled: _Pulled, timing: Timing, zeros: int
+    path: str, channel: Channel, pulled: Pulled, timing: Timing, zeros: int
 ) -> tuple[Block, tuple[Trap, ...], Callable[[int], int | None]]:
     """Return the samples, what was seen in them, and what gives the line of each."""
     rows, value, bad = pulled.rows, pulled.value, pulled.rows.bad
     if pulled.printed is None or timing.by_row:
-        t = row_times(timing, value.size)
+        t = row_times(timing, rows.number())
+        if rows.remark is not None:
+            t[rows.remark] = np.nan
     else:
         t = place(pulled.printed, rows, timing)
     told = np.isfinite(t)

@@ -43,7 +43,8 @@ def _contents(path: str, data: bytes) -> Contents:
     channels: list[Channel] = []
     titles = []
     blocks = list(_blocks(text))
-    for (title, line), stop in zip(blocks, [*(title.start for (title, _) in blocks[1:]), text.stop], strict=True):
+    stops = [*(title.start for title, _ in blocks), text.stop][1:]
+    for (title, line), stop in zip(blocks, stops, strict=True):
         titles.append(title.text.strip())
         sheet = Sheet(text, line.next, stop, line.number + 1, split_heading(line.text)[1])
         channels.extend(channels_of(sheet, _headings(title.text, line.text)))

@@ -134,7 +134,7 @@ def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
     for at, line in enumerate(lines[:_HEADER_LINES]):
         if _is_row(line):
             return None
-        cells = [c.strip(' "') for c in split_cells(line, guess_delimiter(line) or "\t")]
+        cells = [cell.strip() for cell in split_cells(line, guess_delimiter(line) or "\t")]
         if 2 <= len(cells) <= 3 and _TIME.fullmatch(cells[0]):
             if (match := _VELOCITY.fullmatch(cells[1])) and len(cells) == 2:
                 return at, _layout("velocity", 2, match[1])

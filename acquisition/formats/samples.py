@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import F8, U8, Flag
+from acquisition.block import F8, I8, U8, Flag
 from acquisition.formats.nominal import place_unread, snap, time_flags
 from acquisition.formats.timing import Timing
 from acquisition.recording import Trap
@@ -41,6 +41,8 @@ class Rows:
         The first cell of the last row.
     decimals : int
         Decimals that a time is printed with.
+    remark : (n,) bool or None
+        Rows of text between samples, which are none; None where there is no such row.
     """
 
     bad: NDArray[np.bool_]
@@ -48,6 +50,13 @@ class Rows:
     cut: bool = False
     last_cell: str = ""
     decimals: int = 0
+    remark: NDArray[np.bool_] | None = None
+
+    def number(self) -> I8:
+        """Return the number of each row as a sample, counted without remarks; theirs is that of the row before."""
+        if self.remark is None:
+            return np.arange(self.bad.size)
+        return np.cumsum(~self.remark) - 1
 
 
 def place(printed: F8, rows: Rows, timing: Timing) -> F8:

@@ -259,6 +259,7 @@ class _Rows:
         self.rows = 0
         self.skipped: list[I8] = []
         self.last = b""
+        self.last_cells = 0
 
     def _make_room(self, more: int, pages: float) -> None:
         """Grow the columns, to the size that so many pages with so many rows each will need."""
@@ -305,6 +306,7 @@ class _Rows:
         self.rows += count
         begin, end = lines.bounds(0)
         self.last = page.raw[int(begin[-1]) : int(end[-1])].tobytes()
+        self.last_cells = int(lines.cells[-1])
         return None
 
     def _wrong_width(self, raw: NDArray[np.uint8], lines: _Lines) -> NDArray[np.bool_]:
@@ -326,23 +328,19 @@ class _Rows:
         usual = tuple(
             _most_frequent(counts[int(exponent)][k]) + EXPONENT * int(exponent) for k, exponent in enumerate(exponents)
         )
-        cut = np.zeros(self.rows, bool)
         for k, each in enumerate(form):
-            cut |= self._cut(k, each, usual[k], exponents[k])
-        unsound = bool(self.rows) and not ended and self._last_is_cut(usual, cut, form)
-        if unsound:
-            cut[-1] = True
-        bad = bad | cut if cut.any() else bad
+            cut = self._cut(k, each, usual[k], exponents[k])
+            if not ended and self.rows and self._is_cut_last(k, form, usual[k]):
+                cut = np.arange(self.rows) == self.rows - 1 if cut is None else cut
+                cut[-1] = True
+            if cut is not None:
+                values[k][cut], each[cut] = np.nan, UNREAD
+                bad |= cut
         skipped = np.concatenate(self.skipped) if self.skipped else np.empty(0, np.int64)
         truncated = bool(self.rows) and not ended and bool(bad[-1])
         decimals = tuple(each % EXPONENT for each in usual)
         last = self.last.strip(b" ").decode("ascii", "replace")
         return Table(values, form, bad, decimals, exponents, last, truncated, first_line, skipped)
-
-    def _differs(self, form: I1, usual: int, exponent: bool) -> NDArray[np.bool_]:
-        """Tell numbers of another form; where exponents are the exception, they are as good as any."""
-        differs: NDArray[np.bool_] = (form >= 0) & (form != usual)
-        return differs if exponent else differs & (form < EXPONENT)
 
     def _fixed(self, k: int, usual: int, exponent: bool) -> bool:
         """Tell whether a column always prints the same number of decimals."""
@@ -353,26 +351,26 @@ class _Rows:
         stripped = others >= _STRIPPED * numbers and numbers >= _MANY and not self.padded[k]
         return others <= (1 - _UNIFORM) * numbers and not stripped
 
-    def _cut(self, k: int, form: I1, usual: int, exponent: bool) -> NDArray[np.bool_]:
-        """Find numbers that lost some of their decimals, or grew others."""
+    def _cut(self, k: int, form: I1, usual: int, exponent: bool) -> NDArray[np.bool_] | None:
+        """Find numbers that lost some of their decimals, or grew others; None where there is none."""
         if self.counts[k][: 2 * EXPONENT].sum() == self.counts[k][usual] or not self._fixed(k, usual, exponent):
-            return np.zeros(form.size, bool)
-        return self._differs(form, usual, exponent)
+            return None
+        # Where exponents are the exception, a number with one is as good as any.
+        differs: NDArray[np.bool_] = (form >= 0) & (form != usual) & (exponent | (form < EXPONENT))
+        return differs if differs.any() else None
 
-    def _last_is_cut(self, usual: tuple[int, ...], cut: NDArray[np.bool_], form: tuple[I1, ...]) -> bool:
-        """Tell whether a last row without line end may have stopped within a number.
+    def _is_cut_last(self, k: int, form: tuple[I1, ...], usual: int) -> bool:
+        """Tell whether a last row without line end may have stopped within the cell of a column.
 
-        A number is whole where it has all the decimals that its column always prints. In a column that prints
-        now more, now fewer, or none, nothing shows that the last number is whole, so it counts as cut.
+        A number is whole where something follows it, or where it has all the decimals that its column always
+        prints. In a column that prints now more, now fewer, or none, nothing shows that the last number is whole,
+        so it counts as cut.
         """
-        last = max(range(len(self.columns)), key=lambda k: self.columns[k])
-        shown = int(form[last][-1])
-        if shown < 0:
-            return self.width is None and shown == EMPTY
-        exponent = usual[last] >= EXPONENT
-        if usual[last] not in (0, EXPONENT) and self._fixed(last, usual[last], exponent):
-            return shown != usual[last]
-        return self.rows > 1 or bool(cut[-1])
+        if self.last_cells > self.columns[k] + 1 or form[k][-1] < 0:
+            return False
+        if usual not in (0, EXPONENT) and self._fixed(k, usual, usual >= EXPONENT):
+            return int(form[k][-1]) != usual
+        return self.rows > 1
 
 
 def _most_frequent(counts: I8) -> int:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import F8
+from acquisition.block import F8, I8
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.formats.nominal import Grid, find_rate
 from acquisition.recording import Trap
@@ -95,7 +95,13 @@ def _jitter(printed: F8) -> tuple[float, float] | None:
 
 
 def time_by_formula(
-    path: str, start_s: float, step_s: float, printed: F8 | None, tolerance: F8 | None, rate_hz: float | None
+    path: str,
+    start_s: float,
+    step_s: float,
+    printed: F8 | None,
+    tolerance: F8 | None,
+    number: I8,
+    rate_hz: float | None,
 ) -> Timing | None:
     """Take a header's times ``start_s + i step_s``, if the column of times agrees within its rounding.
 
@@ -103,6 +109,8 @@ def time_by_formula(
     ----------
     printed, tolerance : (n,) float64, s, or None
         Times of the rows, NaN where unread, and half the last digit of each; None: no column.
+    number : (n,) int64
+        The i of each row.
 
     Returns
     -------
@@ -113,7 +121,7 @@ def time_by_formula(
         return None
     if printed is not None and tolerance is not None:
         told = np.isfinite(printed)
-        expected = start_s + step_s * np.arange(printed.size)[told]
+        expected = start_s + step_s * number[told]
         slack = 1e-9 * np.maximum(np.abs(expected), step_s)
         if not (np.abs(printed[told] - expected) <= tolerance[told] * 1.0001 + slack).all():
             return None
@@ -155,11 +163,11 @@ def clock_traps(timing: Timing) -> Iterator[Trap]:
         yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the likeliest: {why}")
 
 
-def row_times(timing: Timing, rows: int) -> F8:
-    """Return the times of the first rows of a nominal clock, s."""
+def row_times(timing: Timing, number: I8) -> F8:
+    """Return the times of rows by their numbers on a nominal clock, s."""
     if timing.grid is None:
         raise ValueError("only a grid has times of rows")
-    return timing.grid.time(np.arange(rows))
+    return timing.grid.time(number)
 
 
 def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int) -> F8:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,50 +32,202 @@ class Case:
     label : str
         What is special about it.
     build : callable
-        Bytes of a file that holds ``T`` (s) and ``DISTANCE`` (m).
-    quantum_m : float
-        Step of distance that the reader must report, m.
+        From times (s) and distances (m, NaN where there is none) to the bytes of a file.
+    quantum_m : float or None
+        Step of distance that the reader must report, m; None where the file has none.
     offset_known : bool
         Whether the file says where zero is.
+    options : dict
+        What must be said of such a file.
+    times : bool
+        Whether every row has its time.
+    text : bool
+        Whether it is rows of text.
     """
 
     format: str
     label: str
-    build: Callable[[], bytes]
-    quantum_m: float
+    build: Callable[[Any, Any], bytes]
+    quantum_m: float | None = 1e-5
     offset_known: bool = True
+    options: dict[str, Any] = field(default_factory=dict)
+    times: bool = True
+    text: bool = True
 
 
-def motion_position(newline: str = "\r\n", header: int = 2, error: bool = True) -> bytes:
+def rows(t: Any, x: Any, form: str) -> list[str]:
+    """Print rows; a NaN is printed as ``NaN``."""
+    return [form.format(t=a, x=b).replace("nan", "NaN") for a, b in zip(t, x, strict=True)]
+
+
+def motion_position(t: Any, x: Any, newline: str = "\r\n", header: int = 2, error: bool = True) -> bytes:
     """Write the MotionSensor.vi position file."""
     columns = "Time (s)\tDistance (cm)" + ("\tDist Error (cm)" if error else "")
     lines = ["Motion Sensor Data File Sep 20, 2018 1:40 PM", columns][2 - header :]
-    tail = "\t0.239" if error else ""
-    return newline.join([*lines, *(f"{t:.3f}\t{x * 100:.3f}{tail}" for t, x in zip(T, DISTANCE, strict=True))]).encode()
+    return newline.join([*lines, *rows(t, x * 100, "{t:.3f}\t{x:.3f}" + ("\t0.239" if error else ""))]).encode()
 
 
-def motion_velocity() -> bytes:
+def motion_velocity(t: Any, x: Any) -> bytes:
     """Write the MotionSensor.vi velocity file."""
-    v = np.diff(DISTANCE, prepend=np.nan) * RATE_HZ * 100
-    rows = [f"{t:.3f}\t{x:.3f}".replace("nan", "NaN") for t, x in zip(T, v, strict=True)]
-    return "\r\n".join(["velocity Oct 20, 2022", "Time (s)\tVelocity (cm/s)", *rows]).encode()
+    v = np.diff(x, prepend=np.nan) * RATE_HZ * 100
+    return "\r\n".join(["velocity Oct 20, 2022", "Time (s)\tVelocity (cm/s)", *rows(t, v, "{t:.3f}\t{x:.3f}")]).encode()
+
+
+def lvm(t: Any, x: Any, mode: str = "One", mark: str = "\t", point: str = ".") -> bytes:
+    """Write LabVIEW Measurement; every number of the formula agrees with the column."""
+    name = {"\t": "Tab", ",": "Comma", ";": "Semicolon"}[mark]
+    head = [
+        "LabVIEW Measurement",
+        "Writer_Version\t2",
+        f"Separator\t{name}",
+        f"Decimal_Separator\t{point}",
+        "Multi_Headings\tNo",
+        f"X_Columns\t{mode}",
+        "***End_of_Header***",
+        "",
+        "Channels\t1",
+        f"Samples\t{t.size}",
+        "Date\t1903/12/31",
+        "Time\t19:00:00",
+        "Y_Unit_Label\tcm",
+        "X_Dimension\tTime",
+        "X0\t0.0000000000000000E+0".replace(".", point),
+        "Delta_X\t0.010000".replace(".", point),
+        "***End_of_Header***",
+        "X_Value\tPosition\tComment",
+    ]
+    form = "\t{x:.6f}" if mode == "No" else "{t:.6f}\t{x:.6f}"
+    body = [row.replace(".", point) for row in rows(t, x * 100, form)]
+    return "\r\n".join([*head, *body]).replace("\t", mark).encode()
+
+
+def tdms(t: Any, x: Any) -> bytes:
+    """Write TDMS with npTDMS."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    file = io.BytesIO()
+    properties = {"wf_increment": 0.01, "wf_start_offset": 0.0, "wf_samples": x.size, "unit_string": "m"}
+    with TdmsWriter(file) as writer:
+        writer.write_segment([ChannelObject("Measured", "Position", x, properties)])
+    return file.getvalue()
+
+
+def capstone(t: Any, x: Any) -> bytes:
+    """Write a Capstone export: two runs, the other longer, decimal commas."""
+    head = '\ufeff"Time (s) Run #1";"Position (mm) Run #1";"Time (s) Run #2";"Position (mm) Run #2"'
+    body = [f"{row};{row}" for row in rows(t, x * 1000, "{t:.4f};{x:.4f}")]
+    longer = [f";;{row}" for row in rows([3.0, 3.01], [1.0, 2.0], "{t:.4f};{x:.4f}")]
+    return "\r\n".join([head, *(line.replace(".", ",") for line in body + longer), ""]).encode()
+
+
+def localised(t: Any, x: Any) -> bytes:
+    """Write a localised Capstone export: no units."""
+    return "\r\n".join(["tempo;velocità;posizione", *rows(t, x, "{t:.4f};{x:.2f};{x:.5f}"), ""]).encode()
+
+
+def datastudio(t: Any, x: Any) -> bytes:
+    """Write a DataStudio export of two runs."""
+    blocks = [
+        [f"Position, ChA&B, Run #{run}", "Time ( s )\tPosition ( m )", *rows(t, x + run - 1, "{t:.4f}\t{x:.5f}")]
+        for run in (1, 2)
+    ]
+    return "\r\n".join([*blocks[1], *blocks[0]]).encode()
+
+
+def vernier(t: Any, x: Any) -> bytes:
+    """Write Vernier Format 2."""
+    head = ["Vernier Format 2", "Untitled.cmbl 5/5/2019 9:37:43 .", "Run 1", "Time\tPosition", "t\tx", "s\tm", ""]
+    return "\r\n".join([*head, *rows(t, x, "{t:.2f}\t{x:.5f}")]).encode()
+
+
+def logger_pro(t: Any, x: Any) -> bytes:
+    """Write a Logger Pro export of the latest run and one before."""
+    head = "Latest: Time (s),Latest: Position (m),Run 1: Time (s),Run 1: Position (m)"
+    return "\n".join([head, *(f"{row},{row}" for row in rows(t, x, "{t:.2f},{x:.5f}"))]).encode()
+
+
+def phyphox(t: Any, x: Any, mark: str = ",", newline: str = "\n") -> bytes:
+    """Write a phyphox export."""
+    body = rows(t, x, f"{{t:.9E}}{mark}{{x:.9E}}")
+    return newline.join([f'"Time (s)"{mark}"Distance (m)"', *body]).replace("E-0", "E-").replace("E+0", "E").encode()
+
+
+def phyphox_xml(t: Any, x: Any) -> bytes:
+    """Write a phyphox state."""
+    lists = [",".join(f"{value:.9E}" for value in each).replace("nan", "NaN").replace("NAN", "NaN") for each in (t, x)]
+    containers = "".join(
+        f'<container size="0" init="{numbers}">{name}</container>' for name, numbers in zip("tx", lists, strict=True)
+    )
+    export = '<set name="Raw"><data name="Time (s)">t</data><data name="Distance (m)">x</data></set>'
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<phyphox version="1.7"><title>Sonar</title><data-containers>'
+        f"{containers}</data-containers><export>{export}</export></phyphox>"
+    ).encode()
+
+
+def tracker(t: Any, x: Any) -> bytes:
+    """Write a Tracker table under the name of the mass."""
+    return "\n".join(["masa_A\t\t", "t\tx\ty", *rows(t, x, "{t:.3f}\t1.000000\t{x:.6f}"), ""]).encode()
+
+
+def columns_with_units(t: Any, x: Any) -> bytes:
+    """Write columns under headings with units."""
+    return "\n".join(["Zeit (s);Abstand (mm)", *rows(t, x * 1000, "{t:.3f};{x:.2f}")]).replace(".", ",").encode()
+
+
+def bare(t: Any, x: Any, mark: str = " ") -> bytes:
+    """Write numbers alone."""
+    return "\n".join([*rows(t, x * 100, f"{{t:.3f}}{mark}{{x:.3f}}"), ""]).encode()
 
 
 CASES = [
-    Case("motion-sensor", "position", motion_position, 1e-5),
-    Case("motion-sensor", "position-LF", lambda: motion_position("\n"), 1e-5),
-    Case("motion-sensor", "position-no-header", lambda: motion_position(header=0), 1e-5),
-    Case("motion-sensor", "position-no-error", lambda: motion_position(error=False), 1e-5),
-    Case("motion-sensor", "position-UTF-16", lambda: motion_position().decode().encode("utf-16"), 1e-5),
-    Case("motion-sensor", "velocity", motion_velocity, 1e-5, offset_known=False),
+    Case("motion-sensor", "position", motion_position),
+    Case("motion-sensor", "position-LF", lambda t, x: motion_position(t, x, "\n")),
+    Case("motion-sensor", "position-no-header", lambda t, x: motion_position(t, x, header=0)),
+    Case("motion-sensor", "position-no-error", lambda t, x: motion_position(t, x, error=False)),
+    Case("motion-sensor", "position-UTF-16", lambda t, x: motion_position(t, x).decode().encode("utf-16")),
+    Case("motion-sensor", "velocity", motion_velocity, offset_known=False),
+    Case("lvm", "one-tab", lvm),
+    Case("lvm", "one-comma", lambda t, x: lvm(t, x, mark=",")),
+    Case("lvm", "multi-decimal-comma", lambda t, x: lvm(t, x, "Multi", ";", ",")),
+    Case("lvm", "no-times", lambda t, x: lvm(t, x, "No"), times=False),
+    Case("tdms", "waveform", tdms, None, times=False, text=False),
+    Case("capstone", "run-1", capstone, options={"run": "Run #1"}),
+    Case("capstone", "localised", localised, options={"channel": "posizione", "unit": "m"}),
+    Case("datastudio", "second-block", datastudio, options={"run": "Run #1"}),
+    Case("vernier", "format-2", vernier),
+    Case("logger-pro", "latest", logger_pro, options={"run": "run 1"}),
+    Case("phyphox", "comma", phyphox),
+    Case("phyphox", "tab-CRLF", lambda t, x: phyphox(t, x, "\t", "\r\n")),
+    Case("phyphox", "XML", phyphox_xml, None, text=False),
+    Case("tracker", "masa", tracker, options={"channel": "y", "unit": "m"}),
+    Case("csv", "semicolon-comma", columns_with_units),
+    Case("bare", "blanks", bare, options={"unit": "cm"}),
+    Case("bare", "tabs", lambda t, x: bare(t, x, "\t"), options={"unit": "cm"}),
 ]
 
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.format}:{case.label}")
+every_text = pytest.mark.parametrize(
+    "case", [case for case in CASES if case.text], ids=lambda case: f"{case.format}:{case.label}"
+)
+with_times = pytest.mark.parametrize(
+    "case", [case for case in CASES if case.times], ids=lambda case: f"{case.format}:{case.label}"
+)
+
+
+def whole(case: Case) -> bytes:
+    """Return the file of a case."""
+    return case.build(T, DISTANCE)
 
 
 def read(case: Case, data: bytes | None = None) -> Recording:
     """Read a case, or other bytes as its format."""
-    return get_format(case.format).read("run.dat", case.build() if data is None else data)
+    return get_format(case.format).read("run.dat", whole(case) if data is None else data, **case.options)
+
+
+def codes(recording: Recording) -> set[str]:
+    """Return what was seen on the way."""
+    return {trap.code for trap in recording.traps}
 
 
 def test_every_format_of_the_registry_has_a_case() -> None:
@@ -84,7 +238,7 @@ def test_every_format_of_the_registry_has_a_case() -> None:
 @every_case
 def test_it_is_recognised_by_its_own_format_alone(case: Case) -> None:
     """From the head of the file, whatever its name."""
-    head = case.build()[:HEAD_BYTES]
+    head = whole(case)[:HEAD_BYTES]
     assert [each.name for each in formats() if each.recognises(head)] == [case.format]
 
 
@@ -110,7 +264,13 @@ def test_rate_quantum_clock_and_kind_are_recorded(case: Case) -> None:
     """What is known of the source travels with it."""
     info = read(case).info
     assert (info.rate_hz, info.kind, info.clock, info.name) == (RATE_HZ, "replay", "nominal", "run.dat")
-    assert info.quantum_m == pytest.approx(case.quantum_m, rel=1e-4)
+    if case.quantum_m is None:
+        assert info.quantum_m is None
+    elif case.format == "phyphox":
+        assert info.quantum_m is not None
+        assert 0 < info.quantum_m <= case.quantum_m
+    else:
+        assert info.quantum_m == pytest.approx(case.quantum_m, rel=1e-4)
 
 
 @every_case
@@ -122,7 +282,7 @@ def test_a_nominal_clock_is_said(case: Case) -> None:
 @every_case
 def test_the_file_comes_back_bit_for_bit(case: Case) -> None:
     """The original bytes are kept."""
-    data = case.build()
+    data = whole(case)
     (original,) = read(case, data).originals
     assert (original.name, original.data) == ("run.dat", data)
 
@@ -147,12 +307,16 @@ def test_samples_have_the_types_of_a_block(case: Case) -> None:
     assert samples.t.size == samples.distance.size == samples.flags.size
 
 
-@every_case
+@every_text
 @pytest.mark.parametrize("cut", [1, 2, 3, 4])
 def test_a_truncated_last_row_is_flagged_and_counted(case: Case, cut: int) -> None:
     """A number that stopped midway is no value."""
     width = 2 if case.label.endswith("UTF-16") else 1
-    recording = read(case, case.build()[: -cut * width])
+    ended = whole(case).rstrip(b"\r\n") if width == 1 else whole(case)
+    if (case.format, case.label) == ("capstone", "run-1"):
+        ended = b"\r\n".join(ended.split(b"\r\n")[:-2]).rstrip(b";")
+        ended = ended.rpartition(b";")[0].rpartition(b";")[0]  # the last row stops within run 1
+    recording = read(case, ended[: -cut * width])
     assert recording.malformed_rows == 1
     assert "truncated_row" in {trap.code for trap in recording.traps}
     assert recording.samples.flags[-1] & Flag.MISSING
@@ -163,7 +327,7 @@ def test_a_truncated_last_row_is_flagged_and_counted(case: Case, cut: int) -> No
 @every_case
 def test_half_a_file_is_read_or_refused_in_one_line(case: Case) -> None:
     """Wherever a file stops, nothing but a FormatError comes out, and no sound sample is wrong."""
-    data = case.build()
+    data = whole(case)
     refusals: list[str] = []
     for size in range(0, len(data), 97):
         try:
@@ -183,4 +347,113 @@ def test_half_a_file_is_read_or_refused_in_one_line(case: Case) -> None:
 def test_a_rate_that_contradicts_the_file_is_refused(case: Case) -> None:
     """The user cannot overrule what the times say."""
     with pytest.raises(FormatError, match="37"):
-        get_format(case.format).read("run.dat", case.build(), rate_hz=37.0)
+        get_format(case.format).read("run.dat", whole(case), rate_hz=37.0, **case.options)
+
+
+@with_times
+def test_times_that_repeat_or_run_back_are_flagged_and_counted(case: Case) -> None:
+    """Nothing is dropped: the samples stay, flagged."""
+    t = T.copy()
+    t[50], t[120] = t[49], t[100]
+    recording = read(case, case.build(t, DISTANCE))
+    flags = recording.samples.flags
+    assert len(recording.samples) == T.size
+    assert np.flatnonzero(flags & Flag.DUPLICATE_TIME.value).tolist() == [50]
+    assert np.flatnonzero(flags & Flag.NON_MONOTONIC_TIME.value).tolist() == [120]
+    assert {"duplicate_time", "non_monotonic_time"} <= codes(recording)
+
+
+@with_times
+def test_a_gap_in_time_is_flagged_and_counted(case: Case) -> None:
+    """Ten samples that are not there are known to be missing."""
+    keep = np.ones(T.size, bool)
+    keep[140:150] = False
+    recording = read(case, case.build(T[keep], DISTANCE[keep]))
+    assert np.flatnonzero(recording.samples.flags & Flag.GAP_BEFORE.value).tolist() == [140]
+    (trap,) = (trap for trap in recording.traps if trap.code == "missing_samples")
+    assert trap.count == 10
+
+
+@every_case
+def test_a_run_of_nan_is_missing_samples(case: Case) -> None:
+    """What the file says is no number is none; its neighbours are untouched."""
+    x = DISTANCE.copy()
+    x[60:80] = np.nan
+    recording = read(case, case.build(T, x))
+    missing = np.flatnonzero(recording.samples.flags & Flag.MISSING.value).tolist()
+    assert missing == list(range(60, 80 if case.offset_known else 81))
+    assert "missing_samples" in codes(recording)
+    if case.offset_known:
+        sound = np.delete(recording.samples.distance, missing)
+        np.testing.assert_allclose(sound, np.delete(DISTANCE, missing), atol=1e-9)
+
+
+@every_text
+def test_text_between_rows_is_counted(case: Case) -> None:
+    """A remark in the middle is a malformed row, and every number around it is right."""
+    wide = case.label.endswith("UTF-16")
+    text = whole(case).decode("utf-16" if wide else "utf-8-sig")
+    newline = "\r\n" if "\r\n" in text else "\n"
+    lines = text.split(newline)
+    lines.insert(len(lines) - 40, "here I touched it")
+    recording = read(case, newline.join(lines).encode("utf-16" if wide else "utf-8"))
+    assert recording.malformed_rows == 1
+    assert "malformed_rows" in codes(recording)
+    sound = recording.samples.flags == 0
+    assert np.count_nonzero(sound) >= T.size - 2
+
+
+@every_text
+def test_zero_bytes_at_the_end_are_left_out_and_said(case: Case) -> None:
+    """A writer that was interrupted leaves them."""
+    recording = read(case, whole(case) + bytes(4096))
+    assert len(recording.samples) == T.size
+    assert "zero_filled_tail" in codes(recording)
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if c.offset_known], ids=lambda c: f"{c.format}:{c.label}")
+def test_zeros_that_fill_the_end_are_missing_samples(case: Case) -> None:
+    """No rangefinder reads exactly 0 m twenty times."""
+    x = DISTANCE.copy()
+    x[280:] = 0.0
+    recording = read(case, case.build(T, x))
+    assert np.flatnonzero(recording.samples.flags & Flag.MISSING.value).tolist() == list(range(280, 300))
+    assert "zero_filled_tail" in codes(recording)
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if c.offset_known], ids=lambda c: f"{c.format}:{c.label}")
+def test_a_lost_target_is_flagged_and_counted(case: Case) -> None:
+    """Readings of several metres, then flat, are not the bob's."""
+    x = DISTANCE.copy()
+    x[200:230] = np.concatenate((np.linspace(3.6, 8.1, 10), np.full(20, 8.1)))
+    recording = read(case, case.build(T, x))
+    assert np.flatnonzero(recording.samples.flags & Flag.FALSE_ECHO.value).tolist() == list(range(200, 230))
+    (trap,) = (trap for trap in recording.traps if trap.code == "lost_target")
+    assert trap.count == 30
+
+
+@pytest.mark.parametrize(
+    "case", [c for c in CASES if c.offset_known and c.quantum_m], ids=lambda c: f"{c.format}:{c.label}"
+)
+def test_positions_rounded_to_a_centimetre_are_known_as_such(case: Case) -> None:
+    """However many decimals are printed, the step is 10 mm."""
+    recording = read(case, case.build(T, np.round(DISTANCE, 2)))
+    assert recording.info.quantum_m == pytest.approx(0.01)
+    assert "quantised" in codes(recording)
+
+
+@with_times
+def test_measured_times_stand_and_are_told_from_nominal_ones(case: Case) -> None:
+    """Times that jitter by a few microseconds are kept as they are, and the clock is the device's."""
+    if case.format in ("motion-sensor", "vernier", "logger-pro", "tracker", "csv", "bare", "capstone", "datastudio"):
+        t = np.round(np.cumsum(0.050 + 0.004 * np.random.default_rng(5).random(300)), 3)
+        t = np.round(t, 2) if case.format in ("vernier", "logger-pro") else t
+        t += np.arange(300) * (0.02 if case.format in ("vernier", "logger-pro") else 0.0)
+    else:
+        t = np.cumsum(0.009964 + 8e-6 * np.random.default_rng(5).random(300))
+    recording = read(case, case.build(t, DISTANCE))
+    if case.label == "velocity":
+        assert recording.info.clock in ("device", "nominal")
+        return
+    np.testing.assert_allclose(recording.samples.t, t, atol=6e-3 if case.format in ("vernier", "logger-pro") else 6e-7)
+    assert recording.info.rate_hz == pytest.approx(299 / (t[-1] - t[0]), rel=2e-3)

@@ -59,6 +59,7 @@ PAIRS = [
     ("kamjha__PHY224/position_osc.txt", "kamjha__PHY224/velocity_osc.txt", 0.32078),
 ]
 
+
 @pytest.mark.parametrize("expected", POSITIONS, ids=lambda each: each.path)
 def test_a_position_file(recordings: Path, expected: Expected) -> None:
     """Every row is a sample, on the 100 Hz grid from its own start, and none is flagged."""
