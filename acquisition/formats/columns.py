@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -24,7 +25,7 @@ from acquisition.formats.timing import (
 )
 from acquisition.formats.units import LENGTHS, length_power, unit_words
 from acquisition.recording import Original, Recording, Survey, Trap
-from acquisition.source import SourceInfo
+from acquisition.source import Kind, SourceInfo
 
 __all__ = ["ColumnFormat"]
 
@@ -74,7 +75,10 @@ class ColumnFormat:
         quantum, others = value_traps(samples.distance, samples.flags, pulled.resolution, line, length=length)
         name = PurePath(path).name
         clock = "nominal" if timing.grid is not None else chosen.clock
-        info = SourceInfo("replay", name, timing.rate_hz, quantum_m=quantum or None, clock=clock)
+        # These forms have no place for it, so the names count too: simulated must not pass for measured.
+        said = f"{contents.title} {chosen.name} {name}"
+        kind: Kind = "simulated" if re.search(r"simulat|synthe", said, re.IGNORECASE) else "replay"
+        info = SourceInfo(kind, name, timing.rate_hz, quantum_m=quantum or None, clock=clock)
         return Recording(
             format=self.name,
             path=path,

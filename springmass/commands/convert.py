@@ -1,4 +1,4 @@
-"""``springmass convert``: a recording into a run file, or the original out of one."""
+"""``springmass convert``: a recording into a run file or another program's form, or the original out of a run."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path, PurePath
 from typing import Any
 
+from acquisition.formats.writers import WRITERS
 from acquisition.recording import Original
 from springmass import __version__
 from springmass.analysing import now_utc
@@ -31,15 +32,52 @@ def run(options: argparse.Namespace) -> int:
         written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=scene, overwrite=options.overwrite)
         print(f"{written}: {len(loaded.samples)} samples from {loaded.path}", file=sys.stderr)
         return OK
-    if loaded.format != "run":
-        raise ProgramError(
-            f"{out}: a recording converts to a run file, whose name ends in {' or '.join(RUN_SUFFIXES)}; "
-            f"got {out.suffix or 'no suffix'}",
-            USAGE,
-        )
+    if not _holds(loaded, out):
+        return _write_form(loaded, out, overwrite=options.overwrite)
     for path in _give_back(loaded, out, options.overwrite):
         print(f"{path}: the original inside {loaded.path}, bit for bit", file=sys.stderr)
     return OK
+
+
+def _holds(loaded: Loaded, out: Path) -> bool:
+    """Tell whether the original inside a run file is what is asked for: it has the suffix, or no form has it."""
+    if loaded.format != "run":
+        return False
+    suffixes = {PurePath(each.name).suffix.lower() for each in loaded.originals}
+    return out.is_dir() or out.suffix.lower() in suffixes or out.suffix.lower() not in WRITERS
+
+
+def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
+    """Write the samples in the form that the suffix names."""
+    writer = WRITERS.get(out.suffix.lower())
+    if writer is None:
+        raise ProgramError(
+            f"{out}: the suffix says what to write, one of {', '.join((*RUN_SUFFIXES, *WRITERS))}; "
+            f"got {out.suffix or 'no suffix'}",
+            USAGE,
+        )
+    start_time = str(loaded.provenance.get("start_time", ""))
+    written = writer(str(loaded.path), loaded.samples, loaded.info, loaded.title, start_time)
+    targets = [_beside(out, added) for added, _ in written.files]
+    _demand_free(targets, overwrite)
+    for target, (_, data) in zip(targets, written.files, strict=True):
+        write_whole(target, data, overwrite=overwrite)
+        print(f"{target}: {len(loaded.samples)} samples from {loaded.path}", file=sys.stderr)
+    for sentence in written.lost:
+        print(f"{out}: {sentence}", file=sys.stderr)
+    return OK
+
+
+def _beside(out: Path, added: str) -> Path:
+    """Name the second file of a pair: run_velocity.txt beside run.txt or run_position.txt."""
+    return out.with_name(f"{out.stem.removesuffix('_position')}{added}{out.suffix}") if added else out
+
+
+def _demand_free(targets: Sequence[Path], overwrite: bool) -> None:
+    """Look before the work: of a pair, both are written or none."""
+    for target in () if overwrite else targets:
+        if target.exists():
+            raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite", USAGE)
 
 
 def write_loaded(path: Path, loaded: Loaded, blocks: Any, *, scene: Any = None, overwrite: bool = False) -> Path:
@@ -87,10 +125,7 @@ def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
         raise ProgramError(
             f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder", USAGE
         )
-    if not overwrite:
-        for target in targets:  # of a pair, both or none
-            if target.exists():
-                raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite", USAGE)
+    _demand_free(targets, overwrite)
     return [
         write_whole(target, original.data, overwrite=overwrite)
         for target, original in zip(targets, loaded.originals, strict=True)
