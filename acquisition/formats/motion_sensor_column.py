@@ -127,8 +127,9 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
         quantum, found = value_traps(value, flags, resolution, line)
     stated, constant = _stated_error(path, layout, table, bad)
     traps = (
-        *_layout_traps(layout, stated, constant),
+        *_layout_traps(layout),
         *clock_traps(timing),
+        *_error_traps(layout, stated, constant),
         *row_traps(rows, told, text.zeros),
         *sample_traps(flags, t, timing.rate_hz, line),
         *found,
@@ -164,9 +165,12 @@ def _stated_error(path: str, layout: Layout, table: Table, bad: NDArray[np.bool_
     return median, constant
 
 
-def _layout_traps(layout: Layout, stated: float | None, constant: bool) -> Iterator[Trap]:
+def _layout_traps(layout: Layout) -> Iterator[Trap]:
     if layout.assumed:
         yield Trap("unit_assumed", f"no column line: read as time (s) and {layout.assumed}, in {layout.unit}")
+
+
+def _error_traps(layout: Layout, stated: float | None, constant: bool) -> Iterator[Trap]:
     if stated is not None and constant:
         figure = f"{stated * layout.per_si:g} {layout.unit}"
         yield Trap(

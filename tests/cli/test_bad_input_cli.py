@@ -47,7 +47,6 @@ def refused(done: Any, path: Path, *words: str) -> None:
         (b"\x89HDF\r\n\x1a\n" + bytes(300), "is not what was written"),
         (b"Motion Sensor Data File Mar 12, 2024 2:05 PM", "line 1: expected rows"),
         (b"Dear diary,\r\ntoday we hung a mass.\r\n", "no format recognises it"),
-        (b"0.010\t25.334\r\n0.020\t25.648\r\n0.030\t25.700\r\n", "nothing says what quantity and unit"),
         (b"0.01\t25.3 " * 2000, "one line without end"),
     ],
 )
@@ -56,6 +55,27 @@ def test_what_is_no_recording_is_refused(cli: Cli, tmp_path: Path, command: str,
     path = tmp_path / "run.txt"
     path.write_bytes(content)
     refused(run(cli, command, path, tmp_path / "out.h5"), path, word)
+    assert [file.name for file in tmp_path.iterdir()] == ["run.txt"]
+
+
+@pytest.mark.parametrize("command", [command for command in COMMANDS if command != "formats"])
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        (b"0.010\t25.334\r\n0.020\t25.648\r\n0.030\t25.700\r\n", "nothing says its unit"),
+        (b"Latest: Time (s),Run 1: Time (s),Latest: x (m),Run 1: x (m)\n0,0,1,1\n", 'holds 2 runs: "Latest", "Run 1"'),
+        (b"time;position;velocity\n0,1;0,2;0,3\n0,2;0,2;0,3\n", '"position", "velocity"; name the one to take'),
+    ],
+)
+def test_what_a_file_leaves_open_is_asked_for(
+    cli: Cli, tmp_path: Path, command: str, content: bytes, word: str
+) -> None:
+    """Unit, run and channel are asked for by the option's name; nothing is written."""
+    path = tmp_path / "run.txt"
+    path.write_bytes(content)
+    refused(
+        run(cli, command, path, tmp_path / "out.h5"), path, word, " with --" if "its unit" not in word else "--unit"
+    )
     assert [file.name for file in tmp_path.iterdir()] == ["run.txt"]
 
 

@@ -143,21 +143,85 @@ def test_a_run_file_converts_to_one_that_says_the_same(cli: Cli, data: Path, tmp
 
 
 def test_other_suffixes_are_refused(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """A recording becomes a run file and nothing else."""
-    done = cli("convert", recording, tmp_path / "run.csv")
+    """What is not known to be written is not guessed."""
+    done = cli("convert", recording, tmp_path / "run.mat")
     assert done.code == 2
-    assert "got .csv" in done.complaint
+    assert "one of .h5, .hdf5, .nxs, .txt, .lvm, .csv; got .mat" in done.complaint
     assert cli("convert", recording, tmp_path / "run").complaint.endswith("got no suffix")
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".lvm", ".csv"])
+@pytest.mark.parametrize("name", ["undamped_simulated_position.txt", "sixty_hz_simulated_position.txt"])
+def test_what_is_written_in_another_form_reads_back(
+    cli: Cli, data: Path, tmp_path: Path, suffix: str, name: str
+) -> None:
+    """Times, distances, rate, quantum and kind survive the way through MotionSensor.vi, LVM and CSV."""
+    old, out = springmass.load(data / name), tmp_path / f"back{suffix}"
+    assert cli("convert", data / name, out).code == 0
+    new = springmass.load(out)
+    np.testing.assert_allclose(new.samples.t, old.samples.t, atol=1e-12)
+    np.testing.assert_allclose(new.samples.distance, old.samples.distance, atol=1e-12)
+    assert (new.info.rate_hz, new.info.kind, new.info.clock) == (old.info.rate_hz, "simulated", "nominal")
+    assert new.info.quantum_m == pytest.approx(old.info.quantum_m)
+    assert not {trap.code for trap in new.traps} - {"nominal_clock", "stated_error_is_not_noise"}
+
+
+def test_a_pair_written_is_a_pair_read(cli: Cli, data: Path, tmp_path: Path) -> None:
+    """Position and velocity files join again, and each velocity is the difference of its positions."""
+    assert cli("convert", data / "undamped_simulated_position.txt", tmp_path / "run_position.txt").code == 0
+    pair = springmass.load(tmp_path / "run_position.txt", velocity=tmp_path / "run_velocity.txt")
+    assert "pair_mismatch" not in {trap.code for trap in pair.traps}
+    assert pair.samples.velocity is not None
+    expected = np.diff(pair.samples.distance) * 100
+    np.testing.assert_allclose(pair.samples.velocity[1:], expected, atol=1.1e-5)
+
+
+def test_a_pair_is_written_whole_or_not_at_all(cli: Cli, recording: Path, tmp_path: Path) -> None:
+    """A velocity file that stands there keeps the position from being written."""
+    (tmp_path / "back_velocity.txt").write_bytes(b"mine")
+    done = cli("convert", recording, tmp_path / "back.txt")
+    assert done.code == 2
+    assert not (tmp_path / "back.txt").exists()
+    assert cli("convert", recording, tmp_path / "back.txt", "--overwrite").code == 0
+    assert (tmp_path / "back_velocity.txt").read_bytes() != b"mine"
+
+
+def test_a_run_file_becomes_what_its_original_was_not(cli: Cli, recording: Path, tmp_path: Path) -> None:
+    """Of the original's suffix the original comes back bit for bit; of another the samples are written."""
+    run = tmp_path / "run.h5"
+    assert cli("convert", recording, run).code == 0
+    assert cli("convert", run, tmp_path / "a.txt").code == 0
+    assert (tmp_path / "a.txt").read_bytes() == recording.read_bytes()
+    assert cli("convert", run, tmp_path / "a.lvm").code == 0
+    np.testing.assert_allclose(
+        springmass.load(tmp_path / "a.lvm").samples.distance, springmass.load(run).samples.distance, atol=1e-12
+    )
+
+
+def test_what_a_form_has_no_room_for_is_told(cli: Cli, write: Any, rows: list[bytes], tmp_path: Path) -> None:
+    """Flags are lost in rows of numbers; times that a form cannot tell apart are refused."""
+    recording = write([*rows[:50], rows[49], *rows[50:]])
+    done = cli("convert", recording, tmp_path / "a.csv")
+    assert "the flags of 1 samples have no place" in done.err
+    assert "the title has no place" in done.err
+    fast = tmp_path / "fast.csv"
+    fast.write_text("Time (s),Distance (m)\n" + "".join(f"{i / 10_000:.4f},0.{i:04d}\n" for i in range(99)))
+    done = cli("convert", fast, tmp_path / "b.txt")
+    assert done.code == 3
+    assert "MotionSensor.vi prints times to 1 ms" in done.complaint
+    assert not (tmp_path / "b.txt").exists()
+    assert cli("convert", fast, tmp_path / "b.lvm").code == 0
+    assert springmass.load(tmp_path / "b.lvm").info.rate_hz == 10_000.0
 
 
 def test_a_run_without_originals_has_nothing_to_give_back(cli: Cli, recording: Path, tmp_path: Path) -> None:
     """That is said, not an empty file written."""
     loaded = springmass.load(recording)
     run = springmass.write_run(tmp_path / "live.h5", [loaded.samples], loaded.info)
-    done = cli("convert", run, tmp_path / "back.txt")
+    done = cli("convert", run, tmp_path / "back.dat")
     assert done.code == 3
     assert "no original file travels inside" in done.complaint
-    assert not (tmp_path / "back.txt").exists()
+    assert not (tmp_path / "back.dat").exists()
 
 
 def test_an_empty_run_is_converted_too(cli: Cli, tmp_path: Path, recording: Path) -> None:
@@ -180,7 +244,7 @@ def test_a_folder_that_is_missing_is_a_usage_error(cli: Cli, recording: Path, tm
     assert "make the folder first" in done.complaint
 
 
-@pytest.mark.parametrize("option", [("--rate-hz", "100"), ("--unit", "cm"), ("--channel", "distance")])
+@pytest.mark.parametrize("option", [("--rate-hz", "100"), ("--unit", "cm"), ("--channel", "distance"), ("--run", "1")])
 def test_a_run_file_needs_no_answers(cli: Cli, recording: Path, tmp_path: Path, option: tuple[str, str]) -> None:
     """What completes a text is refused where the file says it all."""
     assert cli("convert", recording, tmp_path / "run.h5").code == 0

@@ -7,9 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import springmass
+from acquisition.clock import VirtualClock
 from acquisition.registry import formats
+from storage.recorder import Recorder
+from storage.wire_layout import LogHeader, SensorEntry
 
 Cli = Callable[..., Any]
+
+
+def write_log(path: Path, channels: int) -> None:
+    """Write a finished wire log of 200 readings for each sensor."""
+    sensors = tuple(SensorEntry(channel, "maxbotix-hr", f"port{channel}") for channel in range(channels))
+    with Recorder(path, LogHeader(sensors=sensors, mono_ns=0, unix_ns=0), VirtualClock()) as recorder:
+        for i in range(200):
+            for channel in range(channels):
+                recorder.put(channel, 100_000_000 * (i + 1), b"R%04d\r" % (1000 + i % 50))
 
 
 def facts_of(out: str) -> dict[str, str]:
@@ -22,7 +34,7 @@ def test_the_list_names_every_family_and_run_files(cli: Cli) -> None:
     done = cli("formats")
     assert done.code == 0
     names = [line.split()[0] for line in done.out.splitlines()]
-    assert names == [*(family.name for family in formats()), "run"]
+    assert names == [*(family.name for family in formats()), "run", "wire"]
     (listed,) = cli("formats", "--json").results
     assert [entry["name"] for entry in listed] == names
     assert all(entry["title"] for entry in listed)
@@ -70,14 +82,52 @@ def test_a_trap_names_its_line(cli: Cli, write: Callable[..., Path], rows: list[
     assert facts_of(out)["malformed_rows"] == "1"
 
 
-def test_a_file_of_another_family_is_named(cli: Cli, tmp_path: Path) -> None:
-    """What it is, that it is not read, and what to do."""
-    path = tmp_path / "run.lvm"
-    path.write_bytes(b"LabVIEW Measurement\t\r\nWriter_Version\t2\r\n")
+def test_channels_runs_and_what_is_missing_are_told(cli: Cli, tmp_path: Path) -> None:
+    """A file that leaves a choice open is described all the same, with the question that every other command asks."""
+    path = tmp_path / "run.csv"
+    path.write_bytes(b'"Position (mm) Run #1";"Position (mm) Run #2"\r\n-19,6620;-14,9504\r\n-19,3720;\r\n')
     done = cli("formats", path)
+    assert (done.code, done.err) == (0, "")
+    facts = facts_of(done.out)
+    assert facts["format"] == "capstone"
+    assert facts["why"] == 'headings in line 1 end in a run, "Run #1"'
+    assert "Run #1: Position (mm), 2 samples, rate not stated" in done.out
+    assert "Run #2: Position (mm), 1 samples, rate not stated" in done.out
+    assert facts["needs"].endswith("name the one to take with --run")
+    (told,) = cli("formats", "--json", path).results
+    assert [(each["run"], each["name"], each["unit"], each["samples"]) for each in told["channels"]] == [
+        ("Run #1", "Position", "mm", 2),
+        ("Run #2", "Position", "mm", 1),
+    ]
+    done = cli("formats", path, "--run", "1", "--rate-hz", "50")
+    assert facts_of(done.out)["rate_hz"] == "50"
+    assert "rate_assumed" in done.out
+
+
+def test_a_wire_log_is_an_input(cli: Cli, data: Path, tmp_path: Path) -> None:
+    """What record leaves behind is described, converted and analysed like any recording; the log stays as it is."""
+    log = tmp_path / "run.wire"
+    write_log(log, channels=1)
+    before = log.read_bytes()
+    facts = facts_of(cli("formats", log).out)
+    assert (facts["format"], facts["kind"], facts["samples"]) == ("wire", "live", "200")
+    assert cli("convert", log, tmp_path / "run.h5").code == 0
+    with springmass.open_run(tmp_path / "run.h5") as run:
+        assert run.originals()[0].data == before == log.read_bytes()
+        assert len(run.samples()) == 200
+    assert cli("formats", log, "--rate-hz", "100").code == 2
+
+
+def test_the_sensors_of_a_wire_log_are_its_channels(cli: Cli, tmp_path: Path) -> None:
+    """Several and none chosen: the line lists them; chosen by number or port."""
+    log = tmp_path / "run.wire"
+    write_log(log, channels=2)
+    done = cli("formats", log)
     assert done.code == 3
-    assert "LVM file" in done.complaint
-    assert "export time and position as text" in done.complaint
+    assert 'holds 2 sensors: "0" (port0), "1" (port1); name the one to take with --channel' in done.complaint
+    for name in ("1", "port1"):
+        assert facts_of(cli("formats", log, "--channel", name).out)["samples"] == "200"
+    assert 'channel "7" was asked for' in cli("formats", log, "--channel", "7").complaint
 
 
 def test_a_name_that_no_terminal_can_show_is_shown_escaped(cli: Cli, recording: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from acquisition import registry
 from acquisition.errors import AcquisitionError, FormatError, NeedsAnswer, UnknownFormat
-from acquisition.registry import formats, get_format, open_recording, sniff
+from acquisition.registry import formats, get_format, inspect, open_recording, sniff
 
 ROWS = "".join(f"{i / 100:.3f}\t{20 + i / 8:.3f}\t0.239\r\n" for i in range(12))
 HEADER = "Motion Sensor Data File Sep 20, 2018 1:40 PM\r\nTime (s)\tDistance (cm)\tDist Error (cm)\r\n"
@@ -65,40 +65,81 @@ def test_importing_the_registry_imports_no_format() -> None:
 @pytest.mark.parametrize(
     ("head", "family"),
     [
-        (b"\x89HDF\r\n\x1a\n" + bytes(99), "HDF5 file"),
-        (b"TDSm\x0e\0\0\0" + bytes(99), "TDMS file"),
-        (b"LabVIEW Measurement\t\r\nWriter_Version\t2\r\n", "LVM file"),
-        (b"Vernier Format 2\nUntitled.cmbl\n", "Vernier Format 2 file"),
-        (b"Latest: Time (s),Latest: Position (m)\n0,0.5\n", "Logger Pro CSV file"),
-        (b'"Time (s)","Acceleration x (m/s^2)"\n0.0E0,1.4E-2\n', "phyphox export"),
-        (
-            b'\xef\xbb\xbf"Position (mm) Run #1";"Position (mm) Run #2"\r\n-19,66;-14,95\r\n',
-            "PASCO Capstone CSV",
-        ),
-        (b"time;position;velocity;acceleration\r\n1.0000;0.4788;0.2900;-4.3317\r\n", "PASCO Capstone CSV"),
-        (b"Voltage, ChA, Run #1\r\nTime ( s )\tVoltage ( V )\r\n0.0\t-0.009\r\n", "PASCO DataStudio file"),
+        (b"TDSm\x0e\0\0\0" + bytes(99), "tdms"),
+        (b"LabVIEW Measurement\t\r\nWriter_Version\t2\r\n", "lvm"),
+        (b"Vernier Format 2\nUntitled.cmbl\n", "vernier"),
+        (b"Latest: Time (s),Latest: Position (m)\n0,0.5\n", "logger-pro"),
+        (b'"Time (s)","Acceleration x (m/s^2)"\n0.0E0,1.4E-2\n', "phyphox"),
+        (b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- saved --><phyphox version="1.7">', "phyphox"),
+        (b'\xef\xbb\xbf"Position (mm) Run #1";"Position (mm) Run #2"\r\n-19,66;-14,95\r\n', "capstone"),
+        ('"Zeit (s) Durchgang #1";"Ort (m) Durchgang #1"\r\n0,1;0,2\r\n'.encode(), "capstone"),
+        ("时间;位置;速度\r\n0.1;0.2;0.3\r\n".encode(), "capstone"),
+        (b"time;position;velocity;acceleration\r\n1.0000;0.4788;0.2900;-4.3317\r\n", "capstone"),
+        (b"Voltage, ChA, Run #1\r\nTime ( s )\tVoltage ( V )\r\n0.0\t-0.009\r\n", "datastudio"),
+        ("质量_A,,,\nt,x,y,rad\n5.68,36.8,-3.8,-1.4\n".encode(), "tracker"),
+        (b"t\tx\ty\n0.000\t1.0\t2.0\n", "tracker"),
+        ("Tempo (s)\tPosizione (m)\n0,1\t0,2\n".encode("cp1252"), "csv"),
+        ("Zeit (s);Länge (m)\n0,1;0,2\n".encode("utf-16"), "csv"),
+        (b"0.1 0.2\n0.2 0.3\n0.3 0.4\n", "bare"),
+        (b"1,5;2,5\n1,6;2,7\n", "bare"),
+        (b"0.1\n0.2\n", "bare"),
+        (b"0 1 2\n1 4 9\n2 9 1\n", "bare"),
     ],
 )
-def test_families_that_are_not_read_are_named(tmp_path: Path, head: bytes, family: str) -> None:
-    """A file of a known family is refused with its name and what to do."""
-    path = tmp_path / "run.txt"
+def test_every_family_is_told_by_content(tmp_path: Path, head: bytes, family: str) -> None:
+    """By the signatures of the wild, under a suffix that says something else."""
+    path = tmp_path / "run.xlsx"
     path.write_bytes(head)
-    with pytest.raises(UnknownFormat) as caught:
-        open_recording(path)
-    assert family in str(caught.value)
-    assert "not read by this version" in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert sniff(path) == family
+    assert get_format(family).evidence(head)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
-    "text", ["0.1 0.2\n0.2 0.3\n0.3 0.4\n", "1,5;2,5\n1,6;2,7\n", "0.1\n0.2\n", "0 1 2\n1 4 9\n2 9 1\n"]
+    ("head", "words"),
+    [
+        (b"\x89HDF\r\n\x1a\n" + bytes(99), "got an HDF5 file; if it is a run file, open it as a run"),
+        (b"PK\x03\x04" + bytes(26) + b"[Content_Types].xml", "workbook (xlsx); export the data as text: in phyphox"),
+        (bytes.fromhex("d0cf11e0a1b11ae1") + bytes(99), "workbook (xls); export the data as text: in phyphox"),
+        (b"PK\x03\x04" + bytes(26) + b"Raw Data.csv", "got a zip archive; unpack it"),
+        (b"TDSh" + bytes(99), "name the .tdms file beside it"),
+    ],
 )
-def test_bare_numbers_are_never_guessed(tmp_path: Path, text: str) -> None:
-    """Numbers without a word need the user's."""
+def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, head: bytes, words: str) -> None:
+    """Workbooks above all: phyphox offers them beside CSV."""
+    path = tmp_path / "run.csv"
+    path.write_bytes(head)
+    with pytest.raises(UnknownFormat) as caught:
+        open_recording(path)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["0.1 0.2\n0.2 0.3\n0.3 0.4\n", "0,1\t2,5\n0,2\t2,7\n0,3\t2,9\n"])
+def test_the_unit_of_bare_numbers_is_never_guessed(tmp_path: Path, text: str) -> None:
+    """It is asked for, and what was given is said."""
     path = tmp_path / "run.txt"
     path.write_text(text)
-    with pytest.raises(NeedsAnswer, match="what quantity and unit they are; put the line"):
-        sniff(path)
+    with pytest.raises(NeedsAnswer, match="nothing says its unit; say with --unit m, cm or mm"):
+        open_recording(path)
+    recording = open_recording(path, unit="cm")
+    assert {"unit_assumed", "nominal_clock"} <= {trap.code for trap in recording.traps}
+    assert recording.info.rate_hz == 10.0
+
+
+def test_the_rate_and_the_channel_of_bare_numbers_are_never_guessed(tmp_path: Path) -> None:
+    """One column has no times; of three columns the user takes one; row numbers are no times."""
+    path = tmp_path / "run.txt"
+    path.write_text("2.5\n2.6\n2.7\n")
+    with pytest.raises(NeedsAnswer, match="no column of times and no sampling interval; give the rate with --rate-hz"):
+        open_recording(path, unit="cm")
+    recording = open_recording(path, unit="cm", rate_hz=50.0)
+    assert recording.samples.t.tolist() == [0.0, 0.02, 0.04]
+    assert {"rate_assumed", "unit_assumed"} <= {trap.code for trap in recording.traps}
+    path.write_text("0 1 2\n1 4 9\n2 9 1\n3 7 5\n")
+    with pytest.raises(NeedsAnswer, match='"column 2", "column 3"; name the one to take with --channel'):
+        open_recording(path, unit="cm", rate_hz=50.0)
+    recording = open_recording(path, unit="cm", rate_hz=50.0, channel="column 3")
+    assert recording.samples.distance.tolist() == [0.02, 0.09, 0.01, 0.05]
 
 
 @pytest.mark.parametrize(
@@ -196,6 +237,8 @@ def test_an_entry_point_adds_a_format(run: Path, tmp_path: Path, monkeypatch: py
     assert sniff(path) == "extra"
     assert get_format("extra") is EXTRA
     assert [each.name for each in formats()][-1] == "extra"
+    assert inspect(path).surveys == ()
+    assert inspect(path).why == ""
     assert sniff(run) == "motion-sensor"
 
 
