@@ -153,10 +153,16 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
 
 def _demand_lines(name: str, file: BinaryIO) -> None:
     """Give up at the first MiB that holds no line end, before a file of any size is read into memory."""
-    line = 1
-    file.seek(0)
-    while len(part := file.read(_LONGEST_LINE)) == _LONGEST_LINE:
-        if b"\n" not in part and b"\r" not in part:
-            demand = "expected lines of text, got a line of more than 1 MiB"
-            raise FormatError(name, demand, "this is no text recording; export it again", line=line)
-        line += part.count(b"\n") or part.count(b"\r")
+    size = os.fstat(file.fileno()).st_size
+    if size < _LONGEST_LINE:
+        return
+    import mmap
+
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
+        for start in range(0, size - _LONGEST_LINE + 1, _LONGEST_LINE):
+            stop = start + _LONGEST_LINE
+            if text.find(b"\n", start, stop) < 0 and text.find(b"\r", start, stop) < 0:
+                before = text[:start]
+                line = 1 + (before.count(b"\n") or before.count(b"\r"))
+                demand = "expected lines of text, got a line of more than 1 MiB"
+                raise FormatError(name, demand, "this is no text recording; export it again", line=line)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
-from acquisition.formats.fixed_point import Page, read_fixed
+from acquisition.formats.fixed_point import Page, Span, read_fixed
 from acquisition.formats.text import parse_number, printed_decimals
 
 __all__ = ["EMPTY", "EXPONENT", "NAN", "UNREAD", "read_column"]
@@ -27,16 +27,13 @@ _LOWER = 0x20
 I1 = NDArray[np.int8]
 
 
-def read_column(
-    page: Page, begin: I8, end: I8, usual: int, shift: int, points: bytes, values: F8, forms: I1
-) -> tuple[int, bool, bool]:
+def read_column(span: Span, usual: int, shift: int, points: bytes, values: F8, forms: I1) -> tuple[int, bool, bool]:
     """Read the cells of one column of a page.
 
     Parameters
     ----------
-    page : Page
-    begin, end : (n,) int64
-        Where each cell begins and ends; equal where it is empty.
+    span : Span
+        Where each of n cells begins and ends; an empty one does both in one place.
     usual : int
         The form that the column had so far; -1: not known yet.
     shift : int
@@ -57,20 +54,20 @@ def read_column(
         Whether every cell is a number of the usual form.
     """
     if usual < 0:
-        usual = _guess(page, begin, end)
+        usual = _guess(span.page, span.begin, span.end)
     padded = False
     if usual < EXPONENT:
-        value, plain = read_fixed(page, begin, end, usual, shift, points)
-        values[:] = value
+        _, plain = read_fixed(span, usual, shift, points, out=values)
         forms[:] = usual
         if usual:
-            padded = bool(((page.raw.take(end - 1, mode="clip") == _ZERO) & plain).any())
+            padded = bool(((span.before_end(1) == _ZERO) & plain).any())
         if plain.all():
             return usual, padded, True
         rest = np.flatnonzero(~plain)
     else:
-        rest = np.arange(end.size)
-    padded |= _read_others(page, rest, begin[rest], end[rest], usual, shift, points, values, forms)
+        rest = np.arange(span.count)
+    begin, end = span.begin[rest], span.end[rest]
+    padded |= _read_others(span.page, rest, begin, end, usual, shift, points, values, forms)
     return usual, padded, False
 
 
@@ -111,9 +108,8 @@ def _read_others(
             group = np.flatnonzero(left & (key == each))
             if abs(places - shift - (exponent - 1000)) > _MOST_POWER:
                 continue
-            value, plain = read_fixed(
-                page, begin[group], stop[group], places, shift + exponent - 1000, points if places else b""
-            )
+            cells = Span(page, group.size, given=(begin[group], stop[group]))
+            value, plain = read_fixed(cells, places, shift + exponent - 1000, points)
             done = group[plain]
             form = places + EXPONENT * scientific
             values[rows[done]], forms[rows[done]] = value[plain], form

@@ -96,13 +96,14 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
         shifts=(0, power, power)[: layout.columns],
     )
     printed = table.values[0]
-    unread = ~(np.abs(printed) < _LONGEST_S)
-    bad = table.bad | unread if unread.any() else table.bad
+    bad = table.bad
+    if not (printed.size and printed.min() > -_LONGEST_S and printed.max() < _LONGEST_S):  # a NaN is neither
+        bad = bad | ~(np.abs(printed) < _LONGEST_S)
     any_bad = bool(bad.any())
     _demand_rows(path, layout, table, bad)
     timing = time_by_column(path, printed[~bad] if any_bad else printed, 10.0 ** -table.decimals[0], rate_hz)
     rows = Rows(bad, table.line, table.cut, table.last_cell, table.decimals[0])
-    t = place(np.where(unread, np.nan, printed) if any_bad else printed, rows, timing)
+    t = place(np.where(np.abs(printed) < _LONGEST_S, printed, np.nan) if any_bad else printed, rows, timing)
     told = np.isfinite(t)
     value = table.values[1]
     if any_bad:

@@ -122,7 +122,7 @@ def _every_point(apart: F8, grid: Grid) -> bool:
 def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     """Return the usual step of increasing times, s, and its relative half width, over ever longer spans."""
     every = max(1, apart.size // (4 * _PROBE))
-    step = max(float(np.median((apart[1:] - apart[:-1])[::every])), resolution)
+    step = max(float(np.median(apart[1::every] - apart[:-1:every])), resolution)
     span, relative_u = 1, resolution / step
     while (span := span * 4) < apart.size and relative_u > 1e-6:
         lengths = apart[span::every] - apart[:-span:every]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 from acquisition.formats.cells import EMPTY, EXPONENT, UNREAD, read_column
-from acquisition.formats.fixed_point import Page
+from acquisition.formats.fixed_point import Page, Span
 from acquisition.formats.text import Text
 
 __all__ = ["Table", "read_table"]
@@ -182,6 +182,8 @@ class _Lines:
     cells : (n,) int64
     regular : int
         Cells of every line, where all have as many; else 0.
+    width : int
+        Bytes of every line, where all are laid out alike; else 0.
     """
 
     start: I8
@@ -190,12 +192,15 @@ class _Lines:
     first: I8
     cells: I8
     regular: int
+    width: int = 0
 
     @classmethod
-    def of(cls, raw: NDArray[np.uint8], mark: int) -> _Lines | None:
+    def of(cls, page: Page, mark: int, *, alike: bool = True) -> _Lines | None:
         """Find the lines; None where a CR stands alone."""
-        newline = raw == _NEWLINE
-        ends = np.flatnonzero(newline | (raw == mark))
+        raw, newline, marks, returns = page.raw, page.where(_NEWLINE, 0), page.where(mark, 1), page.where(_RETURN, 2)
+        if alike and (found := cls._alike(newline, marks, returns)) is not None:
+            return found
+        ends = np.flatnonzero(newline | marks)
         count = int(np.count_nonzero(newline))
         regular = ends.size // count
         if regular * count == ends.size and newline[ends[regular - 1 :: regular]].all():
@@ -208,13 +213,38 @@ class _Lines:
         start = np.empty_like(stop)
         start[0] = 0
         np.add(stop[:-1], 1, out=start[1:])
-        returns = int(np.count_nonzero(raw == _RETURN))
-        if returns:
+        if lone := int(np.count_nonzero(returns)):
             paired = raw.take(stop - 1, mode="clip") == _RETURN
-            if np.count_nonzero(paired & (stop > start)) != returns:
+            if np.count_nonzero(paired & (stop > start)) != lone:
                 return None
             stop = stop - paired
         return cls(start, stop, ends, first, cells, regular)
+
+    @classmethod
+    def _alike(cls, newline: NDArray[np.bool_], marks: NDArray[np.bool_], returns: NDArray[np.bool_]) -> _Lines | None:
+        """Take lines of one length with their separators in the same places, as fixed point gives; None for others."""
+        width = int(newline.argmax()) + 1
+        count = newline.size // width
+        if count * width != newline.size or not newline[width - 1 :: width].all() or np.count_nonzero(newline) != count:
+            return None
+        places = np.flatnonzero(marks[:width])
+        if np.count_nonzero(marks) != places.size * count or not all(marks[at::width].all() for at in places.tolist()):
+            return None
+        paired = bool(width > 1 and returns[width - 2 :: width].all())
+        if np.count_nonzero(returns) != count * paired:
+            return None
+        start = np.arange(0, newline.size, width)
+        ends = np.append(places, width - 1)
+        cells = np.broadcast_to(np.int64(ends.size), count)
+        return cls(start, start + (width - 1 - paired), ends, start, cells, ends.size, width)
+
+    def span(self, page: Page, column: int) -> Span:
+        """Return where the cells of a column are."""
+        if self.width and column < self.regular:
+            first = int(self.ends[column - 1]) + 1 if column else 0
+            last = int(self.stop[0]) if column == self.regular - 1 else int(self.ends[column])
+            return Span(page, self.stop.size, self.width, first, last)
+        return Span(page, self.stop.size, given=self.bounds(column))
 
     def keep(self, rows: NDArray[np.bool_]) -> _Lines:
         """Return some of the lines."""
@@ -258,6 +288,7 @@ class _Rows:
         self.counts = np.zeros((len(columns), 256), np.int64)
         self.rows = 0
         self.skipped: list[I8] = []
+        self.page = Page(np.zeros(1, np.uint8))
         self.last = b""
         self.last_cells = 0
 
@@ -271,12 +302,15 @@ class _Rows:
 
     def take(self, text: NDArray[np.uint8], pages: float) -> None:
         """Read the rows of one page; ``pages`` like it are left, it included."""
-        page = Page(text)
-        lines = _Lines.of(page.raw, self.mark)
+        page = self.page
+        page.fill(text)
+        lines = _Lines.of(page, self.mark)
         if lines is None:
             unified = text.tobytes().replace(b"\r\n", b"\n").replace(b"\r", b"\n")
             return self.take(np.frombuffer(unified, np.uint8), pages)
         blank = _blank(page.raw, lines)
+        if blank is not None or (lines.width and self.width not in (None, lines.regular)):
+            lines = _Lines.of(page, self.mark, alike=False) or lines
         if blank is not None:
             self.skipped.append(np.cumsum(~blank)[blank] + self.rows)
             lines = lines.keep(~blank)
@@ -288,10 +322,10 @@ class _Rows:
         bad = self._wrong_width(page.raw, lines)
         odd = bool(bad.any())
         for k, column in enumerate(self.columns):
-            begin, end = lines.bounds(column)
             form = self.form[k][rows]
+            span = lines.span(page, column)
             usual, padded, plain = read_column(
-                page, begin, end, self.usual[k], self.shifts[k], self.points, self.values[k][rows], form
+                span, self.usual[k], self.shifts[k], self.points, self.values[k][rows], form
             )
             self.usual[k], self.padded[k] = usual, self.padded[k] or padded
             if not plain:
@@ -304,8 +338,8 @@ class _Rows:
             else:
                 self.counts[k, self.usual[k]] += count
         self.rows += count
-        begin, end = lines.bounds(0)
-        self.last = page.raw[int(begin[-1]) : int(end[-1])].tobytes()
+        first = lines.span(page, 0)
+        self.last = page.raw[int(first.begin[-1]) : int(first.end[-1])].tobytes()
         self.last_cells = int(lines.cells[-1])
         return None
 

@@ -72,7 +72,7 @@ def test_importing_the_registry_imports_no_format() -> None:
         (b'"Time (s)","Acceleration x (m/s^2)"\n0.0E0,1.4E-2\n', "phyphox"),
         (b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- saved --><phyphox version="1.7">', "phyphox"),
         (b'\xef\xbb\xbf"Position (mm) Run #1";"Position (mm) Run #2"\r\n-19,66;-14,95\r\n', "capstone"),
-        ('"Zeit (s) Durchgang #1";"Ort (m) Durchgang #1"\r\n0,1;0,2\r\n'.encode(), "capstone"),
+        (b'"Zeit (s) Durchgang #1";"Ort (m) Durchgang #1"\r\n0,1;0,2\r\n', "capstone"),
         ("时间;位置;速度\r\n0.1;0.2;0.3\r\n".encode(), "capstone"),
         (b"time;position;velocity;acceleration\r\n1.0000;0.4788;0.2900;-4.3317\r\n", "capstone"),
         (b"Voltage, ChA, Run #1\r\nTime ( s )\tVoltage ( V )\r\n0.0\t-0.009\r\n", "datastudio"),
