@@ -27,7 +27,9 @@ _LOWER = 0x20
 I1 = NDArray[np.int8]
 
 
-def read_column(span: Span, usual: int, shift: int, points: bytes, values: F8, forms: I1) -> tuple[int, bool, bool]:
+def read_column(
+    span: Span, usual: int, shift: int, points: bytes, values: F8, forms: I1, padded: bool = False
+) -> tuple[int, bool, bool]:
     """Read the cells of one column of a page.
 
     Parameters
@@ -44,6 +46,8 @@ def read_column(span: Span, usual: int, shift: int, points: bytes, values: F8, f
         Receives the numbers; NaN where there is none.
     forms : (n,) int8
         Receives the form of each cell.
+    padded : bool
+        Whether a number that ends in a zero was seen already.
 
     Returns
     -------
@@ -55,11 +59,10 @@ def read_column(span: Span, usual: int, shift: int, points: bytes, values: F8, f
     """
     if usual < 0:
         usual = _guess(span.page, span.begin, span.end)
-    padded = False
     if usual < EXPONENT:
         _, plain = read_fixed(span, usual, shift, points, out=values)
         forms[:] = usual
-        if usual:
+        if usual and not padded:
             padded = bool(((span.before_end(1) == _ZERO) & plain).any())
         if plain.all():
             return usual, padded, True

@@ -173,6 +173,8 @@ def read_fixed(
         point = span.before_end(decimals + 1)
         plain = point == points[0]
         for other in points[1:]:
+            if plain.all():
+                break
             plain |= point == other
     enough = (digits > decimals) & (digits <= MOST_DIGITS)
     if not np.all(enough):

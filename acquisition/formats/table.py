@@ -325,9 +325,9 @@ class _Rows:
             form = self.form[k][rows]
             span = lines.span(page, column)
             usual, padded, plain = read_column(
-                span, self.usual[k], self.shifts[k], self.points, self.values[k][rows], form
+                span, self.usual[k], self.shifts[k], self.points, self.values[k][rows], form, self.padded[k]
             )
-            self.usual[k], self.padded[k] = usual, self.padded[k] or padded
+            self.usual[k], self.padded[k] = usual, padded
             if not plain:
                 bad |= form == UNREAD if self.width is None else form <= EMPTY
                 odd = True
