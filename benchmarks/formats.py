@@ -25,7 +25,7 @@ LOAD = "from springmass.loading import load as f; import storage.run, acquisitio
 PANDAS = "import pandas; f = lambda p: pandas.read_csv(p, sep='\\t', skiprows=1, engine='c')"
 LVM = "import acquisition.formats.lvm; from acquisition.registry import open_recording; "
 LVM += "f = lambda p: open_recording(p, channel='Acceleration_0', unit='m')"
-LVM_READ = "from lvm_read import read as f"
+LVM_READ = "from lvm_read import read; f = lambda p: read(p, read_from_pickle=False, dump_file=False)"
 
 TIMED = """
 import json, resource, sys, time

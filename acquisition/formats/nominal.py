@@ -84,7 +84,8 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
     step, relative_u = _mean_step(apart, resolution)
     rough = 1.0 / step
     nice_step = round(step / resolution) * resolution
-    tried = [rate_hz] if rate_hz else [*_USUAL_RATES_HZ, round(rough), round(1.0 / nice_step, 9), rough]
+    nice = [round(1.0 / nice_step, 9)] if nice_step > 0 else []
+    tried = [rate_hz] if rate_hz else [*_USUAL_RATES_HZ, round(rough), *nice, rough]
     near = dict.fromkeys(float(f) for f in tried if f and abs(f - rough) <= rough * relative_u * 1.5 + 1e-9)
     probe = _probe(apart)
     best: Grid | None = None

@@ -35,7 +35,9 @@ if TYPE_CHECKING:
 __all__ = ["FORMAT"]
 
 _QUOTED = re.compile(r'\s*(?:"[^"]*"[,;\t]?)+\s*')
-_ROOT = re.compile(r"\s*(?:<\?xml[^>]*>\s*)?(?:<!--.*?-->\s*)*<phyphox[\s>]", re.DOTALL)
+_ROOT = re.compile(
+    r"\s*(?:<\?xml[^>]*>\s*)?(?:<!--.*?-->\s*)*(?:<!DOCTYPE[^>\[]*(?:\[.*?\])?\s*>\s*)?<phyphox[\s>]", re.DOTALL
+)
 
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:

@@ -7,7 +7,7 @@ form by form; what is left is read singly. Each cell keeps its form, and by the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,8 @@ __all__ = ["Table", "read_table"]
 I1 = NDArray[np.int8]
 
 _NEWLINE, _RETURN, _TAB, _BLANK = (ord(c) for c in "\n\r\t ")
-_PAGE_BYTES = 1 << 18
+_PAGE_ROWS = 12_000  # their columns fit into the cache
+_PAGE_BYTES = 1 << 15, 1 << 19
 _UNIFORM = 0.9  # a column that prints the same number of decimals in this share of its rows always does
 _MANY, _STRIPPED = 40, 0.03
 
@@ -116,25 +117,25 @@ def read_table(
     stop = text.stop if stop is None else stop
     raw = np.frombuffer(text.data, np.uint8)[start:stop]
     rows = _Rows(tuple(columns), delimiter, width, tuple(shifts) or (0,) * len(columns))
-    for page, share in _pages(raw, delimiter):
-        rows.take(page, share)
+    at, size = 0, _PAGE_BYTES[0]
+    while at < raw.size:
+        page, end = _page(raw, at, size, delimiter)
+        before = rows.rows
+        rows.take(page, (raw.size - at) / (end - at))
+        long = (end - at) / max(rows.rows - before, 1)
+        at, size = end, int(min(max(long * _PAGE_ROWS, _PAGE_BYTES[0]), _PAGE_BYTES[1]))
     return rows.table(first_line, ended=not raw.size or int(raw[-1]) in (_NEWLINE, _RETURN))
 
 
-def _pages(raw: NDArray[np.uint8], delimiter: str) -> Iterator[tuple[NDArray[np.uint8], float]]:
-    """Cut at line ends; each page ends in LF. Beside it: how many such pages are left."""
-    at = 0
-    while at < raw.size:
-        end = min(at + _PAGE_BYTES, raw.size)
-        if end < raw.size:
-            end = _line_end(raw, at, end)
-        page = raw[at:end]
-        if page[-1] != _NEWLINE:
-            page = np.append(page, np.uint8(_NEWLINE))
-        if not delimiter:
-            page = _tabbed(page)
-        yield page, (raw.size - at) / (end - at)
-        at = end
+def _page(raw: NDArray[np.uint8], at: int, size: int, delimiter: str) -> tuple[NDArray[np.uint8], int]:
+    """Return about so many bytes of whole lines, ended by LF, and where they end."""
+    end = min(at + size, raw.size)
+    if end < raw.size:
+        end = _line_end(raw, at, end)
+    page = raw[at:end]
+    if page[-1] != _NEWLINE:
+        page = np.append(page, np.uint8(_NEWLINE))
+    return page if delimiter else _tabbed(page), end
 
 
 def _line_end(raw: NDArray[np.uint8], at: int, end: int) -> int:
@@ -143,8 +144,9 @@ def _line_end(raw: NDArray[np.uint8], at: int, end: int) -> int:
         found = np.flatnonzero(raw[begin:end] == _NEWLINE)
         if found.size:
             return begin + int(found[-1]) + 1
-    for step in range(at, raw.size, _PAGE_BYTES):
-        piece = raw[step : step + _PAGE_BYTES]
+    size = end - at
+    for step in range(at, raw.size, size):
+        piece = raw[step : step + size]
         found = np.flatnonzero((piece == _NEWLINE) | (piece == _RETURN))
         if found.size:
             # A CR alone ends a line; of CRLF both do.

@@ -1,0 +1,364 @@
+"""Readers under damaged files: refused in one line or read truly, within bounds of memory.
+
+Three hunters use the same check, over the files of the conformance suite: hypothesis, a mutator that always runs, and
+a coverage-guided fuzzer where one is installed. A fourth holds the readers to pandas, lvm_read and npTDMS where they
+read the same file.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import random
+import re
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acquisition.errors import FormatError
+from acquisition.formats.text import decode, parse_number
+from acquisition.recording import Recording
+from acquisition.registry import formats, get_format
+
+CONFORMANCE = Path(__file__).parents[1] / "conformance" / "test_formats.py"
+NAMES = sorted(each.name for each in formats())
+MUTANTS = 40
+COVERAGE_RUNS = 6_000
+MOST_MEMORY, BASE_MEMORY = 20, 3 << 20
+SHORT = np.arange(40) / 100.0
+
+
+def cases() -> list[Any]:
+    """Return the files of the conformance suite."""
+    spec = importlib.util.spec_from_file_location("springmass_conformance_formats", CONFORMANCE)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return list(module.CASES)
+
+
+CASES = cases()
+SEEDS = [(case, case.build(SHORT, np.round(0.2 + 0.05 * np.sin(7.9 * SHORT), 5))) for case in CASES]
+
+
+def answers(case: Any) -> dict[str, Any]:
+    """Return what must be said of a case's files."""
+    return dict(case.options)
+
+
+def read(name: str, data: bytes, options: dict[str, Any]) -> Recording | str:
+    """Return the recording, or the message of the refusal."""
+    try:
+        return get_format(name).read("run.dat", data, **options)
+    except FormatError as error:
+        return str(error)
+
+
+def printed(data: bytes) -> np.ndarray:
+    """Return every number that stands in a text, sorted, with the decimal mark read either way."""
+    text = decode(data)
+    cells = {cell for marks in (r"[;\t\s]+", r"[,;\t\s]+") for cell in re.split(marks, text)}
+    found = {value for cell in cells if (value := parse_number(cell.strip('"\0\x1a'))) is not None}
+    return np.array(sorted(found))
+
+
+def check(name: str, data: bytes, options: dict[str, Any]) -> Recording | str:
+    """Read; hold a recording to its promises, and its values to what is printed."""
+    recording = read(name, data, options)
+    if isinstance(recording, str):
+        assert "\n" not in recording
+        return recording
+    samples = recording.samples
+    assert samples.t.size == samples.distance.size == samples.flags.size
+    assert recording.originals[0].data == data
+    assert recording.info.rate_hz > 0
+    sound = (samples.flags & ~np.uint8(64)) == 0
+    assert (np.diff(samples.t[sound]) > 0).all()
+    values = samples.distance[sound] if recording.channel != "velocity" else np.empty(0)
+    if name in ("tdms", "phyphox") or not values.size:
+        return recording
+    assert np.isfinite(values).all()
+    known = printed(data)
+    for scale in (1.0, 100.0, 1000.0, 1e6):
+        near = known[np.clip(np.searchsorted(known, values * scale), 0, known.size - 1)]
+        below = known[np.clip(np.searchsorted(known, values * scale) - 1, 0, known.size - 1)]
+        apart = np.minimum(np.abs(near - values * scale), np.abs(below - values * scale))
+        if (apart <= 1e-9 * (1 + np.abs(values * scale))).all():
+            return recording
+    raise AssertionError(f"{name}: a distance stands nowhere in the file: {values[:5]}")
+
+
+def spoil(data: bytes, faults: list[tuple[str, float, bytes]]) -> bytes:
+    """Do faults to a file: what, where as a share of it, and with what."""
+    out = bytearray(data)
+    for kind, where, what in faults:
+        at = int(where * len(out))
+        if kind == "insert" or not out:
+            out[at:at] = what
+        elif kind == "flip":
+            out[at] ^= 1 << what[0] % 8
+        elif kind == "digit":
+            out[at] = 48 + what[0] % 10
+        elif kind == "drop":
+            del out[at : at + len(what)]
+        elif kind == "repeat":
+            out[at:at] = out[at : at + 4 * len(what)]
+        elif kind == "comma":
+            out = out.replace(b".", b",", what[0])
+        elif kind == "lines":
+            out = out.replace(b"\n", b"\r", what[0])
+        else:
+            del out[at:]
+    return bytes(out)
+
+
+KINDS = ["insert", "flip", "digit", "drop", "repeat", "comma", "lines", "cut"]
+TOKENS = [
+    b"\t",
+    b";",
+    b",",
+    b"\n",
+    b"\r\n",
+    b"NaN",
+    b"-",
+    b"1e5",
+    b"E-3",
+    b"0",
+    b"12.5",
+    b'"',
+    b"\0",
+    b"\xff",
+    b"Run #2",
+]
+
+
+@st.composite
+def spoiled(draw: st.DrawFn) -> tuple[Any, bytes]:
+    """Draw a file and damage it a few times."""
+    case, data = draw(st.sampled_from(SEEDS))
+    what = st.one_of(st.sampled_from(TOKENS), st.binary(min_size=1, max_size=9))
+    fault = st.tuples(st.sampled_from(KINDS), st.floats(0, 1, exclude_max=True), what)
+    return case, spoil(data, draw(st.lists(fault, max_size=5)))
+
+
+@settings(max_examples=300)
+@given(drawn=spoiled())
+def test_a_spoiled_file_is_refused_in_one_line_or_read_truly(drawn: tuple[Any, bytes]) -> None:
+    """Whatever happens to it on the way: no exception, and no sound sample that the file does not print."""
+    case, data = drawn
+    check(case.format, data, answers(case))
+
+
+@settings(max_examples=200)
+@given(name=st.sampled_from(NAMES), data=st.one_of(st.binary(max_size=300), st.text(max_size=120).map(str.encode)))
+def test_any_bytes_are_refused_in_one_line_or_read(name: str, data: bytes) -> None:
+    """Every reader takes any bytes, whether or not it would recognise them."""
+    assert get_format(name).recognises(data) in (True, False)
+    check(name, data, {"unit": "m"} if name != "motion-sensor" else {})
+
+
+@settings(max_examples=200)
+@given(name=st.sampled_from(NAMES), parts=st.lists(st.sampled_from(TOKENS), max_size=60))
+def test_tokens_in_any_order_are_refused_or_read(name: str, parts: list[bytes]) -> None:
+    """Separators, numbers and words that formats are made of, in any order, for every reader."""
+    check(name, b"".join(parts), {"unit": "m", "rate_hz": 50.0} if name != "motion-sensor" else {})
+
+
+@pytest.mark.parametrize("number", range(len(SEEDS)), ids=lambda i: f"{SEEDS[i][0].format}:{SEEDS[i][0].label}")
+def test_mutants_of_its_own_files_are_refused_or_read_truly(number: int) -> None:
+    """Seeded mutants, each of the last that was of use: a fuzzer that needs nothing installed."""
+    case, data = SEEDS[number]
+    rng = random.Random(f"springmass {case.format} {case.label}")
+    pool = [data]
+    outcomes = set()
+    for _ in range(MUTANTS):
+        faults = [
+            (
+                rng.choice(KINDS),
+                rng.random(),
+                rng.choice(TOKENS) if rng.random() < 0.5 else rng.randbytes(rng.randint(1, 9)),
+            )
+            for _ in range(rng.randint(1, 4))
+        ]
+        mutant = spoil(rng.choice(pool), faults)[:6000]
+        done = check(case.format, mutant, answers(case))
+        outcome = re.sub(r"\d+", "", done)[:60] if isinstance(done, str) else (len(done.samples), len(done.traps))
+        if outcome not in outcomes:
+            outcomes.add(outcome)
+            pool.append(mutant)
+    assert len(outcomes) > 3
+
+
+@pytest.mark.parametrize("number", range(len(SEEDS)), ids=lambda i: f"{SEEDS[i][0].format}:{SEEDS[i][0].label}")
+def test_memory_stays_within_twenty_files(number: int) -> None:
+    """The peak of what reading allocates, beyond the 3 MiB that a page takes, is bounded by the file's size."""
+    case, _ = SEEDS[number]
+    t = np.arange(20_000) / 100.0
+    data = case.build(t, np.round(0.2 + 0.05 * np.sin(7.9 * t), 5))
+    get_format(case.format).read("run.dat", SEEDS[number][1], **case.options)  # imports are not the file's
+    for each in (data, data[: len(data) // 2], data.replace(b".", b"x", 5000)):
+        tracemalloc.start()
+        try:
+            read(case.format, each, answers(case))
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+        assert peak < MOST_MEMORY * len(each) + BASE_MEMORY
+
+
+@pytest.mark.parametrize(
+    ("build", "name"),
+    [
+        (lambda: b"LabVIEW Measurement\t\nSeparator\tTab\n***End_of_Header***\n" * 3000, "lvm"),
+        (lambda: b"Latest: Time (s),Latest: x (m)\n" + b"1\n" * 60_000, "logger-pro"),
+        (lambda: b"0.5\n" * 60_000, "bare"),
+        (lambda: b'"x (m) Run #1"' + b';"x (m) Run #2"' * 2000 + b"\n" + b";" * 2000, "capstone"),
+        (lambda: b"Voltage, ChA, Run #1\nTime ( s )\tx ( m )\n0.0\t1.0\n" * 1500, "datastudio"),
+        (lambda: b"Vernier Format 2\n" + b"\n\nRun\nTime\tx\ns\tm\n0.0\t1.0\n" * 1500, "vernier"),
+    ],
+)
+def test_files_made_to_be_large_inside_are_bounded(build: Callable[[], bytes], name: str) -> None:
+    """Thousands of headers, runs or one-character rows take neither long nor much."""
+    data = build()
+    tracemalloc.start()
+    try:
+        check(name, data, {"unit": "m", "rate_hz": 10.0})
+        assert tracemalloc.get_traced_memory()[1] < MOST_MEMORY * len(data) + BASE_MEMORY
+    finally:
+        tracemalloc.stop()
+
+
+def test_xml_that_would_swell_is_refused() -> None:
+    """Entities are not expanded."""
+    data = b'<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><phyphox><title>&b;</title></phyphox>'
+    assert "got a document type" in str(read("phyphox", data, {}))
+
+
+# Differential --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "arguments", "scale"),
+    [
+        ("motion-sensor", "position", {"sep": "\t", "skiprows": 1}, 100),
+        ("capstone", "localised", {"sep": ";", "decimal": ","}, 1),
+        ("logger-pro", "latest", {"sep": ","}, 1),
+        ("phyphox", "comma", {"sep": ","}, 1),
+        ("tracker", "masa", {"sep": "\t", "skiprows": 1}, 1),
+        ("csv", "semicolon-comma", {"sep": ";", "decimal": ","}, 1000),
+        ("bare", "tabs", {"sep": "\t", "header": None}, 100),
+    ],
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_pandas_reads_the_same_numbers(
+    name: str, label: str, arguments: dict[str, Any], scale: float, seed: int
+) -> None:
+    """Times and values are those of pandas, to the last bit of a decimal fraction."""
+    import pandas as pd
+
+    (case,) = (case for case in CASES if (case.format, case.label) == (name, label))
+    rng = np.random.default_rng(seed)
+    t = (rng.integers(0, 400) + np.arange(500)) / 100.0
+    x = np.round(rng.normal(0.3, 0.2, 500), 5)
+    x[rng.integers(0, 500, 20)] = np.nan
+    data = case.build(t, x)
+    table = pd.read_csv(io.BytesIO(data), **arguments)
+    recording = get_format(name).read("run.dat", data, **case.options)
+    theirs = table.iloc[:, 1 if label == "position" else -1].to_numpy(float)
+    np.testing.assert_allclose(recording.samples.distance * scale, theirs, rtol=1e-14, atol=0)
+    np.testing.assert_allclose(recording.samples.t, table.iloc[:, 0].to_numpy(float), rtol=1e-12)
+
+
+@pytest.mark.parametrize("label", ["one-tab", "one-comma", "multi-decimal-comma", "no-times"])
+def test_lvm_read_reads_the_same_numbers(label: str, tmp_path: Path) -> None:
+    """Every kind of X_Columns, separator and decimal mark."""
+    from lvm_read import read as lvm_read
+
+    (case,) = (case for case in CASES if (case.format, case.label) == ("lvm", label))
+    data = case.build(SHORT, np.round(0.2 + 0.05 * np.sin(7.9 * SHORT), 5))
+    path = tmp_path / "run.lvm"
+    path.write_bytes(data + b"\r\n")
+    theirs = lvm_read(str(path))[0]
+    column = 0 if label == "no-times" else 1
+    samples = get_format("lvm").read("run.lvm", data).samples
+    np.testing.assert_allclose(samples.distance * 100, theirs["data"][:, column], rtol=1e-14)
+
+
+@settings(max_examples=40)
+@given(
+    values=st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=50),
+    step=st.floats(1e-6, 1.0),
+    offset=st.floats(0.0, 100.0),
+    kind=st.sampled_from(["<f8", "<f4", "<i4", "<i2"]),
+)
+def test_nptdms_writes_what_is_read(values: list[float], step: float, offset: float, kind: str) -> None:
+    """Numbers of any kind come back, at the times of the waveform's properties."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    numbers = np.clip(np.array(values), -30000, 30000).astype(kind)
+    file = io.BytesIO()
+    with TdmsWriter(file) as writer:
+        properties = {"wf_increment": step, "wf_start_offset": offset, "unit_string": "mm"}
+        writer.write_segment([ChannelObject("Group", "Position", numbers, properties)])
+    samples = get_format("tdms").read("run.tdms", file.getvalue()).samples
+    np.testing.assert_allclose(samples.t, offset + step * np.arange(numbers.size), rtol=1e-9, atol=1e-12)
+    kept = (samples.flags & 1) == 0
+    np.testing.assert_array_equal(samples.distance[kept], (numbers.astype(float) / 1000)[kept])
+
+
+# Coverage-guided -----------------------------------------------------------------------------------------------
+
+HUNT = """
+import importlib.util, sys
+import atheris
+with atheris.instrument_imports(include=["acquisition.formats"]):
+    import acquisition.registry as registry
+    registry.formats()
+    import acquisition.formats.columns, acquisition.formats.pulled
+spec = importlib.util.spec_from_file_location("hunt", sys.argv[1])
+hunt = importlib.util.module_from_spec(spec)
+sys.modules["hunt"] = hunt
+spec.loader.exec_module(hunt)
+
+def target(data):
+    if len(data) > 1:
+        case = hunt.CASES[data[0] % len(hunt.CASES)]
+        hunt.check(case.format, data[1:], hunt.answers(case))
+
+atheris.Setup([sys.argv[0], *sys.argv[2:]], target)
+atheris.Fuzz()
+"""
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
+)
+def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
+    """Some thousand inputs, grown from sound files towards code not yet reached; bounded in number and seconds."""
+    few = np.arange(6) / 100.0
+    for i, case in enumerate(CASES):
+        (tmp_path / f"{i}").write_bytes(bytes([i]) + case.build(few, np.round(0.2 + few, 5)))
+    bounds = [
+        f"-runs={COVERAGE_RUNS}",
+        "-max_total_time=12",
+        "-seed=1",
+        "-max_len=1200",
+        "-timeout=20",
+        "-rss_limit_mb=2048",
+    ]
+    options = [*bounds, f"-artifact_prefix={tmp_path}/"]
+    done = subprocess.run(
+        [sys.executable, "-c", HUNT, __file__, *options, str(tmp_path)], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert re.search(r"Done \d{2,} runs", done.stderr), done.stderr[-3000:]
