@@ -44,6 +44,7 @@ accuracy: $(VENV)/.installed-dev
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ratios.py
 	$(BIN)/python benchmarks/dynamics.py
+	$(BIN)/python benchmarks/formats.py
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

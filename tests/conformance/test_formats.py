@@ -13,6 +13,7 @@ import pytest
 from acquisition.block import Flag, concatenate
 from acquisition.errors import FormatError
 from acquisition.formats.base import HEAD_BYTES, Format
+from acquisition.formats.example import FORMAT as EXAMPLE
 from acquisition.recording import Recording
 from acquisition.registry import formats, get_format
 
@@ -180,6 +181,12 @@ def bare(t: Any, x: Any, mark: str = " ") -> bytes:
     return "\n".join([*rows(t, x * 100, f"{{t:.3f}}{mark}{{x:.3f}}"), ""]).encode()
 
 
+def height_log(t: Any, x: Any) -> bytes:
+    """Write the invented log of the template."""
+    body = (f"{i};{row}" for i, row in enumerate(rows(t, x * 1000, "{x:.2f}")))
+    return "\n".join(["Height log, 100 Hz", *body]).encode()
+
+
 CASES = [
     Case("motion-sensor", "position", motion_position),
     Case("motion-sensor", "position-LF", lambda t, x: motion_position(t, x, "\n")),
@@ -202,6 +209,7 @@ CASES = [
     Case("phyphox", "XML", phyphox_xml, None, text=False),
     Case("tracker", "masa", tracker, options={"channel": "y", "unit": "m"}),
     Case("csv", "semicolon-comma", columns_with_units),
+    Case("example", "template", height_log, times=False),
     Case("bare", "blanks", bare, options={"unit": "cm"}),
     Case("bare", "tabs", lambda t, x: bare(t, x, "\t"), options={"unit": "cm"}),
 ]
@@ -215,6 +223,14 @@ with_times = pytest.mark.parametrize(
 )
 
 
+FAMILIES = (*formats(), EXAMPLE)
+
+
+def format_of(name: str) -> Format:
+    """Return a family by its name; the template is none of the registry's."""
+    return EXAMPLE if name == "example" else get_format(name)
+
+
 def whole(case: Case) -> bytes:
     """Return the file of a case."""
     return case.build(T, DISTANCE)
@@ -222,7 +238,7 @@ def whole(case: Case) -> bytes:
 
 def read(case: Case, data: bytes | None = None) -> Recording:
     """Read a case, or other bytes as its format."""
-    return get_format(case.format).read("run.dat", whole(case) if data is None else data, **case.options)
+    return format_of(case.format).read("run.dat", whole(case) if data is None else data, **case.options)
 
 
 def codes(recording: Recording) -> set[str]:
@@ -232,17 +248,17 @@ def codes(recording: Recording) -> set[str]:
 
 def test_every_format_of_the_registry_has_a_case() -> None:
     """A format without a case is not held to the rules."""
-    assert {each.name for each in formats()} == {case.format for case in CASES}
+    assert {each.name for each in FAMILIES} == {case.format for case in CASES}
 
 
 @every_case
 def test_it_is_recognised_by_its_own_format_alone(case: Case) -> None:
     """From the head of the file, whatever its name."""
     head = whole(case)[:HEAD_BYTES]
-    assert [each.name for each in formats() if each.recognises(head)] == [case.format]
+    assert [each.name for each in FAMILIES if each.recognises(head)] == [case.format]
 
 
-@pytest.mark.parametrize("each", formats(), ids=lambda each: each.name)
+@pytest.mark.parametrize("each", FAMILIES, ids=lambda each: each.name)
 @pytest.mark.parametrize("head", [b"", b"\0", b"\xff\xfe", bytes(range(256)) * 8, b"hello\nworld\n", b"\n" * 99])
 def test_what_is_no_recording_is_not_recognised(each: Format, head: bytes) -> None:
     """Recognising never raises and never claims noise."""
@@ -347,7 +363,7 @@ def test_half_a_file_is_read_or_refused_in_one_line(case: Case) -> None:
 def test_a_rate_that_contradicts_the_file_is_refused(case: Case) -> None:
     """The user cannot overrule what the times say."""
     with pytest.raises(FormatError, match="37"):
-        get_format(case.format).read("run.dat", whole(case), rate_hz=37.0, **case.options)
+        format_of(case.format).read("run.dat", whole(case), rate_hz=37.0, **case.options)
 
 
 @with_times
