@@ -1,7 +1,8 @@
 """Speed and memory of reading old recordings, as ratios to named readers within one run: `make bench`.
 
 Each pair runs alternately, each call in a process of its own, and the least of each side is compared: for cold starts
-the time of the whole process, for long files the time of the call alone and the peak of resident memory.
+the processor time of the whole process, for long files that of the call alone and the peak of resident memory.
+Processor time (user and system, of all threads) is what a call costs whoever else runs on the machine.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,9 +31,9 @@ LVM_READ = "from lvm_read import read; f = lambda p: read(p, read_from_pickle=Fa
 TIMED = """
 import json, resource, sys, time
 {setup}
-start = time.perf_counter()
+start = time.process_time()
 kept = f(sys.argv[1])
-seconds = time.perf_counter() - start
+seconds = time.process_time() - start
 print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss]))
 """
 COLD = "import sys\n{setup}\nkept = f(sys.argv[1])"
@@ -104,10 +104,11 @@ def cold(setup: str, path: Path) -> Callable[[], float]:
     environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(path.parent / "compiled"), "PYTHONDONTWRITEBYTECODE": ""}
 
     def call() -> float:
-        start = time.perf_counter()
         command = [sys.executable, "-c", COLD.format(setup=setup), str(path)]
+        before = os.times()
         subprocess.run(command, check=True, cwd=REPO_ROOT, env=environment)
-        return time.perf_counter() - start
+        after = os.times()
+        return after.children_user + after.children_system - before.children_user - before.children_system
 
     return call
 

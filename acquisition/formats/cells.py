@@ -17,7 +17,7 @@ EXPONENT = 64
 """Added to the decimals in a form where the number has an exponent."""
 NAN, EMPTY, UNREAD = -1, -2, -3
 
-_SAMPLE = 32
+_SAMPLE = 12
 _FEWEST = 16  # a form that fewer cells have is not worth a pass over all of them
 _MOST_DECIMALS = 15
 _MOST_POWER = 22  # powers of ten up to here are exact

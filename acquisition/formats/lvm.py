@@ -74,17 +74,17 @@ def _contents(path: str, data: bytes) -> Contents:
 
 def _separator(path: str, text: Text) -> str:
     """Return the character behind the tag; where the tag is missing, the one behind the first line's words."""
-    lines = text.head(_MOST_HEADER_LINES)
-    if not lines or not lines[0].text.lstrip().startswith(_MAGIC):
+    first = next(text.lines(), None)
+    if first is None or not first.text.lstrip().startswith(_MAGIC):
         demand = f'expected "{_MAGIC}" in the first line'
         raise FormatError(path, demand, "check that this is an LVM file", line=1)
-    for line in lines:
+    for line in text.lines():
         found = re.match(r"\s*Separator(\W)", line.text)
         if found:
             return found[1]
-        if line.text.startswith(_END):
+        if line.text.startswith(_END) or line.number > _MOST_HEADER_LINES:
             break
-    return lines[0].text.lstrip()[len(_MAGIC) :][:1] or "\t"
+    return first.text.lstrip()[len(_MAGIC) :][:1] or "\t"
 
 
 def _header(path: str, text: Text, start: int, number: int, mark: str) -> _Header:

@@ -120,10 +120,9 @@ def time_by_formula(
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
     if printed is not None and tolerance is not None:
-        told = np.isfinite(printed)
-        expected = start_s + step_s * number[told]
+        expected = start_s + step_s * number
         slack = 1e-9 * np.maximum(np.abs(expected), step_s)
-        if not (np.abs(printed[told] - expected) <= tolerance[told] * 1.0001 + slack).all():
+        if (np.abs(printed - expected) > tolerance * 1.0001 + slack).any():  # never true of a NaN
             return None
     rate = 1.0 / step_s
     rounded = float(f"{rate:.9g}")
@@ -183,6 +182,9 @@ def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int)
     exponent : int
         What is added to the decimals in a form with an exponent.
     """
+    usual = int(form[0]) if form.size else 0
+    if 0 <= usual < exponent and (form == usual).all():
+        return np.broadcast_to(np.float64(0.5 * 10.0 ** (shift - usual)), form.size)
     decimals = np.where(form >= exponent, form - exponent, np.maximum(form, 0))
     half = 0.5 * 10.0 ** (shift - decimals)
     scaled = 0.5 * 10.0 ** -decimals.astype(float) * np.abs(printed)
