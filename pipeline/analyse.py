@@ -185,20 +185,19 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     if not fast:
         demodulated, beside = set_apart(conditioned, cycles, demodulated, params.beside, params.demodulate)
     start = float(track.t[np.argmax(conditioned.used)])
-    quickly = quick is not None and fast
-    damping = fit_damping_quickly(demodulated, start, params.damping) if quickly else None
+    plain = fast and quick is not None
+    damping = fit_damping_quickly(demodulated, start, params.damping) if plain else None
     damping = damping or fit_damping(demodulated, start, params.damping)
     strong = damping.best.damping_rate().value > params.relaxation.least_damping * demodulated.angular_frequency
     if strong and isinstance(relaxed := find_relaxation(conditioned, params.relaxation), Relaxation):
         return _still(track, scene, params, conditioned, relaxed)
-    if quick is None or not fast:
-        phase = fit_phase(demodulated, damping, params.phase)
-        rest = fit_rest(demodulated)
-        waveform = reconstruct(beside.conditioned.track, demodulated, phase, rest)
-    else:
-        phase = fit_phase_quickly(demodulated, damping) or fit_phase(demodulated, damping, params.phase)
-        rest = fit_rest_quickly(demodulated) or fit_rest(demodulated)
+    phase = fit_phase_quickly(demodulated, damping) if plain else None
+    phase = phase or fit_phase(demodulated, damping, params.phase)
+    rest = (fit_rest_quickly(demodulated) if plain else None) or fit_rest(demodulated)
+    if fast and quick is not None:
         waveform = quick.waveform(track, damping, phase, rest)
+    else:
+        waveform = reconstruct(beside.conditioned.track, demodulated, phase, rest)
     full = None
     if params.accuracy == "best":
         extra = beside.columns(track.t)
