@@ -238,7 +238,8 @@ def _not_converged(full: FullFit) -> Finding:
 
 def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
     """Why the motion is no oscillation although its spectrum has a peak: a step or a ramp has one too."""
-    size = float(np.quantile(demodulated.amplitude, 0.9))
+    most = demodulated.amplitude.size * 9 // 10
+    size = float(np.partition(demodulated.amplitude, most)[most])
     left = demodulated.noise_m
     if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
         return NoOscillation("the distance does not follow the period that its spectrum shows")

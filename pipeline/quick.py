@@ -95,9 +95,11 @@ def condition_quickly(track: Track, params: ConditionParams) -> Conditioned:
     low, high = float(y.min()), float(y.max())
     if max(np.count_nonzero(y == low), np.count_nonzero(y == high)) >= 8:
         return condition(track, params)
-    for top in (y - low, high - y):
-        inside = np.count_nonzero(top <= width)
-        if inside > max(0.02 * y.size, 8) and inside > 3.0 * (np.count_nonzero(top <= 2.0 * width) - inside):
+    for inside, both in (
+        (np.count_nonzero(y <= low + width), np.count_nonzero(y <= low + 2.0 * width)),
+        (np.count_nonzero(y >= high - width), np.count_nonzero(y >= high - 2.0 * width)),
+    ):
+        if inside > max(0.02 * y.size, 8) and inside > 3.0 * (both - inside):
             return condition(track, params)
     ordered = np.sort(y[:1000])
     return Conditioned(track, track.flags.copy(), noise_m, (), coarsest_step(ordered, track.quantum_m))
@@ -149,9 +151,9 @@ def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None
     windows = len(cycles.bounds) - 1
     if conditioned.plateaus_m or windows < 6 or used < 0.8 * n or not step > 0.0:
         return None
-    regular = track.t[first] + step * np.arange(n)
-    off = np.abs(track.t[first : last + 1] - regular)
-    if not float(np.max(off if rows is None else off[rows - first])) <= 0.02 * step:
+    off = track.t[first : last + 1] - track.t[first] - step * np.arange(n)
+    off = off if rows is None else off[rows - first]
+    if not max(float(off.max()), -float(off.min())) <= 0.02 * step:
         return None
     # Samples left over at the end are lost, and in windows of part periods rest position and swing share samples.
     counts = np.arange(max(windows - max(windows // 8, 1), 5), windows + 1)
@@ -230,19 +232,22 @@ def _bridged(y: F8, bad: NDArray[np.bool_]) -> F8:
 
 @dataclass(slots=True)
 class _Fits:
-    """Coefficients (w, 5), inverse normal matrices (w, 3, 3), residuals and weights (w, l), and which are good (w,)."""
+    """Coefficients (w, 5), inverse normal matrices (w, 3, 3), residuals (w, l), and which windows are good (w,).
+
+    ``weights`` (w, l) are None where every sample counts.
+    """
 
     coefficients: F8
     inverse: F8
     residual: F8
-    weights: F8
     good: NDArray[np.bool_]
+    weights: F8 | None = None
 
     @classmethod
     def of(cls, basis: _Basis, y: F8, slope: C16) -> _Fits:
         coefficients = basis.fit(y, slope)
         inverse = np.broadcast_to(basis.inverse, (len(y), 3, 3))
-        return cls(coefficients, inverse, y - coefficients @ basis.rows, np.ones(y.shape), np.ones(len(y), np.bool_))
+        return cls(coefficients, inverse, y - coefficients @ basis.rows, np.ones(len(y), np.bool_))
 
 
 def _cleaned(
@@ -290,8 +295,8 @@ def _cleaned(
         size = np.abs(solution.residual)
     found = np.concatenate([solution.coefficients, expected[:, 3:]], axis=1)
     few = weights.sum(axis=1) < 0.4 * y.shape[1]
-    parts = (fits.coefficients.copy(), fits.inverse.copy(), fits.residual.copy(), fits.weights.copy(), fits.good.copy())
-    new = (found, solution.inverse, y[hit] - found @ basis.rows, weights, solution.good & ~few)
+    parts = (fits.coefficients.copy(), fits.inverse.copy(), fits.residual.copy(), fits.good.copy(), np.ones(y.shape))
+    new = (found, solution.inverse, y[hit] - found @ basis.rows, solution.good & ~few, weights)
     for mine, theirs in zip(parts, new, strict=True):
         mine[hit] = theirs
     return _Fits(*parts)
@@ -336,9 +341,9 @@ def _quick(
     conditioned: Conditioned, part: slice, t: F8, level: float, basis: _Basis, fits: _Fits, smooth: _Smooth
 ) -> Quick:
     track, length = conditioned.track, basis.rows.shape[1]
-    counts = np.sum(fits.weights, axis=1).astype(np.int64)
-    clean = int(counts.min()) == length
-    squares = np.einsum("wl,wl->w", fits.residual, fits.residual if clean else fits.weights * fits.residual)
+    counts = np.full(len(t), length) if fits.weights is None else np.sum(fits.weights, axis=1).astype(np.int64)
+    weighted = fits.residual if fits.weights is None else fits.weights * fits.residual
+    squares = np.einsum("wl,wl->w", fits.residual, weighted)
     noise = np.sqrt(squares / np.maximum(counts - 3, 1))
     keep = fits.good
     pooled = float(np.sum(squares[keep])) / float(np.sum(counts[keep] - 3))
@@ -355,7 +360,7 @@ def _quick(
     left = track.y - position
     left[: part.start] = left[part.stop :] = np.nan
     flags = conditioned.flags.copy()
-    if not clean:
+    if fits.weights is not None:
         within = flags[part].reshape(fits.weights.shape)
         within[(fits.weights == 0.0) & (within == 0)] |= np.uint8(Quality.FALSE_ECHO)
     demodulated = Demodulated(

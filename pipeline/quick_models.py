@@ -101,29 +101,29 @@ def _start(t: F8, y: F8, u: F8) -> F8:
 
 def _gauss_newton(law: Law, t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, F8, float] | None:
     """Parameters, covariance and chi-square; None where steps do not settle."""
-    for _ in range(STEPS):
+    for taken in range(STEPS):
         with np.errstate(all="ignore"):
             residual = (y - law.amplitude(t, theta)) / u
             jacobian = law.jacobian(t, theta) / u[:, None]
+            normal, right = jacobian.T @ jacobian, jacobian.T @ residual
+            scale = np.sqrt(normal.diagonal())
         chi2 = float(residual @ residual)
-        if not math.isfinite(chi2) or not np.isfinite(jacobian).all():
+        if not (math.isfinite(chi2) and math.isfinite(float(right.sum())) and float(scale.min()) > 0.0):
             return None
-        scale = np.sqrt(np.einsum("np,np->p", jacobian, jacobian))
-        if not scale.min() > 0.0:
+        try:
+            inverse = np.linalg.inv(normal / (scale[:, None] * scale)) / (scale[:, None] * scale)
+        except np.linalg.LinAlgError:
             return None
-        scaled = jacobian / scale
-        normal = scaled.T @ scaled
-        if np.linalg.det(normal) < 1e-12:
-            return None
-        inverse = np.linalg.inv(normal)
-        step = inverse @ (scaled.T @ residual)
-        gain = float(step @ normal @ step)
-        theta = theta + step / scale
+        step = inverse @ right
+        gain = float(step @ right)
+        theta = theta + step
         # A thirtieth of a standard uncertainty is left, quadratic convergence takes it away.
-        if gain <= 1e-3 * max(1.0, chi2 / t.size):
-            return theta, inverse / np.outer(scale, scale), chi2 - gain
-    # A special case that the record contradicts need not settle: it is rejected either way.
-    return (theta, inverse / np.outer(scale, scale), chi2) if chi2 > 2.0 * t.size and math.isfinite(gain) else None
+        if 0.0 <= gain <= 1e-3 * max(1.0, chi2 / t.size):
+            return theta, inverse, chi2 - gain
+        # A special case that the record contradicts need not settle: it is rejected either way.
+        if taken and chi2 > 4.0 * t.size and gain < 0.1 * chi2:
+            return theta, inverse, chi2
+    return None
 
 
 def _weigh(law: Law, theta: F8, covariance: F8, chi2: float, points: int, params: DampingParams) -> LawFit:
