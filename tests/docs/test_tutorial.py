@@ -31,6 +31,7 @@ PAGES = (
     "docs/how-to/record-at-the-bench.md",
     "docs/reference/run-file.md",
     "docs/reference/command-line.md",
+    "docs/explanation/accuracy.md",
     "docs/explanation/method.md",
     "docs/explanation/real-records.md",
     "docs/explanation/velocity.md",
