@@ -30,8 +30,9 @@ from pipeline.instrument import Instrument
 from pipeline.judge import Finding, by_severity, count_quality, judge, judge_samples, judge_still
 from pipeline.judge_scene import judge_scene
 from pipeline.phase import PhaseFit, fit_phase
-from pipeline.quick import condition_quickly, demodulate_quickly, find_cycles_quickly
+from pipeline.quick import demodulate_quickly
 from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
+from pipeline.quick_start import condition_quickly, find_cycles_quickly
 from pipeline.relaxation import Relaxation, find_relaxation, spring_constant
 from pipeline.rest import Rest, fit_rest
 from pipeline.scene import Scene

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from pipeline.condition import MAD_TO_SIGMA, Conditioned
 from pipeline.damping import BARE_MENTION, Damping, LawFit
 from pipeline.demodulate import Demodulated
-from pipeline.estimate import Estimate, Joint
+from pipeline.estimate import Joint
 from pipeline.laws import LAWS
-from pipeline.phase import PhaseFit, squared_amplitude_integral, wrapped
+from pipeline.phase import PhaseFit, squared_amplitude_integral
 from pipeline.record_model import Normal, Record, State, accumulate, scores
-from pipeline.regression import correlation_length, solve_weighted
+from pipeline.refined import refined_phase, refined_rest, refined_waveform
+from pipeline.regression import correlation_length
 from pipeline.rest import Rest
 from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.waveform import Waveform
@@ -362,61 +363,10 @@ def _finish(
         True,
         solved.steps,
         damping,
-        _phase(phase, damping, demodulated, state, covariance[p : p + turns, p : p + turns]),
-        _rest(record, rest, phase.middle, state.linear, covariance[p + turns :, p + turns :]),
-        _waveform(record, conditioned, solved),
+        refined_phase(phase, damping, demodulated, state, covariance[p : p + turns, p : p + turns]),
+        refined_rest(record, rest, phase.middle, state.linear, covariance[p + turns :, p + turns :]),
+        refined_waveform(record, conditioned.track, state, solved.noise_m),
         flags,
         solved.noise_m,
         dict(zip(names, factors.tolist(), strict=True)),
     )
-
-
-def _phase(phase: PhaseFit, damping: Damping, demodulated: Demodulated, state: State, covariance: F8) -> PhaseFit:
-    """The phase with the full fit's values; the frequency reported is the record's mean here too."""
-    before = np.array([phase.t0 - phase.middle])
-    gradient = np.array([1.0, before[0], 0.0])[: state.turning.size]
-    omega = Estimate(float(state.turning[1]), math.sqrt(covariance[1, 1]), "rad/s")
-    backbone = None
-    if state.area is not None:
-        gradient[2] = float(np.interp(before, *state.area)[0])
-        backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), "rad/(s m^2)")
-        tau = demodulated.t - phase.middle
-        u = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
-        line = solve_weighted(np.stack([np.ones(tau.size), tau], axis=1), state.angle(tau), u)
-        omega = Estimate(float(line.values[1]), phase.angular_frequency.u, "rad/s")
-    at_start = Estimate(
-        wrapped(float(state.angle(before)[0])), math.sqrt(float(gradient @ covariance @ gradient)), "rad"
-    )
-    return replace(
-        phase,
-        angular_frequency=omega,
-        phase=at_start,
-        backbone=backbone,
-        coefficients=state.turning,
-        damping=damping,
-    )
-
-
-def _rest(record: Record, rest: Rest, middle: float, linear: F8, covariance: F8) -> Rest:
-    if record.order == 0:
-        mean = record.level + float(linear[0])
-        return replace(rest, mean=Estimate(mean, math.sqrt(covariance[0, 0]), "m"), curve=np.full(rest.t.size, mean))
-    curve = record.level + linear[: record.order + 1] @ record.rest(rest.t - middle)
-    return replace(rest, curve=curve, drift_m=float(np.ptp(curve)))
-
-
-def _waveform(record: Record, conditioned: Conditioned, solved: _Solved) -> Waveform:
-    state, track = solved.state, conditioned.track
-    position = np.empty(record.tau.size)
-    velocity = np.empty(record.tau.size)
-    for part in record.parts():
-        angle = state.angle(record.tau[part])
-        amplitude = state.law.amplitude(record.elapsed[part], state.theta)
-        rate = np.full(angle.size, state.turning[1])
-        if state.area is not None:
-            rate += state.turning[2] * amplitude**2
-        cosine = np.cos(angle)
-        position[part] = record.level + state.linear @ record.linear(part) + amplitude * cosine
-        velocity[part] = -state.law.rate(amplitude, state.theta) * cosine - amplitude * rate * np.sin(angle)
-    residual = track.y - position
-    return Waveform(position, velocity, residual, solved.noise_m)

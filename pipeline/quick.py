@@ -8,24 +8,17 @@ standard stages.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.condition import (
-    FOURTH_DIFFERENCE_GAIN,
-    MAD_TO_SIGMA,
-    Conditioned,
-    coarsest_step,
-    condition,
-)
-from pipeline.condition import Params as ConditionParams
-from pipeline.cycles import Cycles, NoOscillation, find_cycles
-from pipeline.cycles import Params as CyclesParams
+from pipeline.condition import Conditioned
+from pipeline.cycles import Cycles
 from pipeline.damping import Damping
 from pipeline.demodulate import THIRD_TO_SIGMA, WEAK, Demodulated, polar
 from pipeline.phase import PhaseFit
+from pipeline.quick_start import bridged
 from pipeline.rest import Rest
 from pipeline.track import F8, Quality, Track
 from pipeline.waveform import Waveform
@@ -33,10 +26,9 @@ from pipeline.windows import Windows, ranked, solve
 
 C16 = NDArray[np.complex128]
 
-__all__ = ["Quick", "condition_quickly", "demodulate_quickly", "find_cycles_quickly"]
+__all__ = ["Quick", "demodulate_quickly"]
 
 OUTLIER_SIGMAS = 4.5  # one good sample in 150,000 lies further off
-SMOOTH = 8.0  # greatest over median second difference: 1.4 for curvature, 6.3 for the noise of 12,000 samples
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,65 +57,6 @@ class Quick:
         shift = float(np.mean((found.offset - rest.at(found.t)) ** 2))
         inside = float(np.mean(found.noise**2)) * (1.0 - 3.0 / self.length)
         return Waveform(self.position, self.velocity, track.y - self.position, math.sqrt(inside + swing + shift))
-
-
-def condition_quickly(track: Track, params: ConditionParams) -> Conditioned:
-    """Pass a clean track in a few sweeps; hand any other to :func:`pipeline.condition.condition`.
-
-    Parameters
-    ----------
-    track : Track
-    params : pipeline.condition.Params
-
-    Notes
-    -----
-    Clean means: no flag, all finite, time strictly increasing, no second difference beyond eight times their median
-    (a spike of seven standard deviations makes one), and at neither end of the range a band with three times as many
-    samples as the next one or eight that are equal.
-    """
-    y = track.y
-    if len(track) < 64 or track.flags.any() or not (np.isfinite(y).all() and np.isfinite(track.t).all()):
-        return condition(track, params)
-    second = y[2:] - 2.0 * y[1:-1] + y[:-2]
-    typical = float(np.median(np.abs(second[:: max(second.size // 2000, 1)])))
-    extreme = max(float(second.max()), -float(second.min()))
-    if not (np.diff(track.t).min() > 0.0 and 0.0 < extreme <= SMOOTH * typical):
-        return condition(track, params)
-    fourth = second[2:] - 2.0 * second[1:-1] + second[:-2]
-    noise_m = MAD_TO_SIGMA * float(np.median(np.abs(fourth[:: max(fourth.size // 4000, 1)]))) / FOURTH_DIFFERENCE_GAIN
-    width = 8.0 * max(noise_m, 0.5 * (track.quantum_m or 0.0))
-    low, high = float(y.min()), float(y.max())
-    if max(np.count_nonzero(y == low), np.count_nonzero(y == high)) >= 8:
-        return condition(track, params)
-    for inside, both in (
-        (np.count_nonzero(y <= low + width), np.count_nonzero(y <= low + 2.0 * width)),
-        (np.count_nonzero(y >= high - width), np.count_nonzero(y >= high - 2.0 * width)),
-    ):
-        if inside > max(0.02 * y.size, 8) and inside > 3.0 * (both - inside):
-            return condition(track, params)
-    ordered = np.sort(y[:1000])
-    return Conditioned(track, track.flags.copy(), noise_m, (), coarsest_step(ordered, track.quantum_m))
-
-
-def find_cycles_quickly(conditioned: Conditioned, params: CyclesParams) -> Cycles | NoOscillation:
-    """Find the frequency on means of neighbouring samples, where a period has plenty of them."""
-    track = conditioned.track
-    block = len(track) // 2000
-    bad = conditioned.flags != 0
-    if block >= 2 and np.isfinite(track.t).all() and np.count_nonzero(bad) < 0.2 * bad.size:
-        whole = len(track) // block * block
-        few = replace(
-            track,
-            t=track.t[:whole].reshape(-1, block).mean(axis=1),
-            y=_bridged(track.y[:whole], bad[:whole]).reshape(-1, block).mean(axis=1),
-            flags=np.zeros(whole // block, np.uint8),
-            rate_hz=track.rate_hz / block,
-        )
-        noise_m = conditioned.noise_m / math.sqrt(block)
-        found = find_cycles(replace(conditioned, track=few, flags=few.flags, noise_m=noise_m), params)
-        if isinstance(found, Cycles) and found.frequency_hz < few.rate_hz / 8.0:
-            return replace(found, bounds=found.bounds * block)
-    return find_cycles(conditioned, params)
 
 
 def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None:
@@ -196,7 +129,7 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     track = conditioned.track
     part = slice(first, first + w * length)
     bad = conditioned.flags[part].reshape(w, length) != 0
-    values = _bridged(track.y[part], bad.ravel())
+    values = bridged(track.y[part], bad.ravel())
     level = float(values.mean())
     y = values.reshape(w, length) - level
     tau: F8 = step * (np.arange(length, dtype=np.float64) - 0.5 * (length - 1))
@@ -221,13 +154,6 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     if np.count_nonzero(fits.good) < max(0.9 * w, 5):
         return None
     return _quick(conditioned, part, t, level, basis, fits, smooth)
-
-
-def _bridged(y: F8, bad: NDArray[np.bool_]) -> F8:
-    if not bad.any():
-        return y
-    good = np.flatnonzero(~bad)
-    return np.interp(np.arange(y.size), good, y[good])
 
 
 @dataclass(slots=True)

@@ -14,8 +14,9 @@ from pipeline.cycles import Params as CyclesParams
 from pipeline.damping import Params as DampingParams
 from pipeline.damping import fit_damping
 from pipeline.phase import fit_phase
-from pipeline.quick import Quick, condition_quickly, demodulate_quickly, find_cycles_quickly
+from pipeline.quick import Quick, demodulate_quickly
 from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
+from pipeline.quick_start import condition_quickly, find_cycles_quickly
 from pipeline.rest import fit_rest
 from pipeline.track import Quality, Track
 
