@@ -52,16 +52,15 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
     u = np.sqrt(demodulated.covariance[:, 0, 0])
     if set(params.laws) != set(NESTED) or t.size < 8 or not y.min() > 5.0 * u.max():
         return None
-    full = LAWS["linear+quadratic"]
     theta = _start(t, y, u)
-    found = _gauss_newton(full, t, y, u, theta)
+    found = _gauss_newton((0, 1, 2), t, y, u, theta)
     if found is None:
         return None
     theta, covariance, chi2 = found
     free = t.size - 3
     if chi2 > chi2_quantile(0.99, free):
         return None
-    if correlation_length((y - full.amplitude(t, theta)) / u) > 1.0:
+    if correlation_length((y - _mixture(t, theta)[0]) / u) > 1.0:
         return None
     fits: dict[str, LawFit] = {}
     for name, slots in NESTED.items():
@@ -70,7 +69,7 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
             others = [k for k in range(3) if k not in slots]
             pull = np.linalg.solve(covariance[np.ix_(others, others)], theta[others])
             start = theta[list(slots)] - covariance[np.ix_(slots, others)] @ pull
-            solution = _gauss_newton(LAWS[name], t, y, u, start)
+            solution = _gauss_newton(slots, t, y, u, start)
         if solution is None:
             return None
         fits[name] = _weigh(LAWS[name], *solution, t.size, params)
@@ -99,12 +98,39 @@ def _start(t: F8, y: F8, u: F8) -> F8:
     return np.array([amplitude[0], float(rates[0]) - beta * amplitude[0], beta])
 
 
-def _gauss_newton(law: Law, t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, F8, float] | None:
+def _mixture(t: F8, theta: F8) -> tuple[F8, F8]:
+    """Amplitude (n,) and derivatives (n, 3) of linear and quadratic drag together, in one pass.
+
+    The general law of :mod:`pipeline.laws` costs five times as much; a test holds the two together.
+    """
+    start, gamma, beta = theta
+    fall = np.exp(-gamma * t)
+    if abs(gamma) * float(t[-1]) < 1e-4:
+        reach, bend = t - 0.5 * gamma * t**2, t**2 * (gamma * t / 3.0 - 0.5)
+    else:
+        reach = (1.0 - fall) / gamma
+        bend = (t * fall - reach) / gamma
+    below = 1.0 + beta * start * reach
+    amplitude = start * fall / below
+    by = np.stack(
+        [
+            amplitude / (start * below),
+            -amplitude * (t + beta * start * bend / below),
+            -amplitude * start * reach / below,
+        ]
+    )
+    return amplitude, by.T
+
+
+def _gauss_newton(slots: tuple[int, ...], t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, F8, float] | None:
     """Parameters, covariance and chi-square; None where steps do not settle."""
     for taken in range(STEPS):
         with np.errstate(all="ignore"):
-            residual = (y - law.amplitude(t, theta)) / u
-            jacobian = law.jacobian(t, theta) / u[:, None]
+            whole = np.zeros(3)
+            whole[list(slots)] = theta
+            amplitude, by = _mixture(t, whole)
+            residual = (y - amplitude) / u
+            jacobian = by[:, slots] / u[:, None]
             normal, right = jacobian.T @ jacobian, jacobian.T @ residual
             scale = np.sqrt(normal.diagonal())
         chi2 = float(residual @ residual)
