@@ -55,6 +55,10 @@ class Blocks:
     samples: float
     origin: float
 
+    def unweighted(self, rows: F8) -> F8:
+        """Divide rows (b,) that were multiplied by the weights by them; 0 where a block holds no sample."""
+        return np.divide(rows, self.weight, out=np.zeros_like(rows), where=self.weight > 0)
+
     @classmethod
     def of(cls, t: F8, y: F8, step: float, rate_hz: float) -> Blocks:
         """Average values y (n,) at times t (n,) over blocks of ``step`` seconds, a whole number of samples each."""
@@ -217,7 +221,7 @@ def strongest(blocks: Blocks, residual: F8, basis: F8, band: Band) -> Peak | Non
     if np.min(np.abs(np.diagonal(r)[:2])) < 0.2:  # the model holds it already
         return None
     share = q.T @ (residual * blocks.weight)
-    left = residual - np.where(blocks.weight > 0, (q @ share) / np.maximum(blocks.weight, 1e-300), 0.0)
+    left = residual - blocks.unweighted(q @ share)
     density = spectral_density(blocks, left, f, band)
     # Rows are weighted by samples, the density is one full block's.
     evidence = 0.5 * float(share[:2] @ share[:2]) / (density * blocks.samples)

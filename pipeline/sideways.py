@@ -119,7 +119,7 @@ class _Search:
         self.basis = np.linalg.qr(self.columns)[0]
         target = self.blocks.y * self.blocks.weight
         left = target - self.basis @ (self.basis.T @ target)
-        self.residual = np.where(self.blocks.weight > 0, left / np.maximum(self.blocks.weight, 1e-300), 0.0)
+        self.residual = self.blocks.unweighted(left)
 
     def run(self) -> tuple[Mode, ...]:
         """Return modes, the strongest first, with their products, then harmonics; all fitted together."""
@@ -204,9 +204,7 @@ class _Search:
             )
             columns = self.weighted(trial)
             values, cofactors, gain = self.fitted(columns)
-            left = self.residual - np.where(
-                self.blocks.weight > 0, columns @ values / np.maximum(self.blocks.weight, 1e-300), 0.0
-            )
+            left = self.residual - self.blocks.unweighted(columns @ values)
             unit = spectral_density(self.blocks, left, abs(f), self.band) * self.blocks.samples
             chance = false_alarm(gain / unit, len(orders))
             if chance > 0.5 * self.params.false_alarm:
