@@ -21,9 +21,7 @@ MOST_STEPS, LEAST_STEPS = 1000, 24
 NODES = 8  # amplitudes, each half of the one before
 REFINED = 4
 POINTS = 240
-DOUBT_OF_CUBIC = (
-    2.0  # with a cubic spring an amplitude's error becomes one of pace, from wherever in its turn it starts
-)
+CUBIC_PERIODS = 5  # a period that depends on amplitude does not end where it began: over several that matters less
 
 
 def predicted_by_pilot(
@@ -69,7 +67,7 @@ def predicted_by_pilot(
     if seconds <= 1.5 * period or eq.gamma_per_s > 0.9 * eq.angular_frequency_per_s:
         return float(early)
     carried = share * _carried(problem, _defects(integrator, truth, problem, step), seconds) / start
-    return float(early + (DOUBT_OF_CUBIC if eq.cubic_per_m2_s2 else 1.0) * carried)
+    return float(early + carried)
 
 
 def _pilot_step(integrator: Integrator, problem: Problem, step_s: float, period: float) -> tuple[float, float]:
@@ -100,6 +98,8 @@ def _defects(integrator: Integrator, truth: Integrator, problem: Problem, step: 
     """Return amplitudes, rising, and what a second adds to amplitude (real) and phase (imaginary) there."""
     eq = problem.equation
     steps = max(round(2.0 * math.pi / eq.angular_frequency_per_s / step), LEAST_STEPS)
+    if eq.cubic_per_m2_s2:
+        steps *= CUBIC_PERIODS
     sizes, rates = [], []
     for node in range(NODES):
         share = 0.5**node
