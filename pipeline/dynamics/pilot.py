@@ -21,6 +21,7 @@ MOST_STEPS, LEAST_STEPS = 1000, 24
 NODES = 8  # amplitudes, each half of the one before
 REFINED = 4
 POINTS = 240
+CUBIC_DOUBT = 1.5
 CUBIC_PERIODS = 5  # a period that depends on amplitude does not end where it began: over several that matters less
 
 
@@ -67,7 +68,8 @@ def predicted_by_pilot(
     if seconds <= 1.5 * period or eq.gamma_per_s > 0.9 * eq.angular_frequency_per_s:
         return float(early)
     carried = share * _carried(problem, _defects(integrator, truth, problem, step), seconds) / start
-    return float(early + carried)
+    # With a cubic spring an error of amplitude is one of pace too, of another size for every start.
+    return float(early + (CUBIC_DOUBT if eq.cubic_per_m2_s2 else 1.0) * carried)
 
 
 def _pilot_step(integrator: Integrator, problem: Problem, step_s: float, period: float) -> tuple[float, float]:
