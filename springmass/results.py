@@ -32,6 +32,8 @@ _SEVERITY = {
     "rate_assumed": "warning",
     "unit_assumed": "warning",
     "stale_header": "warning",
+    "lost_target": "warning",
+    "quantised": "warning",
 }
 
 

@@ -76,6 +76,7 @@ def _load(path: str, options: argparse.Namespace) -> Loaded:
     return load(
         path,
         channel=options.channel,
+        run=options.run,
         rate_hz=options.rate_hz,
         unit=options.unit,
         from_s=options.from_s,
@@ -122,5 +123,5 @@ def _all_findings(result: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _parameters(options: argparse.Namespace) -> dict[str, Any]:
-    names = ("accuracy", "mass_correlation", "channel", "rate_hz", "unit", "from_s", "to_s", "strict")
+    names = ("accuracy", "mass_correlation", "channel", "run", "rate_hz", "unit", "from_s", "to_s", "strict")
     return {name: getattr(options, name) for name in names}
