@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -30,6 +29,8 @@ class Original:
     @property
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the bytes."""
+        import hashlib  # a twentieth of a cold start that does not ask for it
+
         return hashlib.sha256(self.data).hexdigest()
 
 

@@ -24,7 +24,8 @@ COLD_ROWS, LONG_ROWS, LVM_ROWS = 12_000, 10_000_000, 51_200
 OPEN = "from acquisition.registry import open_recording as f; import acquisition.formats.motion_sensor"
 LOAD = "from springmass.loading import load as f; import storage.run, acquisition.formats.motion_sensor"
 PANDAS = "import pandas; f = lambda p: pandas.read_csv(p, sep='\\t', skiprows=1, engine='c')"
-LVM = "import acquisition.formats.lvm; from acquisition.registry import open_recording; "
+LVM = "import acquisition.formats.motion_sensor, acquisition.formats.lvm; "
+LVM += "from acquisition.registry import open_recording; "
 LVM += "f = lambda p: open_recording(p, channel='Acceleration_0', unit='m')"
 LVM_READ = "from lvm_read import read; f = lambda p: read(p, read_from_pickle=False, dump_file=False)"
 

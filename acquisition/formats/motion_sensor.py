@@ -24,7 +24,6 @@ from acquisition.formats.motion_sensor_layout import evidence
 from acquisition.formats.nominal import time_flags
 from acquisition.formats.samples import IRREGULAR, UNREAD_FLAGS
 from acquisition.formats.text import decode, is_text, unify
-from acquisition.formats.velocity import find_quantum, integrate, outer_join
 from acquisition.recording import Original, Recording, Survey, Trap
 from acquisition.source import SourceInfo
 
@@ -127,6 +126,8 @@ def _position_alone(column: Column) -> Recording:
 
 def _velocity_alone(column: Column) -> Recording:
     """Sum velocity up to position; its zero is the first sample, for the file does not hold its offset."""
+    from acquisition.formats.velocity import find_quantum, integrate
+
     rate_hz, tick = column.timing.rate_hz, column.tick()
     flags = column.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
@@ -150,6 +151,8 @@ def _velocity_alone(column: Column) -> Recording:
 
 
 def _join(position: Column, velocity: Column) -> Recording:
+    from acquisition.formats.velocity import find_quantum, outer_join
+
     rate_hz = position.timing.rate_hz
     if abs(velocity.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
         demand = f"expected {rate_hz:g} Hz as in {position.name}, got {velocity.timing.rate_hz:g} Hz"

@@ -18,7 +18,6 @@ from acquisition.formats.samples import Rows, flags_of, place, row_traps, sample
 from acquisition.formats.table import Table, read_table
 from acquisition.formats.text import text_of
 from acquisition.formats.timing import Timing, check_rate, clock_traps, time_by_column
-from acquisition.formats.velocity import find_tick
 from acquisition.recording import Trap
 
 __all__ = ["Column", "read_column"]
@@ -77,6 +76,8 @@ class Column:
 
     def tick(self) -> float | None:
         """Return the step that all values are multiples of, m or m/s, if one is evident."""
+        from acquisition.formats.velocity import find_tick
+
         return find_tick(self.value, self.resolution)
 
 
