@@ -260,9 +260,15 @@ def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
 
 def _off_median(y: F8) -> F8:
     # Continued as point reflections, so that a slope at either end looks like a slope.
-    padded = np.concatenate([2.0 * y[0] - y[2:0:-1], y, 2.0 * y[-1] - y[-2:-4:-1]])
+    first, last = _end(y[:5]), _end(y[:-6:-1])
+    padded = np.concatenate([2.0 * first - y[2:0:-1], y, 2.0 * last - y[-2:-4:-1]])
     a, b, c, d, e = (padded[i : i + y.size] for i in range(5))
     return np.abs(y - _median_of_five(a, b, c, d, e))
+
+
+def _end(y: F8) -> float:
+    """The first of five samples, or what two of the others continue to where it stands off both."""
+    return float(np.median([y[0], 2.0 * y[1] - y[2], 2.0 * y[2] - y[4]]))
 
 
 def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:

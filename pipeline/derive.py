@@ -225,7 +225,7 @@ class _Laws:
         odds = {name: math.exp(-0.5 * (damping.fits[name].bic - damping.best.bic)) for name in names}
         total = sum(odds.values())
         self.weights = {name: x / total for name, x in odds.items() if name != damping.selected}
-        self.others = inputs.add_alternatives("choice_of_law", self.weights, "B")
+        self.others = inputs.add_alternatives("choice_of_law", self.weights, "A")
 
     def nominal(self, f: Callable[[LawFit], float]) -> float:
         """Return what the selected law says."""

@@ -6,7 +6,7 @@ Examples
 >>> problem = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
 >>> trajectory = get_integrator("strang").run(problem, 0.01, 12000)
 >>> trajectory.y.shape, f"{trajectory.relative_energy()[-1]:.4f}"
-((12001,), '0.0292')
+((12001,), '0.0461')
 """
 
 from __future__ import annotations

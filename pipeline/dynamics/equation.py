@@ -119,7 +119,7 @@ class Equation:
 
         Examples
         --------
-        >>> Equation.from_laws(8.66, beta_per_m_s=0.235).laws()[1]
+        >>> round(Equation.from_laws(8.66, beta_per_m_s=0.235).laws()[1], 12)
         0.235
         """
         return cls(

@@ -13,7 +13,7 @@ from pipeline.accuracy import TIERS, params_for
 from pipeline.analyse import Motion, analyse
 from pipeline.track import Track
 
-TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "50"))
+TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "100"))
 SLACK = 0.02  # of coverage: what a model of the noise may cost, on either side
 EFFICIENCY = {"fast": 1.15, "standard": 1.10, "best": 1.05}  # greatest rms error over the Cramer-Rao bound
 QUANTITIES = ("period", "amplitude", "phase", "gamma")
