@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,17 +33,17 @@ MOTION_SENSOR = "motion-sensor"  # fixes the speed of sound
 LINE_PROTOCOL = "line-protocol"  # sends echo times
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Loaded:
     """One input, read.
+
+    The original files inside a run file, and its digest, are read when they are asked for.
 
     Parameters
     ----------
     path : Path
     format : str
         The family that read it, "run" for a run file, "wire" for a wire log.
-    sha256 : str
-        Of the file's bytes.
     info : SourceInfo
     channel : str
     title : str
@@ -50,7 +52,10 @@ class Loaded:
         The samples for the pipeline, cut to the seconds asked for.
     traps : tuple of Trap
     malformed_rows : int
-    originals : tuple of Original
+    take_originals : callable
+        Gives the original files.
+    take_sha256 : callable
+        Gives the SHA-256 of the file's bytes.
     scene : mapping or None
         The scene a run file carries.
     provenance : mapping
@@ -61,7 +66,6 @@ class Loaded:
 
     path: Path
     format: str
-    sha256: str
     info: SourceInfo
     channel: str
     title: str
@@ -69,10 +73,34 @@ class Loaded:
     track: Track
     traps: tuple[Trap, ...]
     malformed_rows: int
-    originals: tuple[Original, ...]
+    take_originals: Callable[[], tuple[Original, ...]]
+    take_sha256: Callable[[], str]
     scene: Mapping[str, Any] | None
     provenance: Mapping[str, Any] = field(default_factory=dict)
     recorded_format: str = ""
+
+    @cached_property
+    def originals(self) -> tuple[Original, ...]:
+        """The original files, bit for bit.
+
+        Raises
+        ------
+        storage.errors.StorageError
+            If one inside a run file is not what was written, or the run file is another by now.
+        """
+        return self.take_originals()
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the file's bytes; of a wire log empty where nothing of it was kept.
+
+        Raises
+        ------
+        storage.errors.StorageError
+            If the samples that were read from a run file are not those that were written, or the file is another
+            by now.
+        """
+        return self.take_sha256()
 
     def samples_in_blocks(self, size: int = 1024) -> Iterator[Block]:
         """Yield the samples in blocks of at most ``size``."""
@@ -240,7 +268,6 @@ def _from_recording(path: Path, recording: Recording) -> Loaded:
     return Loaded(
         path,
         recording.format,
-        recording.originals[0].sha256,
         recording.info,
         recording.channel,
         recording.title,
@@ -248,7 +275,8 @@ def _from_recording(path: Path, recording: Recording) -> Loaded:
         to_track(recording.samples, recording.info, recorded_format=recording.format),
         recording.traps,
         recording.malformed_rows,
-        recording.originals,
+        lambda: recording.originals,
+        lambda: recording.originals[0].sha256,
         None,
         provenance=_origin(recording),
         recorded_format=recording.format,
@@ -264,12 +292,12 @@ def _origin(recording: Recording) -> dict[str, Any]:
 def _load_run(path: Path) -> Loaded:
     from storage.run import open_run
 
+    stamp = _stamp(path)
     with open_run(path) as run:
-        samples = run.samples()
+        samples = run.samples(digests=False)
         return Loaded(
             path,
             "run",
-            hashlib.sha256(path.read_bytes()).hexdigest(),
             run.info,
             run.channel,
             run.title,
@@ -277,11 +305,46 @@ def _load_run(path: Path) -> Loaded:
             to_track(samples, run.info, recorded_format=run.format, sensor=run.provenance.get("sensor")),
             run.traps,
             run.malformed_rows,
-            run.originals(),
+            lambda: _originals_of(path, stamp),
+            lambda: _sha256_of(path, stamp, samples),
             run.scene,
             run.provenance,
             run.format,
         )
+
+
+def _stamp(path: Path) -> tuple[int, int, int] | None:
+    """Return what tells one file from another that took its name; None where none is there."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns
+
+
+def _demand_same(path: Path, stamp: tuple[int, int, int] | None) -> None:
+    if _stamp(path) != stamp:
+        raise ProgramError(f"{path}: the file that was loaded was demanded, got another; load it again", UNREADABLE)
+
+
+def _originals_of(path: Path, stamp: tuple[int, int, int] | None) -> tuple[Original, ...]:
+    """Read the original files inside a run file that was loaded."""
+    from storage.run import open_run
+
+    _demand_same(path, stamp)
+    with open_run(path) as run:
+        return run.originals()
+
+
+def _sha256_of(path: Path, stamp: tuple[int, int, int] | None, samples: Block) -> str:
+    """Digest a run file that was loaded, and hold the samples read from it against their own digests."""
+    from storage.run import open_run
+
+    _demand_same(path, stamp)
+    with open_run(path) as run:
+        run.check(samples)
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _load_wire(path: Path, channel: str | None) -> Loaded:
@@ -300,8 +363,15 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
             demand = f'channel "{channel}" was asked for, the log holds {listed}; name one of these'
             raise ProgramError(f"{path}: {demand}", UNREADABLE)
         loaded = _load_run(wanted[0].path)
-    sha256 = loaded.originals[0].sha256 if loaded.originals else ""
-    return replace(loaded, path=path, format="wire", sha256=sha256, recorded_format="wire")
+        originals = loaded.originals  # while the run file is there
+    return replace(
+        loaded,
+        path=path,
+        format="wire",
+        take_originals=lambda: originals,
+        take_sha256=lambda: originals[0].sha256 if originals else "",
+        recorded_format="wire",
+    )
 
 
 def _between(loaded: Loaded, from_s: float | None, to_s: float | None) -> Track:

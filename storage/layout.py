@@ -50,6 +50,7 @@ __all__ = [
     "attributes",
     "column_attributes",
     "fields",
+    "filters",
     "signal_attributes",
 ]
 
@@ -69,6 +70,12 @@ FILTERS: Mapping[str, Any] = {
     "fletcher32": True,
 }
 """What every reader can undo without a plugin. The checksum makes a flipped bit an error, not a value."""
+
+UNPACKED: Mapping[str, Any] = {"fletcher32": True}
+"""For columns whose last digits are noise: packing saves a quarter of their room and triples the time to read them."""
+
+NOISY = frozenset({"distance", "velocity"})
+"""The columns that are kept so."""
 
 LIBVER = ("v110", "v110")
 """HDF5 1.10's file format (2016): the oldest in which all of the file's own bookkeeping carries checksums."""
@@ -138,6 +145,11 @@ COLUMNS: tuple[Column, ...] = (
         NO_HOST_NS,
     ),
 )
+
+
+def filters(path: str) -> Mapping[str, Any]:
+    """Return what an array's chunks go through on their way to the disk."""
+    return UNPACKED if path.rpartition("/")[2] in NOISY else FILTERS
 
 
 def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None]:

@@ -25,6 +25,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import Block
@@ -80,8 +81,9 @@ class Run:
     """An open run file.
 
     What it says of itself is read at once, samples when they are asked for. Nothing is delivered unchecked:
-    every chunk carries a checksum, and every column read to its end is held against its SHA-256. Of the ways
-    to the samples, :meth:`blocks` and :meth:`dataset` are lazy, :meth:`samples` and :meth:`load_dataset` whole.
+    every chunk carries a checksum, and every column read to its end is held against its SHA-256, unless
+    :meth:`samples` is told to leave that to :meth:`check`. Of the ways to the samples, :meth:`blocks` and
+    :meth:`dataset` are lazy, :meth:`samples` and :meth:`load_dataset` whole.
 
     Parameters
     ----------
@@ -194,19 +196,44 @@ class Run:
             raise ValueError(f"blocks hold at least 1 sample, got size = {size}")
         return _Blocks(self._contents, size)
 
-    def samples(self) -> Block:
+    def samples(self, *, digests: bool = True) -> Block:
         """Return all samples as one block.
+
+        Parameters
+        ----------
+        digests : bool
+            Whether the columns are held against their SHA-256. Where they are not, damage is an error all the
+            same, by the chunks' checksums, but an array that someone rewrote is not; :meth:`check` finds it later.
 
         Raises
         ------
         RunDamaged
             If they are not what was written.
         """
-        if not len(self):
-            header = self._contents.header
-            return _block(header.first, {name: self._contents.column(name)[:] for name in header.columns})
-        (block,) = self.blocks(len(self))
+        header = self._contents.header
+        values = {}
+        for name in (name for name in _BLOCK_COLUMNS if name in header.columns):
+            column = self._contents.column(name)
+            with reading(self.path, f"the column {name!r} from sample 0"):
+                values[name] = column[:]
+            # Fletcher's sum of zeros is zero: only a digest tells a chunk of zeros from one that was lost.
+            digests = digests or (column.compression is None and _has_empty_chunk(values[name], column.chunks))
+        block = _block(header.first, values)
+        if digests:
+            self.check(block)
         return block
+
+    def check(self, samples: Block) -> None:
+        """Hold samples that :meth:`samples` returned against their digests.
+
+        Raises
+        ------
+        RunDamaged
+            Naming the first column that is not what was written.
+        """
+        for name in (name for name in _BLOCK_COLUMNS if name in self._contents.header.columns):
+            values = np.ascontiguousarray(getattr(samples, _BLOCK_COLUMNS[name]))
+            self._contents.check(name, hashlib.sha256(values.data).hexdigest())
 
     def dataset(self) -> xarray.Dataset:
         """Return the samples as a dataset that reads what is asked for, when it is asked for.
@@ -316,6 +343,13 @@ class _Blocks:
             read = _block(run.header.first + start, values)
             for row in range(0, len(read), self.size):
                 yield read[row : row + self.size]
+
+
+def _has_empty_chunk(values: NDArray[Any], chunks: tuple[int, ...] | None) -> bool:
+    """Tell whether all bytes of some chunk are zero."""
+    size = chunks[0] if chunks else max(values.size, 1)
+    suspects = np.flatnonzero(values[::size] == 0) * size
+    return any(not values[start : start + size].view(np.uint8).any() for start in suspects.tolist())
 
 
 _BLOCK_COLUMNS = {

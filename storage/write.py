@@ -198,9 +198,9 @@ class _Columns:
 def _create(file: Any, path: str, dtype: str, length: int | None) -> Any:
     """Make an array of a known length, or a growing one; zero length only a growing one can have."""
     if length:
-        return file.create_dataset(path, (length,), dtype, chunks=(min(length, CHUNK),), **layout.FILTERS)
+        return file.create_dataset(path, (length,), dtype, chunks=(min(length, CHUNK),), **layout.filters(path))
     chunk = CHUNK if length is None else 1
-    return file.create_dataset(path, (0,), dtype, maxshape=(None,), chunks=(chunk,), **layout.FILTERS)
+    return file.create_dataset(path, (0,), dtype, maxshape=(None,), chunks=(chunk,), **layout.filters(path))
 
 
 def _write_originals(file: Any, originals: Sequence[Original]) -> None:
