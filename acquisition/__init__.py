@@ -1,12 +1,19 @@
 """From a port or an old file to blocks of samples; knows nothing of the rest."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from acquisition.block import Block, Flag, concatenate
-from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.errors import AcquisitionError, FormatError, NeedsAnswer, SourceError, UnknownFormat
 from acquisition.recording import Original, Recording, Trap
 from acquisition.registry import formats, open_recording, sniff
-from acquisition.replay import Replay
 from acquisition.source import Source, SourceInfo
+
+if TYPE_CHECKING:
+    from acquisition.clock import Clock, SystemClock, VirtualClock
+    from acquisition.replay import Replay
 
 __all__ = [
     "AcquisitionError",
@@ -30,3 +37,12 @@ __all__ = [
     "open_recording",
     "sniff",
 ]
+
+# What no file is read with: it would be a tenth of a cold start's imports.
+_LATER = {"Clock": "clock", "SystemClock": "clock", "VirtualClock": "clock", "Replay": "replay"}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"acquisition.{_LATER[name]}"), name)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import stat
-from pathlib import Path
 from typing import BinaryIO, Protocol, runtime_checkable
 
 from acquisition.errors import FormatError
@@ -133,7 +132,7 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
             raise FormatError(name, "expected a file, got a directory", "name a recording inside it")
         if not stat.S_ISREG(mode):
             raise FormatError(name, "expected a regular file, got a device or pipe", "save it to a file first")
-        with Path(name).open("rb") as file:
+        with open(name, "rb") as file:
             head = file.read(HEAD_BYTES)
             if not head:
                 raise FormatError(name, "expected a recording, got an empty file", "check that the export ended")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import PurePath
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +66,7 @@ class Column:
     @property
     def name(self) -> str:
         """The file's name without its folder."""
-        return PurePath(self.path).name
+        return os.path.basename(self.path)
 
     @property
     def simulated(self) -> bool:

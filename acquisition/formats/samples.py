@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import F8, I8, U8, Flag
-from acquisition.formats.nominal import place_unread, snap, time_flags
+from acquisition.formats.nominal import median, place_unread, snap, time_flags
 from acquisition.formats.timing import Timing
 from acquisition.recording import Trap
 
@@ -194,11 +194,11 @@ def _far(distance: F8) -> NDArray[np.int64]:
     some = _some(distance)
     if some.size < _ZEROS:
         return np.empty(0, np.int64)
-    median = float(np.median(some))
-    limit = _FAR_M + _FAR_SPREADS * float(np.median(np.abs(some - median)))
-    if np.fmax.reduce(distance) <= median + limit and np.fmin.reduce(distance) >= median - limit:
+    middle = median(some)
+    limit = _FAR_M + _FAR_SPREADS * median(np.abs(some - middle))
+    if np.fmax.reduce(distance) <= middle + limit and np.fmin.reduce(distance) >= middle - limit:
         return np.empty(0, np.int64)
-    return np.flatnonzero(np.abs(distance - median) > limit)
+    return np.flatnonzero(np.abs(distance - middle) > limit)
 
 
 def _common_step(distance: F8, resolution: float) -> float:

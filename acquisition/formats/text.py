@@ -138,6 +138,8 @@ def decode(data: bytes) -> str:
     >>> decode("\\ufeff0,5".encode("utf-16-le")), decode(b"20 \\xb0C")
     ('0,5', '20 °C')
     """
+    if data.isascii() and b"\0" not in data:
+        return data.decode("ascii")  # the usual line, without a look at what else it may be
     if data.startswith(codecs.BOM_UTF8):
         data = data[3:]
     elif encoding := _utf16(data[:8192]):
