@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import stat
-from typing import BinaryIO, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, BinaryIO, Protocol, runtime_checkable
 
 from acquisition.errors import FormatError
 from acquisition.formats.text import is_text
 from acquisition.recording import Recording, Survey
+
+if TYPE_CHECKING:
+    import mmap
 
 __all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "read_bytes", "read_head"]
 
@@ -16,6 +19,7 @@ HEAD_BYTES = 8192
 """How much of a file a format sees to recognise it."""
 
 _LONGEST_LINE = 1 << 20
+_AT_ONCE = 1 << 24  # a shorter text may well be read before it is looked at
 _MARKUP = b"\xef\xbb\xbf \t\r\n"  # XML may well stand in one line
 
 
@@ -138,10 +142,15 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
                 raise FormatError(name, "expected a recording, got an empty file", "check that the export ended")
             if limit is not None:
                 return head[:limit]
-            if is_text(head) and not head.lstrip(_MARKUP).startswith(b"<"):
-                _demand_lines(name, file)
+            by_lines = is_text(head) and not head.lstrip(_MARKUP).startswith(b"<")
+            if by_lines and os.fstat(file.fileno()).st_size > _AT_ONCE:
+                _demand_lines_of_file(name, file)
+                by_lines = False
             file.seek(0)
-            return file.read()
+            data = file.read()
+            if by_lines:
+                _demand_lines(name, data)
+            return data
     except OSError as error:
         raise FormatError(
             name, f"cannot be opened ({error.strerror or error})", "check its name and permissions"
@@ -150,18 +159,20 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
         raise FormatError(repr(name), f"is no file name ({error})", "check its name") from error
 
 
-def _demand_lines(name: str, file: BinaryIO) -> None:
-    """Give up at the first MiB that holds no line end, before a file of any size is read into memory."""
-    size = os.fstat(file.fileno()).st_size
-    if size < _LONGEST_LINE:
-        return
+def _demand_lines_of_file(name: str, file: BinaryIO) -> None:
+    """Demand lines before a file of any size is read into memory."""
     import mmap
 
     with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
-        for start in range(0, size - _LONGEST_LINE + 1, _LONGEST_LINE):
-            stop = start + _LONGEST_LINE
-            if text.find(b"\n", start, stop) < 0 and text.find(b"\r", start, stop) < 0:
-                before = text[:start]
-                line = 1 + (before.count(b"\n") or before.count(b"\r"))
-                demand = "expected lines of text, got a line of more than 1 MiB"
-                raise FormatError(name, demand, "this is no text recording; export it again", line=line)
+        _demand_lines(name, text)
+
+
+def _demand_lines(name: str, text: bytes | mmap.mmap) -> None:
+    """Give up at the first MiB that holds no line end."""
+    for start in range(0, len(text) - _LONGEST_LINE + 1, _LONGEST_LINE):
+        stop = start + _LONGEST_LINE
+        if text.find(b"\n", start, stop) < 0 and text.find(b"\r", start, stop) < 0:
+            before = text[:start]
+            line = 1 + (before.count(b"\n") or before.count(b"\r"))
+            demand = "expected lines of text, got a line of more than 1 MiB"
+            raise FormatError(name, demand, "this is no text recording; export it again", line=line)

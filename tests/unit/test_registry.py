@@ -185,7 +185,7 @@ def test_a_file_without_read_permission_is_refused(run: Path, monkeypatch: pytes
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr("builtins.open", refuse)
     with pytest.raises(FormatError, match=r"cannot be opened \(Permission denied\); check its name and permissions"):
         open_recording(run)
 
