@@ -65,7 +65,7 @@ def test_a_flipped_bit_is_an_error_on_loading(path: Path) -> None:
 def test_a_lost_chunk_is_an_error_on_loading(path: Path) -> None:
     """A chunk of zeros has the checksum zero, so its column's digest is asked."""
     spoil(path, 2, to=b"\0")
-    with pytest.raises(RunDamaged, match="the column 'distance'.*SHA-256"):
+    with pytest.raises(RunDamaged, match=r"the column 'distance'.*SHA-256"):
         springmass.load(path)
 
 
