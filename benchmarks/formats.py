@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -106,10 +107,10 @@ def cold(setup: str, path: Path) -> Callable[[], float]:
 
     def call() -> float:
         command = [sys.executable, "-c", COLD.format(setup=setup), str(path)]
-        before = os.times()
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)  # os.times() counts in hundredths of a second
         subprocess.run(command, check=True, cwd=REPO_ROOT, env=environment)
-        after = os.times()
-        return after.children_user + after.children_system - before.children_user - before.children_system
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
     return call
 
