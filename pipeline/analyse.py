@@ -14,6 +14,7 @@ from pipeline import damping as dampings
 from pipeline import demodulate as demodulation
 from pipeline import derive as derivation
 from pipeline import fullfit as fullfits
+from pipeline import motion_fit as solutions
 from pipeline import phase as phases
 from pipeline import relaxation as relaxations
 from pipeline.beside import Beside, set_apart
@@ -29,6 +30,7 @@ from pipeline.fullfit import FullFit, fit_record
 from pipeline.instrument import Instrument
 from pipeline.judge import Finding, by_severity, count_quality, judge, judge_samples, judge_still
 from pipeline.judge_scene import judge_scene
+from pipeline.motion_fit import MotionFit, MotionMisfit, fit_motion, moving_part
 from pipeline.phase import PhaseFit, fit_phase
 from pipeline.quick import demodulate_quickly
 from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
@@ -51,7 +53,7 @@ class Params:
     ----------
     accuracy : {"fast", "standard", "best"}
         The tier; :func:`pipeline.accuracy.params_for` gives the options that belong to it.
-    condition, cycles, demodulate, beside, damping, phase, derive, full, relaxation
+    condition, cycles, demodulate, beside, damping, phase, derive, full, relaxation, motion
         Of the stages of those names.
     """
 
@@ -65,6 +67,7 @@ class Params:
     derive: derivation.Params = field(default_factory=derivation.Params)
     full: fullfits.Params = field(default_factory=fullfits.Params)
     relaxation: relaxations.Params = field(default_factory=relaxations.Params)
+    motion: solutions.Params = field(default_factory=solutions.Params)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,6 +179,12 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     fast = params.accuracy == "fast"
     conditioned = (condition_quickly if fast else condition)(track, params.condition)
     cycles = (find_cycles_quickly if fast else find_cycles)(conditioned, params.cycles)
+    stopped = False
+    share = 0.75 if isinstance(cycles, NoOscillation) else 0.25
+    if (moving := moving_part(conditioned, share)) is not None:
+        trimmed = (find_cycles_quickly if fast else find_cycles)(moving, params.cycles)
+        stopped = not isinstance(trimmed, NoOscillation)
+        cycles = trimmed if stopped else cycles
     if isinstance(cycles, NoOscillation):
         return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or cycles)
     quick = demodulate_quickly(conditioned, cycles)
@@ -189,18 +198,25 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     plain = fast and quick is not None
     damping = fit_damping_quickly(demodulated, start, params.damping) if plain else None
     damping = damping or fit_damping(demodulated, start, params.damping)
+    solved = fit_motion(conditioned, demodulated, damping, params.motion, params.damping, stopped=stopped)
     strong = damping.best.damping_rate().value > params.relaxation.least_damping * demodulated.angular_frequency
-    if strong and isinstance(relaxed := find_relaxation(conditioned, params.relaxation), Relaxation):
+    linear = not isinstance(solved, MotionFit) or solved.damping.selected == "linear"
+    if strong and linear and isinstance(relaxed := find_relaxation(conditioned, params.relaxation), Relaxation):
         return _still(track, scene, params, conditioned, relaxed)
-    phase = fit_phase_quickly(demodulated, damping) if plain else None
-    phase = phase or fit_phase(demodulated, damping, params.phase)
-    rest = (fit_rest_quickly(demodulated) if plain else None) or fit_rest(demodulated)
-    if fast and quick is not None:
-        waveform = quick.waveform(track, damping, phase, rest)
+    if isinstance(solved, MotionFit):
+        demodulated, beside = replace(demodulated, flags=solved.flags), Beside.nothing(conditioned)
+        damping, phase, rest = solved.damping, solved.phase(demodulated), solved.rest(demodulated)
+        waveform = solved.waveform
     else:
-        waveform = reconstruct(beside.conditioned.track, demodulated, phase, rest)
+        phase = fit_phase_quickly(demodulated, damping) if plain else None
+        phase = phase or fit_phase(demodulated, damping, params.phase)
+        rest = (fit_rest_quickly(demodulated) if plain else None) or fit_rest(demodulated)
+        if fast and quick is not None:
+            waveform = quick.waveform(track, damping, phase, rest)
+        else:
+            waveform = reconstruct(beside.conditioned.track, demodulated, phase, rest)
     full = None
-    if params.accuracy == "best":
+    if params.accuracy == "best" and not isinstance(solved, MotionFit):
         extra = beside.columns(track.t)
         full = fit_record(
             beside.conditioned, demodulated, damping, phase, rest, waveform, extra=extra, params=params.full
@@ -223,6 +239,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         judge(conditioned, cycles, demodulated, damping, phase, rest, waveform, beside),
         judge_scene(scene, effects),
         () if full is None or full.converged else (_not_converged(full),),
+        () if solved is None else (_on_solution(solved),),
     )
     motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived, beside, full)
     return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
@@ -235,6 +252,12 @@ def _not_converged(full: FullFit) -> Finding:
         f"the fit of the whole waveform did not converge in {full.steps} Gauss-Newton steps from the windows' values; "
         "these stand, as at standard accuracy",
     )
+
+
+def _on_solution(solved: MotionFit | MotionMisfit) -> Finding:
+    if isinstance(solved, MotionFit):
+        return Finding("strongly_damped", "info", solved.why)
+    return Finding("not_converged", "warning", solved.why)
 
 
 def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:

@@ -277,9 +277,9 @@ def _fit_all(
             unfitted.pop(law.name, None)
         else:
             unfitted[law.name] = why
-    least = _least_chi2(sound)
+    least = least_chi2(sound)
     return {
-        name: _weigh(LAWS[name], fit, least[name], y.size, spread.correlation, params) for name, fit in sound.items()
+        name: weigh(LAWS[name], fit, least[name], y.size, spread.correlation, params) for name, fit in sound.items()
     }
 
 
@@ -300,7 +300,7 @@ def _astray(law: Law, fit: Fitted, t: F8, y: F8) -> str | None:
     return "its numbers ran out of range" if np.any(growth > 20.0 * top) else None
 
 
-def _least_chi2(fits: Mapping[str, Fitted]) -> dict[str, float]:
+def least_chi2(fits: Mapping[str, Fitted]) -> dict[str, float]:
     """Each law's chi-square at its best without negative coefficients, which is a special case's or its own."""
     least: dict[str, float] = {}
     for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
@@ -315,7 +315,7 @@ def _least_chi2(fits: Mapping[str, Fitted]) -> dict[str, float]:
     return least
 
 
-def _weigh(law: Law, fit: Fitted, least_chi2: float, points: int, correlation: float, params: Params) -> LawFit:
+def weigh(law: Law, fit: Fitted, least_chi2: float, points: int, correlation: float, params: Params) -> LawFit:
     count = len(law.parameters)
     covariance = correlation * fit.covariance
     free = points - count

@@ -204,7 +204,8 @@ def covariance_or_infinite(jacobian: F8) -> F8:
     if np.abs(np.diagonal(r)).min() <= 1e-13:
         return unknown
     triangle = np.linalg.inv(r) / scale[:, None]
-    return np.asarray(triangle @ triangle.T)
+    with np.errstate(over="ignore", invalid="ignore"):  # infinite where the points say nothing
+        return np.asarray(triangle @ triangle.T)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
