@@ -208,8 +208,9 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         damping, phase, rest = solved.damping, solved.phase(demodulated), solved.rest(demodulated)
         waveform = solved.waveform
     else:
-        phase = fit_phase_quickly(demodulated, damping) if plain else None
-        phase = phase or fit_phase(demodulated, damping, params.phase)
+        phase = (fit_phase_quickly(demodulated, damping) if plain else None) or fit_phase(
+            demodulated, damping, params.phase
+        )
         rest = (fit_rest_quickly(demodulated) if plain else None) or fit_rest(demodulated)
         if fast and quick is not None:
             waveform = quick.waveform(track, damping, phase, rest)
