@@ -57,7 +57,7 @@ class FullFit:
     steps : int
         Gauss-Newton steps taken by the selected law's fit.
     damping : Damping
-        The laws that were admissible, with parameters of the full fit; the others as before.
+        The laws that were admissible and the linear one, with parameters of the full fit; the others as before.
     phase : PhaseFit
     rest : Rest
     waveform : Waveform
@@ -160,7 +160,8 @@ def fit_record(
     if not solved.converged:
         return FullFit(False, solved.steps, damping, phase, rest, waveform, demodulated.flags, demodulated.noise_m, {})
     fits = dict(damping.fits)
-    for name in {damping.selected, *damping.admissible}:
+    # The one exponential too, for it is what everyone compares with, admissible or not.
+    for name in {damping.selected, *damping.admissible, "linear"} & fits.keys():
         own = solved if name == damping.selected else _other_law(record, fits[name], solved, params)
         if own.converged:
             fits[name] = replace(fits[name], joint=_law_joint(record, own, demodulated), converged=True)

@@ -29,6 +29,8 @@ C16 = NDArray[np.complex128]
 __all__ = ["Quick", "demodulate_quickly"]
 
 OUTLIER_SIGMAS = 4.5  # one good sample in 150,000 lies further off
+CLEAN = 0.3  # least share of clean windows; clusters of echoes on a seventh of the samples leave fewer
+EXCESS = 1.3  # of the calmest windows' scatter over the noise from differences: beyond, clusters sit in these too
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +74,9 @@ def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None
     Windows hold equally many samples, near a whole number of periods. A first product gives phases and amplitudes
     from which frequency and decay are told; a second one in a basis that has them gives the result. How far a window
     differs from the record's mean in either is put right to first order. Windows that hold flagged samples or false
-    echoes are fitted again without these, each by itself; where fewer than a third are clean nothing is returned.
+    echoes are fitted again without these, each by itself. Where fewer than three in ten are clean, or where even the calmest
+    quarter scatters by more than 1.3 times the noise that differences of neighbours tell, nothing is returned: clusters
+    of echoes have then pulled the fits that were to judge them.
     """
     track = conditioned.track
     rows = np.flatnonzero(conditioned.flags == 0) if conditioned.flags.any() else None
@@ -142,7 +146,8 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     # The calmest quarter of the windows tells the noise: clusters of echoes may sit in all others.
     typical = math.sqrt(float(np.partition(squares, w // 4)[w // 4]) / (length - 3)) + 1e-150
     clean = ~(bad.any(axis=1) | (np.abs(residual) > OUTLIER_SIGMAS * typical).any(axis=1))
-    if np.count_nonzero(clean) < max(0.3 * w, 5):
+    expected = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
+    if typical > EXCESS * expected or np.count_nonzero(clean) < max(CLEAN * w, 5):
         return None
     smooth = _smooth(coefficients, t, basis.omega, clean)
     if float(smooth.amplitude.min()) < WEAK * typical * math.sqrt(2.0 / length):

@@ -63,11 +63,11 @@ def test_motion_at_every_sample(synthetic: ModuleType) -> None:
 
 @pytest.mark.parametrize("shift_m", [0.003, 0.01, 0.03])
 def test_clusters_and_flagged_samples_are_let_go(synthetic: ModuleType, shift_m: float) -> None:
-    """False echoes on a quarter of every other window are flagged; amplitude and rest stay right."""
+    """False echoes on a quarter of every fourth period are flagged; amplitude and rest stay right."""
     truth = synthetic.Truth(gamma=0.005)
     t = synthetic.times(60.0)
     turn = truth.phase_at(t) / (2.0 * np.pi)
-    false = (np.floor(turn) % 2 == 0) & (np.abs(turn % 1.0 - 0.5) < 0.12)
+    false = (np.floor(turn) % 4 == 0) & (np.abs(turn % 1.0 - 0.5) < 0.12)
     y = synthetic.noisy(truth, t, 2e-4, 2)
     y[false] += shift_m
     y[500:503] = np.nan
@@ -83,9 +83,9 @@ def test_clusters_and_flagged_samples_are_let_go(synthetic: ModuleType, shift_m:
     assert np.mean(np.abs(d.offset - truth.offset) < 3.0 * u[:, 2]) > 0.97
 
 
-@pytest.mark.parametrize("what", ["jitter", "clipped", "short", "tail"])
+@pytest.mark.parametrize("what", ["jitter", "clipped", "short", "tail", "clusters"])
 def test_what_it_cannot_do_it_leaves(synthetic: ModuleType, what: str) -> None:
-    """Jittered times, clipped crests, few periods and windows without a signal are not taken."""
+    """Jittered times, clipped crests, few periods, windows without a signal and clusters in each are not taken."""
     truth = synthetic.Truth(gamma=0.2 if what == "tail" else 0.01)
     t = synthetic.times(3.0 if what == "short" else 60.0)
     if what == "jitter":
@@ -93,6 +93,8 @@ def test_what_it_cannot_do_it_leaves(synthetic: ModuleType, what: str) -> None:
     y = synthetic.noisy(truth, t, 3e-4, 3)
     if what == "clipped":
         y = np.minimum(y, truth.offset + 0.5 * truth.amplitude)
+    if what == "clusters":
+        y[np.abs(truth.phase_at(t) / (2.0 * np.pi) % 1.0 - 0.5) < 0.1] += 0.006
     assert quick(t, y) is None
 
 
