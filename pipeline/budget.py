@@ -7,14 +7,14 @@ ordinary arithmetic knows what it came from, correlations included.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
 
-__all__ = ["Budget", "Contribution", "Inputs", "Kind"]
+__all__ = ["Budget", "Budgets", "Contribution", "Inputs", "Kind", "linear"]
 
 Kind = Literal["A", "B"]
 
@@ -179,3 +179,54 @@ class Inputs:
         if name in self._kinds:
             raise ValueError(f"an input {name!r} is there already")
         self._kinds[name] = kind
+
+
+class Budgets(Mapping[str, Budget]):
+    """Budgets of several results, each worked out when it is asked for.
+
+    Parameters
+    ----------
+    inputs : Inputs
+    results : mapping of str to (variable, str)
+        Made of the inputs, with units.
+    """
+
+    def __init__(self, inputs: Inputs, results: Mapping[str, tuple[Any, str]]) -> None:
+        self._inputs, self._results = inputs, results
+        self._known: dict[str, Budget] = {}
+
+    def __getitem__(self, quantity: str) -> Budget:
+        if quantity not in self._known:
+            self._known[quantity] = self._inputs.budget(quantity, *self._results[quantity])
+        return self._known[quantity]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._results)
+
+    def __len__(self) -> int:
+        return len(self._results)
+
+
+def linear(value: float, terms: Iterable[tuple[float, Any]]) -> Any:
+    """Return a variable of that value which varies as the sum of slopes times variables, built in one go.
+
+    Parameters
+    ----------
+    value : float
+    terms : iterable of (float, variable or number)
+        Slope and what it belongs to; plain numbers are exact and add nothing.
+
+    Examples
+    --------
+    >>> from uncertainties import ufloat
+    >>> print(linear(7.0, [(3.0, ufloat(1.0, 0.1)), (4.0, ufloat(5.0, 0.1)), (1.0, 2.0)]))
+    7.0+/-0.5
+    """
+    from uncertainties.core import AffineScalarFunc, LinearCombination
+
+    slopes: dict[Any, float] = {}
+    for slope, x in terms:
+        if slope and isinstance(x, AffineScalarFunc):
+            for variable, own in x.derivatives.items():
+                slopes[variable] = slopes.get(variable, 0.0) + float(slope) * own
+    return AffineScalarFunc(float(value), LinearCombination(slopes))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from pipeline.ambient import Ambient
-from pipeline.budget import Budget, Inputs
+from pipeline.budget import Budget, Budgets, Inputs, linear
 from pipeline.condition import MAD_TO_SIGMA
 from pipeline.curves import Curve, by_parameters, drag_curve, energy_curve
 from pipeline.damping import Damping, LawFit
@@ -21,7 +22,7 @@ from pipeline.instrument import U_CRYSTAL, Instrument
 from pipeline.phase import PhaseFit
 from pipeline.rest import Rest
 from pipeline.scene import Scene
-from pipeline.track import UNUSABLE, Quality
+from pipeline.track import F8, UNUSABLE, Quality
 
 __all__ = ["Derived", "Params", "derive"]
 
@@ -46,43 +47,65 @@ class Params:
     u_air_temperature_k: float = 0.5
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Derived:
-    """Everything that Table 1 lists.
+    """Everything that Table 1 lists. Budgets, and what only they and curves need, are worked out when asked for.
 
     Parameters
     ----------
     estimates : mapping of str to Estimate
         With every known contribution to the uncertainty, the clock's and the scale's among them.
-    statistical : mapping of str to Estimate
-        The same values with what the record's own scatter contributes alone (Type A).
     coefficients : mapping of str to Estimate
         The selected law's parameters with every known contribution.
     budgets : mapping of str to Budget
         Of every estimate and coefficient: which input contributes what.
-    effective_mass_kg : Estimate or None
-        Mass that oscillates: bob, a third of the spring, air carried along, as far as the scene requires them.
-    own_mass_kg, spring_share_kg : Estimate or None
-        Its parts: what belongs to this run alone, and the share of the spring, which other runs have too.
-    half_stiffness : Estimate
-        Mechanical energy over the recorded amplitude's square, N/m; per kilogram where the scene gives no mass.
-    drag_length : Estimate or None
-        Drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude, m; None without disc, mass or air
-        temperature.
     law_weights : mapping of str to float
         Of the admissible laws other than the selected one; with that one's they add up to 1.
+    parts : mapping of str to (variable, str)
+        What the properties below are read from, with units; absent where the scene does not give it.
     """
 
     estimates: Mapping[str, Estimate]
-    statistical: Mapping[str, Estimate]
     coefficients: Mapping[str, Estimate]
     budgets: Mapping[str, Budget]
-    effective_mass_kg: Estimate | None
-    own_mass_kg: Estimate | None
-    spring_share_kg: Estimate | None
-    half_stiffness: Estimate
-    drag_length: Estimate | None
     law_weights: Mapping[str, float]
+    parts: Mapping[str, tuple[Any, str]]
+
+    @cached_property
+    def statistical(self) -> Mapping[str, Estimate]:
+        """The estimates with what the record's own scatter contributes to their uncertainties alone (Type A)."""
+        return {name: Estimate(e.value, self.budgets[name].u_of("A"), e.unit) for name, e in self.estimates.items()}
+
+    @cached_property
+    def effective_mass_kg(self) -> Estimate | None:
+        """Mass that oscillates: bob, a third of the spring, air carried along, as far as the scene requires them."""
+        return self._part("mass")
+
+    @cached_property
+    def own_mass_kg(self) -> Estimate | None:
+        """What of the mass belongs to this run alone."""
+        return self._part("own_mass")
+
+    @cached_property
+    def spring_share_kg(self) -> Estimate | None:
+        """The share of the spring in the mass, which other runs have too."""
+        return self._part("spring_share")
+
+    @cached_property
+    def half_stiffness(self) -> Estimate:
+        """Mechanical energy over the recorded amplitude's square, N/m; per kilogram where the scene gives no mass."""
+        return _estimate(*self.parts["half_stiffness"])
+
+    @cached_property
+    def drag_length(self) -> Estimate | None:
+        """Drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude, m.
+
+        None without disc, mass or air temperature.
+        """
+        return self._part("drag_length")
+
+    def _part(self, name: str) -> Estimate | None:
+        return _estimate(*self.parts[name]) if name in self.parts else None
 
     def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve:
         """Return the mechanical energy against time with its band, J; J/kg where no mass is known.
@@ -163,9 +186,12 @@ def derive(
     rate = inputs.add("clock_rate", instrument.clock_rate, "B")
     scale = ambient.scale(instrument)
     omega = inputs.add("angular_frequency", phase.angular_frequency, "A") * rate
-    start = laws.quantity(lambda fit: float(fit.joint.values[0])) * scale
+    start = (
+        laws.quantity(lambda fit: float(fit.joint.values[0]), lambda fit: np.eye(1, fit.joint.values.size)[0]) * scale
+    )
     lam = laws.quantity(_rate_at_start) * rate
-    v_rms = omega * scale * laws.quantity(lambda fit: _root_mean_square(fit, demodulated, damping.t0))
+    elapsed = demodulated.t - damping.t0
+    v_rms = omega * scale * laws.quantity(lambda fit: _root_mean_square(fit, elapsed), _slopes_of_it(elapsed))
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, "m"), "B")
     found: dict[str, tuple[Any, str]] = {
         "period": (2 * math.pi / omega, "s"),
@@ -184,9 +210,12 @@ def derive(
     diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = None if own is None else own + (0.0 if share is None else share)
+    parts = {"half_stiffness": (0.5 * omega**2 * scale**2 * (1.0 if mass is None else mass), "N/m")}
+    for name, x in (("mass", mass), ("own_mass", own), ("spring_share", share)):
+        if x is not None:
+            parts[name] = x, "kg"
     if mass is not None:
         found["spring_constant"] = ((omega**2 + damping.squared_rate(demodulated.t) * rate**2) * mass, "N/m")
-    drag_length = None
     if diameter is not None:
         found["keulegan_carpenter_number"] = (2 * math.pi * start / diameter, "")
         if ambient.known:
@@ -194,24 +223,15 @@ def derive(
         if ambient.known and mass is not None:
             # C over beta; the area, the mass and the density are in it once.
             over_beta = 6 * mass / (omega * ambient.density * diameter**2)
-            drag_length = _estimate(over_beta * rate / scale, "m")
+            parts["drag_length"] = over_beta * rate / scale, "m"
             if damping.settled and "beta" in coefficients:
                 found["drag_coefficient"] = (over_beta * coefficients["beta"][0], "")
-    half_stiffness = _estimate(0.5 * omega**2 * scale**2 * (1.0 if mass is None else mass), "N/m")
-    budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
-    estimates = {name: budgets[name].estimate for name in found}
-    effective, own_mass, spring_share = (None if m is None else _estimate(m, "kg") for m in (mass, own, share))
     return Derived(
-        estimates=estimates,
-        statistical={name: Estimate(e.value, budgets[name].u_of("A"), e.unit) for name, e in estimates.items()},
-        coefficients={name: budgets[name].estimate for name in coefficients},
-        budgets=budgets,
-        effective_mass_kg=effective,
-        own_mass_kg=own_mass,
-        spring_share_kg=spring_share,
-        half_stiffness=half_stiffness,
-        drag_length=drag_length,
+        estimates={name: _estimate(x, unit) for name, (x, unit) in found.items()},
+        coefficients={name: _estimate(x, unit) for name, (x, unit) in coefficients.items()},
+        budgets=Budgets(inputs, found | coefficients),
         law_weights=laws.weights,
+        parts=parts,
     )
 
 
@@ -231,16 +251,17 @@ class _Laws:
         """Return what the selected law says."""
         return f(self.damping.best)
 
-    def quantity(self, f: Callable[[LawFit], float]) -> Any:
-        """Return a function of a law as a variable: linear in the parameters, with the choice of the law."""
+    def quantity(self, f: Callable[[LawFit], float], slopes: Callable[[LawFit], F8] | None = None) -> Any:
+        """Return a function of a law as a variable: linear in the parameters, with the choice of the law.
+
+        ``slopes`` gives its derivatives by the parameters where they are known in closed form.
+        """
         best = self.damping.best
         value = f(best)
-        x: Any = value
-        for variable, slope in zip(self.variables, by_parameters(best, f), strict=True):
-            x = x + slope * (variable - variable.nominal_value)
-        for name, z in self.others.items():
-            x = x + (f(self.damping.fits[name]) - value) * z
-        return x
+        derivatives = by_parameters(best, f) if slopes is None else slopes(best)
+        terms = list(zip(derivatives.tolist(), self.variables, strict=True))
+        terms += [(f(self.damping.fits[name]) - value, z) for name, z in self.others.items()]
+        return linear(value, terms)
 
 
 def _rate_at_start(fit: LawFit) -> float:
@@ -249,9 +270,20 @@ def _rate_at_start(fit: LawFit) -> float:
     return float(fit.law.rate(theta[:1], theta)[0] / theta[0])
 
 
-def _root_mean_square(fit: LawFit, demodulated: Demodulated, t0: float) -> float:
+def _root_mean_square(fit: LawFit, elapsed: F8) -> float:
     """Of the displacement over the windows, m."""
-    return math.sqrt(float(np.mean(fit.amplitude(demodulated.t - t0) ** 2)) / 2.0)
+    return math.sqrt(float(np.mean(fit.amplitude(elapsed) ** 2)) / 2.0)
+
+
+def _slopes_of_it(elapsed: F8) -> Callable[[LawFit], F8]:
+    """The derivatives of :func:`_root_mean_square` by a law's parameters."""
+
+    def slopes(fit: LawFit) -> F8:
+        amplitude = fit.amplitude(elapsed)
+        power = math.sqrt(2.0 * elapsed.size * float(amplitude @ amplitude))
+        return np.asarray(amplitude @ fit.law.jacobian(elapsed, fit.joint.values) / max(power, 1e-300))
+
+    return slopes
 
 
 def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:

@@ -75,8 +75,8 @@ def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None
     from which frequency and decay are told; a second one in a basis that has them gives the result. How far a window
     differs from the record's mean in either is put right to first order. Windows that hold flagged samples or false
     echoes are fitted again without these, each by itself. Where fewer than three in ten are clean, or where even the calmest
-    quarter scatters by more than 1.3 times the noise that differences of neighbours tell, nothing is returned: clusters
-    of echoes have then pulled the fits that were to judge them.
+    quarter scatters by more than 1.3 times the noise that differences of neighbours tell, nothing is returned:
+    clusters of echoes have then pulled the fits that were to judge them.
     """
     track = conditioned.track
     rows = np.flatnonzero(conditioned.flags == 0) if conditioned.flags.any() else None
