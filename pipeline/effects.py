@@ -15,7 +15,7 @@ from pipeline.beside import Beside
 from pipeline.damping import Damping
 from pipeline.estimate import Estimate
 from pipeline.instrument import Instrument
-from pipeline.phase import PhaseFit
+from pipeline.phase import PhaseFit, words_on_exponent
 from pipeline.rest import Rest
 from pipeline.scene import Scene
 
@@ -179,10 +179,10 @@ def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
         why = "a constant frequency describes the phase: an ideal spring needs no more"
         return Effect(name, None, None, unit, False, why)
     start = damping.best.joint["A0"].value
-    shift = phase.backbone.value * start**2 / phase.angular_frequency.value
+    shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
     why = (
         f"the phase bends: the frequency shifts by {shift:.2g} of itself from rest to the first amplitude, "
-        "far beyond its uncertainty"
+        f"with {words_on_exponent(phase.exponent)}, far beyond its uncertainty"
     )
     return Effect(name, None, shift, unit, True, why)
 

@@ -14,7 +14,7 @@ from pipeline.damping import BARE_MENTION, Damping, LawFit
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Joint
 from pipeline.laws import LAWS
-from pipeline.phase import PhaseFit, squared_amplitude_integral
+from pipeline.phase import PhaseFit, amplitude_integral
 from pipeline.record_model import Normal, Record, State, accumulate, scores
 from pipeline.refined import refined_phase, refined_rest, refined_waveform
 from pipeline.regression import correlation_length
@@ -125,7 +125,7 @@ def fit_record(
 
     Notes
     -----
-    The model is :math:`y = L c + A(t; \\theta) \\cos\\bigl(\\varphi + \\omega\\tau + \\kappa \\int A^2\\bigr)` with
+    The model is :math:`y = L c + A(t; \\theta) \\cos\\bigl(\\varphi + \\omega\\tau + \\kappa \\int A^p\\bigr)` with
     time counted from the middle of the record, where frequency and phase are not correlated. Gauss-Newton steps are
     taken in all parameters together; those of the linear columns are exact, which is variable projection [1]_. Steps
     that raise the sum of squares are halved.
@@ -192,12 +192,14 @@ def _record(
 
 def _start(record: Record, fit: LawFit, phase: PhaseFit) -> State:
     area = _area(record, fit, phase) if phase.coefficients.size == 3 else None
-    return State(fit.law, fit.joint.values.copy(), phase.coefficients.copy(), np.zeros(record.linear_count), area)
+    return State(
+        fit.law, fit.joint.values.copy(), phase.coefficients.copy(), np.zeros(record.linear_count), area, phase.exponent
+    )
 
 
 def _area(record: Record, fit: LawFit, phase: PhaseFit) -> tuple[F8, F8]:
     last = phase.t0 + float(record.elapsed.max())
-    return squared_amplitude_integral(fit, phase.t0, phase.middle, phase.t0, last)
+    return amplitude_integral(fit, phase.t0, phase.middle, phase.t0, last, phase.exponent)
 
 
 def _solve(record: Record, state: State, weights: F8, params: Params) -> _Solved:

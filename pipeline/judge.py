@@ -15,7 +15,7 @@ from pipeline.cycles import Cycles, NoOscillation
 from pipeline.damping import Damping
 from pipeline.demodulate import Demodulated
 from pipeline.echoes import Clusters, find_clusters
-from pipeline.phase import PhaseFit
+from pipeline.phase import PhaseFit, words_on_exponent
 from pipeline.relaxation import Relaxation
 from pipeline.rest import Rest
 from pipeline.track import U8, UNUSABLE, Quality
@@ -245,13 +245,13 @@ def _motion_findings(
         )
     if phase.backbone is not None:
         start = phase.damping.best.joint["A0"].value
-        shift = phase.backbone.value * start**2 / phase.angular_frequency.value
+        shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
         yield Finding(
             "amplitude_dependent_frequency",
             "warning",
             f"the frequency depends on amplitude: it is {abs(shift):.2%} {'higher' if shift > 0 else 'lower'} at "
-            f"{start * 1e3:.0f} mm than at rest; the period given is the record's mean, "
-            "its uncertainty covers the bend",
+            f"{start * 1e3:.0f} mm than at rest and shifts with {words_on_exponent(phase.exponent)}; "
+            "the period given is the record's mean, its uncertainty covers the bend",
         )
     if rest.moves:
         yield Finding("rest_drift", "warning", _words_on_rest(rest))

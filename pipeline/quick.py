@@ -74,8 +74,8 @@ def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None
     Windows hold equally many samples, near a whole number of periods. A first product gives phases and amplitudes
     from which frequency and decay are told; a second one in a basis that has them gives the result. How far a window
     differs from the record's mean in either is put right to first order. Windows that hold flagged samples or false
-    echoes are fitted again without these, each by itself. Where fewer than three in ten are clean, or where even the calmest
-    quarter scatters by more than 1.3 times the noise that differences of neighbours tell, nothing is returned:
+    echoes are fitted again without these, each by itself. Where fewer than three in ten are clean, or where even the
+    calmest quarter scatters by more than 1.3 times the noise that differences of neighbours tell, nothing is returned:
     clusters of echoes have then pulled the fits that were to judge them.
     """
     track = conditioned.track

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,11 +83,13 @@ class State:
         The law's.
     turning : (2 or 3,) float64
         Phase in the middle (rad), angular frequency (rad/s) and, where there is one, the backbone
-        (rad/(s m^2)) of :math:`\\omega(A) = \\omega_0 + \\kappa A^2`.
+        (rad/(s m^p)) of :math:`\\omega(A) = \\omega_0 + \\kappa A^p`.
     linear : (k,) float64
         Coefficients of the linear columns, m.
     area : tuple of (g,) float64, or None
-        Times from the middle and the integral of the squared amplitude, m^2 s; with a backbone only.
+        Times from the middle and the integral of A^p, m^p s; with a backbone only.
+    exponent : float
+        p.
     """
 
     law: Law
@@ -95,6 +97,7 @@ class State:
     turning: F8
     linear: F8
     area: tuple[F8, F8] | None = None
+    exponent: float = 2.0
 
     @property
     def values(self) -> F8:
@@ -104,7 +107,9 @@ class State:
     def moved(self, step: F8) -> State:
         """Return the state a step away."""
         p, q = self.theta.size, self.theta.size + self.turning.size
-        return State(self.law, self.theta + step[:p], self.turning + step[p:q], self.linear + step[q:], self.area)
+        return replace(
+            self, theta=self.theta + step[:p], turning=self.turning + step[p:q], linear=self.linear + step[q:]
+        )
 
     def angle(self, tau: F8) -> F8:
         """Return the total phase at times from the middle, rad."""

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.damping import Damping
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate
-from pipeline.phase import PhaseFit, wrapped
+from pipeline.phase import PhaseFit, backbone_unit, wrapped
 from pipeline.record_model import Record, State
 from pipeline.regression import solve_weighted
 from pipeline.rest import Rest
@@ -30,7 +30,7 @@ def refined_phase(
     backbone = None
     if state.area is not None:
         gradient[2] = float(np.interp(before, *state.area)[0])
-        backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), "rad/(s m^2)")
+        backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), backbone_unit(phase.exponent))
         tau = demodulated.t - phase.middle
         u = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
         line = solve_weighted(np.stack([np.ones(tau.size), tau], axis=1), state.angle(tau), u)
@@ -66,7 +66,7 @@ def refined_waveform(record: Record, track: Track, state: State, noise_m: float)
         amplitude = state.law.amplitude(record.elapsed[part], state.theta)
         rate = np.full(angle.size, state.turning[1])
         if state.area is not None:
-            rate += state.turning[2] * amplitude**2
+            rate += state.turning[2] * np.abs(amplitude) ** state.exponent
         cosine = np.cos(angle)
         position[part] = record.level + state.linear @ record.linear(part) + amplitude * cosine
         velocity[part] = -state.law.rate(amplitude, state.theta) * cosine - amplitude * rate * np.sin(angle)
