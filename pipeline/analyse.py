@@ -218,6 +218,8 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
             waveform = reconstruct(beside.conditioned.track, demodulated, phase, rest)
     full = None
     if params.accuracy == "best" and not isinstance(solved, MotionFit):
+        # The record without modes and with their columns: as good as the whole record with them, for the columns span
+        # what was taken out. Values and intervals agree to rounding, and put_back serves both tiers.
         extra = beside.columns(track.t)
         full = fit_record(
             beside.conditioned, demodulated, damping, phase, rest, waveform, extra=extra, params=params.full

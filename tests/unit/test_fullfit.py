@@ -45,6 +45,25 @@ def test_mixed_drag_and_a_bending_phase_leave_noise_alone(synthetic: ModuleType)
         assert abs(drag[name].value - true) < 4.0 * drag[name].u, name
 
 
+def test_a_frequency_that_shifts_with_the_root_of_the_amplitude() -> None:
+    """The full fit keeps the power that the windows showed: noise alone is left, velocity and coefficient are right."""
+    t = np.arange(12_000) / 100.0
+    gamma, kappa, omega = 0.015, -0.23, 8.3
+    amplitude = 0.05 * np.exp(-gamma * t)
+    angle = omega * t + kappa * np.sqrt(0.05) * 2.0 * (1.0 - np.exp(-0.5 * gamma * t)) / gamma
+    y = 0.2 + amplitude * np.cos(angle) + 1e-4 * np.random.default_rng(4).standard_normal(t.size)
+    motion, full = best(t, y)
+    assert full.converged
+    assert full.noise_m == pytest.approx(1e-4, rel=0.03)
+    assert motion.phase.exponent == 0.5
+    assert motion.phase.backbone is not None
+    assert motion.phase.backbone.unit == "rad/(s m^0.5)"
+    assert abs(motion.phase.backbone.value - kappa) < 4.0 * motion.phase.backbone.u
+    turning = omega + kappa * np.sqrt(amplitude)
+    true = -gamma * amplitude * np.cos(angle) - amplitude * turning * np.sin(angle)
+    np.testing.assert_allclose(motion.waveform.velocity, true, atol=1e-4)
+
+
 def test_velocity_is_the_derivative(synthetic: ModuleType) -> None:
     """The waveform's velocity is that of the true motion."""
     truth = synthetic.Truth(gamma=0.0065, beta=0.2, kappa=-4.3)

@@ -48,6 +48,27 @@ def test_injected_backbone_is_found(synthetic: ModuleType, sigma_m: float, kappa
     assert np.max(np.abs(pulls)) <= 3.0
 
 
+@pytest.mark.parametrize(
+    ("power", "kappa", "unit"),
+    [(2.0, -4.3, "rad/(s m^2)"), (1.0, -0.25, "rad/(s m)"), (0.5, -0.23, "rad/(s m^0.5)")],
+)
+def test_the_power_of_the_amplitude_is_found(windows: Windows, power: float, kappa: float, unit: str) -> None:
+    """Phases that bend with a power of the amplitude give that power, and its coefficient within its interval."""
+    gamma, pulls = 0.015, []
+    amplitude = 0.05 * np.exp(-gamma * T)
+    area = 0.05**power * (1.0 - np.exp(-power * gamma * T)) / (power * gamma)
+    for seed in range(12):
+        noise = 1e-3 * np.random.default_rng(seed).standard_normal(T.size)
+        fit = fitted(windows, T, amplitude, 8.3 * T + kappa * area + noise, 1e-3)
+        assert fit.exponent == power
+        assert fit.backbone is not None
+        assert fit.backbone.unit == unit
+        np.testing.assert_allclose(fit.rate(T) - 8.3, kappa * amplitude**power, atol=4e-4)
+        np.testing.assert_allclose(np.diff(fit.total(T)), np.diff(8.3 * T + kappa * area), atol=4e-4)
+        pulls.append((fit.backbone.value - kappa) / fit.backbone.u)
+    assert np.max(np.abs(pulls)) <= 3.5
+
+
 @pytest.mark.parametrize(("seconds", "sigma_m"), [(120.0, 3e-4), (120.0, 2.39e-3), (20.0, 3e-4)])
 def test_no_backbone_where_none_is(synthetic: ModuleType, seconds: float, sigma_m: float) -> None:
     """At a constant frequency at least 38 of 40 records show no dependence on amplitude."""
