@@ -199,7 +199,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     damping = fit_damping_quickly(demodulated, start, params.damping) if plain else None
     damping = damping or fit_damping(demodulated, start, params.damping)
     solved = fit_motion(conditioned, demodulated, damping, params.motion, params.damping, stopped=stopped)
-    strong = damping.best.damping_rate().value > params.relaxation.least_damping * demodulated.angular_frequency
+    strong = damping.best.rate_at_start() > params.relaxation.least_damping * demodulated.angular_frequency
     linear = not isinstance(solved, MotionFit) or solved.damping.selected == "linear"
     if strong and linear and isinstance(relaxed := find_relaxation(conditioned, params.relaxation), Relaxation):
         return _still(track, scene, params, conditioned, relaxed)

@@ -110,8 +110,13 @@ class LawFit:
         """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
         return rates_of(self.law, amplitude, self.joint.values, self.joint.covariance)
 
+    def rate_at_start(self) -> float:
+        """Return the logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
+        theta = self.joint.values
+        return float(self.law.rate(theta[:1], theta)[0] / theta[0])
+
     def damping_rate(self) -> Estimate:
-        """Logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
+        """Return :meth:`rate_at_start` with its uncertainty."""
         values = self.joint.values
 
         def rate(theta: F8) -> float:

@@ -189,7 +189,7 @@ def derive(
     start = (
         laws.quantity(lambda fit: float(fit.joint.values[0]), lambda fit: np.eye(1, fit.joint.values.size)[0]) * scale
     )
-    lam = laws.quantity(_rate_at_start) * rate
+    lam = laws.quantity(LawFit.rate_at_start) * rate
     elapsed = demodulated.t - damping.t0
     v_rms = omega * scale * laws.quantity(lambda fit: _root_mean_square(fit, elapsed), _slopes_of_it(elapsed))
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, "m"), "B")
@@ -204,7 +204,7 @@ def derive(
         "damping_rate": (lam, "1/s"),
         "velocity_rms": (v_rms, "m/s"),
     }
-    if laws.nominal(_rate_at_start) > 0:
+    if damping.best.rate_at_start() > 0:
         found["quality_factor"] = (omega / (2 * lam), "")
     coefficients = _coefficients(damping, laws, rate, scale)
     diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
@@ -247,10 +247,6 @@ class _Laws:
         self.weights = {name: x / total for name, x in odds.items() if name != damping.selected}
         self.others = inputs.add_alternatives("choice_of_law", self.weights, "A")
 
-    def nominal(self, f: Callable[[LawFit], float]) -> float:
-        """Return what the selected law says."""
-        return f(self.damping.best)
-
     def quantity(self, f: Callable[[LawFit], float], slopes: Callable[[LawFit], F8] | None = None) -> Any:
         """Return a function of a law as a variable: linear in the parameters, with the choice of the law.
 
@@ -262,12 +258,6 @@ class _Laws:
         terms = list(zip(derivatives.tolist(), self.variables, strict=True))
         terms += [(f(self.damping.fits[name]) - value, z) for name, z in self.others.items()]
         return linear(value, terms)
-
-
-def _rate_at_start(fit: LawFit) -> float:
-    """Logarithmic rate of the amplitude at the first sample, 1/s."""
-    theta = fit.joint.values
-    return float(fit.law.rate(theta[:1], theta)[0] / theta[0])
 
 
 def _root_mean_square(fit: LawFit, elapsed: F8) -> float:
