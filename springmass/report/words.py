@@ -10,6 +10,7 @@ from pipeline.estimate import Estimate
 from pipeline.relaxation import Relaxation
 from springmass.report.figures.phase import turn_step
 from springmass.report.figures.position import ZOOM_PERIODS, has_error_bars, is_long
+from springmass.report.motion import row_step
 from springmass.report.tables import pretty
 
 __all__ = ["LETTERS", "caption", "kept", "verdict"]
@@ -112,10 +113,24 @@ def _drag(_: Analysis, motion: Motion) -> str:
     )
 
 
+def _motion(analysis: Analysis, _: Motion) -> str:
+    periods = f"the first {ZOOM_PERIODS} periods" if is_long(analysis) else "time"
+    step = row_step(analysis)
+    rows = "position, velocity and acceleration at every sample" if step == 1 else f"all three at one sample in {step}"
+    whole = " over the whole record (the periods above are shaded)" if is_long(analysis) else ""
+    return (
+        f"Velocity v and acceleration a over {periods}, from an oscillator smoother: every sample speaks on every "
+        f"other, nothing is differenced. Beneath{whole}, what the velocity differs from the fitted law's, in its band "
+        "of one standard uncertainty u, and u of both: larger at the edges, where one side is missing. Clock and "
+        f"scale, which move all alike, are not in u. motion.csv holds {rows}."
+    )
+
+
 _CAPTIONS: dict[str, Callable[[Analysis, Motion], str]] = {
     "position": _position,
     "amplitude": _amplitude,
     "drag": _drag,
     "energy": _energy,
+    "motion": _motion,
     "phase": _phase,
 }

@@ -15,6 +15,7 @@ from springmass.report.budgets import budget_csv
 from springmass.report.figures import MAKERS, comparison_figure, draw, render
 from springmass.report.html import ComparedRuns, ReportRun, render_html
 from springmass.report.latex import budget_tex, table_tex
+from springmass.report.motion import motion_csv, smoothed_or_why
 from springmass.report.tables import results_csv
 
 __all__ = ["ReportRun", "write_report"]
@@ -66,8 +67,9 @@ def write_report(
     Notes
     -----
     Beside the page: ``results.json`` (``summary``, else one object for one run and a list for several; what is no
-    number is null), ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, and ``figures/`` with every figure
-    as SVG and PDF.
+    number is null), ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, ``motion.csv`` of each run that
+    oscillates, and ``figures/`` with every figure as SVG and PDF. Names of figures and motions begin with their run's
+    where there are several.
     The same arguments give the same bytes.
     """
     from storage.atomic import write_whole
@@ -79,8 +81,12 @@ def write_report(
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
     pictures = []
     for stem, run in zip(_stems(names), runs, strict=True):
-        drawn = {name: {kind: render(figure, kind) for kind in _KINDS} for name, figure in draw(run.analysis).items()}
+        smoothed = smoothed_or_why(run.analysis)
+        figures = draw(run.analysis, smoothed)
+        drawn = {name: {kind: render(figure, kind) for kind in _KINDS} for name, figure in figures.items()}
         _write_figures(directory / "figures", stem, drawn)
+        motion = directory / f"{stem}motion.csv"
+        _put(motion, None if isinstance(smoothed, str) else motion_csv(run.analysis, smoothed))
         pictures.append({name: files["svg"] for name, files in drawn.items()})
     plain = [_plain(result) for result in results]
     content = _plain(summary) if summary is not None else plain[0] if len(plain) == 1 else plain
@@ -101,16 +107,19 @@ def write_report(
 
 
 def _write_figures(folder: Path, stem: str, drawn: Mapping[str, Mapping[Literal["svg", "pdf"], bytes]]) -> None:
-    from storage.atomic import write_whole
-
     for name in MAKERS:
         for kind in _KINDS:
-            target = folder / f"{stem}{name}.{kind}"
-            if name in drawn:
-                write_whole(target, drawn[name][kind])
-            else:
-                # Left by an earlier report of a run that did oscillate, it would pass for one of this.
-                target.unlink(missing_ok=True)
+            _put(folder / f"{stem}{name}.{kind}", drawn[name][kind] if name in drawn else None)
+
+
+def _put(target: Path, content: bytes | str | None) -> None:
+    """Write a file, or take away one that an earlier report left: it would pass for one of this."""
+    from storage.atomic import write_whole
+
+    if content is None:
+        target.unlink(missing_ok=True)
+    else:
+        write_whole(target, content)
 
 
 def _stems(names: Sequence[str]) -> list[str]:

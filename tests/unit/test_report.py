@@ -22,7 +22,7 @@ from pipeline.cycles import NoOscillation
 from pipeline.estimate import Estimate
 from pipeline.judge import Finding
 from pipeline.scene import Scene
-from pipeline.track import Track
+from pipeline.track import UNUSABLE, Track
 from springmass.report import (
     ReportRun,
     budget_csv,
@@ -38,9 +38,10 @@ from springmass.report import (
     write_report,
 )
 from springmass.report.budgets import INPUTS
-from springmass.report.figures import comparison_figure
+from springmass.report.figures import comparison_figure, motion_figure
 from springmass.report.html import render_html
 from springmass.report.inline import inline_svg
+from springmass.report.motion import motion_csv, smoothed_or_why
 from springmass.report.tables import law_status, pretty, pretty_number
 
 PROVENANCE = {"version": "0.1.0", "parameters": {"cycles": {"false_alarm": 1e-6}}, "command": "analyse <run>"}
@@ -111,12 +112,14 @@ def files_in(directory: Path) -> dict[str, bytes]:
 
 
 def test_every_file_of_a_report_is_written(tmp_path: Path) -> None:
-    """A report is a page, five tables and every figure that the scene allows in two forms, and nothing besides."""
+    """A report is a page, six tables and every figure that the scene allows in two forms, and nothing besides."""
     written(tmp_path / "run.results", run_of(bare()))
     figures = {
-        f"figures/{name}.{kind}" for name in ("position", "amplitude", "phase", "energy") for kind in ("svg", "pdf")
+        f"figures/{name}.{kind}"
+        for name in ("position", "amplitude", "phase", "energy", "motion")
+        for kind in ("svg", "pdf")
     }
-    tables = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv", "budget.tex"}
+    tables = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv", "budget.tex", "motion.csv"}
     assert set(files_in(tmp_path / "run.results")) == tables | figures
     written(tmp_path / "disc.results", run_of(damped()))
     drag = {"figures/drag.svg", "figures/drag.pdf"}
@@ -181,9 +184,58 @@ def test_the_same_arguments_give_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_the_page_of_a_long_record_stays_small(tmp_path: Path) -> None:
-    """Twelve thousand samples make a page of less than 650 kB."""
+    """Twelve thousand samples make a page of less than 700 kB."""
     page = written(tmp_path, run_of(analyse(track_of(120.0), SCENE)))
-    assert len(page.encode()) < 650_000
+    assert len(page.encode()) < 700_000
+
+
+def test_the_motion_is_written_at_every_sample() -> None:
+    """Position, velocity and acceleration stand beside each distance; what is no number is an empty cell."""
+    analysis = damped()
+    smoothed = analysis.smoothed()
+    rows = list(csv.DictReader(io.StringIO(motion_csv(analysis, smoothed))))
+    assert len(rows) == len(analysis.track)
+    assert sum(row["used"] == "1" for row in rows) == analysis.quality["used"]
+    assert rows[62]["distance_m"] == ""
+    assert [float(row["time_s"]) for row in rows] == list(analysis.track.t)
+    for column, value in (
+        ("u_velocity_m_per_s", smoothed.u_velocity),
+        ("acceleration_m_per_s2", smoothed.acceleration),
+    ):
+        assert np.allclose([float(row[column]) for row in rows], value, rtol=1e-9, atol=0.0)
+
+
+def test_the_band_of_the_velocity_is_wider_at_the_edges() -> None:
+    """The figure's lowest panel shows the uncertainty grow towards both ends of the record."""
+    u = motion_figure(bare()).axes[3].lines[0].get_ydata()
+    middle = float(np.median(np.asarray(u)))
+    assert float(u[0]) > 1.3 * middle
+    assert float(u[-1]) > 1.3 * middle
+
+
+def test_the_law_of_the_figure_is_the_motion_itself() -> None:
+    """On a record that follows its law the difference drawn stays within three of its uncertainties."""
+    difference = np.asarray(motion_figure(damped()).axes[2].lines[0].get_ydata())
+    assert 0.0 < np.max(np.abs(difference)) < 3e3 * np.max(damped().smoothed().u_velocity)
+
+
+def test_a_record_that_cannot_be_smoothed_says_so(tmp_path: Path) -> None:
+    """Its page has a sentence in the figure's place, and a table of an earlier report is taken away."""
+    motion = bare().motion
+    assert isinstance(motion, Motion)
+    flags = np.full_like(motion.demodulated.flags, int(UNUSABLE))
+    blind = dataclasses.replace(
+        bare(), motion=dataclasses.replace(motion, demodulated=dataclasses.replace(motion.demodulated, flags=flags))
+    )
+    why = smoothed_or_why(blind)
+    assert isinstance(why, str)
+    assert "eight usable samples" in why
+    assert "motion" not in draw(bare(), why)
+    assert "to smooth this record" in page_of(run_of(blind))
+    written(tmp_path, run_of(bare()))
+    assert (tmp_path / "motion.csv").exists()
+    written(tmp_path, run_of(still()))
+    assert not (tmp_path / "motion.csv").exists()
 
 
 def test_csv_holds_every_estimate_and_every_law() -> None:
@@ -312,7 +364,7 @@ def test_several_runs_stand_side_by_side(tmp_path: Path) -> None:
     assert page.count("<th>same</th>") >= 2
     assert page.count("Phase plot") == 2
     assert html.escape(comparison.message.replace("+-", "±")) in page
-    assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 11
+    assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 13
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.1])

@@ -1,4 +1,4 @@
-"""Figures of a report: position and residuals, amplitude and laws, drag, energy, phase plot.
+"""Figures of a report: position and residuals, amplitude and laws, velocity and acceleration, drag, energy, phase plot.
 
 Every maker takes an analysis and returns a matplotlib ``Figure`` that belongs to no window, or None where the record
 or its scene give nothing to draw. Long series are thinned to what the eye can see or drawn as pixels inside the vector
@@ -8,14 +8,17 @@ file, so that the page stays small. A further figure is a maker and a line in :d
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from pipeline.analyse import Analysis
 from pipeline.cycles import NoOscillation
+from pipeline.smoother import Smoothed
 from springmass.report.figures.amplitude import amplitude_figure
 from springmass.report.figures.canvas import render
 from springmass.report.figures.comparison import comparison_figure
 from springmass.report.figures.curves import drag_figure, energy_figure
+from springmass.report.figures.motion import motion_figure
 from springmass.report.figures.phase import phase_figure
 from springmass.report.figures.position import position_figure
 
@@ -29,6 +32,7 @@ __all__ = [
     "drag_figure",
     "draw",
     "energy_figure",
+    "motion_figure",
     "phase_figure",
     "position_figure",
     "render",
@@ -39,17 +43,26 @@ MAKERS: dict[str, Callable[[Analysis], Figure | None]] = {
     "amplitude": amplitude_figure,
     "drag": drag_figure,
     "energy": energy_figure,
+    "motion": motion_figure,
     "phase": phase_figure,
 }
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis, smoothed: Smoothed | str | None = None) -> dict[str, Figure]:
     """Return every figure of a run by name, in the report's order; the position alone of one at rest.
 
     Parameters
     ----------
     analysis : Analysis
+    smoothed : Smoothed or str, optional
+        The run's ``smoothed()``, where it is at hand, or why there is none; left out, it is worked out.
     """
-    names = ("position",) if isinstance(analysis.motion, NoOscillation) else tuple(MAKERS)
-    drawn = {name: MAKERS[name](analysis) for name in names}
+    if isinstance(analysis.motion, NoOscillation):
+        return {"position": position_figure(analysis)}
+    makers = dict(MAKERS)
+    if isinstance(smoothed, str):
+        del makers["motion"]
+    else:
+        makers["motion"] = partial(motion_figure, smoothed=smoothed)
+    drawn = {name: maker(analysis) for name, maker in makers.items()}
     return {name: figure for name, figure in drawn.items() if figure is not None}

@@ -14,7 +14,7 @@ from springmass.report.figures.canvas import DENSE_POINTS, legend_above, model_p
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["phase_figure", "turn_step"]
+__all__ = ["measured_phase", "phase_figure", "turn_step"]
 
 LEAST_TURNS, MOST_TURNS = 4, 24  # drawn in a phase plot
 
@@ -49,7 +49,7 @@ def phase_figure(analysis: Analysis) -> Figure:
     scale = Normalize(first, end)
     with style():
         figure, (panel,) = panels([(4.0, 0.0)], width=5.6, right=1.05)
-        displacement, velocity, label = _measured_phase(analysis, motion)
+        displacement, velocity, label = measured_phase(analysis, motion)
         turn = np.floor((track.t - first) / period)
         drawn = np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, turn_step(motion)) == 0)
         dots: dict[str, Any] = {
@@ -80,8 +80,8 @@ def phase_figure(analysis: Analysis) -> Figure:
         return figure
 
 
-def _measured_phase(analysis: Analysis, motion: Motion) -> tuple[F8, F8, str]:
-    """Displacement and velocity of the samples used, NaN elsewhere: as recorded, or from both neighbours."""
+def measured_phase(analysis: Analysis, motion: Motion) -> tuple[F8, F8, str]:
+    """Return displacement and velocity of the samples used, NaN elsewhere, and in words where the velocity is from."""
     track = analysis.track
     used: NDArray[np.bool_] = (analysis.flags & UNUSABLE) == 0
     displacement = np.where(used, track.y - motion.rest.at(track.t), np.nan)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +24,7 @@ from springmass.report.figures.canvas import (
     panels,
     share,
     style,
+    thinned,
 )
 
 if TYPE_CHECKING:
@@ -123,7 +123,8 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
     y = track.y * 1e3
     used = inside & ((flags & UNUSABLE) == 0) & np.isfinite(y)
     if np.count_nonzero(used) > DENSE_POINTS:
-        panel.plot(*_thinned(track.t[used], y[used], 900), color=SKY, lw=0.5, label="samples used")
+        ends = thinned(y[used], 900)
+        panel.plot(track.t[used][ends], y[used][ends], color=SKY, lw=0.5, label="samples used")
     else:
         panel.plot(track.t[used], y[used], ".", ms=4.0, mew=0, color=SKY, label="samples used")
         if has_error_bars(analysis):
@@ -156,11 +157,3 @@ def _mark(panel: Axes, t: F8, y: F8, marker: str, colour: str, label: str) -> No
     """Set markers on top of everything, whole also at the edge."""
     look: dict[str, Any] = {"ms": 7 if marker == "|" else 3.2, "mew": 0.8, "color": colour, "ls": ""}
     panel.plot(t, y, marker, mfc="none", label=label, clip_on=False, zorder=4, **look)
-
-
-def _thinned(t: F8, y: F8, bins: int) -> tuple[F8, F8]:
-    """Keep the least and the greatest of every bin: on paper of that many pixels nothing is lost."""
-    edges = np.linspace(0, t.size, bins + 1).astype(np.int64)
-    keep = [at + f(y[at:to]) for at, to in itertools.pairwise(edges) if to > at for f in (np.argmin, np.argmax)]
-    rows = np.unique(np.array(keep, np.int64))
-    return t[rows], y[rows]
