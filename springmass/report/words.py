@@ -26,7 +26,7 @@ def kept(estimate: Estimate) -> str:
 def verdict(analysis: Analysis) -> str:
     """Return what became of the damping laws, in a sentence or a few."""
     if isinstance(analysis.motion, Relaxation):
-        return f"{analysis.motion.why[0].upper()}{analysis.motion.why[1:]}."
+        return f"{analysis.motion.why[0].upper()}{analysis.motion.why[1:]}.".replace("+-", "±")
     if isinstance(analysis.motion, NoOscillation):
         return "Nothing oscillates in this record; rest position and noise are all that it gives."
     damping = analysis.motion.damping
@@ -59,6 +59,8 @@ def caption(name: str, analysis: Analysis) -> str:
         As in :data:`springmass.report.figures.MAKERS`.
     analysis : Analysis
     """
+    if isinstance(analysis.motion, Relaxation):
+        return f"Distance from the sensor. Samples scatter by {_sigma(analysis)}."
     if isinstance(analysis.motion, NoOscillation):
         return f"Distance from the sensor; nothing oscillates. Samples scatter by {_sigma(analysis)}."
     return _CAPTIONS[name](analysis, analysis.motion)

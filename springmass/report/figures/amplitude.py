@@ -63,8 +63,10 @@ def amplitude_figure(analysis: Analysis) -> Figure:
         above.set_ylabel("amplitude / mm")
         residual = (amplitude - damping.best.amplitude(t - damping.t0) * 1e3) / np.where(u > 0, u, 1.0)
         below.plot(t[kept], residual[kept], "o", ms=2.6, mew=0, color=BLUE)
-        below.plot(t[~kept], residual[~kept], "o", mfc="none", color=ORANGE, ms=4)
         finish_residual(below, residual[kept], "residual / u")
+        # What was left out lies far off; at the edge it is seen and flattens nothing.
+        at_most = np.clip(residual[~kept], *below.get_ylim())
+        below.plot(t[~kept], at_most, "o", mfc="none", color=ORANGE, ms=4, clip_on=False, zorder=4)
         below.set_xlabel("time / s")
         share(above, below, damping.t0, end)
         legend_above(above, handle=2.8)

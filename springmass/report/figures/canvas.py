@@ -95,8 +95,19 @@ def render(figure: Figure, kind: Literal["svg", "pdf"]) -> bytes:
     }
     out = io.BytesIO()
     with style():
+        _shrink_wide_numbers(figure)
         figure.savefig(out, format=kind, metadata=metadata[kind])
     return out.getvalue()
+
+
+def _shrink_wide_numbers(figure: Figure) -> None:
+    """Print the numbers at an axis smaller where they would run into its label."""
+    room = 0.44 * figure.dpi
+    for axes in figure.axes:
+        widest = max((label.get_window_extent().width for label in axes.get_yticklabels()), default=0.0)
+        if widest > room and axes.get_ylabel():
+            size = _SETTINGS["font.size"] * room / widest
+            axes.tick_params(axis="y", labelsize=max(size, 6.0))
 
 
 @contextmanager
@@ -146,7 +157,7 @@ def legend_above(panel: Axes, *, handle: float = 1.5) -> None:
     entries.sort(key=lambda entry: not entry[1].startswith(("samples", "amplitude")))
     handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
     rows = 1
-    for rows in (1, 2, 3):
+    for rows in range(1, len(labels) + 1):
         legend = panel.legend(
             handles,
             labels,
