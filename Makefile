@@ -6,7 +6,7 @@ PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constr
 # Short linear algebra on small matrices: one thread is faster than several, and it makes timings mean something.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test trials accuracy bench lint docs-figures clean
+.PHONY: help demo test trials accuracy bench lint docs-figures docs-trade clean
 
 help:
 	@echo "make demo     from two old recordings to Table 1 and a report"
@@ -54,6 +54,9 @@ lint: $(VENV)/.installed-dev
 
 docs-figures: $(VENV)/.installed
 	$(BIN)/python docs/figures/draw.py
+
+docs-trade: $(VENV)/.installed-dev
+	$(BIN)/python docs/figures/trade.py
 
 clean:
 	rm -rf $(VENV) demo-output dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -22,7 +22,7 @@ __all__ = ["build_parser", "main"]
 COMMANDS = {
     "demo": "replay, analyse and compare the bundled recordings: Table 1 in one command",
     "analyse": "turn recordings into Table 1, findings and a report",
-    "compare": "several runs of one spring: do they agree, and does one damping law hold",
+    "compare": "compare several runs of one spring: do they agree, and does one damping law hold",
     "record": "record a run from the bench, so that nothing is lost",
     "recover": "build a run file from a wire log, however torn",
     "replay": "play a recording back through the interface of a live sensor",
@@ -142,7 +142,7 @@ def _add_completions(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rate-hz", type=_positive, metavar="R", help="samples per second, where the file does not say"
     )
-    parser.add_argument("--unit", metavar="U", help="unit of the distance, where the file does not say")
+    parser.add_argument("--unit", metavar="U", help="unit of the distance where the file does not say: m, cm, mm or um")
 
 
 def _add_analyse(parser: argparse.ArgumentParser) -> None:
@@ -164,7 +164,7 @@ def _add_accuracy(parser: argparse.ArgumentParser) -> None:
         "--accuracy",
         choices=("fast", "standard", "best"),
         default="standard",
-        help="how much time to spend for how much accuracy",
+        help="how much time to spend for how much accuracy (default standard)",
     )
 
 
@@ -195,7 +195,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
 
 def _add_demo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--out", metavar="DIR", default="springmass-demo", help="folder for what it makes (%(default)s)"
+        "--out", metavar="DIR", default="springmass-demo", help="folder for what it makes (default %(default)s)"
     )
 
 
@@ -211,10 +211,14 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
 
 def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", required=True, metavar="S.toml", help="scene file: masses, spring, start, damping")
-    parser.add_argument("--method", default="auto", metavar="NAME", help="integrator, or auto (default)")
-    parser.add_argument("--dt", type=_finite, default=0.01, metavar="S", help="time between samples, and step (0.01)")
+    parser.add_argument("--method", default="auto", metavar="NAME", help="integrator, or auto (default auto)")
+    parser.add_argument(
+        "--dt", type=_finite, default=0.01, metavar="S", help="time between samples, and step (default 0.01)"
+    )
     parser.add_argument("--seconds", type=_positive, default=10.0, metavar="N", help="how long (default 10)")
-    parser.add_argument("--tolerance", type=_finite, metavar="E", help="largest error over the amplitude (auto: 1e-6)")
+    parser.add_argument(
+        "--tolerance", type=_finite, metavar="E", help="largest error over the amplitude (auto: default 1e-6)"
+    )
     parser.add_argument("--force", action="store_true", help="run a step that is unstable")
     parser.add_argument("--against", metavar="RUN", help="measured run to lay the prediction over")
     parser.add_argument("--out", metavar="DIR", help="folder for NAME.simulated (default: here; with --json: none)")
@@ -244,7 +248,7 @@ def _add_trade(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--echoes", type=_echo_share, metavar="X", help="share of false echoes, 0 to 0.4 (default 0)")
     parser.add_argument("--integrators", action="store_true", help="measure trajectories instead: error against time")
     parser.add_argument("--out", metavar="DIR", help="folder for trade.svg, trade.pdf and trade.json")
-    parser.add_argument("--json", action="store_true", help="as one JSON object on stdout")
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     _add_input_options(parser)
 
 
@@ -279,7 +283,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="applied to echo times, m/s")
     parser.add_argument("--trigger", type=_positive, metavar="M", help="start when the bob leaves its rest by this, m")
     parser.add_argument("--pre", type=_positive, metavar="S", help="seconds to keep from before (default 2)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated bench")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated bench's noise (default 0)")
     parser.add_argument(
         "--crystal-ppm", type=_finite, default=0.0, metavar="PPM", help="of the simulated sensor's clock"
     )

@@ -192,7 +192,7 @@ def _phase(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
 def _error(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
     """Running maxima: an error crosses zero twice a period."""
     figure = _blank(WIDTH, 3.2)
-    panel = figure.add_axes((LEFT / WIDTH, 0.14, (WIDTH - LEFT - RIGHT) / WIDTH, 0.74))
+    panel = figure.add_axes((LEFT / WIDTH, 0.14, (WIDTH - LEFT - 2 * RIGHT) / WIDTH, 0.74))
     start = simulation.problem.amplitude_m() or 1.0
     choice = simulation.choice
     curves = [(run, words, colour, "-") for run, (_, words, colour) in zip(runs, EULERS, strict=True)]

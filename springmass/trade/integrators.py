@@ -162,6 +162,8 @@ def integrators_figure(rows: Sequence[Work]) -> Figure:
                 assert row.tolerance is not None
                 axis.plot([row.seconds * 1e3], [_within(row.error)], "o", ms=9.5, mfc="none", mew=1.2, color="#000000")
             axis.set_ylim(ROUNDING / 100.0, 1e3)
+        for axis in axes[:-1]:
+            axis.tick_params(labelbottom=False)
         axes[-1].set_xlabel("time for 120 s at 100 Hz / ms")
         known: dict[str, Any] = {}
         for axis in axes:

@@ -10,7 +10,7 @@ from pipeline.estimate import Estimate
 from springmass.trade.measure import Trade
 from springmass.trade.methods import UNITS, Method, Unavailable
 
-__all__ = ["own_json", "own_text", "trade_json", "trade_text"]
+__all__ = ["own_json", "own_text", "ratio", "trade_json", "trade_text"]
 
 HEADS = {"frequency": "frequency", "amplitude": "amplitude", "damping_rate": "damping"}
 
@@ -27,7 +27,7 @@ def trade_text(trade: Trade, absent: Sequence[Unavailable]) -> str:
     ]
     body = [["method", "time / ms", *(f"{HEADS[q]} / bound" for q in UNITS), "failed", "beaten in time and error by"]]
     for row in trade.rows:
-        errors = [_ratio(row.error[q]) if q in row.error else "-" for q in UNITS]
+        errors = [ratio(row.error[q]) if q in row.error else "-" for q in UNITS]
         failed = str(row.failed) if row.failed else "-"
         body.append([row.method.label, f"{row.seconds * 1e3:.3g}", *errors, failed, trade.beaten(row) or "-"])
     lines += _aligned(body)
@@ -131,7 +131,8 @@ def _plain(estimate: Estimate | None) -> str:
     return str(Estimate(estimate.value, estimate.u))
 
 
-def _ratio(value: float) -> str:
+def ratio(value: float) -> str:
+    """Return an error over its bound to the digits that a hundred records know."""
     return f"{value:.2f}" if value < 10 else f"{value:.3g}" if value < 1000 else f"{value:.0f}"
 
 

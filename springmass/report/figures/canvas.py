@@ -102,7 +102,7 @@ def render(figure: Figure, kind: Literal["svg", "pdf"]) -> bytes:
 
 def _shrink_wide_numbers(figure: Figure) -> None:
     """Print the numbers at an axis smaller where they would run into its label."""
-    room = 0.44 * figure.dpi
+    room = 0.38 * figure.dpi
     for axes in figure.axes:
         widest = max((label.get_window_extent().width for label in axes.get_yticklabels()), default=0.0)
         if widest > room and axes.get_ylabel():
