@@ -60,7 +60,7 @@ def caption(name: str, analysis: Analysis) -> str:
     analysis : Analysis
     """
     if isinstance(analysis.motion, Relaxation):
-        return f"Distance from the sensor. Samples scatter by {_sigma(analysis)}."
+        return f"Distance from the sensor with the fitted relaxation. Samples scatter by {_sigma(analysis)}."
     if isinstance(analysis.motion, NoOscillation):
         return f"Distance from the sensor; nothing oscillates. Samples scatter by {_sigma(analysis)}."
     return _CAPTIONS[name](analysis, analysis.motion)

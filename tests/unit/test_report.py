@@ -21,6 +21,7 @@ from pipeline.compare import SpringRun, compare_springs
 from pipeline.cycles import NoOscillation
 from pipeline.estimate import Estimate
 from pipeline.judge import Finding
+from pipeline.relaxation import Relaxation
 from pipeline.scene import Scene
 from pipeline.track import UNUSABLE, Track
 from springmass.report import (
@@ -43,6 +44,7 @@ from springmass.report.html import render_html
 from springmass.report.inline import inline_svg
 from springmass.report.motion import motion_csv, smoothed_or_why
 from springmass.report.tables import law_status, pretty, pretty_number
+from springmass.report.words import caption
 
 PROVENANCE = {"version": "0.1.0", "parameters": {"cycles": {"false_alarm": 1e-6}}, "command": "analyse <run>"}
 SCENE = Scene(
@@ -345,6 +347,27 @@ def test_a_run_without_oscillation_gives_a_report_too(tmp_path: Path) -> None:
     }
     assert 'class="error"' in page
     assert "Phase plot" not in page
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        lambda t: 0.06 * np.exp(-0.8 * t) - 0.01 * np.exp(-6.0 * t),
+        lambda t: 0.05 * (1.0 + 3.0 * t) * np.exp(-3.0 * t),
+        lambda t: 0.05 * np.exp(-t) * np.cos(8.0 * t),
+    ],
+    ids=["overdamped", "critical", "strong"],
+)
+def test_a_relaxation_is_drawn_with_its_fit(shape: Any) -> None:
+    """The curve over the samples of a motion that damping ends is that motion."""
+    t = np.arange(1000) / 100
+    rng = np.random.default_rng(2)
+    analysis = analyse(Track.from_arrays(t, 0.3 + shape(t) + 3e-4 * rng.standard_normal(t.size)))
+    assert isinstance(analysis.motion, Relaxation)
+    (fit,) = [line for line in draw(analysis)["position"].axes[0].lines if line.get_label() == "fit"]
+    x, y = np.asarray(fit.get_xdata()), np.asarray(fit.get_ydata())
+    assert np.max(np.abs(y - 1e3 * (0.3 + shape(x)))) < 0.3
+    assert "nothing oscillates" not in caption("position", analysis)
 
 
 @pytest.mark.parametrize("seconds", [1.6, 3.0])

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Motion
 from pipeline.cycles import NoOscillation
+from pipeline.relaxation import Relaxation
 from pipeline.track import F8, UNUSABLE, Quality
 from springmass.report.figures.canvas import (
     BLUE,
@@ -72,6 +73,9 @@ def position_figure(analysis: Analysis) -> Figure:
         if isinstance(motion, NoOscillation):
             figure, (only,) = panels([(2.6, 0.0)])
             _draw_distance(only, analysis, start, end)
+            if isinstance(motion, Relaxation):
+                t, y = _relaxing(analysis, motion)
+                only.plot(t, y * 1e3, color="#000000", lw=0.9, label="fit", zorder=2.5)
             legend_above(only)
             only.set_xlabel("time / s")
             return figure
@@ -89,6 +93,27 @@ def position_figure(analysis: Analysis) -> Figure:
             axes[2].set_title(f"the first {ZOOM_PERIODS} periods", loc="left", fontsize=8.5, pad=3)
         axes[-1].set_xlabel("time / s")
         return figure
+
+
+def _relaxing(analysis: Analysis, motion: Relaxation) -> tuple[F8, F8]:
+    """Return times and distances of the relaxation with the rates found; its two amplitudes and rest are linear."""
+    track, x = analysis.track, motion.estimates
+    used = ((analysis.flags & UNUSABLE) == 0) & (track.t >= motion.start_s)
+
+    def columns(t: F8) -> F8:
+        since = t - motion.start_s
+        if motion.kind == "strong":
+            turn = x["angular_frequency"].value * since
+            pair = np.exp(-x["damping_rate"].value * since) * np.array([np.cos(turn), np.sin(turn)])
+        elif motion.kind == "critical":
+            pair = np.exp(-x["relaxation_rate"].value * since) * np.array([np.ones_like(since), since])
+        else:
+            pair = np.array([np.exp(-x[f"relaxation_rate_{name}"].value * since) for name in ("slow", "fast")])
+        return np.column_stack([np.ones_like(since), *pair])
+
+    weights, *_ = np.linalg.lstsq(columns(track.t[used]), track.y[used], rcond=None)
+    grid = np.linspace(motion.start_s, float(np.nanmax(track.t)), 600)
+    return grid, np.asarray(columns(grid) @ weights)
 
 
 def _draw_pair(axes: Sequence[Axes], analysis: Analysis, motion: Motion, start: float, end: float) -> None:
