@@ -44,7 +44,7 @@ def amplitude_figure(analysis: Analysis) -> Figure:
     damping, t, amplitude = motion.damping, motion.demodulated.t, motion.demodulated.amplitude * 1e3
     u, kept = damping.scatter.u * 1e3, damping.scatter.kept
     end = float(np.nanmax(analysis.track.t))
-    grid = np.linspace(damping.t0, end, 240)
+    grid = np.linspace(damping.t0, end, 160)
     with style():
         figure, (above, below) = panels([(2.7, 0.0), (1.0, 0.08)])
         error_bars(above, t[kept], amplitude[kept], u[kept], "amplitude of one window")
