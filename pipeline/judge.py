@@ -299,7 +299,8 @@ def _words_on_rest(rest: Rest) -> str:
 def _words_on(clusters: Clusters | None) -> str:
     if clusters is None or not clusters.count:
         return ""
+    many = f"{clusters.count} cluster{'s' * (clusters.count > 1)}"
     return (
-        f"; {clusters.samples} of them come in {clusters.count} clusters, {clusters.turning} of these at turning "
+        f"; {clusters.samples} of them come in {many}, {clusters.turning} of these at turning "
         f"points; left in, all of them would change the amplitude by {clusters.shift_m * 1e3:+.2g} mm"
     )
