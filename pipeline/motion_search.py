@@ -40,7 +40,8 @@ def stop_row(conditioned: Conditioned) -> int | None:
     noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)
     end = float(np.median(blocks[-max(len(blocks) // 10, 2) :]))
     moving = np.flatnonzero(np.median(np.abs(blocks - end), axis=1) > 2.0 * noise)
-    if not moving.size or moving[-1] >= len(blocks) - 4:
+    # A few blocks that deep noise lifts are no motion: of those before the stop a share must stand off.
+    if moving.size < 3 or moving.size < 0.3 * (moving[-1] + 1) or moving[-1] >= len(blocks) - 4:
         return None
     return int(rows[(int(moving[-1]) + 2) * BLOCK])
 

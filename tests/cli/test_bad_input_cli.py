@@ -92,7 +92,7 @@ def test_what_cannot_be_opened_is_refused(
     def forbid(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "open", forbid)
+    monkeypatch.setattr("builtins.open", forbid)
     refused(run(cli, command, recording, out), recording, "Permission denied", "check its name and permissions")
 
 
