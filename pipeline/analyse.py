@@ -35,6 +35,7 @@ from pipeline.phase import PhaseFit, fit_phase
 from pipeline.quick import demodulate_quickly
 from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
 from pipeline.quick_start import condition_quickly, find_cycles_quickly
+from pipeline.regression import correlation_length
 from pipeline.relaxation import Relaxation, find_relaxation, spring_constant
 from pipeline.rest import Rest, fit_rest
 from pipeline.scene import Scene
@@ -281,7 +282,8 @@ def _still(track: Track, scene: Scene, params: Params, conditioned: Conditioned,
     y = track.y[conditioned.used]
     if not y.size:
         raise AnalysisError("no usable sample is left; see the counts of flagged samples")
-    u = float(np.std(y)) / np.sqrt(y.size)
+    # Where the distance steps or creeps, neighbours say the same: their number would make the mean look certain.
+    u = float(np.std(y) * np.sqrt(correlation_length(y) / y.size))
     estimates = {
         "offset": Estimate(float(np.mean(y)), float(u), "m"),
         "noise": Estimate(conditioned.noise_m, conditioned.noise_m / np.sqrt(2.0 * y.size), "m"),

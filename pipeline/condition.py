@@ -131,9 +131,11 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
     flags |= _time_flags(np.where(judged, np.nan, track.t), judged)
     clean = (flags & UNUSABLE) == 0
     if np.count_nonzero(clean) < 8:
+        flagged = {flag: int(np.count_nonzero(flags & np.uint8(flag))) for flag in Quality if flag & UNUSABLE}
+        why = ", ".join(f"{count} {flag.name.lower()}" for flag, count in flagged.items() if count and flag.name)
         raise AnalysisError(
-            f"an analysis needs eight usable samples at least, got {np.count_nonzero(clean)} of {len(track)}; "
-            "record longer, or see the counts of flagged samples"
+            f"an analysis needs eight usable samples at least, got {np.count_nonzero(clean)} of {len(track)}"
+            f"{f' (flagged: {why})' if why else ''}; record longer, or see to those flagged"
         )
     y, rows = track.y[clean], np.flatnonzero(clean)
     half_step = 0.5 * (track.quantum_m or 0.0)

@@ -160,6 +160,16 @@ def test_what_does_not_oscillate_is_an_error_in_words(what: str) -> None:
     assert result.quality["used"] > 0
 
 
+def test_the_rest_position_of_a_step_is_not_stated_too_finely() -> None:
+    """Where the distance steps by 50 mm, the mean's uncertainty is of its size; in white noise it is that of a mean."""
+    t = np.arange(3000) / 100
+    noise = 3e-4 * np.random.default_rng(2).standard_normal(t.size)
+    step = analyse(Track.from_arrays(t, 0.3 + 0.05 * (t > 15) + noise)).estimates["offset"]
+    white = analyse(Track.from_arrays(t, 0.3 + noise)).estimates["offset"]
+    assert 0.01 < step.u < 0.05
+    assert white.u == pytest.approx(3e-4 / np.sqrt(t.size), rel=0.1)
+
+
 @pytest.mark.parametrize("y", [[0.1, 0.2], [np.nan] * 1000, [np.inf] * 50, [0.1] * 7])
 def test_too_few_distances_are_refused(y: list[float]) -> None:
     """Two samples, nothing but missing ones, seven: refused with the number that there was."""

@@ -170,6 +170,13 @@ def test_too_few_usable_samples_are_refused(usable: int) -> None:
         condition(Track.from_arrays(np.arange(100) / 100, y))
 
 
+def test_a_refusal_names_what_was_flagged() -> None:
+    """A record written backwards is refused with the count of samples whose time runs backward."""
+    t = np.arange(100)[::-1] / 100
+    with pytest.raises(AnalysisError, match=r"got 1 of 100 \(flagged: 99 non_monotonic_time\)"):
+        condition(Track.from_arrays(t, 0.2 + 0.01 * np.cos(8.3 * t), rate_hz=100.0))
+
+
 @pytest.mark.parametrize("usable", [8, 9, 12])
 def test_eight_usable_samples_are_enough(usable: int) -> None:
     """From eight on a record is judged."""
