@@ -149,7 +149,7 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     if apart.size > 2:  # the whole length, where the steps in it can be counted
         length = float(apart[-1] - apart[0])
         steps_in_all = length / step
-        if steps_in_all * relative_u < 0.5:
+        if steps_in_all * relative_u < 0.5 <= steps_in_all:
             step, relative_u = length / round(steps_in_all), resolution / length
     return step, relative_u
 
