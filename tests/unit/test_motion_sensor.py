@@ -413,3 +413,10 @@ def test_rates_are_found_in_rounded_times(rate: float) -> None:
     assert found is not None
     assert found.rate_hz == rate
     assert found.certain
+
+
+def test_times_closer_than_their_last_digit_give_no_certain_rate() -> None:
+    """Where a damaged file's times differ by less than most of their cells print, no rate is certain."""
+    found = find_rate(np.array([0.0, 0.02, 0.21]), 1.0)
+    assert found is not None
+    assert not found.certain
