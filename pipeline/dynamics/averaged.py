@@ -13,10 +13,12 @@ import numpy as np
 
 from pipeline.dynamics.equation import Problem, Real
 from pipeline.dynamics.integrator import Trajectory, every_member, integrate
+from pipeline.laws.drag import amplitudes
 from pipeline.track import F8
 
 __all__ = ["AVERAGED", "Averaged", "amplitude", "stopping_time"]
 
+MOST_TURNS = 8
 WEAK = 0.3  # damping rate over frequency up to which a cycle can be averaged over
 
 
@@ -28,31 +30,21 @@ def amplitude(start: Real, gamma: Real, beta: Real, mu: Real, t: F8) -> F8:
     start : float or (m,) float64, m
     gamma, beta, mu : float or (m,) float64
         1/s, 1/(m s), m/s.
-    t : (n,) or (n, 1) float64, s
+    t : (n,) float64, s
 
-    Notes
-    -----
-    A Riccati equation. With :math:`\\kappa^2 = \\gamma^2/4 - \\mu\\beta`, :math:`C = \\cosh\\kappa t`,
-    :math:`S = \\sinh(\\kappa t)/\\kappa` (cosine and sine where :math:`\\kappa^2 < 0`):
-    :math:`A = (A_0 (C - \\gamma S/2) - \\mu S)/(C + \\gamma S/2 + \\beta A_0 S)`.
+    Returns
+    -------
+    (n,) or (n, m) float64, m
+        By the closed form of :mod:`pipeline.laws.drag`.
 
     Examples
     --------
     >>> amplitude(0.05, 0.0, 0.0, 0.01, np.array([0.0, 2.0, 6.0]))
     array([0.05, 0.03, 0.  ])
     """
-    square = 0.25 * np.square(gamma) - np.multiply(mu, beta)
-    kappa = np.sqrt(np.abs(square))
-    safe = np.where(kappa > 0, kappa, 1.0)
-    # Above zero both are multiplied by exp(-kappa t), which cancels in the ratio.
-    late = np.exp(-2.0 * kappa * t)
-    hyperbolic = np.where(kappa > 0, -np.expm1(-2.0 * kappa * t) / (2.0 * safe), t)
-    c = np.where(square >= 0, 0.5 * (1.0 + late), np.cos(kappa * t))
-    s = np.where(square >= 0, hyperbolic, np.sin(kappa * t) / safe)
-    going = t < stopping_time(start, gamma, beta, mu)
-    below = c + (0.5 * np.asarray(gamma) + np.multiply(beta, start)) * s
-    above = start * (c - 0.5 * np.asarray(gamma) * s) - mu * s
-    return np.where(going, np.maximum(above, 0.0) / np.where(going, below, 1.0), 0.0)
+    theta = np.array(np.broadcast_arrays(start, mu, gamma, beta), np.float64)
+    found = amplitudes(t, theta.reshape(4, -1).T)
+    return found[0] if theta.ndim == 1 else np.ascontiguousarray(found.T)
 
 
 def stopping_time(start: Real, gamma: Real, beta: Real, mu: Real) -> Real:
@@ -102,12 +94,11 @@ class Averaged:
         return math.inf
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return what a pilot run over a few cycles shows, carried along the whole motion."""
+        """Return what a pilot run shows."""
         from pipeline.dynamics.pilot import predicted_by_pilot
-        from pipeline.dynamics.strang import STRANG
 
         def of(one: Problem) -> float:
-            return math.inf if self.refusal(one) else predicted_by_pilot(self, STRANG, one, step_s, seconds)
+            return math.inf if self.refusal(one) else predicted_by_pilot(self, one, step_s, seconds)
 
         return every_member(problem, of, max)
 
@@ -126,21 +117,23 @@ def _weakness(problem: Problem) -> Real:
 def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
     eq = problem.equation
     gamma, beta, mu = eq.laws()
-    t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
-    t = t.reshape(-1, *(1,) * np.ndim(problem.displacement_m))
+    times: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
+    t = times.reshape(-1, *(1,) * np.ndim(problem.displacement_m))
     damped = np.sqrt((eq.angular_frequency_per_s - gamma) * (eq.angular_frequency_per_s + gamma))
     y, v = problem.displacement_m, problem.velocity_m_per_s
     # Displacement and velocity tell amplitude and phase only together with the rate at which it falls.
     start, rate = np.asarray(problem.amplitude_m()), np.asarray(gamma)
     bend = 0.375 * np.asarray(eq.cubic_per_m2_s2) / eq.angular_frequency_per_s
     turn = damped
-    for _ in range(8):
-        with_rate = np.where(start > 0, start, 1.0)
+    for _ in range(MOST_TURNS):
+        before, with_rate = start, np.where(start > 0, start, 1.0)
         rate = gamma + beta * start + np.where(start > 0, mu / with_rate, 0.0)
         turn = damped + bend * start**2
         start = np.hypot(y, (v + rate * y) / turn)
+        if np.all(np.abs(start - before) <= 1e-16 * start):
+            break
     phase = np.arctan2(-(v + rate * y) / turn, y)
-    a = amplitude(start, gamma, beta, mu, t)
+    a = amplitude(start, gamma, beta, mu, times)
     falling = np.where(a > 0, mu + (gamma + beta * a) * a, 0.0)
     angle = phase + damped * t
     if np.any(bend):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from pipeline.dynamics.averaged import AVERAGED
-from pipeline.dynamics.equation import Problem
+from pipeline.dynamics.averaged import AVERAGED, stopping_time
+from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.exact import EXACT, rounding_error
 from pipeline.dynamics.integrator import Integrator, Trajectory
 from pipeline.dynamics.runge_kutta import RK4
@@ -25,16 +25,19 @@ MOST_PARTS = 100_000
 MOST_TRIES = 12
 SAFETY = 1.2  # what a prediction may be short of the truth
 
-# Nanoseconds on the machine of the notes: of a step, and of a kept state where that is what counts.
+# Nanoseconds on the machine of the notes: of a run, of a step and of a kept state where that is what counts.
+_RUN_NS = 1e5
 _STEP_NS = {
     "forward-euler": 500.0,
     "symplectic-euler": 550.0,
-    "verlet": 900.0,
+    "verlet": 850.0,
     "yoshida4": 1900.0,
-    "rk4": 1200.0,
-    "strang": 200.0,
+    "rk4": 1400.0,
+    "strang": 210.0,
 }
-_STATE_NS = {"exact": 6.0, "averaged": 130.0}
+_STATE_NS = {"exact": 6.0, "averaged": 90.0}
+_AVERAGED_NS = 3e5
+_TURN_NS = 1.3e4  # a turning point located by Strang
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,21 +113,28 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     >>> choose(mixed, 0.01, 12000, 1e-11).integrator.name
     'taylor'
     """
-    demand_tolerance(problem, spacing_s * count, tolerance)
-    reduced, terms = required(problem, spacing_s * count, tolerance)
-    options = []
-    for integrator in AUTO:
-        found = fit_step(integrator, reduced, spacing_s, count, (1.0 - SHARE) * tolerance / SAFETY)
-        if found is not None:
-            options.append(replace(found, terms=terms))
-            if integrator is EXACT:
-                break  # nothing is cheaper
-    if not options:
+    seconds = spacing_s * count
+    demand_tolerance(problem, seconds, tolerance)
+    reduced, terms = required(problem, seconds, tolerance)
+    room = tolerance - sum(term.size for term in terms if not term.included)
+    best: Choice | None = None
+    # By what each costs at least, so that the dear ones need no prediction.
+    for _, _, integrator in sorted(
+        (cost_ns(each, reduced, 1, count, seconds), place, each) for place, each in enumerate(AUTO)
+    ):
+        most = math.inf if best is None else best.cost_ns
+        best = fit_step(integrator, reduced, spacing_s, count, room / _safety(integrator), most) or best
+    if best is None:
         raise DynamicsError(
-            f"no integrator keeps a tolerance of {tolerance:g} for {spacing_s * count:g} s of this scene; "
+            f"no integrator keeps a tolerance of {tolerance:g} for {seconds:g} s of this scene; "
             "ask for a larger tolerance or a shorter run"
         )
-    return min(options, key=lambda choice: choice.cost_ns)
+    return replace(best, terms=terms)
+
+
+def _safety(integrator: Integrator) -> float:
+    """What a prediction may be short of the truth; without a step it is not carried from one step to another."""
+    return SAFETY if integrator.order else 1.05
 
 
 def demand_tolerance(problem: Problem, seconds: float, tolerance: float) -> None:
@@ -142,28 +152,33 @@ def demand_tolerance(problem: Problem, seconds: float, tolerance: float) -> None
         )
 
 
-def fit_step(integrator: Integrator, problem: Problem, spacing_s: float, count: int, tolerance: float) -> Choice | None:
+def fit_step(
+    integrator: Integrator,
+    problem: Problem,
+    spacing_s: float,
+    count: int,
+    tolerance: float,
+    most_ns: float = math.inf,
+) -> Choice | None:
     """Return an integrator with the largest step that is predicted to keep a tolerance; None where none does.
 
-    The step divides the spacing of the kept states.
+    The step divides the spacing of the kept states. What costs more than ``most_ns`` is not looked at.
     """
     if integrator.refusal(problem):
         return None
     seconds = spacing_s * count
     if isinstance(integrator, Taylor | SolveIvp):
         integrator = replace(integrator, tolerance=min(tolerance, 1e-3))
-    parts = 1
-    if math.isfinite(limit := integrator.stable_step(problem)):
-        if limit <= 0.0 and integrator.name != "forward-euler":
-            return None
-        parts = max(1, math.ceil(spacing_s / limit)) if limit > 0.0 else 1
+    if cost_ns(integrator, problem, 1, count, seconds) >= most_ns:
+        return None
+    parts = _least_parts(integrator, problem, spacing_s)
     found, too_few = None, 0
     for _ in range(MOST_TRIES):
-        if parts > MOST_PARTS:
+        cost = cost_ns(integrator, problem, parts, count, seconds)
+        if parts > MOST_PARTS or cost >= most_ns:
             break
         error = integrator.predicted_error(problem, spacing_s / parts, seconds)
         if error <= tolerance:
-            cost = cost_ns(integrator, problem, parts, count, seconds)
             found = Choice(integrator, parts, spacing_s / parts, error, cost, problem)
         else:
             too_few = parts
@@ -177,24 +192,41 @@ def fit_step(integrator: Integrator, problem: Problem, spacing_s: float, count: 
     return found
 
 
+def _least_parts(integrator: Integrator, problem: Problem, spacing_s: float) -> int:
+    """Return the fewest steps a spacing with which a method is stable; more than can be where none is."""
+    limit = integrator.stable_step(problem)
+    if limit <= 0.0:
+        return 1 if integrator.name == "forward-euler" else MOST_PARTS + 1
+    return max(1, math.ceil(min(spacing_s / limit, MOST_PARTS + 1.0)))
+
+
 def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, seconds: float) -> float:
     """Return what a run of one trajectory costs, ns, on the machine that the figures were taken on.
 
     Only ratios matter; ``springmass trade --integrators`` measures them on any machine.
     """
     eq = problem.equation
-    radians = eq.angular_frequency_per_s * seconds
-    if integrator.name in _STATE_NS:
-        return 1e5 + _STATE_NS[integrator.name] * count
+    name, cubic, friction = integrator.name, bool(eq.cubic_per_m2_s2), bool(eq.friction_m_per_s2)
+    if name in _STATE_NS:
+        return _RUN_NS + _AVERAGED_NS * (name == "averaged") + _STATE_NS[name] * count
+    # Once friction holds the bob nothing more is solved by those who see it.
+    moving = min(seconds, float(stopping_time(problem.amplitude_m(), *eq.laws()))) if friction else seconds
+    radians = eq.angular_frequency_per_s * moving
     if isinstance(integrator, Taylor):
-        kinked = eq.drag_per_m > 0 or eq.friction_m_per_s2 > 0
-        steps = radians * (0.65 if kinked else 0.62)
-        return float(1e5 + steps * (6e4 + 6e4 * bool(eq.cubic_per_m2_s2)) + 100.0 * count)
+        return _RUN_NS + radians * _taylor_ns(eq, integrator.order_of(problem, seconds)) + 100.0 * count
     if isinstance(integrator, SolveIvp):
         return float(3e5 * radians * (integrator.rtol(problem, seconds) / 1e-9) ** -0.1)
-    step = _STEP_NS[integrator.name]
-    turns = 0.0
-    if integrator.name == "strang":
-        step += 150.0 * bool(eq.cubic_per_m2_s2) + 200.0 * bool(eq.friction_m_per_s2)
-        turns = radians / math.pi * 1.5e4 if eq.friction_m_per_s2 else 0.0
-    return float(1e5 + step * parts * count + turns)
+    steps = parts * count
+    if name != "strang":
+        return _RUN_NS + _STEP_NS[name] * steps
+    if not friction:
+        return _RUN_NS + (_STEP_NS[name] + 40.0 * cubic) * steps
+    finer = max(1, math.ceil(eq.angular_frequency_per_s * seconds / steps))
+    return _RUN_NS + (280.0 + 120.0 * cubic) * finer * steps * moving / seconds + radians / math.pi * _TURN_NS
+
+
+def _taylor_ns(eq: Equation, order: int) -> float:
+    """What a radian costs by a series of some order, as measured for orders of 12 to 21."""
+    kinked, cubic = eq.drag_per_m > 0 or eq.friction_m_per_s2 > 0, eq.cubic_per_m2_s2 != 0.0
+    steps = 1.0 + 0.03 * max(order - 12, 0) if kinked or cubic else 0.75
+    return steps * (2e4 + 1200.0 * order + 1300.0 * order * cubic)

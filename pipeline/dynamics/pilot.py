@@ -1,14 +1,16 @@
-"""A pilot run: what a period at several amplitudes shows of a method's error, carried along the whole motion."""
+"""A pilot run: the whole motion in coarse steps, beside the same in finer ones, shows a method's error beforehand."""
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.dynamics.averaged import amplitude
 from pipeline.dynamics.equation import Problem
+from pipeline.dynamics.strang import STRANG
+from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
 if TYPE_CHECKING:
@@ -16,26 +18,20 @@ if TYPE_CHECKING:
 
 __all__ = ["predicted_by_pilot"]
 
-STEPS_A_PERIOD = 64
-MOST_STEPS, LEAST_STEPS = 1000, 24
-NODES = 8  # amplitudes, each half of the one before
-REFINED = 4
-POINTS = 240
-CUBIC_DOUBT = 1.5
-CUBIC_PERIODS = 5  # a period that depends on amplitude does not end where it began: over several that matters less
+FINE = 0.25  # radians a step, of the spring, of drag and of quadratic drag together: there the power law holds
+NEAR = 4.0  # with friction a pilot's step is at most so many planned ones
+STIFF = 10.0  # drag over spring beyond which a pilot cannot have steps that fine all along
+MOST_STIFF_STEPS = 20_000
+MOST_PARTS = 16  # of a step, for the truth beside it
 
 
-def predicted_by_pilot(
-    integrator: Integrator, truth: Integrator, problem: Problem, step_s: float, seconds: float
-) -> float:
+def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, seconds: float) -> float:
     """Return the expected largest error of the displacement over the starting amplitude.
 
     Parameters
     ----------
     integrator : Integrator
         Whose error is asked for.
-    truth : Integrator
-        What it is compared with, at a quarter of the step.
     problem : Problem
         Of one trajectory.
     step_s, seconds : float
@@ -43,103 +39,61 @@ def predicted_by_pilot(
 
     Notes
     -----
-    From the start a first stretch is run twice; their difference is the error within a cycle. Then, at amplitudes of a
-    half, a quarter and so on, the relative error :math:`\\delta + i\\varphi` that a cycle adds to amplitude and phase
-    is measured. Along the averaged amplitude :math:`A(t)` they add up to
-    :math:`\\dot\\varphi = \\varphi' + 3cA\\,\\delta A/4\\omega` and
-    :math:`\\dot{\\delta A} = A\\delta' - (\\gamma + 2\\beta A)\\,\\delta A`. A step finer than the pilot's counts
-    by the method's order.
+    The motion is run from start to end at the planned step h or, where that is finer, at a quarter of a radian, H.
+    The truth beside it is Strang splitting in steps of at most H and of half as much, extrapolated to none. The largest
+    difference counts by :math:`(h/H)^p` with the method's order p. A pilot of the whole motion costs a few steps a
+    radian, and holds whatever adds up along it: the phase, the pace of a cubic spring, the stop.
+
+    With friction each turning point splits a step, and what that adds falls faster than the power law says. There the
+    pilot's step is at most four planned ones.
     """
-    start = problem.amplitude_m()
-    if start == 0.0:
+    if problem.amplitude_m() == 0.0:
         return 0.0
-    problem, _ = problem.scaled()
-    start = problem.amplitude_m()
-    eq = problem.equation
-    period = 2.0 * math.pi / eq.angular_frequency_per_s
-    step, finer = _pilot_step(integrator, problem, step_s, min(seconds, period))
+    problem, _ = _scaled(problem)
+    start, omega = problem.amplitude_m(), problem.equation.angular_frequency_per_s
+    fine = longest = _fine_step(problem)
+    if integrator.order:
+        longest = min(longest, 0.5 * integrator.stable_step(problem))
+        if problem.equation.has_friction:
+            longest = min(longest, NEAR * step_s)
+    pilot = max(step_s, min(longest, seconds / 4.0))
     # The kink of drag at a turning point keeps a high order from what its power promises.
-    share = finer ** min(integrator.order, 3) / (1.0 - float(REFINED) ** -integrator.order if integrator.order else 1.0)
-    if period / step > 20 * MOST_STEPS:
+    order = min(integrator.order, 3)
+    if integrator is not STRANG and integrator.order and omega * pilot * MOST_STIFF_STEPS < 2.0 * math.pi:
         return math.inf  # far too stiff for a method with a limit
-    stretch = min(max(round(min(seconds, 1.5 * period) / step), LEAST_STEPS), max(1, round(seconds / step)))
-    coarse, fine = _both(integrator, truth, problem, step, stretch)
-    early = share * float(np.max(np.abs(coarse.real - fine.real))) / start
-    if seconds <= 1.5 * period or eq.gamma_per_s > 0.9 * eq.angular_frequency_per_s:
-        return float(early)
-    carried = share * _carried(problem, _defects(integrator, truth, problem, step), seconds) / start
-    # With a cubic spring an error of amplitude is one of pace too, of another size for every start.
-    return float(early + (CUBIC_DOUBT if eq.cubic_per_m2_s2 else 1.0) * carried)
+    if fine * omega < FINE / STIFF and pilot < seconds / MOST_STIFF_STEPS:
+        pilot, order = seconds / MOST_STIFF_STEPS, min(order, 1)
+    return (step_s / pilot) ** order * _largest_error(integrator, problem, pilot, fine, seconds) / start
 
 
-def _pilot_step(integrator: Integrator, problem: Problem, step_s: float, period: float) -> tuple[float, float]:
-    """Return the pilot's step, s, and how much finer the planned one is."""
-    eq = problem.equation
-    fastest = max(abs(problem.velocity_m_per_s), eq.angular_frequency_per_s * problem.amplitude_m())
-    wanted = min(
-        2.0 * math.pi / eq.angular_frequency_per_s / STEPS_A_PERIOD, 0.2 / max(eq.drag_per_m * fastest, 1e-300)
-    )
-    wanted = min(max(wanted, period / MOST_STEPS), 0.5 * integrator.stable_step(problem))
-    if not integrator.order:
-        return wanted, 1.0
-    return (step_s, 1.0) if step_s >= wanted else (wanted, step_s / wanted)
+_scaled = functools.lru_cache(maxsize=4)(Problem.scaled)  # the same object for the same, to be remembered by
 
 
-def _both(integrator: Integrator, truth: Integrator, problem: Problem, step: float, steps: int) -> tuple[F8, F8]:
-    """Return displacement and, as imaginary part, velocity over frequency, of method and truth."""
-    omega = problem.equation.angular_frequency_per_s
-    runs = (
-        integrator.run(problem, step, steps),
-        truth.run(problem, step / REFINED, steps * REFINED, every=REFINED),
-    )
-    first, second = (run.y + 1j * run.v / omega for run in runs)
-    return first, second
+def _fine_step(problem: Problem) -> float:
+    """Return the step at which Strang's error follows its power law, s."""
+    eq, start = problem.equation, problem.amplitude_m()
+    hard = math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * start * start)
+    return FINE / (hard + eq.gamma_per_s + 2.0 * eq.drag_per_m * hard * start)
 
 
-def _defects(integrator: Integrator, truth: Integrator, problem: Problem, step: float) -> tuple[F8, F8]:
-    """Return amplitudes, rising, and what a second adds to amplitude (real) and phase (imaginary) there."""
-    eq = problem.equation
-    steps = max(round(2.0 * math.pi / eq.angular_frequency_per_s / step), LEAST_STEPS)
-    if eq.cubic_per_m2_s2:
-        steps *= CUBIC_PERIODS
-    sizes, rates = [], []
-    for node in range(NODES):
-        share = 0.5**node
-        size = problem.amplitude_m() * share
-        # Where in its turn a motion starts sets the energy that a step believes in, and with it a cubic spring's pace.
-        starts = [Problem(eq, size, 0.0)]
-        if eq.cubic_per_m2_s2:
-            starts.append(Problem(eq, problem.displacement_m * share, problem.velocity_m_per_s * share))
-        if any(integrator.refusal(one) for one in starts):
-            break  # so near to the stop that the smallest node so far stands for the rest
-        found = []
-        for one in starts:
-            coarse, fine = _both(integrator, truth, one, step, steps)
-            if abs(fine[-1]) > 0.0 and abs(coarse[-1]) > 0.0:
-                found.append(np.log(coarse[-1] / fine[-1]) / (steps * step))
-        if found:
-            sizes.append(size)
-            rates.append(max((r.real for r in found), key=abs) + 1j * max((r.imag for r in found), key=abs))
-    return np.array(sizes[::-1]), np.array(rates[::-1])
+@functools.lru_cache(maxsize=32)
+def _largest_error(integrator: Integrator, problem: Problem, pilot: float, fine: float, seconds: float) -> float:
+    """Return the largest error of a run in steps of the pilot, m. Remembered, as every finer step asks for it."""
+    coarse, truth = _truth(problem, pilot, fine, seconds)
+    if integrator is STRANG and coarse is not None:
+        found = coarse
+    else:
+        try:
+            found = integrator.run(problem, pilot, len(truth) - 1).y
+        except DynamicsError:
+            return math.inf  # it ran away: that is its error
+    return float(np.max(np.abs(found - truth)))
 
 
-def _carried(problem: Problem, defects: tuple[F8, F8], seconds: float) -> float:
-    """Return the largest error, m, that the defects add up to."""
-    sizes, rates = defects
-    if not sizes.size:
-        return 0.0
-    eq = problem.equation
-    gamma, beta, mu = eq.laws()
-    bend = 0.75 * eq.cubic_per_m2_s2 / eq.angular_frequency_per_s
-    t = np.linspace(0.0, seconds, POINTS)
-    size = amplitude(problem.amplitude_m(), gamma, beta, mu, t)
-    # Beyond the smallest node quadratic drag fades, and with it what it adds.
-    grow = np.interp(size, sizes, rates.real)
-    turn = np.interp(size, sizes, rates.imag)
-    off, phase, worst = 0.0, 0.0, 0.0
-    for i in range(POINTS):
-        worst = max(worst, math.hypot(off, size[i] * phase))
-        phase += t[1] * (turn[i] + bend * size[i] * off)
-        shrink = gamma + 2.0 * beta * size[i]
-        off = (off + t[1] * size[i] * grow[i]) / (1.0 + t[1] * shrink)
-    return worst
+@functools.lru_cache(maxsize=4)
+def _truth(problem: Problem, pilot: float, fine: float, seconds: float) -> tuple[F8 | None, F8]:
+    """Return the displacement in steps of the pilot, if these are fine, and the extrapolated one at the same times."""
+    steps = max(1, round(seconds / pilot))
+    parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
+    once, twice = (STRANG.run(problem, pilot / k, steps * k, every=k).y for k in (parts, 2 * parts))
+    return once if parts == 1 else None, twice + (twice - once) / 3.0

@@ -83,7 +83,7 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     if gamma + beta * start > STRONG * omega:
         if h > method.stable_step(problem):
             return math.inf
-        return predicted_by_pilot(method, method, problem, h, h * steps) + float(friction)
+        return predicted_by_pilot(method, problem, h, h * steps) + float(friction)
     values = np.linalg.eigvals(step_matrix(method, omega * h, gamma / omega).astype(np.complex128))
     turning = np.log(values[np.argmax(values.imag)]) / h
     if turning.imag <= 0.0:

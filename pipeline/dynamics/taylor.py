@@ -64,6 +64,10 @@ class Taylor:
         """Return the tolerance, or the rounding where that is more."""
         return every_member(problem, lambda one: max(self.tolerance, rounding_error(one, seconds)), max)
 
+    def order_of(self, problem: Problem, seconds: float) -> int:
+        """Return the number of terms of its series."""
+        return _order(_local(problem, seconds, self.tolerance))
+
     def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         count = steps // every + 1
         solved = [_solve(one, step_s * every, count, self.tolerance) for one in problem.members()]
@@ -76,15 +80,29 @@ class Taylor:
 TAYLOR = Taylor()
 
 
+def _fastest(problem: Problem) -> float:
+    """The frequency of a spring as hard as it gets, 1/s."""
+    eq = problem.equation
+    return math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * problem.amplitude_m() ** 2)
+
+
+def _local(problem: Problem, seconds: float, tolerance: float) -> float:
+    """What a step may err so that all of them keep the tolerance."""
+    return max(tolerance / (1.0 + _fastest(problem) * seconds), 1e-18)
+
+
+def _order(local: float) -> int:
+    return next(p for p in range(6, 60) if LONGEST**p / math.factorial(p) < local)
+
+
 def _solve(problem: Problem, apart: float, count: int, tolerance: float) -> F8:
     """Return the states (count, 2) at multiples of a time apart."""
     eq = problem.equation
     states = np.empty((count, 2))
     y, v = problem.displacement_m, problem.velocity_m_per_s
     states[0] = y, v
-    fast = math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * problem.amplitude_m() ** 2)
-    local = max(tolerance / (1.0 + fast * apart * count), 1e-18)
-    order = next(p for p in range(6, 60) if LONGEST**p / math.factorial(p) < local)
+    fast, local = _fastest(problem), _local(problem, apart * count, tolerance)
+    order = _order(local)
     kinked = eq.drag_per_m > 0 or eq.friction_m_per_s2 > 0
     row, since = 0, 0.0  # the last state kept, and the time since: a sum of short times rounds little
     for _ in range(MOST_STEPS):

@@ -58,7 +58,7 @@ def _symmetric(eq: Equation, h: float) -> Callable[[Real, Real, Real], tuple[Rea
     shrink = np.exp(-gamma * h)
     # The time in which quadratic drag acts, shortened by what viscous drag takes of the speed meanwhile.
     reach = drag * np.where(np.equal(gamma, 0.0), 0.5 * h, -np.expm1(-gamma * h) / np.where(gamma, 2.0 * gamma, 1.0))
-    if np.ndim(gamma) == 0:
+    if np.ndim(shrink) == 0:
         shrink, reach = float(shrink), float(reach)
     half = 0.5 * h
 
