@@ -18,8 +18,11 @@ from pipeline.errors import DynamicsError
 
 __all__ = ["AUTO", "Choice", "choose", "cost_ns", "fit_step", "least_tolerance"]
 
-AUTO: tuple[Integrator, ...] = (EXACT, AVERAGED, STRANG, RK4, TAYLOR)
+AUTO: tuple[Integrator, ...] = (EXACT, AVERAGED, STRANG, TAYLOR)
 """What is chosen from. Every other method costs more than one of these at any tolerance; ``trade`` shows it."""
+
+KNOWN: tuple[Integrator, ...] = (EXACT, TAYLOR)
+"""Those of them whose error is known without a pilot."""
 
 MOST_PARTS = 100_000
 MOST_TRIES = 12
@@ -118,10 +121,8 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     reduced, terms = required(problem, seconds, tolerance)
     room = tolerance - sum(term.size for term in terms if not term.included)
     best: Choice | None = None
-    # By what each costs at least, so that the dear ones need no prediction.
-    for _, _, integrator in sorted(
-        (cost_ns(each, reduced, 1, count, seconds), place, each) for place, each in enumerate(AUTO)
-    ):
+    # First those whose error is known without a pilot, then by what each costs at least: the dear need no prediction.
+    for integrator in sorted(AUTO, key=lambda each: cost_ns(each, reduced, 1, count, seconds) * (each not in KNOWN)):
         most = math.inf if best is None else best.cost_ns
         best = fit_step(integrator, reduced, spacing_s, count, room / _safety(integrator), most) or best
     if best is None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["predicted_by_pilot"]
 
 FINE = 0.25  # radians a step, of the spring, of drag and of quadratic drag together: there the power law holds
-NEAR = 4.0  # with friction a pilot's step is at most so many planned ones
+NEAR = 4.0  # with friction a pilot's step is at most so many planned ones, and the fine one over it at least
 STIFF = 10.0  # drag over spring beyond which a pilot cannot have steps that fine all along
 MOST_STIFF_STEPS = 20_000
 MOST_PARTS = 16  # of a step, for the truth beside it
@@ -45,7 +45,7 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     radian, and holds whatever adds up along it: the phase, the pace of a cubic spring, the stop.
 
     With friction each turning point splits a step, and what that adds falls faster than the power law says. There the
-    pilot's step is at most four planned ones.
+    pilot's step is at most four planned ones, down to a quarter of H.
     """
     if problem.amplitude_m() == 0.0:
         return 0.0
@@ -55,7 +55,7 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     if integrator.order:
         longest = min(longest, 0.5 * integrator.stable_step(problem))
         if problem.equation.has_friction:
-            longest = min(longest, NEAR * step_s)
+            longest = min(longest, max(NEAR * step_s, fine / NEAR))
     pilot = max(step_s, min(longest, seconds / 4.0))
     # The kink of drag at a turning point keeps a high order from what its power promises.
     order = min(integrator.order, 3)
