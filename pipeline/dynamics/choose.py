@@ -9,11 +9,10 @@ from pipeline.dynamics.averaged import AVERAGED, stopping_time
 from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.exact import EXACT, rounding_error
 from pipeline.dynamics.integrator import Integrator, Trajectory
-from pipeline.dynamics.runge_kutta import RK4
 from pipeline.dynamics.solve_ivp import SolveIvp
 from pipeline.dynamics.strang import STRANG
 from pipeline.dynamics.taylor import TAYLOR, Taylor
-from pipeline.dynamics.terms import SHARE, Term, required
+from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
 
 __all__ = ["AUTO", "Choice", "choose", "cost_ns", "fit_step", "least_tolerance"]
@@ -212,7 +211,7 @@ def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, se
         return _RUN_NS + _AVERAGED_NS * (name == "averaged") + _STATE_NS[name] * count
     # Once friction holds the bob nothing more is solved by those who see it.
     moving = min(seconds, float(stopping_time(problem.amplitude_m(), *eq.laws()))) if friction else seconds
-    radians = eq.angular_frequency_per_s * moving
+    radians = float(eq.angular_frequency_per_s * moving)
     if isinstance(integrator, Taylor):
         return _RUN_NS + radians * _taylor_ns(eq, integrator.order_of(problem, seconds)) + 100.0 * count
     if isinstance(integrator, SolveIvp):
@@ -222,12 +221,12 @@ def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, se
         return _RUN_NS + _STEP_NS[name] * steps
     if not friction:
         return _RUN_NS + (_STEP_NS[name] + 40.0 * cubic) * steps
-    finer = max(1, math.ceil(eq.angular_frequency_per_s * seconds / steps))
+    finer: int = max(1, math.ceil(eq.angular_frequency_per_s * seconds / steps))
     return _RUN_NS + (280.0 + 120.0 * cubic) * finer * steps * moving / seconds + radians / math.pi * _TURN_NS
 
 
 def _taylor_ns(eq: Equation, order: int) -> float:
     """What a radian costs by a series of some order, as measured for orders of 12 to 21."""
     kinked, cubic = eq.drag_per_m > 0 or eq.friction_m_per_s2 > 0, eq.cubic_per_m2_s2 != 0.0
-    steps = 1.0 + 0.03 * max(order - 12, 0) if kinked or cubic else 0.75
-    return steps * (2e4 + 1200.0 * order + 1300.0 * order * cubic)
+    steps: float = 1.0 + 0.03 * max(order - 12, 0) if kinked or cubic else 0.75
+    return float(steps * (2e4 + 1200.0 * order + 1300.0 * order * cubic))

@@ -24,7 +24,7 @@ class OneStep:
     name, words, order
         As in :class:`pipeline.dynamics.integrator.Integrator`.
     make : callable
-        Equation and step, s, to the function of one step.
+        Equation and step, s, to the function of one step; of many steps, (n,) float64, it is a step of each.
     closed_limit : callable, optional
         Frequency, 1/s, and damping, 1/s, to the largest stable step, s; without it the limit is searched for.
     """
@@ -32,7 +32,7 @@ class OneStep:
     name: str
     words: str
     order: int
-    make: Callable[[Equation, float], Step] = field(repr=False)
+    make: Callable[[Equation, Real], Step] = field(repr=False)
     closed_limit: Callable[[float, float], float] | None = field(default=None, repr=False)
 
     def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - every integrator has the same signature

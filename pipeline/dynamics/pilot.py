@@ -49,7 +49,7 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     """
     if problem.amplitude_m() == 0.0:
         return 0.0
-    problem, _ = _scaled(problem)
+    problem = _scaled(problem)
     start, omega = problem.amplitude_m(), problem.equation.angular_frequency_per_s
     fine = longest = _fine_step(problem)
     if integrator.order:
@@ -63,22 +63,25 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
         return math.inf  # far too stiff for a method with a limit
     if fine * omega < FINE / STIFF and pilot < seconds / MOST_STIFF_STEPS:
         pilot, order = seconds / MOST_STIFF_STEPS, min(order, 1)
-    return (step_s / pilot) ** order * _largest_error(integrator, problem, pilot, fine, seconds) / start
+    share = float((step_s / pilot) ** order)
+    return share * _largest_error(integrator, problem, pilot, fine, seconds) / float(start)
 
 
-_scaled = functools.lru_cache(maxsize=4)(Problem.scaled)  # the same object for the same, to be remembered by
+@functools.lru_cache(maxsize=4)
+def _scaled(problem: Problem) -> Problem:
+    """Return the problem in units of its amplitude: the same object for the same, so that its truth is remembered."""
+    return problem.scaled()[0]
 
 
 def _fine_step(problem: Problem) -> float:
     """Return the step at which Strang's error follows its power law, s."""
     eq, start = problem.equation, problem.amplitude_m()
     hard = math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * start * start)
-    return FINE / (hard + eq.gamma_per_s + 2.0 * eq.drag_per_m * hard * start)
+    return float(FINE / (hard + eq.gamma_per_s + 2.0 * eq.drag_per_m * hard * start))
 
 
-@functools.lru_cache(maxsize=32)
 def _largest_error(integrator: Integrator, problem: Problem, pilot: float, fine: float, seconds: float) -> float:
-    """Return the largest error of a run in steps of the pilot, m. Remembered, as every finer step asks for it."""
+    """Return the largest error of a run in steps of the pilot, m."""
     coarse, truth = _truth(problem, pilot, fine, seconds)
     if integrator is STRANG and coarse is not None:
         found = coarse
@@ -92,7 +95,10 @@ def _largest_error(integrator: Integrator, problem: Problem, pilot: float, fine:
 
 @functools.lru_cache(maxsize=4)
 def _truth(problem: Problem, pilot: float, fine: float, seconds: float) -> tuple[F8 | None, F8]:
-    """Return the displacement in steps of the pilot, if these are fine, and the extrapolated one at the same times."""
+    """Return the displacement in steps of the pilot, if these are fine, and the extrapolated one at the same times.
+
+    Remembered, as every finer step and the next method ask for it again.
+    """
     steps = max(1, round(seconds / pilot))
     parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
     once, twice = (STRANG.run(problem, pilot / k, steps * k, every=k).y for k in (parts, 2 * parts))

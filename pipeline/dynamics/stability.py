@@ -48,23 +48,26 @@ def step_matrix(method: OneStep, x: float | F8, ratio: float) -> F8:
         return np.array([step(1.0, 0.0), step(0.0, 1.0)]).T
 
 
-def growth_per_step(method: OneStep, x: float | F8, ratio: float) -> float | F8:
-    """Return the spectral radius of a step, or of each of several: above 1 the motion grows.
+def growth_per_step(method: OneStep, x: float, ratio: float) -> float:
+    """Return the spectral radius of a step: above 1 the motion grows.
 
     Examples
     --------
     >>> from pipeline.dynamics.euler import FORWARD_EULER
-    >>> float(growth_per_step(FORWARD_EULER, 0.75, 0.0))
+    >>> growth_per_step(FORWARD_EULER, 0.75, 0.0)
     1.25
     """
-    matrix = step_matrix(method, x, ratio)
-    a, b, c, d = (matrix[..., i, j] for i in (0, 1) for j in (0, 1))
+    return float(_growths(step_matrix(method, x, ratio)))
+
+
+def _growths(matrices: F8) -> F8:
+    """Spectral radii of matrices (..., 2, 2); inf where one is not finite."""
+    a, b, c, d = (matrices[..., i, j] for i in (0, 1) for j in (0, 1))
     with np.errstate(all="ignore"):
         under = 0.25 * (a - d) ** 2 + b * c
         turning = np.sqrt(np.abs(a * d - b * c))
         growth = np.where(under < 0, turning, np.abs(0.5 * (a + d)) + np.sqrt(np.abs(under)))
-    found = np.where(np.isfinite(growth), growth, np.inf)
-    return found if found.ndim else float(found)
+    return np.where(np.isfinite(growth), growth, np.inf)
 
 
 @functools.lru_cache(maxsize=4096)
@@ -81,7 +84,7 @@ def limit_by_search(method: OneStep, ratio: float) -> float:
     steps = np.geomspace(1e-3 / max(ratio, 1.0), GREATEST, LOOKS)
     low, high = 0.0, math.inf
     for _ in range(REFINEMENTS):
-        grows = growth_per_step(method, steps, ratio) > 1.0 + _ROUNDING
+        grows = _growths(step_matrix(method, steps, ratio)) > 1.0 + _ROUNDING
         bad = int(np.argmax(grows))
         if not grows[bad]:
             # The end of a finer look is the step that grew in the coarser.

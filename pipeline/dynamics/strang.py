@@ -63,9 +63,7 @@ class Strang:
 
         def of(one: Problem) -> float:
             rounding = rounding_error(one, seconds, seconds / step_s)
-            return (
-                rounding if one.equation.is_linear else rounding + predicted_by_pilot(self, one, step_s, seconds)
-            )
+            return rounding if one.equation.is_linear else rounding + predicted_by_pilot(self, one, step_s, seconds)
 
         return every_member(problem, of, max)
 
