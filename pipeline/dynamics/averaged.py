@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics.equation import Problem, Real
-from pipeline.dynamics.integrator import Trajectory, every_member, integrate
+from pipeline.dynamics.integrator import Trajectory, integrate, worst_error
+from pipeline.errors import DynamicsError
 from pipeline.laws.drag import amplitudes
 from pipeline.track import F8
 
@@ -37,13 +38,21 @@ def amplitude(start: Real, gamma: Real, beta: Real, mu: Real, t: F8) -> F8:
     (n,) or (n, m) float64, m
         By the closed form of :mod:`pipeline.laws.drag`.
 
+    Raises
+    ------
+    DynamicsError
+        If products of the coefficients leave the range of numbers.
+
     Examples
     --------
     >>> amplitude(0.05, 0.0, 0.0, 0.01, np.array([0.0, 2.0, 6.0]))
     array([0.05, 0.03, 0.  ])
     """
     theta = np.array(np.broadcast_arrays(start, mu, gamma, beta), np.float64)
-    found = amplitudes(t, theta.reshape(4, -1).T)
+    with np.errstate(all="ignore"):
+        found = amplitudes(np.asarray(t, np.float64), theta.reshape(4, -1).T)
+    if np.any(np.isnan(found)):
+        raise DynamicsError("the amplitude's coefficients leave the range of numbers; take smaller ones")
     return found[0] if theta.ndim == 1 else np.ascontiguousarray(found.T)
 
 
@@ -55,18 +64,19 @@ def stopping_time(start: Real, gamma: Real, beta: Real, mu: Real) -> Real:
     >>> float(stopping_time(0.05, 0.0, 0.0, 0.01))
     5.0
     """
-    square = 0.25 * np.square(gamma) - np.multiply(mu, beta)
-    kappa = np.sqrt(np.abs(square))
-    # A negative rate, as of a method that adds energy, may outgrow friction: then it never stops.
-    pull = mu + 0.5 * np.asarray(gamma) * start
-    held = (np.asarray(mu) > 0) & (pull > 0) & (mu + (gamma + np.multiply(beta, start)) * start > 0)
-    ratio = np.asarray(start) / np.where(held, pull, 1.0)
-    x = kappa * ratio
-    # kappa < gamma / 2 keeps x below 1 where the hyperbolic form holds.
-    hyperbolic = np.arctanh(np.minimum(np.where(square > 0, x, 0.0), 1.0 - 1e-16))
-    angle = np.where(square > 0, hyperbolic, np.arctan(x))
-    time = np.where(kappa > 0, angle / np.where(kappa > 0, kappa, 1.0), ratio)
-    return np.where(held, time, np.inf)
+    with np.errstate(all="ignore"):
+        square = 0.25 * np.square(gamma) - np.multiply(mu, beta)
+        kappa = np.sqrt(np.abs(square))
+        # A negative rate, as of a method that adds energy, may outgrow friction: then it never stops.
+        pull = mu + 0.5 * np.asarray(gamma) * start
+        held = (np.asarray(mu) > 0) & (pull > 0) & (mu + (gamma + np.multiply(beta, start)) * start > 0)
+        ratio = np.asarray(start) / np.where(held, pull, 1.0)
+        x = kappa * ratio
+        # kappa < gamma / 2 keeps x below 1 where the hyperbolic form holds.
+        hyperbolic = np.arctanh(np.minimum(np.where(square > 0, x, 0.0), 1.0 - 1e-16))
+        angle = np.where(square > 0, hyperbolic, np.arctan(x))
+        time = np.where(kappa > 0, angle / np.where(kappa > 0, kappa, 1.0), ratio)
+        return np.where(held & ~np.isnan(time), time, np.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +110,7 @@ class Averaged:
         def of(one: Problem) -> float:
             return math.inf if self.refusal(one) else predicted_by_pilot(self, one, step_s, seconds)
 
-        return every_member(problem, of, max)
+        return worst_error(problem, step_s, seconds, of)
 
 
 AVERAGED = Averaged()

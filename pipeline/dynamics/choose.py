@@ -203,8 +203,9 @@ def _least_parts(integrator: Integrator, problem: Problem, spacing_s: float) -> 
 def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, seconds: float) -> float:
     """Return what a run of one trajectory costs, ns, on the machine that the figures were taken on.
 
-    Only ratios matter; ``springmass trade --integrators`` measures them on any machine.
+    Only ratios matter; ``python benchmarks/dynamics.py`` compares them with measured times.
     """
+    problem, _ = problem.scaled()
     eq = problem.equation
     name, cubic, friction = integrator.name, bool(eq.cubic_per_m2_s2), bool(eq.friction_m_per_s2)
     if name in _STATE_NS:

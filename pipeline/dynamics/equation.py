@@ -177,6 +177,7 @@ class Problem:
             object.__setattr__(self, "equation", replace(self.equation, **spread))
             object.__setattr__(self, "displacement_m", _broadcast(self.displacement_m, shape))
             object.__setattr__(self, "velocity_m_per_s", _broadcast(self.velocity_m_per_s, shape))
+        self._demand_amplitude()
         self._demand_bound()
 
     @property
@@ -292,6 +293,17 @@ class Problem:
             return cls(equation, _value(scene.start_displacement_m), _value(scene.start_velocity_m_per_s))
         except DynamicsError as error:
             raise DynamicsError(f"{where}: {error}") from error
+
+    def _demand_amplitude(self) -> None:
+        """A start of finite displacement and velocity still has no amplitude where the frequency is next to none."""
+        omega = self.equation.angular_frequency_per_s
+        with np.errstate(over="ignore"):
+            amplitude = np.hypot(self.displacement_m, np.divide(self.velocity_m_per_s, omega))
+        if not np.all(np.isfinite(amplitude)):
+            raise DynamicsError(
+                f"velocity_m_per_s over angular_frequency_per_s must be a length that a number holds, got "
+                f"{_shown(self.velocity_m_per_s)} over {_shown(omega)}"
+            )
 
     def _demand_bound(self) -> None:
         """A softening spring pulls back only up to omega / sqrt(-c), and only below the energy at that point."""

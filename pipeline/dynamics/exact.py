@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.flow import flows
-from pipeline.dynamics.integrator import Trajectory, demand_run, solved
+from pipeline.dynamics.integrator import Trajectory, demand_run, demand_times, solved
 from pipeline.track import F8
 
 __all__ = ["EXACT", "Exact", "rounding_error"]
@@ -54,8 +54,9 @@ class Exact:
         """Return inf: it is exact for any step."""
         return math.inf
 
-    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:  # noqa: ARG002
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the rounding of the phase."""
+        demand_times(step_s, seconds)
         return rounding_error(problem, seconds)
 
 

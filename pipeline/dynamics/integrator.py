@@ -19,11 +19,15 @@ __all__ = [
     "Step",
     "Trajectory",
     "demand_run",
+    "demand_times",
     "every_member",
     "integrate",
     "march_steps",
     "solved",
+    "worst_error",
 ]
+
+SHORTEST_S, LONGEST_S = 1e-100, 1e100
 
 Step = Callable[[Real, Real], tuple[Real, Real]]
 """One step: displacement and velocity before it to those after it."""
@@ -116,14 +120,25 @@ class Trajectory:
         """Return displacements (k,) at times between, (k,) in s, of one trajectory; held before and after.
 
         A cubic through displacements and velocities: it errs by at most (omega spacing)^4 / 384 of the amplitude.
+
+        Raises
+        ------
+        DynamicsError
+            For a time that is no number, or a displacement beyond the range of numbers.
         """
-        place = np.clip(np.asarray(t) / self.spacing_s, 0.0, len(self.y) - 1.0)
-        row = np.minimum(place.astype(np.intp), len(self.y) - 2)
-        x = place - row
-        y, v = self.y, self.v * self.spacing_s
-        rise = x * x * (3.0 - 2.0 * x)
-        bends = x * (1.0 - x) * ((1.0 - x) * v[row] - x * v[row + 1])
-        return np.asarray((1.0 - rise) * y[row] + rise * y[row + 1] + bends)
+        with np.errstate(all="ignore"):
+            place = np.clip(np.asarray(t) / self.spacing_s, 0.0, len(self.y) - 1.0)
+            if np.any(np.isnan(place)):
+                raise DynamicsError("the times asked for must be numbers, got NaN")
+            row = np.minimum(place.astype(np.intp), len(self.y) - 2)
+            x = place - row
+            y, v = self.y, self.v * self.spacing_s
+            rise = x * x * (3.0 - 2.0 * x)
+            bends = x * (1.0 - x) * ((1.0 - x) * v[row] - x * v[row + 1])
+            found = np.asarray((1.0 - rise) * y[row] + rise * y[row + 1] + bends)
+        if not np.all(np.isfinite(found)):
+            raise DynamicsError("between its states the displacement leaves the range of numbers; take a finer spacing")
+        return found
 
     def relative_energy(self) -> F8:
         """Return the mechanical energy over that of the start, (n,) or (n, m); 1 where there was none.
@@ -194,8 +209,7 @@ def demand_run(integrator: Integrator, problem: Problem, step_s: float, steps: i
     ------
     DynamicsError
     """
-    if not (math.isfinite(step_s) and step_s > 0):
-        raise DynamicsError(f"the step must be more than 0 s and finite, got {step_s!r}")
+    demand_times(step_s, step_s * steps)
     if steps < 1 or every < 1 or steps % every:
         raise DynamicsError(
             f"the number of steps must be a positive multiple of {max(every, 1)}, of which one is kept, got {steps}"
@@ -203,6 +217,18 @@ def demand_run(integrator: Integrator, problem: Problem, step_s: float, steps: i
     why = integrator.refusal(problem)
     if why:
         raise DynamicsError(f"{integrator.name} cannot solve this: {why}")
+
+
+def demand_times(step_s: float, seconds: float) -> None:
+    """Refuse a step or a duration that is none, or at which numbers end.
+
+    Raises
+    ------
+    DynamicsError
+    """
+    for name, value in (("step", step_s), ("duration", seconds)):
+        if not SHORTEST_S <= value <= LONGEST_S:
+            raise DynamicsError(f"the {name} must be between {SHORTEST_S:g} and {LONGEST_S:g} s, got {value!r}")
 
 
 def solved(integrator: Integrator, problem: Problem, spacing_s: float, y: F8, v: F8) -> Trajectory:
@@ -223,6 +249,27 @@ def solved(integrator: Integrator, problem: Problem, spacing_s: float, y: F8, v:
                 f"{integrator.name} ran beyond the range of numbers by t = {first:g} s; {_remedy(integrator, problem)}"
             )
     return Trajectory(problem, spacing_s, y, v)
+
+
+def worst_error(problem: Problem, step_s: float, seconds: float, of: Callable[[Problem], float]) -> float:
+    """Return the largest predicted error of an ensemble's members, inf where the prediction runs beyond all numbers.
+
+    Raises
+    ------
+    DynamicsError
+        If there is no member, or step or duration are none.
+    """
+    demand_times(step_s, seconds)
+
+    def bounded(one: Problem) -> float:
+        try:
+            error = of(one)
+        except (OverflowError, ZeroDivisionError):
+            return math.inf
+        return math.inf if math.isnan(error) else error
+
+    with np.errstate(all="ignore"):
+        return every_member(problem, bounded, max)
 
 
 def every_member(problem: Problem, of: Callable[[Problem], float], worst: Callable[..., float]) -> float:

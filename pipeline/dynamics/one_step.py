@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.dynamics.equation import Equation, Problem, Real
-from pipeline.dynamics.integrator import Step, Trajectory, every_member, integrate, march_steps
+from pipeline.dynamics.integrator import Step, Trajectory, every_member, integrate, march_steps, worst_error
 from pipeline.dynamics.predict import predicted_by_average
 from pipeline.dynamics.stability import limit_by_search
 
@@ -50,7 +50,7 @@ class OneStep:
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the error of phase and damping that the step makes, and what friction adds; see Notes of predict."""
-        return every_member(problem, lambda one: predicted_by_average(self, one, step_s, seconds), max)
+        return worst_error(problem, step_s, seconds, lambda one: predicted_by_average(self, one, step_s, seconds))
 
     def _limit(self, problem: Problem) -> float:
         eq = problem.equation

@@ -23,6 +23,7 @@ NEAR = 4.0  # with friction a pilot's step is at most so many planned ones, and 
 STIFF = 10.0  # drag over spring beyond which a pilot cannot have steps that fine all along
 MOST_STIFF_STEPS = 20_000
 MOST_PARTS = 16  # of a step, for the truth beside it
+MOST_STEPS = 2_000_000  # of a truth in many parts
 
 
 def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, seconds: float) -> float:
@@ -64,7 +65,10 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     if fine * omega < FINE / STIFF and pilot < seconds / MOST_STIFF_STEPS:
         pilot, order = seconds / MOST_STIFF_STEPS, min(order, 1)
     share = float((step_s / pilot) ** order)
-    return share * _largest_error(integrator, problem, pilot, fine, seconds) / float(start)
+    parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
+    if parts > NEAR and seconds / pilot * parts > MOST_STEPS:
+        return math.inf  # so coarse that to see its error takes many times the run
+    return share * _largest_error(integrator, problem, pilot, parts, seconds) / float(start)
 
 
 @functools.lru_cache(maxsize=4)
@@ -80,9 +84,9 @@ def _fine_step(problem: Problem) -> float:
     return float(FINE / (hard + eq.gamma_per_s + 2.0 * eq.drag_per_m * hard * start))
 
 
-def _largest_error(integrator: Integrator, problem: Problem, pilot: float, fine: float, seconds: float) -> float:
+def _largest_error(integrator: Integrator, problem: Problem, pilot: float, parts: int, seconds: float) -> float:
     """Return the largest error of a run in steps of the pilot, m."""
-    coarse, truth = _truth(problem, pilot, fine, seconds)
+    coarse, truth = _truth(problem, pilot, parts, seconds)
     if integrator is STRANG and coarse is not None:
         found = coarse
     else:
@@ -94,12 +98,11 @@ def _largest_error(integrator: Integrator, problem: Problem, pilot: float, fine:
 
 
 @functools.lru_cache(maxsize=4)
-def _truth(problem: Problem, pilot: float, fine: float, seconds: float) -> tuple[F8 | None, F8]:
+def _truth(problem: Problem, pilot: float, parts: int, seconds: float) -> tuple[F8 | None, F8]:
     """Return the displacement in steps of the pilot, if these are fine, and the extrapolated one at the same times.
 
     Remembered, as every finer step and the next method ask for it again.
     """
     steps = max(1, round(seconds / pilot))
-    parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
     once, twice = (STRANG.run(problem, pilot / k, steps * k, every=k).y for k in (parts, 2 * parts))
     return once if parts == 1 else None, twice + (twice - once) / 3.0

@@ -37,13 +37,11 @@ def predicted_by_average(method: OneStep, problem: Problem, step_s: float, secon
     start = problem.amplitude_m()
     if start == 0.0:
         return 0.0
+    problem, _ = problem.scaled()
     steps = max(1, round(seconds / step_s))
     floor = rounding_error(problem, seconds, steps)
-    with np.errstate(all="ignore"):
-        if problem.equation.is_linear:
-            error = _linear(method, problem, step_s, steps)
-        else:
-            error = _averaged(method, problem, step_s, steps)
+    whole = _linear if problem.equation.is_linear else _averaged
+    error = whole(method, problem, step_s, steps)
     return error + floor if math.isfinite(error) else math.inf
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,12 +13,13 @@ import numpy as np
 
 from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.exact import rounding_error
-from pipeline.dynamics.integrator import Trajectory, every_member, integrate
+from pipeline.dynamics.integrator import Trajectory, integrate, worst_error
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
 __all__ = ["DOP853", "LSODA", "SolveIvp"]
 
+MOST_CALLS = 2_000_000  # of the right side: many seconds
 LEAST_RTOL = 3e-14  # scipy raises anything less to a hundred roundings
 
 
@@ -58,14 +60,14 @@ class SolveIvp:
         """Return inf: it chooses its own step."""
         return math.inf
 
-    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:  # noqa: ARG002
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what the local tolerance grows to."""
 
         def of(one: Problem) -> float:
             radians = 1.0 + one.equation.angular_frequency_per_s * seconds
             return float(rounding_error(one, seconds) + self.grows * radians * self.rtol(one, seconds))
 
-        return every_member(problem, of, max)
+        return worst_error(problem, step_s, seconds, of)
 
     def rtol(self, problem: Problem, seconds: float) -> float:
         """Return the local tolerance that leads to the one at the end."""
@@ -84,7 +86,7 @@ class SolveIvp:
         """Return displacement and velocity (2, n); with friction from turning point to turning point."""
         from scipy.integrate import solve_ivp
 
-        eq = problem.equation
+        eq, calls = problem.equation, itertools.count()
         start = np.array([problem.displacement_m, problem.velocity_m_per_s])
         size = max(problem.amplitude_m(), np.finfo(np.float64).tiny)
         options: dict[str, Any] = {
@@ -93,7 +95,7 @@ class SolveIvp:
             "atol": rtol * np.array([size, size * eq.angular_frequency_per_s]),
         }
         if not eq.friction_m_per_s2:
-            done = solve_ivp(_right_side(eq, 0), (0.0, float(t[-1])), start, t_eval=t, **options)
+            done = solve_ivp(self._right_side(eq, 0, calls), (0.0, float(t[-1])), start, t_eval=t, **options)
             return np.asarray(self._whole(done).y)
         states = np.empty((2, t.size))
         row, now = 0, 0.0
@@ -104,7 +106,7 @@ class SolveIvp:
                 break
             done = self._whole(
                 solve_ivp(
-                    _right_side(eq, way),
+                    self._right_side(eq, way, calls),
                     (now, float(t[-1])),
                     start,
                     events=_turning(way),
@@ -123,21 +125,24 @@ class SolveIvp:
                 break
         return states
 
+    def _right_side(
+        self, eq: Equation, way: int, calls: itertools.count[int]
+    ) -> Callable[[float, F8], tuple[float, float]]:
+        stiffness, viscous, drag = eq.angular_frequency_per_s**2, 2.0 * eq.gamma_per_s, eq.drag_per_m
+        friction, cubic = way * eq.friction_m_per_s2, eq.cubic_per_m2_s2
+
+        def right_side(t: float, state: F8) -> tuple[float, float]:
+            if next(calls) > MOST_CALLS:
+                raise DynamicsError(f"{self.name} gave up at t = {t:g} s: too stiff or too long; take strang or auto")
+            y, v = float(state[0]), float(state[1])
+            return v, -(stiffness + cubic * y * y) * y - (viscous + drag * abs(v)) * v - friction
+
+        return right_side
+
     def _whole(self, done: Any) -> Any:
         if done.status < 0:
             raise DynamicsError(f"{self.name} gave up: {done.message}; take strang, taylor or auto")
         return done
-
-
-def _right_side(eq: Equation, way: int) -> Callable[[float, F8], tuple[float, float]]:
-    stiffness, viscous, drag = eq.angular_frequency_per_s**2, 2.0 * eq.gamma_per_s, eq.drag_per_m
-    friction, cubic = way * eq.friction_m_per_s2, eq.cubic_per_m2_s2
-
-    def right_side(t: float, state: F8) -> tuple[float, float]:  # noqa: ARG001 - the time is solve_ivp's
-        y, v = float(state[0]), float(state[1])
-        return v, -(stiffness + cubic * y * y) * y - (viscous + drag * abs(v)) * v - friction
-
-    return right_side
 
 
 def _turning(way: int) -> Callable[[float, F8], float]:

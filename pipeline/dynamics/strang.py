@@ -21,14 +21,16 @@ import numpy as np
 from pipeline.dynamics.equation import Problem, Real
 from pipeline.dynamics.exact import rounding_error
 from pipeline.dynamics.flow import flow, flows
-from pipeline.dynamics.integrator import Trajectory, every_member, integrate
+from pipeline.dynamics.integrator import Trajectory, integrate, worst_error
 from pipeline.dynamics.turning import Friction, Frictions
+from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
 __all__ = ["STRANG", "Strang"]
 
 
 SHORT = 1e-3  # radians: between nearer displacements the velocity would be lost in rounding
+LONGEST_WITH_FRICTION = 1e6  # radians a step
 MOST_KEPT = 4_000_000  # states between those asked for that may be held meanwhile
 
 
@@ -65,7 +67,7 @@ class Strang:
             rounding = rounding_error(one, seconds, seconds / step_s)
             return rounding if one.equation.is_linear else rounding + predicted_by_pilot(self, one, step_s, seconds)
 
-        return every_member(problem, of, max)
+        return worst_error(problem, step_s, seconds, of)
 
 
 def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
@@ -175,7 +177,13 @@ def _march_ensemble(problem: Problem, h: float, steps: int, every: int) -> tuple
 
 def _march_with_friction(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
     # Within a step a bob may turn once: no step longer than a radian.
-    parts = max(1, math.ceil(float(np.max(problem.equation.angular_frequency_per_s)) * h))
+    radians = float(np.max(problem.equation.angular_frequency_per_s)) * h
+    if radians > LONGEST_WITH_FRICTION:
+        raise DynamicsError(
+            f"with friction a step of strang is at most {LONGEST_WITH_FRICTION:g} radians, as each of them is looked "
+            f"at for turning points, got {radians:.3g}; take a shorter step"
+        )
+    parts = max(1, math.ceil(radians))
     if problem.is_ensemble:
         ys, vs = Frictions(problem, h / parts).run(steps * parts, every * parts)
         return _with_start(problem, ys, vs)

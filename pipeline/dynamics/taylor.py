@@ -19,7 +19,7 @@ import numpy as np
 
 from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.exact import rounding_error
-from pipeline.dynamics.integrator import Trajectory, every_member, integrate
+from pipeline.dynamics.integrator import Trajectory, integrate, worst_error
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
@@ -60,9 +60,15 @@ class Taylor:
         """Return inf: it chooses its own step."""
         return math.inf
 
-    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:  # noqa: ARG002
-        """Return the tolerance, or the rounding where that is more."""
-        return every_member(problem, lambda one: max(self.tolerance, rounding_error(one, seconds)), max)
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return the tolerance, or the rounding where that is more; inf for more steps than it takes."""
+
+        def of(one: Problem) -> float:
+            if _fastest(one) * seconds > LONGEST * MOST_STEPS:
+                return math.inf
+            return max(self.tolerance, rounding_error(one, seconds))
+
+        return worst_error(problem, step_s, seconds, of)
 
     def order_of(self, problem: Problem, seconds: float) -> int:
         """Return the number of terms of its series."""
@@ -83,7 +89,8 @@ TAYLOR = Taylor()
 def _fastest(problem: Problem) -> float:
     """The frequency of a spring as hard as it gets, 1/s."""
     eq = problem.equation
-    return math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * problem.amplitude_m() ** 2)
+    start = problem.amplitude_m()
+    return math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * start * start)
 
 
 def _local(problem: Problem, seconds: float, tolerance: float) -> float:
@@ -104,6 +111,11 @@ def _solve(problem: Problem, apart: float, count: int, tolerance: float) -> F8:
     fast, local = _fastest(problem), _local(problem, apart * count, tolerance)
     order = _order(local)
     kinked = eq.drag_per_m > 0 or eq.friction_m_per_s2 > 0
+    too_long = DynamicsError(
+        f"taylor needs more than {MOST_STEPS} steps for {apart * (count - 1):g} s; take a shorter run, strang or auto"
+    )
+    if fast * apart * (count - 1) > LONGEST * MOST_STEPS and not eq.has_friction:
+        raise too_long
     row, since = 0, 0.0  # the last state kept, and the time since: a sum of short times rounds little
     for _ in range(MOST_STEPS):
         way = eq.direction(y, v) if kinked else 1
@@ -125,9 +137,7 @@ def _solve(problem: Problem, apart: float, count: int, tolerance: float) -> F8:
         y, v = _polynomial(ys, h), 0.0 if turned else _polynomial(vs, h)
         if row == count - 1:
             return states
-    raise DynamicsError(
-        f"taylor needs more than {MOST_STEPS} steps for {apart * (count - 1):g} s; take a shorter run, strang or auto"
-    )
+    raise too_long
 
 
 def _series(eq: Equation, way: int, y: float, v: float, unit: float, order: int) -> tuple[list[float], list[float]]:
