@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,10 +12,14 @@ import numpy as np
 from scipy.signal import lfilter
 
 from pipeline.dynamics import Equation, Problem, get_integrator
+from pipeline.dynamics.choose import AUTO, choose, cost_ns
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.solve_ivp import LSODA, SolveIvp
 from pipeline.dynamics.taylor import TAYLOR
+from pipeline.errors import DynamicsError
+from pipeline.track import F8
 
+Scene = tuple[Problem, float, int, float]
 MIXED = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
 LINEAR = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.0073), 0.05)
 STEP_S, COUNT = 0.01, 12_000
@@ -36,6 +41,11 @@ def main() -> int:
         )
     for name, error in errors().items():
         print(f"      {error:.2g}  error over the amplitude of {name}")
+    off = costs(time.process_time)
+    middle = float(np.median(np.concatenate(list(off.values()))))
+    for name, ratios in off.items():
+        low, half, high = np.quantile(ratios / middle, (0.05, 0.5, 0.95))
+        print(f"      {half:.2f} ({low:.2f} to {high:.2f})  time over cost_ns of {name}, of {len(ratios)} runs")
     return int(bad > 0)
 
 
@@ -49,6 +59,8 @@ def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable
     pulse = np.zeros(COUNT + 1)
     pulse[0] = 0.05
     lsoda = equal_lsoda()
+    scenes = spread_scenes(60)
+    choices = [choose(*scene) for scene in scenes]
     return [
         (
             "Strang, mixed drag, 120 s",
@@ -77,7 +89,83 @@ def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable
             lambda: strang.run(MIXED, STEP_S, SHORT, every=100),
             15,
         ),
+        (
+            f"a trajectory of {MEMBERS} together, with friction",
+            "one alone",
+            0.05,
+            1.0 / MEMBERS,
+            lambda: strang.run(with_friction(ensemble, 1e-3), STEP_S, SHORT, every=100),
+            lambda: strang.run(with_friction(MIXED, 1e-3), STEP_S, SHORT, every=100),
+            7,
+        ),
+        (
+            f"choosing for {len(scenes)} scenes",
+            "running what is chosen",
+            2.0,
+            1.0,
+            lambda: [choose(problem, *rest) for problem, *rest in (fresh(scene) for scene in scenes)],
+            lambda: [choice.run(scene[2]) for choice, scene in zip(choices, scenes, strict=True)],
+            5,
+        ),
     ]
+
+
+def with_friction(problem: Problem, mu_m_per_s: float) -> Problem:
+    """Return the problem with the friction that takes so much amplitude a second."""
+    eq = problem.equation
+    return replace(
+        problem, equation=replace(eq, friction_m_per_s2=0.5 * np.pi * eq.angular_frequency_per_s * mu_m_per_s)
+    )
+
+
+def spread_scenes(number: int) -> list[Scene]:
+    """Return scenes with all terms now and then: a problem, the spacing of its samples, their number, a tolerance."""
+    rng = np.random.default_rng(3)
+
+    def spread(low: float, high: float, share: float = 1.0) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high)))) if rng.random() < share else 0.0
+
+    found = []
+    for _ in range(number):
+        equation = Equation(
+            angular_frequency_per_s=8.66,
+            gamma_per_s=spread(1e-4, 10.0, 0.8),
+            drag_per_m=spread(1e-4, 10.0, 0.8),
+            friction_m_per_s2=spread(1e-4, 1.0, 0.4),
+            cubic_per_m2_s2=spread(1.0, 3000.0, 0.3),
+        )
+        radians = spread(0.01, 1.0)
+        count = int(spread(6.0, 600.0) / radians) + 1
+        found.append((Problem(equation, 0.05), radians / 8.66, count, spread(1e-9, 1e-2)))
+    return found
+
+
+def fresh(scene: Scene) -> Scene:
+    """Return the same as a new problem, of which no pilot is remembered."""
+    return (replace(scene[0]), *scene[1:])
+
+
+def costs(timer: Callable[[], float], number: int = 60, rounds: int = 5) -> dict[str, F8]:
+    """Return the measured times of runs over what ``cost_ns`` has them cost, by integrator, those that auto takes."""
+    found: dict[str, list[float]] = {}
+    for problem, spacing, count, tolerance in spread_scenes(number):
+        for integrator in (*AUTO, get_integrator("rk4"), get_integrator("verlet")):
+            if integrator.refusal(problem):
+                continue
+            if integrator is TAYLOR:
+                integrator = replace(TAYLOR, tolerance=tolerance)
+            least = np.inf
+            for _ in range(rounds):
+                start = timer()
+                try:
+                    integrator.run(problem, spacing, count)
+                except DynamicsError:
+                    break
+                least = min(least, timer() - start)
+            if np.isfinite(least):
+                cost = cost_ns(integrator, problem, 1, count, spacing * count)
+                found.setdefault(integrator.name, []).append(1e9 * least / cost)
+    return {name: np.array(each) for name, each in found.items()}
 
 
 def equal_lsoda() -> SolveIvp:

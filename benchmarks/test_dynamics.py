@@ -6,6 +6,7 @@ import importlib.util
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 HERE = Path(__file__).resolve().parent
@@ -41,3 +42,16 @@ def test_every_ratio_can_be_taken(dynamics):
     together, alone = found["a trajectory of 4096 together"]
     assert together.y.shape == (13, 4096)
     assert alone.y.shape == (13,)
+    together, alone = found["a trajectory of 4096 together, with friction"]
+    assert together.y.shape == (13, 4096)
+    assert alone.y.shape == (13,)
+    choices, runs = found["choosing for 60 scenes"]
+    assert [choice.integrator.name in ("exact", "averaged", "strang", "taylor") for choice in choices] == [True] * 60
+    assert [len(run.y) for run in runs] == [scene[2] + 1 for scene in dynamics.spread_scenes(60)]
+
+
+def test_the_cost_of_a_run_can_be_compared_with_its_time(dynamics):
+    """By a timer that counts calls every run takes one, over a cost that is positive."""
+    ratios = dynamics.costs(iter(range(10_000)).__next__, number=6, rounds=1)
+    assert {"strang", "taylor", "averaged", "rk4", "verlet"} <= set(ratios)
+    assert all((each > 0.0).all() and np.isfinite(each).all() for each in ratios.values())

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.dynamics.equation import Real
 from pipeline.track import F8
 
-__all__ = ["Entries", "flow", "flows"]
+__all__ = ["Entries", "flow", "flows", "underdamped"]
 
 Entries = tuple[float, float, float, float]
 """The matrix (a, b; c, d) that takes displacement and velocity through a time."""
@@ -49,22 +49,23 @@ def flows(omega: Real, gamma: Real, t: Real) -> tuple[F8, F8, F8, F8]:
     """Return the entries of :func:`flow` for arrays that broadcast."""
     if type(omega) is float and type(gamma) is float:
         apart = math.sqrt(abs((gamma - omega) * (gamma + omega)))
-        return (_underdamped if gamma < omega else _overdamped)(omega, gamma, apart, np.asarray(t))
+        return (underdamped if gamma < omega else _overdamped)(omega, gamma, apart, np.asarray(t))
     omega, gamma, t = (np.asarray(x, np.float64) for x in (omega, gamma, t))
     under = gamma < omega
     between = np.sqrt(np.abs((gamma - omega) * (gamma + omega)))
     if under.all():
-        return _underdamped(omega, gamma, between, t)
+        return underdamped(omega, gamma, between, t)
     if not under.any():
         return _overdamped(omega, gamma, between, t)
     # Each branch sees only values that it can hold.
-    below = _underdamped(omega, np.where(under, gamma, 0.0), np.where(under, between, omega), t)
+    below = underdamped(omega, np.where(under, gamma, 0.0), np.where(under, between, omega), t)
     above = _overdamped(omega, np.where(under, omega, gamma), np.where(under, 0.0, between), t)
     a, b, c, d = (np.where(under, one, other) for one, other in zip(below, above, strict=True))
     return a, b, c, d
 
 
-def _underdamped(omega: Real, gamma: Real, damped: Real, t: F8) -> tuple[F8, F8, F8, F8]:
+def underdamped(omega: Real, gamma: Real, damped: Real, t: F8) -> tuple[F8, F8, F8, F8]:
+    """Return the entries of :func:`flows` below critical damping; ``damped`` is the root of omega^2 - gamma^2, 1/s."""
     shrink = np.exp(-gamma * t)
     cosine, b = shrink * np.cos(damped * t), shrink * np.sin(damped * t) / damped
     return cosine + gamma * b, b, -omega * omega * b, cosine - gamma * b

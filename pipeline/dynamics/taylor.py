@@ -64,7 +64,11 @@ class Taylor:
         """Return the tolerance, or the rounding where that is more; inf for more steps than it takes."""
 
         def of(one: Problem) -> float:
-            if _fastest(one) * seconds > LONGEST * MOST_STEPS:
+            one, _ = one.scaled()
+            eq = one.equation
+            # Where drag outweighs the spring its own time is what a step has.
+            stiff = math.sqrt(1.0 + eq.drag_per_m * one.amplitude_m())
+            if (_fastest(one) * stiff + eq.gamma_per_s) * seconds > LONGEST * MOST_STEPS:
                 return math.inf
             return max(self.tolerance, rounding_error(one, seconds))
 

@@ -6,12 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.dynamics.equation import Equation, Problem
-from pipeline.dynamics.flow import flow, flows
+from pipeline.dynamics.flow import flow, flows, underdamped
 from pipeline.track import F8
 
 __all__ = ["Friction", "Frictions"]
 
+Entries = tuple[F8, F8, F8, F8]
+"""The matrix of half a step, each entry of every member."""
+
 OVERWHELMING = 1e9  # friction over every other force: it stops the bob before anything else acts
+BLOCK_RADIANS, LONGEST_BLOCK = 1.4, 32  # turning points lie pi apart
 _CLOSE = 1e-12  # of a step: the displacement does not feel it where the velocity is 0
 _MOST = 40
 
@@ -138,7 +142,7 @@ def _guess(h: float, v0: float, v1: float, a0: float, a1: float) -> float:
 
 
 class Frictions:
-    """An ensemble of such bobs; those that turn within a step are treated together.
+    """An ensemble of such bobs, in blocks of steps; those that turn within a block are treated together.
 
     Parameters
     ----------
@@ -153,45 +157,89 @@ class Frictions:
         self.v: F8 = np.array(problem.velocity_m_per_s)
         self._h = step_s
         self._all = _Members(problem.equation)
-        self._half = flows(problem.equation.angular_frequency_per_s, problem.equation.gamma_per_s, 0.5 * step_s)
+        self._half = self._all.half(np.full(self.y.size, step_s))
         others = np.abs(self._all.pull(self.y)) + self._all.fastest * np.abs(self.v)
         self.v[self._all.hold > OVERWHELMING * others] = 0.0
         self._way = np.where(self.v != 0.0, np.sign(self.v), self._all.released(self.y))
+        # As long as few turn twice within a block: those are not treated together.
+        fastest = float(np.max(problem.equation.angular_frequency_per_s, initial=0.0))
+        self._block = min(max(int(BLOCK_RADIANS / (fastest * step_s or 1.0)), 1), LONGEST_BLOCK)
 
     def run(self, steps: int, every: int) -> F8:
         """Go on by so many steps; return every so many states, displacements and velocities (2, n, m)."""
         states = np.empty((2, steps // every, self.y.size))
-        for number in range(1, steps + 1):
-            self._step()
-            if number % every == 0:
-                states[:, number // every - 1] = self.y, self.v
+        for done in range(0, steps, self._block):
+            within = self._after(min(self._block, steps - done))
+            kept = np.arange(-(done + 1) % every, within.shape[1], every)
+            states[:, (done + 1 + kept) // every - 1] = within[:, kept]
         return states
 
-    def _step(self) -> None:
-        way = self._way
-        y, v = self._all.moved(self.y, self.v, way, self._half, self._h)
-        turns = np.flatnonzero(v * way <= 0.0)
+    def _after(self, steps: int) -> F8:
+        """Go on by a block; return all its states (2, steps, m)."""
+        way, rest = self._way, -self._way * self._all.shift
+        states = np.empty((2, steps, self.y.size))
+        y, v = self.y, self.v
+        straight, late, before = way != 0.0, [], []
+        for number in range(steps):
+            y_after, v_after = self._all.moved(y, v, rest, self._half, self._h)
+            turns = np.flatnonzero((v_after * way <= 0.0) & straight)
+            if turns.size:
+                straight[turns] = False
+                late.append(turns)
+                before.append((y[turns], v[turns], y_after[turns], v_after[turns]))
+            else:
+                late.append(turns)
+            y, v = y_after, v_after
+            states[0, number], states[1, number] = y, v
+        held = way == 0.0
+        if held.any():
+            states[0][:, held], states[1][:, held] = self.y[held], 0.0
+        if before:
+            self._turned(states, late, before)
+        self.y, self.v = states[:, -1]
+        return states
+
+    def _turned(self, states: F8, late: list[NDArray[np.intp]], before: list[tuple[F8, F8, F8, F8]]) -> None:
+        """Write the states, from their turning point to the end of the block, of those that turn."""
+        which = np.concatenate(late)
+        some, way = self._all[which], self._way[which]
+        half = _those(self._half, which)
+        y, v, way = self._around(some, way, *(np.concatenate(each) for each in zip(*before, strict=True)))
+        count = 0
+        for number, turns in enumerate(late):
+            if count:  # those of earlier steps go on
+                one, entries = some[:count], _those(half, slice(count))
+                y[:count], v[:count], way[:count] = self._step(one, entries, y[:count], v[:count], way[:count])
+            count += turns.size
+            states[0, number, which[:count]], states[1, number, which[:count]] = y[:count], v[:count]
+        self._way[which] = way
+
+    def _step(self, some: _Members, half: Entries, y: F8, v: F8, way: F8) -> tuple[F8, F8, F8]:
+        """Return states and ways after one step, whoever turns in it."""
+        y_after, v_after = some.moved(y, v, -way * some.shift, half, self._h)
+        turns = np.flatnonzero(v_after * way <= 0.0)
         if turns.size:
             held = way[turns] == 0.0
-            y[turns[held]], v[turns[held]] = self.y[turns[held]], 0.0
+            y_after[turns[held]], v_after[turns[held]] = y[turns[held]], 0.0
             turns = turns[~held]
         if turns.size:
-            y[turns], v[turns] = self._around(turns, y[turns], v[turns])
-        self.y, self.v = y, v
+            way = way.copy()
+            y_after[turns], v_after[turns], way[turns] = self._around(
+                some[turns], way[turns], y[turns], v[turns], y_after[turns], v_after[turns]
+            )
+        return y_after, v_after, way
 
-    def _around(self, turns: NDArray[np.intp], y: F8, v: F8) -> tuple[F8, F8]:
-        """Return the states after a step that holds a turning point."""
-        some, way = self._all[turns], self._way[turns]
-        spent = self._turning(some, self.y[turns], self.v[turns], way, y, v)
-        y, _ = some.moved(self.y[turns], self.v[turns], way, some.half(spent), spent)
-        self._way[turns] = way = some.released(y)
+    def _around(self, some: _Members, way: F8, y: F8, v: F8, y_after: F8, v_after: F8) -> tuple[F8, F8, F8]:
+        """Return the states and ways after a step that holds a turning point."""
+        spent, y = self._turning(some, y, v, way, y_after, v_after)
+        way = some.released(y)
         left = self._h - spent
-        after = some.moved(y, np.zeros_like(y), way, some.half(left), left)
-        return np.where(way != 0.0, after[0], y), np.where(way != 0.0, after[1], 0.0)
+        after = some.moved(y, np.zeros_like(y), -way * some.shift, some.half(left), left)
+        return np.where(way != 0.0, after[0], y), np.where(way != 0.0, after[1], 0.0), way
 
-    def _turning(self, some: _Members, y: F8, v: F8, way: F8, y_after: F8, v_after: F8) -> F8:
+    def _turning(self, some: _Members, y: F8, v: F8, way: F8, y_after: F8, v_after: F8) -> tuple[F8, F8]:
+        """Return the times within the step at which velocities pass zero, and the displacements there."""
         low, high = np.zeros(y.size), np.full(y.size, self._h)
-        before, since = v, np.zeros(y.size)
         slopes = (some.slope(y, v, way), some.slope(y_after, v_after, way))
         safe = [np.where(slope == 0.0, 1.0, slope) for slope in slopes]
         share = v / np.where(v == v_after, 1.0, v - v_after)
@@ -199,45 +247,57 @@ class Frictions:
             (1.0 - share) / safe[0] - share / safe[1]
         )
         t = np.where((t > low) & (t < high), t, 0.5 * high)
-        for _ in range(_MOST):
-            _, now = some.moved(y, v, way, some.half(t), t)
+        rest = -way * some.shift
+        before, since = v, low
+        for number in range(_MOST):
+            y_now, now = some.moved(y, v, rest, some.half(t), t)
             ahead = now * way > 0.0
             low, high = np.where(ahead, t, low), np.where(ahead, high, t)
-            better = t - np.where(now == before, 0.0, now * (t - since) / np.where(now == before, 1.0, now - before))
+            # The guess is near: from there along the acceleration, then along secants.
+            rise, run = (now - before, t - since) if number else (some.slope(y_now, now, way), 1.0)
+            better = t - np.where(rise == 0.0, 0.0, now * run / np.where(rise == 0.0, 1.0, rise))
             better = np.where((better >= low) & (better <= high), better, 0.5 * (low + high))
             before, since = now, t
             change, t = np.abs(better - t), better
             if np.max(change) <= _CLOSE * self._h:
                 break
-        return t
+        return t, y_now  # so near the turning point the displacement rests
+
+
+def _those(half: Entries, which: NDArray[np.intp] | slice) -> Entries:
+    a, b, c, d = half
+    return a[which], b[which], c[which], d[which]
 
 
 class _Members:
     """The coefficients of an ensemble, or of some of its members, as arrays."""
 
     def __init__(self, equation: Equation) -> None:
-        self._equation = equation
-        self.omega, self.gamma, self.drag = (
-            equation.angular_frequency_per_s,
-            equation.gamma_per_s,
-            equation.drag_per_m,
+        self.omega, self.gamma, self.drag, self.hold, self.cubic = (
+            getattr(equation, name) for name in equation.__slots__
         )
-        self.hold, self.cubic = equation.friction_m_per_s2, equation.cubic_per_m2_s2
         self.shift = self.hold / self.omega**2
         self.fastest = self.omega + self.gamma
+        self.between = np.sqrt(np.abs((self.gamma - self.omega) * (self.gamma + self.omega)))
+        self._turning = bool(np.all(self.gamma < self.omega))
         self._with_cubic = bool(np.any(self.cubic))
 
-    def __getitem__(self, which: NDArray[np.intp]) -> _Members:
-        eq = self._equation
-        return _Members(Equation(**{name: getattr(eq, name)[which] for name in eq.__slots__}))
+    def __getitem__(self, which: NDArray[np.intp] | slice) -> _Members:
+        some = object.__new__(_Members)
+        for name in ("omega", "gamma", "drag", "hold", "cubic", "shift", "fastest", "between"):
+            setattr(some, name, getattr(self, name)[which])
+        some._turning, some._with_cubic = self._turning, self._with_cubic
+        return some
 
-    def half(self, t: F8) -> tuple[F8, F8, F8, F8]:
+    def half(self, t: F8) -> Entries:
         """Return the matrix of half a step of each its own length."""
+        if self._turning:
+            return underdamped(self.omega, self.gamma, self.between, 0.5 * t)
         return flows(self.omega, self.gamma, 0.5 * t)
 
     def pull(self, y: F8) -> F8:
         """Return the spring's pull per mass."""
-        return np.asarray(self.omega**2 * y + self.cubic * y**3 if self._with_cubic else self.omega**2 * y)
+        return np.asarray(self.omega**2 * y + self.cubic * y * y * y if self._with_cubic else self.omega**2 * y)
 
     def released(self, y: F8) -> F8:
         """Return which way each moves from rest, 0 where friction holds it."""
@@ -248,16 +308,34 @@ class _Members:
         """Return the acceleration of each if it keeps its way."""
         return np.asarray(-(self.pull(y) + (2.0 * self.gamma + self.drag * v * way) * v + way * self.hold))
 
-    def moved(self, y: F8, v: F8, way: F8, half: tuple[F8, F8, F8, F8], h: float | F8) -> tuple[F8, F8]:
-        """Return the states after a step if none turns."""
+    def moved(self, y: F8, v: F8, rest: F8, half: Entries, h: float | F8) -> tuple[F8, F8]:
+        """Return the states after a step about the rest position of each one's way, if none turns."""
         a, b, c, d = half
-        rest = -way * self.shift
         y = y - rest
-        y, v = a * y + b * v, c * y + d * v
-        if not self._with_cubic:
-            v = v / (1.0 + self.drag * h * np.abs(v))
-        else:
-            push = 0.5 * h * self.cubic * (y + rest) ** 3
-            v = v - push
-            v = v / (1.0 + self.drag * h * np.abs(v)) - push
-        return a * y + b * v + rest, c * y + d * v
+        y_middle, speed = a * y, b * v
+        y_middle += speed
+        np.multiply(c, y, out=y)
+        v = d * v
+        v += y
+        if self._with_cubic:
+            reach = y_middle + rest
+            push = reach * reach
+            push *= reach
+            push *= self.cubic
+            push *= 0.5 * h
+            v -= push
+        np.abs(v, out=speed)
+        speed *= self.drag
+        speed *= h
+        speed += 1.0
+        v /= speed
+        if self._with_cubic:
+            v -= push
+        np.multiply(a, y_middle, out=y)
+        np.multiply(b, v, out=speed)
+        y += speed
+        y += rest
+        np.multiply(c, y_middle, out=y_middle)
+        v *= d
+        v += y_middle
+        return y, v
