@@ -82,7 +82,10 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
         if h > method.stable_step(problem):
             return math.inf
         return predicted_by_pilot(method, problem, h, h * steps) + float(friction)
-    values = np.linalg.eigvals(step_matrix(method, omega * h, gamma / omega).astype(np.complex128))
+    matrix = step_matrix(method, omega * h, gamma / omega)
+    if not np.all(np.isfinite(matrix)):
+        return math.inf
+    values = np.linalg.eigvals(matrix.astype(np.complex128))
     turning = np.log(values[np.argmax(values.imag)]) / h
     if turning.imag <= 0.0:
         return math.inf
