@@ -89,7 +89,7 @@ class Averaged:
 
     def refusal(self, problem: Problem) -> str:
         """Return why not, where a cycle changes the amplitude too much to be averaged over."""
-        if np.any(_weakness(problem) > WEAK):
+        if not np.all(_weakness(problem) <= WEAK):
             return (
                 f"a cycle can be averaged over where damping takes less than {WEAK:g} per radian; take strang or auto"
             )
@@ -120,8 +120,9 @@ def _weakness(problem: Problem) -> Real:
     """Damping per radian at the start."""
     gamma, beta, mu = problem.equation.laws()
     start = np.asarray(problem.amplitude_m())
-    held = np.where(start > 0, mu / np.where(start > 0, start, 1.0), 0.0)
-    return (gamma + beta * start + held) / problem.equation.angular_frequency_per_s
+    with np.errstate(all="ignore"):
+        held = np.where(start > 0, mu / np.where(start > 0, start, 1.0), 0.0)
+        return (gamma + beta * start + held) / problem.equation.angular_frequency_per_s
 
 
 def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:

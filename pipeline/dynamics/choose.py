@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pipeline.dynamics.averaged import AVERAGED, stopping_time
 from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.exact import EXACT, rounding_error
-from pipeline.dynamics.integrator import Integrator, Trajectory
+from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
 from pipeline.dynamics.solve_ivp import SolveIvp
 from pipeline.dynamics.strang import STRANG
 from pipeline.dynamics.taylor import TAYLOR, Taylor
@@ -116,6 +116,7 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     'taylor'
     """
     seconds = spacing_s * count
+    demand_times(spacing_s, seconds)
     demand_tolerance(problem, seconds, tolerance)
     reduced, terms = required(problem, seconds, tolerance)
     room = tolerance - sum(term.size for term in terms if not term.included)
@@ -164,9 +165,10 @@ def fit_step(
 
     The step divides the spacing of the kept states. What costs more than ``most_ns`` is not looked at.
     """
+    seconds = spacing_s * count
+    demand_times(spacing_s, seconds)
     if integrator.refusal(problem):
         return None
-    seconds = spacing_s * count
     if isinstance(integrator, Taylor | SolveIvp):
         integrator = replace(integrator, tolerance=min(tolerance, 1e-3))
     if cost_ns(integrator, problem, 1, count, seconds) >= most_ns:
@@ -205,6 +207,7 @@ def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, se
 
     Only ratios matter; ``python benchmarks/dynamics.py`` compares them with measured times.
     """
+    demand_times(seconds, seconds)
     problem, _ = problem.scaled()
     eq = problem.equation
     name, cubic, friction = integrator.name, bool(eq.cubic_per_m2_s2), bool(eq.friction_m_per_s2)

@@ -87,13 +87,17 @@ class Equation:
         return 0 if abs(pull) <= self.friction_m_per_s2 else -1 if pull > 0 else 1
 
     def laws(self) -> tuple[Real, Real, Real]:
-        """Return gamma (1/s), beta (1/(m s)) and mu (m/s) of the averaged dA/dt = -(mu + gamma A + beta A^2)."""
+        """Return gamma (1/s), beta (1/(m s)) and mu (m/s) of the averaged dA/dt = -(mu + gamma A + beta A^2).
+
+        One that is too large for a number is inf.
+        """
         omega = self.angular_frequency_per_s
-        return (
-            self.gamma_per_s,
-            self.drag_per_m * omega / _AMPLITUDE_TO_DRAG,
-            2.0 * self.friction_m_per_s2 / (math.pi * omega),
-        )
+        with np.errstate(over="ignore"):
+            return (
+                self.gamma_per_s,
+                self.drag_per_m * omega / _AMPLITUDE_TO_DRAG,
+                2.0 * self.friction_m_per_s2 / (math.pi * omega),
+            )
 
     @classmethod
     def from_laws(

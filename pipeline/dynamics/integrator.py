@@ -148,8 +148,8 @@ class Trajectory:
         scaled, unit = self.problem.scaled()
         with np.errstate(over="ignore", invalid="ignore"):
             now = _energy(scaled, self.y / unit, self.v / unit)
-        start = _energy(scaled, np.asarray(scaled.displacement_m), np.asarray(scaled.velocity_m_per_s))
-        relative = np.divide(now, start, out=np.ones_like(now), where=np.broadcast_to(start > 0, now.shape))
+            start = _energy(scaled, np.asarray(scaled.displacement_m), np.asarray(scaled.velocity_m_per_s))
+            relative = np.divide(now, start, out=np.ones_like(now), where=np.broadcast_to(start > 0, now.shape))
         if not np.all(np.isfinite(relative)):
             raise DynamicsError("the energy grew beyond the range of numbers; take fewer steps or another method")
         return relative

@@ -80,7 +80,10 @@ class SolveIvp:
         rtol = self.rtol(problem, float(t[-1]))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of a failure that solve_ivp reports as well
-            solved = [self._solve(one, t, rtol) for one in problem.members()]
+            try:
+                solved = [self._solve(one, t, rtol) for one in problem.members()]
+            except (ValueError, np.linalg.LinAlgError) as error:  # scipy's, where its numbers end
+                raise DynamicsError(f"{self.name} gave up: {error}; take strang, taylor or auto") from error
         if not problem.is_ensemble:
             return solved[0][0], solved[0][1]
         return np.stack([y for y, _ in solved], axis=1), np.stack([v for _, v in solved], axis=1)

@@ -56,7 +56,7 @@ class Strang:
         if not np.any(eq.cubic_per_m2_s2):
             return math.inf
         with np.errstate(over="ignore"):
-            added = 3.0 * np.abs(eq.cubic_per_m2_s2) * np.square(problem.amplitude_m())
+            added = 3.0 * np.square(np.sqrt(np.abs(eq.cubic_per_m2_s2)) * problem.amplitude_m())
         return float(np.min(1.0 / np.sqrt(added + eq.angular_frequency_per_s**2)))
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:

@@ -1,0 +1,153 @@
+"""No warning, overflow or NaN leaves a public function of the dynamics, whatever numbers it is given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem, get_integrator, solve_ivp, taylor
+from pipeline.dynamics.averaged import amplitude, stopping_time
+from pipeline.dynamics.choose import choose, cost_ns, fit_step, least_tolerance
+from pipeline.dynamics.terms import required
+from pipeline.errors import DynamicsError
+
+PROBLEMS = 60
+STEPS = 40
+EXTREMES = (
+    *(0.0, -0.0, 5e-324, 1e-310, 1e-300, 1e-160, 1e-100, 1e-30, 1e-12, 1.0, 1e12, 1e30, 1e100, 1e154, 1e155, 1e200),
+    *(1e300, 1.7e308, math.inf, -math.inf, math.nan, -1.0, -1e-310, -1e300),
+)
+REFUSED = object()
+
+
+def value(rng: np.random.Generator, tame: float) -> float:
+    """Return a number near 1 with some probability, else of any power of ten, else an extreme."""
+    draw = rng.random()
+    if draw < tame:
+        return float(10.0 ** rng.uniform(-3.0, 2.0))
+    if draw < 0.9:
+        return float(10.0 ** rng.uniform(-320.0, 308.0)) * (1.0 if rng.random() < 0.9 else -1.0)
+    return EXTREMES[rng.integers(len(EXTREMES))]
+
+
+def coefficients(rng: np.random.Generator) -> dict[str, float]:
+    """Return what an equation is made of: each term there or not."""
+    shares = {"gamma_per_s": 0.7, "drag_per_m": 0.6, "friction_m_per_s2": 0.4, "cubic_per_m2_s2": 0.3}
+    found = {name: value(rng, 0.5) if rng.random() < share else 0.0 for name, share in shares.items()}
+    return {"angular_frequency_per_s": value(rng, 0.7), **found}
+
+
+def attempt(call: Callable[[], Any], *, infinite: bool = False) -> Any:
+    """Return what a call gives, every number in it finite; a refusal in one line is as good."""
+    try:
+        found = call()
+    except DynamicsError as error:
+        refusal = str(error)
+        found = REFUSED
+    else:
+        refusal = ""
+    assert "\n" not in refusal
+    for each in found if isinstance(found, tuple) else (found,):
+        if isinstance(each, float | np.ndarray):
+            assert not np.any(np.isnan(each))
+            assert infinite or np.all(np.isfinite(each))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_number_is_answered_by_a_number_or_one_line(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From 5e-324 to 1.7e308, zero, negative, infinite and NaN: warnings are errors, so are overflows and NaN."""
+    # What would take minutes gives up after moments, by the same way.
+    monkeypatch.setattr(taylor, "MOST_STEPS", 500)
+    monkeypatch.setattr(solve_ivp, "MOST_CALLS", 5_000)
+    rng = np.random.default_rng((61, seed))
+    for _ in range(PROBLEMS):
+        given: dict[str, Any] = coefficients(rng)
+        members = rng.random() < 0.2
+        if members:
+            given = {name: np.array([each, value(rng, 0.8), value(rng, 0.8)]) for name, each in given.items()}
+        equation = attempt(lambda given=given: Equation(**given))
+        if equation is REFUSED:
+            continue
+        attempt(equation.laws, infinite=True)
+        start = value(rng, 0.5), value(rng, 0.5)
+        problem = attempt(lambda equation=equation, start=start: Problem(equation, *start))
+        if problem is REFUSED:
+            continue
+        step = float(rng.choice([1e-3, 0.05, 0.5, 2.0]) / np.max(equation.angular_frequency_per_s))
+        step = step if rng.random() < 0.8 else value(rng, 0.3)
+        solved_by_all(problem, step, rng)
+        if not members:
+            chosen_for(problem, step, float(10.0 ** rng.uniform(-13.0, 0.0)))
+
+
+def solved_by_all(problem: Problem, step: float, rng: np.random.Generator) -> None:
+    """Ask some integrators for everything they can say about a problem."""
+    for name in rng.choice(list(INTEGRATORS), 4, replace=False).tolist():
+        solved_by(get_integrator(name), problem, step)
+
+
+def solved_by(integrator: Integrator, problem: Problem, step: float) -> None:
+    """Ask one integrator."""
+    attempt(lambda: integrator.refusal(problem))
+    attempt(lambda: integrator.stable_step(problem), infinite=True)
+    attempt(lambda: integrator.predicted_error(problem, step, step * STEPS), infinite=True)
+    run = attempt(lambda: integrator.run(problem, step, STEPS, every=4))
+    if run is REFUSED:
+        return
+    for each in (run.y, run.v, run.t):
+        assert np.all(np.isfinite(each))
+    attempt(run.relative_energy)
+    attempt(run.energy_j_per_kg)
+    if not problem.is_ensemble:
+        attempt(lambda: run.at(np.array([-1.0, 0.0, step, 50.0 * step])))
+
+
+def chosen_for(problem: Problem, step: float, tolerance: float) -> None:
+    """Ask for the choice, what it costs, and what is averaged."""
+    attempt(problem.amplitude_m)
+    attempt(lambda: required(problem, step * STEPS, tolerance)[0].equation.laws(), infinite=True)
+    attempt(lambda: least_tolerance(problem, step * STEPS), infinite=True)
+    choice = attempt(lambda: choose(problem, step, STEPS, tolerance))
+    if choice is not REFUSED:
+        attempt(lambda: choice.run(STEPS).y)
+    for integrator in INTEGRATORS.values():
+        attempt(lambda integrator=integrator: cost_ns(integrator, problem, 1, STEPS, step * STEPS), infinite=True)
+    attempt(lambda: fit_step(get_integrator("verlet"), problem, step, STEPS, tolerance))
+    laws = problem.equation.laws()
+    attempt(lambda: stopping_time(problem.amplitude_m(), *laws), infinite=True)
+    attempt(lambda: amplitude(problem.amplitude_m(), *laws, np.array([0.0, 1.0, 10.0])))
+
+
+@pytest.mark.parametrize("name", ["taylor", "lsoda", "dop853"])
+def test_a_run_that_would_not_end_gives_up(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step count, or a number of calls, is the end of an adaptive method, and its line says what to take instead."""
+    monkeypatch.setattr(taylor, "MOST_STEPS", 500)
+    monkeypatch.setattr(solve_ivp, "MOST_CALLS", 5_000)
+    problem = Problem(Equation.from_laws(8.66, beta_per_m_s=0.235), 0.05)
+    with pytest.raises(DynamicsError, match=f"{name} .*take .*strang or auto"):
+        get_integrator(name).run(problem, 1.0, 10_000)
+
+
+def test_a_step_that_is_none_is_refused() -> None:
+    """Outside 1e-100 to 1e100 s, and with friction beyond 1e6 radians, the line says what is allowed."""
+    problem = Problem(Equation(angular_frequency_per_s=8.66, friction_m_per_s2=0.1), 0.05)
+    for step in (1e-310, 1e-101, 1e101, math.nan, -1.0, 0.0):
+        for call in (
+            lambda step=step: get_integrator("exact").predicted_error(problem, step, 1.0),
+            lambda step=step: get_integrator("strang").run(problem, step, 10),
+        ):
+            with pytest.raises(DynamicsError, match=r"the step must be between 1e-100 and 1e\+100 s, got"):
+                call()
+    with pytest.raises(DynamicsError, match=r"at most 1e.06 radians.*take a shorter step"):
+        get_integrator("strang").run(problem, 1e6, 10)
+
+
+def test_a_speed_that_makes_no_amplitude_is_refused() -> None:
+    """1e300 m/s at 1e-90 1/s is an amplitude of 1e390 m, which no number holds."""
+    with pytest.raises(DynamicsError, match="must be a length that a number holds, got"):
+        Problem(Equation(angular_frequency_per_s=1e-90), 0.0, 1e300)
