@@ -144,6 +144,9 @@ def _guess(h: float, v0: float, v1: float, a0: float, a1: float) -> float:
 class Frictions:
     """An ensemble of such bobs, in blocks of steps; those that turn within a block are treated together.
 
+    Within a block every bob keeps its way. Those that should have turned are then taken up where they did, around their
+    turning points all at once, and from there to the block's end; what was written of them meanwhile is written anew.
+
     Parameters
     ----------
     problem : Problem
@@ -183,12 +186,10 @@ class Frictions:
         for number in range(steps):
             y_after, v_after = self._all.moved(y, v, rest, self._half, self._h)
             turns = np.flatnonzero((v_after * way <= 0.0) & straight)
+            late.append(turns)
             if turns.size:
                 straight[turns] = False
-                late.append(turns)
                 before.append((y[turns], v[turns], y_after[turns], v_after[turns]))
-            else:
-                late.append(turns)
             y, v = y_after, v_after
             states[0, number], states[1, number] = y, v
         held = way == 0.0

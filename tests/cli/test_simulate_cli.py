@@ -143,6 +143,8 @@ def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path:
         (("--method", "exact"), "exact cannot solve this"),
         (("--seconds", "1e9"), "makes 100000000000 steps"),
         (("--seconds", "0.001"), "makes 0 steps"),
+        (("--dt", "1e-200", "--seconds", "1e-199"), "the step must be between 1e-100 and 1e+100 s, got 1e-200"),
+        (("--dt", "1e200", "--seconds", "1e201"), "the step must be between 1e-100 and 1e+100 s, got 1e+200"),
     ],
 )
 def test_bad_input_is_one_line_with_code_two(cli: Callable, scene: Path, arguments: tuple[str, ...], told: str) -> None:

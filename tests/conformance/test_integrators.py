@@ -124,6 +124,27 @@ def test_an_ensemble_with_friction_and_a_cubic_spring_is_its_members(name: str) 
         np.testing.assert_allclose(together.y[:, i], alone.y, rtol=0, atol=0.05 * tolerance)
 
 
+def test_an_ensemble_with_friction_of_every_kind_is_its_members() -> None:
+    """Held from the start, next to never held, beyond critical damping, of other frequencies, kept at every step or at some."""
+    rng = np.random.default_rng(4)
+    size = 60
+    equation = Equation(
+        angular_frequency_per_s=rng.uniform(2.0, 12.0, size),
+        gamma_per_s=np.where(rng.random(size) < 0.2, rng.uniform(10.0, 40.0, size), rng.uniform(0.0, 0.5, size)),
+        drag_per_m=rng.uniform(0.0, 2.0, size),
+        friction_m_per_s2=np.where(rng.random(size) < 0.2, 1e-12, 10.0 ** rng.uniform(-4.0, 1.0, size)),
+        cubic_per_m2_s2=np.where(rng.random(size) < 0.5, 0.0, rng.uniform(-20.0, 400.0, size)),
+    )
+    problem = Problem(equation, rng.uniform(-0.1, 0.1, size), np.where(rng.random(size) < 0.5, 0.0, 0.1))
+    strang = get_integrator("strang")
+    every, some = strang.run(problem, 0.02, 396), strang.run(problem, 0.02, 396, every=11)
+    np.testing.assert_array_equal(some.y, every.y[::11])
+    for i, one in enumerate(problem.members()):
+        alone = strang.run(one, 0.02, 396)
+        np.testing.assert_allclose(every.y[:, i], alone.y, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(every.v[:, i], alone.v, rtol=0, atol=1e-9)
+
+
 def test_keeping_fewer_states_changes_none(integrator: Integrator) -> None:
     """``every`` chooses among the same steps."""
     problem = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.05), 0.05)
