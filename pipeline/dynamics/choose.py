@@ -9,6 +9,7 @@ from pipeline.dynamics.averaged import AVERAGED, stopping_time
 from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.exact import EXACT, rounding_error
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
+from pipeline.dynamics.pilot import in_own_units
 from pipeline.dynamics.solve_ivp import SolveIvp
 from pipeline.dynamics.strang import STRANG
 from pipeline.dynamics.taylor import TAYLOR, Taylor
@@ -205,7 +206,7 @@ def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, se
     Only ratios matter; ``python benchmarks/dynamics.py`` compares them with measured times.
     """
     demand_times(seconds, seconds)
-    problem, _ = problem.scaled()
+    problem = in_own_units(problem)
     eq = problem.equation
     name, cubic, friction = integrator.name, bool(eq.cubic_per_m2_s2), bool(eq.friction_m_per_s2)
     if name in _STATE_NS:

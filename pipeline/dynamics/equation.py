@@ -26,6 +26,7 @@ Real = Any
 
 _AMPLITUDE_TO_DRAG = 3.0 * math.pi / 4.0  # b = (3 pi / 4) beta / omega, from energy lost per cycle
 _LARGEST, _SMALLEST = 1e100, 1e-100
+_MOST_FRICTION = 1e300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -219,21 +220,25 @@ class Problem:
         The length is a power of two, so that nothing is rounded; squares then neither overflow nor vanish.
         """
         eq = self.equation
-        amplitude = np.maximum(np.abs(self.displacement_m), np.abs(self.velocity_m_per_s / eq.angular_frequency_per_s))
-        unit = np.ldexp(1.0, np.clip(np.frexp(amplitude)[1], -1021, 1022))
-        if not self.is_ensemble:
-            unit = float(unit)
+        if self.is_ensemble:
+            size = np.maximum(np.abs(self.displacement_m), np.abs(self.velocity_m_per_s / eq.angular_frequency_per_s))
+            unit = np.ldexp(1.0, np.clip(np.frexp(size)[1], -1021, 1022))
+        else:  # asked often, so without numpy
+            size = max(abs(self.displacement_m), abs(self.velocity_m_per_s / eq.angular_frequency_per_s))
+            unit = math.ldexp(1.0, min(max(math.frexp(size)[1], -1021), 1022))
+            if unit == 1.0 and eq.friction_m_per_s2 <= _MOST_FRICTION:
+                return self, unit
         if eq.is_linear:
             return self._replaced(eq, unit), unit
         with np.errstate(over="ignore"):
             drag = np.multiply(eq.drag_per_m, unit)
             # Friction beyond all bounds holds whatever it touches, and a bound that large does too.
-            friction = np.minimum(np.divide(eq.friction_m_per_s2, unit), 1e300)
+            friction = np.minimum(np.divide(eq.friction_m_per_s2, unit), _MOST_FRICTION)
             cubic = np.multiply(np.multiply(eq.cubic_per_m2_s2, unit), unit)
         for name, part in (("drag_per_m", drag), ("cubic_per_m2_s2", cubic)):
             if not np.all(np.isfinite(part)):
                 raise DynamicsError(
-                    f"{name} {_shown(getattr(eq, name))} at an amplitude of {_shown(amplitude)} m leaves the range of "
+                    f"{name} {_shown(getattr(eq, name))} at an amplitude of {_shown(size)} m leaves the range of "
                     "numbers; take a smaller amplitude or coefficient"
                 )
         parts = {"drag_per_m": drag, "friction_m_per_s2": friction, "cubic_per_m2_s2": cubic}

@@ -16,7 +16,7 @@ from pipeline.track import F8
 if TYPE_CHECKING:
     from pipeline.dynamics.integrator import Integrator
 
-__all__ = ["predicted_by_pilot"]
+__all__ = ["in_own_units", "predicted_by_pilot"]
 
 FINE = 0.25  # radians a step, of the spring, of drag and of quadratic drag together: there the power law holds
 NEAR = 4.0  # with friction a pilot's step is at most so many planned ones, and the fine one over it at least
@@ -50,7 +50,7 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     """
     if problem.amplitude_m() == 0.0:
         return 0.0
-    problem = _scaled(problem)
+    problem = in_own_units(problem)
     start, omega = problem.amplitude_m(), problem.equation.angular_frequency_per_s
     fine = longest = _fine_step(problem)
     if integrator.order:
@@ -71,8 +71,8 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     return share * _largest_error(integrator, problem, pilot, parts, seconds) / float(start)
 
 
-@functools.lru_cache(maxsize=4)
-def _scaled(problem: Problem) -> Problem:
+@functools.lru_cache(maxsize=8)
+def in_own_units(problem: Problem) -> Problem:
     """Return the problem in units of its amplitude: the same object for the same, so that its truth is remembered."""
     return problem.scaled()[0]
 
