@@ -125,7 +125,7 @@ def test_an_ensemble_with_friction_and_a_cubic_spring_is_its_members(name: str) 
 
 
 def test_an_ensemble_with_friction_of_every_kind_is_its_members() -> None:
-    """Held from the start, next to never held, beyond critical damping, of other frequencies, kept at every step or at some."""
+    """Held from the start or next to never, beyond critical damping, kept at every step or at some: all alike."""
     rng = np.random.default_rng(4)
     size = 60
     equation = Equation(
