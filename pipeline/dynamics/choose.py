@@ -19,14 +19,14 @@ from pipeline.errors import DynamicsError
 __all__ = ["AUTO", "Choice", "choose", "cost_ns", "fit_step", "least_tolerance"]
 
 AUTO: tuple[Integrator, ...] = (EXACT, AVERAGED, STRANG, TAYLOR)
-"""What is chosen from. On random scenes no other method costs less than half of one of these; the trials show it."""
+"""What is chosen from. On 12 of 10,000 random scenes another method, mostly Runge-Kutta, costs less than half of it."""
 
 KNOWN: tuple[Integrator, ...] = (EXACT, TAYLOR)
 """Those of them whose error is known without a pilot."""
 
 MOST_PARTS = 100_000
 MOST_TRIES = 12
-SAFETY = 1.2  # what a prediction may be short of the truth
+SAFETY = 1.35  # what a prediction may be short of the truth
 SAFETY_WITHOUT_STEP = 1.05  # where it is not carried from one step to another
 
 # Nanoseconds on the machine of the notes: of a run, of a step and of a kept state where that is what counts.

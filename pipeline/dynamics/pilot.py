@@ -20,6 +20,7 @@ __all__ = ["in_own_units", "predicted_by_pilot"]
 
 FINE = 0.25  # radians a step, of the spring, of drag and of quadratic drag together: there the power law holds
 NEAR = 4.0  # with friction a pilot's step is at most so many planned ones, and the fine one over it at least
+SCATTER = 1.5  # where in a step it turns sets a cubic spring's energy, and with that its pace, a little at random
 STIFF = 10.0  # drag over spring beyond which a pilot cannot have steps that fine all along
 MOST_STIFF_STEPS = 20_000
 MOST_PARTS = 16  # of a step, for the truth beside it
@@ -65,6 +66,8 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     if fine * omega < FINE / STIFF and pilot < seconds / MOST_STIFF_STEPS:
         pilot, order = seconds / MOST_STIFF_STEPS, min(order, 1)
     share = float((step_s / pilot) ** order)
+    if order and problem.equation.has_friction and problem.equation.cubic_per_m2_s2:
+        share *= SCATTER
     parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
     if parts > NEAR and seconds / pilot * parts > MOST_STEPS:
         return math.inf  # so coarse that to see its error takes many times the run
