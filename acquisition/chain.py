@@ -51,14 +51,11 @@ class SensorChain:
         self.last: Readings = NO_READINGS
         self._broken = False
         self._next = 0
-        self._t: list[float] = []
-        self._distance: list[float] = []
-        self._flags: list[int] = []
-        self._host_ns: list[int] = []
+        self._held: list[tuple[float, float, int, int]] = []
 
     def __len__(self) -> int:
         """Return how many samples :meth:`block` would give."""
-        return len(self._t)
+        return len(self._held)
 
     def feed(self, host_ns: int, data: bytes) -> Block:
         """Take the bytes of one read, return the samples they completed (perhaps none)."""
@@ -73,27 +70,23 @@ class SensorChain:
         A sample is held as plain numbers: arrays are made once for many of them.
         """
         self.last = readings = self.decoder.feed(host_ns, data)
-        push, distance_of = self.timebase.push, self.calibration.distance
         for reading in readings:
-            t, flag = push(reading)
-            distance = distance_of(reading.echo_us, reading.distance_m)
+            t, flag = self.timebase.push(reading)
+            distance = self.calibration.distance(reading.echo_us, reading.distance_m)
             if distance != distance:
                 flag |= MISSING
             if self._broken:
                 flag |= GAP_BEFORE
                 self._broken = False
-            self._t.append(t)
-            self._distance.append(distance)
-            self._flags.append(flag)
-            self._host_ns.append(host_ns)
+            self._held.append((t, distance, flag, host_ns))
         return len(readings)
 
     def block(self) -> Block:
         """Return the samples held, with the next indices of the run, and hold none."""
+        held, self._held = self._held, []
         first = self._next
-        self._next += len(self._t)
-        t, distance, flags, host_ns = self._t, self._distance, self._flags, self._host_ns
-        self._t, self._distance, self._flags, self._host_ns = [], [], [], []
+        self._next += len(held)
+        t, distance, flags, host_ns = zip(*held, strict=True) if held else ((),) * 4
         return Block(
             first,
             np.array(t, np.float64),

@@ -105,24 +105,26 @@ class Timebase:
 
     def push(self, reading: Reading) -> tuple[float, int]:
         """Return a reading's sensor time in s and the flag that time adds: a gap before it, a repeat, a step back."""
-        if reading.device_us >= 0:
-            raw, unit_s = reading.device_us, 1e-6
-        elif reading.sequence >= 0:
-            raw, unit_s = reading.sequence, self._period_s
+        host_ns = reading.host_ns
+        if (raw := reading.device_us) >= 0:
+            unit_s = 1e-6
+        elif (raw := reading.sequence) >= 0:
+            unit_s = self._period_s
         else:
-            raw, unit_s = reading.host_ns, NANO
+            raw, unit_s = host_ns, NANO
         if self._last_raw is not None:
             difference = raw - self._last_raw
             ticks = self._ticks + difference
             t = self._anchor_s + ticks * unit_s
-            if 0.0 < difference * unit_s <= self._longest_s and 0.0 < t - self._latest_s <= self._longest_s:
-                self._last_raw, self._last_host_ns = raw, reading.host_ns
+            longest_s = self._longest_s
+            if 0.0 < difference * unit_s <= longest_s and 0.0 < t - self._latest_s <= longest_s:
+                self._last_raw, self._last_host_ns = raw, host_ns
                 self._ticks, self._latest_s = ticks, t
                 self._count += 1
                 return t, 0
         elif self._clock is None:
             self._clock = "host" if unit_s == NANO else "device"
-        return self._step(raw, unit_s, reading.host_ns)
+        return self._step(raw, unit_s, host_ns)
 
     def _step(self, raw: int, unit_s: float, host_ns: int) -> tuple[float, int]:
         restarted = self._advance(raw, unit_s, host_ns)

@@ -23,7 +23,7 @@ REOPEN_EVERY_NS = 500_000_000
 IDLE_WAIT_S = 0.5
 BLOCKING_WAIT_S = 0.25
 POLLED_WAIT_S = 0.01
-CADENCE_NS = 1_000_000
+CADENCE_NS = 500_000
 """Where several ports keep the reader busy it looks at them so often; alone, a port is read as soon as it speaks."""
 
 
@@ -129,8 +129,9 @@ class PortReader:
     clock : Clock
         The system's: real ports know no other.
     decode : callable, optional
-        Called on the reading thread when every port that had something was read and its bytes were handed on: time
-        for work that may wait until then. It does a bounded piece and returns whether more is left.
+        Called on the reading thread when every port that had something was read, its bytes were handed on and what was
+        due to be asked was asked: time for work that may wait until then. It does a bounded piece and returns whether
+        more is to be done at once.
     cadence_ns : int
         Least time between two looks at several busy ports, ns; 0 reads each as soon as it speaks.
 
@@ -213,11 +214,10 @@ class PortReader:
                 before_ns, now = woke_ns, self._clock.now_ns()
                 woke_ns = now
                 for key, _ in ready:
-                    if key.data is not None and not self._take(key.data, now):
+                    if (line := key.data) is not None and not self._take(line, now):
                         selector.unregister(key.fd)
-                        key.data.transport.close()
-                        lost.append(key.data)
-                behind = self._decode is not None and self._decode()
+                        line.transport.close()
+                        lost.append(line)
                 for line in [line for line in lost if self._tries_again(line)]:
                     selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
                     lost.remove(line)
@@ -226,6 +226,7 @@ class PortReader:
                         selector.unregister(line.transport.fileno())
                         line.transport.close()
                         lost.append(line)
+                behind = self._decode is not None and self._decode()  # last: it may wake another thread
                 if not behind and now - before_ns < 2 * cadence_ns:
                     self._clock.sleep_until_ns(now + cadence_ns)
 

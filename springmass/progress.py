@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.block import I8, Block, Flag
+from pipeline.accuracy import params_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
 from storage.recorder import RecorderStatus
 
@@ -16,7 +17,7 @@ __all__ = ["Progress", "Shown"]
 
 SECOND_NS = 1_000_000_000
 MOTION_EVERY_NS = 1_900_000_000
-"""Every second line of progress: a swing lasts about as long, and an analysis costs a hundredth of a core a second."""
+"""Every second line of progress: a swing lasts about as long, and an analysis costs some milliseconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,8 @@ class Shown:
 
     def __init__(self, rate_hz: float) -> None:
         self.samples = self.missing = 0
-        self._motion = MotionAccumulator(rate_hz)
+        # A third of the time of the standard tier, which the run itself is analysed with; period and amplitude agree.
+        self._motion = MotionAccumulator(rate_hz, params=params_for("fast"))
         self._found: LiveMotion | NotYet = NotYet("no samples so far")
         self._found_ns = 0
         self._stamps: deque[I8] = deque()

@@ -1,7 +1,7 @@
 """A recording session: ports opened, sensors heard, bytes kept, and the run file built at the end.
 
 The reading thread brings bytes; they go to the recorder as they are, and then through the decoders. The session's own
-thread looks for marks five times a second and at the samples once.
+thread looks for marks five times a second, where they can be typed, and at the samples once.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from storage.wire_layout import LogHeader
 __all__ = ["Progress", "Sensor", "Session", "Trigger"]
 
 HEAR_S = 3.0  # silence longer than this before a run is no sensor
-LOOK_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
+LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 BYTES_PER_READ = 64  # log bytes a reading takes, for the look at the disk
 
 
@@ -206,7 +206,9 @@ class Session:
         marks: queue.SimpleQueue[str] | None,
     ) -> None:
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
-        for _ in self._turns(LOOK_S, progress, recorder, start_ns, end_ns):
+        # Without marks a turn a second will do: the samples are told of once a second, and an error of the disk stands.
+        turn_s = 1.0 if marks is None else LOOK_FOR_MARKS_S
+        for _ in self._turns(turn_s, progress, recorder, start_ns, end_ns):
             if recorder.status.error:
                 return  # close() raises it; what was recorded stands
             while marks is not None and not marks.empty():
@@ -248,6 +250,8 @@ class Session:
         while end_ns is None or self._clock.now_ns() < end_ns:
             turn_ns = min(self._clock.now_ns() + wait_ns, tick_ns, tick_ns if end_ns is None else end_ns)
             self._wait_until(turn_ns)
+            if turn_ns == end_ns:
+                self._tee.stop()  # what comes while the last line is worked out is no part of the run
             yield self._look() if recorder is None or turn_ns == tick_ns else []
             if turn_ns == tick_ns:
                 progress(self._progress((self._clock.now_ns() - start_ns) * 1e-9, recorder))

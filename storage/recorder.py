@@ -3,6 +3,9 @@
 Three threads share the work. The reading thread only puts records into a queue. A second takes them out and appends
 them to the wire log at once, so that a killed process loses no more than the read in flight. A third calls fdatasync
 once a second: that may take as long as the disk likes, and neither of the others waits for it.
+
+The second thread is woken when the reading thread has nothing else to do (:meth:`Recorder.enqueue`,
+:meth:`Recorder.wake`): woken earlier, the two would contend for the interpreter while ports wait.
 """
 
 from __future__ import annotations
@@ -10,7 +13,6 @@ from __future__ import annotations
 import json
 import os
 import threading
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +23,7 @@ from acquisition.clock import Clock
 from storage.disk import DiskNearlyFull, check_disk
 from storage.errors import WriteFailed, one_line
 from storage.wire_layout import HEAD_BYTES, event_payload
-from storage.wire_log import Kind, LogFile, LogHeader, WireLogWriter, open_log_file
+from storage.wire_log import Item, Kind, LogFile, LogHeader, WireLogWriter, open_log_file
 
 __all__ = ["DiskNearlyFull", "Recorder", "RecorderStatus", "check_disk"]
 
@@ -60,18 +62,6 @@ class RecorderStatus:
     closed: bool
 
 
-@dataclass(frozen=True, slots=True)
-class _Item:
-    kind: Kind
-    channel: int
-    mono_ns: int
-    payload: bytes
-
-    @property
-    def size(self) -> int:
-        return HEAD_BYTES + len(self.payload)
-
-
 @dataclass(slots=True)
 class _Overflow:
     """What one channel lost since the queue became full."""
@@ -81,9 +71,9 @@ class _Overflow:
     records: int = 0
     bytes: int = 0
 
-    def event(self, channel: int) -> _Item:
+    def event(self, channel: int) -> Item:
         facts = {"records": self.records, "bytes": self.bytes, "first_ns": self.first_ns}
-        return _Item(Kind.EVENT, channel, self.last_ns, event_payload("overflow", facts))
+        return Kind.EVENT, channel, self.last_ns, event_payload("overflow", facts)
 
 
 class Recorder:
@@ -125,9 +115,10 @@ class Recorder:
         self._sync_every_ns = int(sync_every_s * 1e9)
         self._limit = queue_bytes
         self._lock = threading.Lock()
-        self._more = threading.Condition(self._lock)
         self._done = threading.Condition(self._lock)
-        self._queue: deque[_Item] = deque()
+        # Held while the appender may rest. A lock costs a third of a condition's wake-up, of which there is one a read.
+        self._rest = threading.Lock()
+        self._queue: list[Item] = []
         self._queued_bytes = 0
         self._appending = False
         self._overflows: dict[int, _Overflow] = {}
@@ -162,21 +153,35 @@ class Recorder:
 
     def put(self, channel: int, host_ns: int, data: bytes) -> None:
         """Take the bytes of one read of a port; never waits for the disk, never raises for its sake."""
-        self._offer(_Item(Kind.DATA, channel, host_ns, data))
+        self._offer(Kind.DATA, channel, host_ns, data)
+        self.wake()
 
     data = put  # as a sink calls it
+
+    def enqueue(self, channel: int, host_ns: int, data: bytes) -> None:
+        """Take the bytes of one read as :meth:`put` does, to be appended at the next :meth:`wake` at the latest."""
+        self._offer(Kind.DATA, channel, host_ns, data)
+
+    def wake(self) -> None:
+        """Have what is queued appended; costs nothing where there is nothing."""
+        with self._lock:
+            if (self._queue or self._overflows or self._closing) and self._rest.locked():
+                self._rest.release()
 
     def mark(self, text: str, *, host_ns: int | None = None, channel: int = 0) -> None:
         """Take a mark."""
         now = self._clock.now_ns() if host_ns is None else host_ns
-        self._offer(_Item(Kind.MARK, channel, now, text.encode("utf-8", "replace")))
+        self._offer(Kind.MARK, channel, now, text.encode("utf-8", "replace"))
+        self.wake()
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Take "lost", "reopened", "timeout", "trigger", "calibration" or another event, with facts about it."""
-        self._offer(_Item(Kind.EVENT, channel, host_ns, event_payload(kind, facts)))
+        self._offer(Kind.EVENT, channel, host_ns, event_payload(kind, facts))
+        self.wake()
 
     def drain(self, *, sync: bool = False) -> RecorderStatus:
         """Return when all that was put before is in the log, with ``sync`` on the disk; or the recording stopped."""
+        self.wake()
         with self._done:
             self._done.wait_for(lambda: self._error or not (self._queue or self._appending))
         if sync:
@@ -195,7 +200,7 @@ class Recorder:
             if self._closing:
                 return
             self._closing = True
-            self._more.notify()
+        self.wake()
         self._appender.join()
         self._stop_sync.set()
         self._syncer.join()
@@ -208,66 +213,68 @@ class Recorder:
         if self._error is not None:
             raise self._error
 
-    def _offer(self, item: _Item) -> None:
-        if not 0 <= item.channel <= 255:
-            raise ValueError(f"a channel must lie in 0 to 255, got {item.channel}")
+    def _offer(self, kind: Kind, channel: int, mono_ns: int, payload: bytes) -> None:
+        if not 0 <= channel <= 255:
+            raise ValueError(f"a channel must lie in 0 to 255, got {channel}")
+        size = HEAD_BYTES + len(payload)
         with self._lock:
             open_ = self._error is None and not self._closing
             # After an overflow nothing is taken before its event: records around a loss must not look like neighbours.
-            if open_ and not self._overflows and self._queued_bytes + item.size <= self._limit:
-                self._queue.append(item)
-                self._queued_bytes += item.size
-                self._more.notify()
+            if open_ and not self._overflows and self._queued_bytes + size <= self._limit:
+                self._queue.append((kind, channel, mono_ns, payload))
+                self._queued_bytes += size
                 return
             self._dropped_records += 1
-            self._dropped_bytes += len(item.payload)
+            self._dropped_bytes += len(payload)
             if open_:
-                lost = self._overflows.setdefault(item.channel, _Overflow(item.mono_ns, item.mono_ns))
-                lost.last_ns = item.mono_ns
+                lost = self._overflows.setdefault(channel, _Overflow(mono_ns, mono_ns))
+                lost.last_ns = mono_ns
                 lost.records += 1
-                lost.bytes += len(item.payload)
-                self._more.notify()
+                lost.bytes += len(payload)
 
-    def _take(self) -> list[_Item]:
+    def _take(self) -> list[Item]:
         """Wait for records and take all of them; none when the recording closes.
 
         What overflowed came after everything queued and before everything to come: its events stand in its place.
         """
-        with self._lock:
-            self._appending = False
-            if not self._queue:
+        while True:
+            with self._lock:
+                if self._queue or self._overflows:
+                    taken, self._queue, self._queued_bytes = self._queue, [], 0
+                    if self._overflows:
+                        taken += [lost.event(channel) for channel, lost in self._overflows.items()]
+                        self._overflows.clear()
+                    self._appending = True
+                    return taken
+                self._appending = False
                 self._done.notify_all()
-            self._more.wait_for(lambda: self._queue or self._overflows or self._closing)
-            taken = [*self._queue, *(lost.event(channel) for channel, lost in self._overflows.items())]
-            self._queue.clear()
-            self._overflows.clear()
-            self._queued_bytes = 0
-            self._appending = bool(taken)
-            return taken
+                if self._closing:
+                    return []
+            # Whoever queues releases it after that, so a record put since the look just now is not slept over.
+            self._rest.acquire()
 
     def _append_all(self) -> None:
         while taken := self._take():
-            for number, item in enumerate(taken):
-                try:
-                    self._log.append(item.kind, item.payload, mono_ns=item.mono_ns, channel=item.channel)
-                except Exception as error:  # a defect, too, must stop the recording and not look like one
-                    self._stop(self._one_line(error), taken[number:])
-                    return
+            try:
+                self._log.extend(taken)
+            except Exception as error:  # a defect, too, must stop the recording and not look like one
+                self._stop(self._one_line(error), taken[self._log.extended :])
+                return
 
     def _one_line(self, error: Exception) -> WriteFailed:
         if isinstance(error, WriteFailed):
             return error
         return WriteFailed(self.path, f"a record could not be appended ({one_line(error)})", "report this defect")
 
-    def _stop(self, error: WriteFailed, left: list[_Item]) -> None:
+    def _stop(self, error: WriteFailed, left: list[Item]) -> None:
         """Keep what there is: what was appended can still be synced, though no more can be appended."""
         with self._lock:
             self._error = self._error or error
             left += self._queue
-            self._queue.clear()
+            self._queue = []
             self._queued_bytes = 0
             self._dropped_records += len(left)
-            self._dropped_bytes += sum(len(item.payload) for item in left)
+            self._dropped_bytes += sum(len(payload) for *_, payload in left)
             self._appending = False
             self._done.notify_all()
         self._sync()

@@ -50,6 +50,7 @@ __all__ = [
     "Parts",
     "Record",
     "SensorEntry",
+    "ends_item",
     "event_payload",
     "frame",
     "frames",
@@ -260,6 +261,18 @@ def frames(kind: Kind, payload: bytes, *, sequence: int, mono_ns: int, log: int,
         yield frame(
             kind, piece, sequence=sequence + number, mono_ns=mono_ns, log=log, channel=channel, parts=int(parts)
         )
+
+
+def ends_item(record: bytes) -> bool:
+    """Return whether a record is the last of what was appended: no part that goes on, and no copy of the header.
+
+    Examples
+    --------
+    >>> [ends_item(record) for record in frames(Kind.DATA, bytes(70_000), sequence=0, mono_ns=0, log=1)]
+    [False, True]
+    """
+    *_, kind, _, parts = _HEAD.unpack_from(record)
+    return kind != Kind.HEADER and not parts & Parts.GOES_ON
 
 
 def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, Kind, int, int, bytes] | None:

@@ -25,17 +25,18 @@ import errno
 import os
 import secrets
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from itertools import accumulate
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from storage.errors import RunExists, WriteFailed, one_line
-from storage.wire_layout import Kind, LogHeader, SensorEntry, frames
+from storage.wire_layout import HEAD_BYTES, MAX_PAYLOAD, Kind, LogHeader, SensorEntry, ends_item, frame, frames
 from storage.wire_read import Damage, LogContents, NotALog, Record, parse_log, read_log
 
 __all__ = [
     "Damage",
+    "Item",
     "Kind",
     "LogContents",
     "LogFile",
@@ -52,6 +53,11 @@ __all__ = [
 
 FIRST_COPY = 8192
 """Byte of the log past which the header is first repeated."""
+WRITE_BYTES = 1 << 18
+"""So much is written at a time where many records wait."""
+
+Item = tuple[Kind, int, int, bytes]
+"""What a record is made of: kind, channel, host's monotonic clock in ns, payload."""
 
 
 class LogFile(Protocol):
@@ -103,8 +109,7 @@ def open_log_file(path: Path) -> LogFile:
     return _OsFile(descriptor)
 
 
-@dataclass(frozen=True, slots=True)
-class Written:
+class Written(NamedTuple):
     """How far a log has come: records, and bytes of the file."""
 
     records: int = 0
@@ -114,7 +119,8 @@ class Written:
 class WireLogWriter:
     """Appends records to a new log.
 
-    One thread appends; others may call :meth:`sync` at the same time.
+    One thread appends; others may call :meth:`sync` at the same time. ``written`` and ``synced`` say how far the log
+    has come, in the kernel's hands and on the disk; ``extended`` how many items of the last call are whole in the log.
 
     Parameters
     ----------
@@ -145,6 +151,7 @@ class WireLogWriter:
     ) -> None:
         self.path = Path(path)
         self.written = self.synced = Written()
+        self.extended = 0
         self._log = secrets.randbits(32) if log is None else log
         self._next_copy = FIRST_COPY
         self._syncing = threading.Lock()
@@ -196,33 +203,77 @@ class WireLogWriter:
         WriteFailed
             If the disk does not take it all. Then nothing more is taken; what was written before stands.
         """
-        if error := self._append_error or self._sync_error:
-            raise error
-        if self.written.bytes >= self._next_copy:
-            # Doubling distances: about twenty copies in a day's log, and no zeroed page takes all of them. Before the
-            # record and not after it, so that an error always means that the record itself is not whole in the log.
-            self._next_copy = 2 * self.written.bytes
-            self._append(Kind.HEADER, self._header, mono_ns, 0)
-        self._append(kind, payload, mono_ns, channel)
+        self.extend(((kind, channel, mono_ns, payload),))
         return self.written.records - 1
 
-    def _append(self, kind: Kind, payload: bytes, mono_ns: int, channel: int) -> None:
-        first = self.written.records
-        for record in frames(kind, payload, sequence=first, mono_ns=mono_ns, log=self._log, channel=channel):
-            self._write(record)
-            self.written = Written(self.written.records + 1, self.written.bytes + len(record))
+    def extend(self, items: Iterable[Item]) -> None:
+        """Append the records of many items with few writes.
 
-    def _write(self, record: bytes) -> None:
+        Parameters
+        ----------
+        items : iterable of Item
+
+        Raises
+        ------
+        WriteFailed
+            If the disk does not take them all. Then nothing more is taken; :attr:`extended` says how many of them are
+            whole in the log.
+        """
+        self.extended = 0
+        if error := self._append_error or self._sync_error:
+            raise error
+        batch: list[bytes] = []
+        laid, end = 0, self.written.bytes
         try:
-            taken = self._file.write(record)
-            while taken < len(record):  # a nearly full disk takes a part, then says why
-                more = self._file.write(memoryview(record)[taken:])
+            for kind, channel, mono_ns, payload in items:
+                if end >= self._next_copy:
+                    # Doubling distances: about twenty copies in a day's log, and no zeroed page takes all of them.
+                    # Before the record and not after it, so that an error always means that the record itself is not
+                    # whole in the log.
+                    self._next_copy = 2 * end
+                    end += self._lay(batch, Kind.HEADER, 0, mono_ns, self._header)
+                end += self._lay(batch, kind, channel, mono_ns, payload)
+                laid += 1
+                if end - self.written.bytes >= WRITE_BYTES:
+                    whole, batch = batch, []
+                    self._write(whole, laid)
+                    laid = 0
+        finally:
+            if batch:
+                self._write(batch, laid)
+
+    def _lay(self, batch: list[bytes], kind: Kind, channel: int, mono_ns: int, payload: bytes) -> int:
+        """Add an item's records to those that are to be written; return their bytes."""
+        before = len(batch)
+        sequence = self.written.records + before
+        if len(payload) <= MAX_PAYLOAD:
+            batch.append(frame(kind, payload, sequence=sequence, mono_ns=mono_ns, log=self._log, channel=channel))
+            return HEAD_BYTES + len(payload)
+        batch += frames(kind, payload, sequence=sequence, mono_ns=mono_ns, log=self._log, channel=channel)
+        return sum(map(len, batch[before:]))
+
+    def _write(self, batch: list[bytes], items: int) -> None:
+        """Write the records of so many items, and count those that are whole in the log."""
+        data = b"".join(batch)
+        taken = 0
+        try:
+            taken = self._file.write(data)
+            while taken < len(data):  # a nearly full disk takes a part, then says why
+                more = self._file.write(memoryview(data)[taken:])
                 if more <= 0:
-                    raise OSError(errno.EIO, f"{taken} of {len(record)} bytes were taken")
+                    raise OSError(errno.EIO, f"{taken} of {len(data)} bytes were taken")
                 taken += more
         except OSError as error:
+            whole = [record for record, end in zip(batch, accumulate(map(len, batch)), strict=True) if end <= taken]
+            self._count(len(whole), sum(map(len, whole)), sum(map(ends_item, whole)))
             self._append_error = self._failed("could not be written further", error)
             raise self._append_error from error
+        self._count(len(batch), taken, items)
+
+    def _count(self, records: int, size: int, items: int) -> None:
+        before = self.written
+        self.written = Written(before.records + records, before.bytes + size)
+        self.extended += items
 
     def sync(self) -> Written:
         """Return when everything appended before the call is on the disk, and how much that is.

@@ -25,7 +25,7 @@ LONGEST = 96
 _WRAP = 1 << 32
 _FIELDS = rb"R1,([0-9]{1,10}+),([0-9]{1,10}+),([0-9]{1,6}+\.[0-9]{2})?+,(-?[0-9]{1,5}+)?+,([A-Z])"
 _RECORD = re.compile(_FIELDS)
-_SOUND = re.compile(rb"\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?+\n")  # what nearly every line is
+_sound_line = re.compile(rb"\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?+\n").fullmatch  # what nearly every line is
 _ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable, neither $ nor * within
 
 
@@ -102,7 +102,7 @@ class LineProtocolDecoder:
 
 def _sound(host_ns: int, line: bytes) -> Reading | None:
     """Return the reading of a line, with its end, in which nothing is wrong or unusual."""
-    found = _SOUND.fullmatch(line)
+    found = _sound_line(line)
     if found is None:
         return None
     body, sequence, device_us, echo, temperature, status, crc = found.groups()

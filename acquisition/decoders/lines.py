@@ -19,6 +19,11 @@ class LineSplitter:
     skip_first : bool
         Whether the first line after the start or a flush is dropped and counted as ``partial_line``: reading may
         have begun midway, and half a number looks like a number.
+
+    Attributes
+    ----------
+    between : bool
+        Whether the next byte begins a line, and one that is not to be dropped.
     """
 
     def __init__(self, end: bytes, limit: int, faults: dict[str, int], *, skip_first: bool = False) -> None:
@@ -29,16 +34,12 @@ class LineSplitter:
         self._skip = skip_first
         self._overlong = False
         self._held = b""
+        self.between = not skip_first
 
     @property
     def pending(self) -> int:
         """Bytes of the line that has begun."""
         return len(self._held)
-
-    @property
-    def between(self) -> bool:
-        """Whether the next byte begins a line, and one that is not to be dropped."""
-        return not (self._held or self._overlong or self._skip)
 
     def split(self, data: bytes) -> list[bytes]:
         """Return the lines that these bytes end, without their ends."""
@@ -57,6 +58,7 @@ class LineSplitter:
                 if len(line) > self._limit:
                     self._drop(line, "bad_frame")
             lines = [line for line in lines if len(line) <= self._limit]
+        self.between = not (self._held or self._overlong or self._skip)
         return lines
 
     def flush(self) -> None:
@@ -67,6 +69,7 @@ class LineSplitter:
         self._held = b""
         self._overlong = False
         self._skip = self._skip_first
+        self.between = not self._skip_first
 
     def _drop(self, line: bytes, why: str) -> None:
         self._faults["garbage_bytes"] += len(line) + 1

@@ -26,10 +26,17 @@ class Log:
     def __init__(self) -> None:
         self.reads: list[tuple[int, int, bytes]] = []
         self.events: list[str] = []
+        self.awake = 0
 
     def data(self, channel: int, host_ns: int, data: bytes) -> None:
         """Remember a read."""
         self.reads.append((channel, host_ns, data))
+
+    enqueue = data
+
+    def wake(self) -> None:
+        """Remember up to where it was to be appended."""
+        self.awake = len(self.reads)
 
     def event(self, channel: int, host_ns: int, kind: str, facts: dict[str, Any]) -> None:
         """Remember an event."""
@@ -83,6 +90,66 @@ def test_what_is_recorded_decodes_to_what_was_shown() -> None:
     assert b"".join(data for _, _, data in log.reads) == data
     assert log.events == [f'0 {12 * STEP_NS} lost {{"why": "cable"}}']
     assert tee.gone == {0: "cable"}
+
+
+def test_the_recorder_is_woken_after_each_piece() -> None:
+    """What was read waits for the appending no longer than one piece of decoding takes, in a flood too."""
+    tee = Tee([chain()], {})
+    log = started(tee, [chain()], 0)
+    for i in range(1000):
+        tee.data(0, i * STEP_NS, frame(i))
+    assert log.awake == 0
+    assert tee.decode()
+    assert log.awake == 1000
+    tee.data(0, 1000 * STEP_NS, frame(1000))
+    tee.decode()
+    assert log.awake == 1001
+
+
+def test_samples_asked_for_once_a_second_are_decoded_then() -> None:
+    """Nothing is decoded in between but a whole piece; what is asked for is all that was read, and the same bits."""
+    tee, other = Tee([chain()], {}), chain()
+    expected, found, untouched = [], [], 0
+    for i in range(1000):
+        tee.data(0, i * STEP_NS, frame(i))
+        before = len(tee._chains[0])
+        assert not tee.decode()
+        untouched += len(tee._chains[0]) == before
+        expected.append(other.feed(i * STEP_NS, frame(i)))
+        if i % 100 == 99:
+            found += [block for _, block in tee.blocks()]
+            assert sum(map(len, found)) == i + 1
+    assert untouched > 800
+    whole, parts = concatenate(expected), concatenate(found)
+    for name in ("t", "distance", "flags", "host_ns"):
+        assert getattr(parts, name).tobytes() == getattr(whole, name).tobytes()
+
+
+def test_samples_asked_for_often_are_decoded_as_they_come() -> None:
+    """Ten times a second is often, also after a time in which nobody asked."""
+    tee = Tee([chain()], {})
+    for i in range(300):
+        tee.data(0, i * STEP_NS, frame(i))
+        tee.decode()
+        if i == 100 or (i > 200 and i % 10 == 0):
+            tee.blocks()
+        elif i > 220:
+            assert len(tee._chains[0]) == i % 10
+
+
+def test_a_flood_is_decoded_piece_by_piece_though_nobody_asks() -> None:
+    """Less than a piece waits until somebody asks."""
+    tee = Tee([chain()], {})
+    tee.data(0, 0, frame(0))
+    tee.blocks()
+    tee.data(0, 1000 * STEP_NS, frame(1))
+    tee.blocks()
+    for i in range(2, 1000):
+        tee.data(0, (1000 + i) * STEP_NS, frame(i))
+    while tee.decode():
+        pass
+    assert 1000 - len(tee._chains[0]) < reads.ROUND_BYTES / len(frame(0)) + 1
+    assert sum(len(block) for _, block in tee.blocks()) == 1000
 
 
 def test_decoding_stops_after_a_piece_and_goes_on_later() -> None:

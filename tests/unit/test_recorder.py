@@ -120,6 +120,22 @@ def test_putting_never_waits_for_the_disk() -> None:
     assert disk.threads["write"] == {"MainThread", "springmass-log"}  # the header and the end; all else
 
 
+def test_what_is_enqueued_is_appended_when_the_log_is_woken() -> None:
+    """The reading thread says when: many reads are then one write; closing leaves none behind."""
+    disk = Disk()
+    recording = recorder(disk)
+    recording.drain()
+    before = len(disk.data)
+    for number in range(10):
+        recording.enqueue(0, number, b"x")
+    assert (recording.status.queued_records, recording.status.records, len(disk.data)) == (10, 1, before)
+    recording.wake()
+    assert recording.drain().records == 11
+    recording.enqueue(0, 10, b"last")
+    recording.close()
+    assert [record.payload for record in parse_log(bytes(disk.data)) if record.kind is Kind.DATA][-1] == b"last"
+
+
 def test_a_slow_sync_holds_up_no_write() -> None:
     """Records are appended while fdatasync hangs, so a kill in that time loses none of them."""
     disk = Disk()

@@ -165,6 +165,43 @@ def test_a_full_disk_keeps_what_was_written(trouble: int, words: str) -> None:
     assert log.sync().records == kept
 
 
+def test_what_is_appended_together_is_one_write_and_the_same_log() -> None:
+    """Many items are one write; the bytes are those of items appended one by one, copies of the header among them."""
+    items = [(Kind.DATA, n % 3, n, bytes([n % 256]) * (n % 90)) for n in range(400)]
+    items.insert(200, (Kind.MARK, 0, 7, bytes(2 * MAX_PAYLOAD + 1)))
+    together, single = Disk(), Disk()
+    log = WireLogWriter("run.wire", HEADER, open_file=together, log=9)
+    writes: list[int] = []
+    take = together.write
+    together.write = lambda data: (writes.append(len(data)), take(data))[1]  # type: ignore[method-assign]
+    log.extend(items)
+    other = WireLogWriter("run.wire", HEADER, open_file=single, log=9)
+    for kind, channel, mono_ns, payload in items:
+        other.append(kind, payload, mono_ns=mono_ns, channel=channel)
+    assert together.data == single.data
+    assert (log.written, log.extended) == (other.written, len(items))
+    assert len(writes) == 1
+
+
+@pytest.mark.parametrize("room", [0, 27, 28, 5000, 20_000, 90_000, 140_000])
+def test_of_items_appended_together_those_that_are_whole_are_counted(room: int) -> None:
+    """A disk that fills up within a write keeps the records before; the log holds the items that were counted."""
+    disk = Disk()
+    log = WireLogWriter("run.wire", HEADER, open_file=disk)
+    disk.room = len(disk.data) + room
+    items = [(Kind.DATA, 1, n, b"R%04d\r" % n) for n in range(400)]
+    items[300:300] = [(Kind.MARK, 0, 300, bytes(2 * MAX_PAYLOAD + 1))]
+    with pytest.raises(WriteFailed, match="No space left"):
+        log.extend(items)
+    contents = parse_log(bytes(disk.data))
+    found = [content(record) for record in contents if record.kind is not Kind.HEADER]
+    assert found == items[: log.extended]
+    assert contents.damage.tail_bytes + contents.damage.skipped_bytes <= disk.room - log.written.bytes
+    with pytest.raises(WriteFailed):
+        log.extend(items)
+    assert log.extended == 0
+
+
 def test_a_failed_sync_is_never_taken_back() -> None:
     """After one failed sync nothing more counts as safe: the kernel forgets which pages it could not write."""
     disk = Disk()
