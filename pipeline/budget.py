@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal
 
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
 
-__all__ = ["Budget", "Budgets", "Contribution", "Inputs", "Kind", "linear"]
+__all__ = ["Budget", "Budgets", "Contribution", "Inputs", "Kind", "estimate_of", "linear", "product"]
 
 Kind = Literal["A", "B"]
 
@@ -106,14 +107,14 @@ class Inputs:
         AnalysisError
             If the uncertainty is negative or no number.
         """
-        from uncertainties import ufloat
-
         self._register(name, kind)
         if not (math.isfinite(estimate.u) and estimate.u >= 0):
             raise AnalysisError(
                 f"{name}: a standard uncertainty must be finite and not negative, got {estimate.u:g}; check the input"
             )
-        return ufloat(estimate.value, estimate.u, tag=(name, estimate.unit)) if estimate.u > 0 else estimate.value
+        if not estimate.u > 0:
+            return estimate.value
+        return _library().Variable(estimate.value, estimate.u, (name, estimate.unit))
 
     def add_joint(self, name: str, joint: Joint, kind: Kind) -> list[Any]:
         """Return parameters estimated together as correlated variables; they are one line in every budget.
@@ -125,11 +126,12 @@ class Inputs:
         joint : Joint
         kind : {"A", "B"}
         """
-        from uncertainties import correlated_values
-
         self._register(name, kind)
         self._groups.add(name)
-        return list(correlated_values(joint.values, joint.covariance, tags=[(name, "")] * len(joint.names)))
+        tags = [(name, "")] * len(joint.names)
+        found = _library().correlated_values(joint.values, joint.covariance, tags=tags)
+        # Slopes as plain floats: everything made of them is, then, and arithmetic with numpy's scalars is slow.
+        return [linear(x.nominal_value, [(slope, v) for v, slope in x.derivatives.items()]) for x in found]
 
     def add_alternatives(self, name: str, weights: Mapping[str, float], kind: Kind) -> dict[str, Any]:
         """Return a variable of mean 0 and variance w for each alternative; they are one line in every budget.
@@ -137,11 +139,10 @@ class Inputs:
         A result x that would be x_i under the alternative i is x + sum_i (x_i - x) z_i, whose variance holds
         sum_i w_i (x_i - x)^2, with the same sign for all results that an alternative moves together.
         """
-        from uncertainties import ufloat
-
         self._register(name, kind)
         self._groups.add(name)
-        return {key: ufloat(0.0, math.sqrt(w), tag=(name, "")) if w > 0 else 0.0 for key, w in weights.items()}
+        variable = _library().Variable
+        return {key: variable(0.0, math.sqrt(w), (name, "")) if w > 0 else 0.0 for key, w in weights.items()}
 
     def budget(self, quantity: str, x: Any, unit: str) -> Budget:
         """Return the budget of a result made of these inputs.
@@ -152,9 +153,7 @@ class Inputs:
         x : number or variable
         unit : str
         """
-        from uncertainties import nominal_value, std_dev
-
-        total = Estimate(float(nominal_value(x)), float(std_dev(x)), unit)
+        total = estimate_of(x, unit)
         if total.u == 0:
             return Budget(quantity, total, ())
         variances: dict[str, float] = {}
@@ -207,6 +206,13 @@ class Budgets(Mapping[str, Budget]):
         return len(self._results)
 
 
+def estimate_of(x: Any, unit: str) -> Estimate:
+    """Return value and standard uncertainty of a variable, or of an exact number."""
+    if isinstance(x, _library().AffineScalarFunc):
+        return Estimate(x.nominal_value, x.std_dev, unit)
+    return Estimate(float(x), 0.0, unit)
+
+
 def linear(value: float, terms: Iterable[tuple[float, Any]]) -> Any:
     """Return a variable of that value which varies as the sum of slopes times variables, built in one go.
 
@@ -222,11 +228,56 @@ def linear(value: float, terms: Iterable[tuple[float, Any]]) -> Any:
     >>> print(linear(7.0, [(3.0, ufloat(1.0, 0.1)), (4.0, ufloat(5.0, 0.1)), (1.0, 2.0)]))
     7.0+/-0.5
     """
-    from uncertainties.core import AffineScalarFunc, LinearCombination
-
+    library = _library()
     slopes: dict[Any, float] = {}
     for slope, x in terms:
-        if slope and isinstance(x, AffineScalarFunc):
+        if slope and isinstance(x, library.AffineScalarFunc):
             for variable, own in x.derivatives.items():
                 slopes[variable] = slopes.get(variable, 0.0) + float(slope) * own
-    return AffineScalarFunc(float(value), LinearCombination(slopes))
+    return library.AffineScalarFunc(value, library.LinearCombination(slopes))
+
+
+def product(factor: float, *powers: tuple[Any, int]) -> Any:
+    """Return a factor times powers of variables as one variable, built in one go; a number where all are exact.
+
+    Parameters
+    ----------
+    factor : float
+    *powers : (variable or number, int)
+        What to multiply by, and its exponent.
+
+    Examples
+    --------
+    >>> from uncertainties import ufloat
+    >>> print(product(2.0, (ufloat(3.0, 0.1), 2), (ufloat(4.0, 0.1), -1), (2.0, 1)))
+    9.0+/-0.6
+    """
+    library = _library()
+    value, uncertain = factor, []
+    for x, power in powers:
+        if isinstance(x, library.AffineScalarFunc):
+            number = x.nominal_value
+            uncertain.append((x.derivatives, number, power))
+        else:
+            number = x
+        value *= number**power
+    if not uncertain:
+        return value
+    slopes: dict[Any, float] = {}
+    for i, (derivatives, number, power) in enumerate(uncertain):
+        if number:
+            slope = value * power / number
+        else:
+            others = math.prod(n**p for j, (_, n, p) in enumerate(uncertain) if j != i)
+            slope = factor * others * power * number ** (power - 1)
+        for variable, own in derivatives.items():
+            slopes[variable] = slopes.get(variable, 0.0) + slope * own
+    return library.AffineScalarFunc(value, library.LinearCombination(slopes))
+
+
+@cache
+def _library() -> Any:
+    """The package's core, imported when it is first needed."""
+    from uncertainties import core
+
+    return core

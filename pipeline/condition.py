@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
+from pipeline.median import median, median_size
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
 __all__ = ["Conditioned", "Params", "coarsest_step", "condition", "fourth_difference_noise"]
@@ -193,13 +195,14 @@ def fourth_difference_noise(y: F8) -> float:
     """
     if y.size < 5:
         return 0.0
-    differences = np.diff(y, 4)
-    return float(MAD_TO_SIGMA * np.median(np.abs(differences)) / FOURTH_DIFFERENCE_GAIN)
+    return float(MAD_TO_SIGMA * median_size(np.diff(y, 4)) / FOURTH_DIFFERENCE_GAIN)
 
 
 def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
     """Flag times that repeat or run behind the latest time seen so far; those judged before stay as they are."""
     flags = np.zeros(t.size, np.uint8)
+    if np.all(np.diff(t) > 0.0):
+        return flags
     finite = np.isfinite(t)
     latest = np.maximum.accumulate(np.where(finite, t, -np.inf))
     before = np.concatenate([[-np.inf], latest[:-1]])
@@ -254,8 +257,8 @@ def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
         smooth[spikes] = np.interp(np.flatnonzero(spikes), kept, y[kept])
     if np.count_nonzero(spikes) > 0.05 * y.size:
         # So many come in runs too, which a median of five believes; but hardly any lie within the motion.
-        middle = float(np.median(y[~spikes]))
-        reach = 3.0 * MAD_TO_SIGMA * float(np.median(np.abs(y[~spikes] - middle)))
+        middle = median(y[~spikes])
+        reach = 3.0 * MAD_TO_SIGMA * median_size(y[~spikes] - middle)
         spikes |= np.abs(y - middle) > reach
     return spikes
 
@@ -270,7 +273,8 @@ def _off_median(y: F8) -> F8:
 
 def _end(y: F8) -> float:
     """The first of five samples, or what two of the others continue to where it stands off both."""
-    return float(np.median([y[0], 2.0 * y[1] - y[2], 2.0 * y[2] - y[4]]))
+    first, second, third, fifth = float(y[0]), float(y[1]), float(y[2]), float(y[4])
+    return sorted((first, 2.0 * second - third, 2.0 * third - fifth))[1]
 
 
 def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:
@@ -302,13 +306,16 @@ def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float
         return 0.0, 0.0, none
     first = int(np.searchsorted(ordered, low + 0.6 * (high - low)))
     upper = ordered[first:]
+    few = math.ceil(max(0.02 * y.size, 8))
+    if upper.size < few or not np.any(upper[few - 1 :] <= upper[: upper.size - few + 1] + width):
+        return 0.0, 0.0, none
     counts = np.searchsorted(upper, upper + width, side="right") - np.arange(upper.size)
     start = int(np.argmax(counts))
     inside = int(counts[start])
     bottom = upper[start]
     above = upper.size - start - inside
     beneath = first + start - int(np.searchsorted(ordered, bottom - width))
-    if inside < max(0.02 * y.size, 8) or above > 0.1 * inside or inside < contrast * (beneath + 1):
+    if above > 0.1 * inside or inside < contrast * (beneath + 1):
         return 0.0, 0.0, none
     band = (y >= bottom) & (y <= bottom + width)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], band.astype(np.int8), [0]])))

@@ -110,7 +110,7 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     t, y = track.t[used], track.y[used]
     spread = float(np.ptp(y))
     resolution = conditioned.quantum_m or 0.0
-    if spread <= max(3.0 * resolution, 1e-12 * float(np.max(np.abs(y)))):
+    if spread <= max(3.0 * resolution, 1e-12 * max(float(y.max()), -float(y.min()))):
         return NoOscillation(
             f"the distance stays within {spread * 1e3:.3g} mm: nothing moves, or the sensor reads one fixed object"
         )
@@ -140,11 +140,12 @@ def _spectral_line(t: F8, y: F8, rate_hz: float, false_alarm: float) -> tuple[fl
     grid = t[0] + np.arange(n) / rate_hz
     values = np.interp(grid, t, y)
     centred = np.arange(n) - 0.5 * (n - 1)
-    values = values - values.mean()
-    values -= centred * (centred @ values) / (centred @ centred)
+    values -= values.mean()
+    values -= centred * (float(centred @ values) / float(centred @ centred))
     threshold = math.log(n / false_alarm)
     # Without a window lines are narrow, and between two bins one may be lost: they must lie closer.
-    for window, finer in ((np.hanning(n), 1), (np.ones(n), 4)):
+    for shape, finer in ((np.hanning, 1), (np.ones, 4)):
+        window = shape(n)
         frequency_hz, power, ratio = _peak(values * window, rate_hz, finer)
         if ratio >= threshold:
             return frequency_hz, 2.0 * math.sqrt(power) / float(window.sum())
@@ -155,14 +156,15 @@ def _peak(values: F8, rate_hz: float, finer: int) -> tuple[float, float, float]:
     """Frequency, Hz, and power of the highest peak, and its ratio to the floor."""
     n = values.size
     size = finer << (n - 1).bit_length()
-    power = np.abs(np.fft.rfft(values, size)) ** 2
+    line = np.fft.rfft(values, size)
+    power = line.real**2 + line.imag**2
     least = max(1, math.floor(size / n))  # slower than one period per record is drift
     k = least + int(np.argmax(power[least:-1]))
     # What lies outside the peak's neighbourhood stands for the floor.
     reach = 4 * math.ceil(size / n)
-    outside = np.concatenate([power[least : max(k - reach, least)], power[k + reach :]])
-    floor = float(np.mean(outside)) if outside.size else 0.0
-    left, mid, right = np.log(np.maximum(power[k - 1 : k + 2], 1e-300))
+    below, above = power[least : max(k - reach, least)], power[k + reach :]
+    floor = float(below.sum() + above.sum()) / max(below.size + above.size, 1)
+    left, mid, right = (math.log(max(value, 1e-300)) for value in power[k - 1 : k + 2].tolist())
     curvature = left - 2.0 * mid + right
     shift = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
     ratio = float(power[k]) / floor if floor > 0 else math.inf

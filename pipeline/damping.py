@@ -112,20 +112,29 @@ class LawFit:
 
     def rate_at_start(self) -> float:
         """Return the logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
+        return _relative_rate(self.law, self.joint.values)
+
+    def slopes_of_rate(self) -> F8:
+        """Return the derivatives (p,) of :meth:`rate_at_start` by the parameters.
+
+        Central differences over a thousandth of each parameter's uncertainty, so that their error is far below it.
+        """
         theta = self.joint.values
-        return float(self.law.rate(theta[:1], theta)[0] / theta[0])
+        slopes = np.empty(theta.size)
+        variances = self.joint.covariance.diagonal().tolist()
+        for k, (value, variance) in enumerate(zip(theta.tolist(), variances, strict=True)):
+            step = max(1e-3 * math.sqrt(max(variance, 0.0)), 1e-7 * max(abs(value), 1e-9))
+            above, below = theta.copy(), theta.copy()
+            above[k] += step
+            below[k] -= step
+            slopes[k] = (_relative_rate(self.law, above) - _relative_rate(self.law, below)) / (2.0 * step)
+        return slopes
 
     def damping_rate(self) -> Estimate:
         """Return :meth:`rate_at_start` with its uncertainty."""
-        values = self.joint.values
-
-        def rate(theta: F8) -> float:
-            return float(self.law.rate(theta[:1], theta)[0] / theta[0])
-
-        steps = 1e-6 * np.maximum(np.abs(values), 1e-9)
-        gradient = np.array([(rate(values + d) - rate(values - d)) for d in np.diag(steps)]) / (2 * steps)
-        variance = float(gradient @ self.joint.covariance @ gradient)
-        return Estimate(rate(values), math.sqrt(max(variance, 0.0)), "1/s")
+        slopes = self.slopes_of_rate()
+        variance = float(slopes @ self.joint.covariance @ slopes)
+        return Estimate(self.rate_at_start(), math.sqrt(max(variance, 0.0)), "1/s")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,10 +187,7 @@ class Damping:
         Added to the square of the angular frequency it gives that of the undamped oscillation: exactly for linear
         drag, to second order in the damping for the others.
         """
-        amplitude = self.best.amplitude(t - self.t0)
-        power = float(amplitude @ amplitude)
-        rate = self.best.law.rate(amplitude, self.best.joint.values)
-        return float(rate @ rate) / power if power > 0.0 else 0.0
+        return mean_squared_rate(self.best, self.best.amplitude(t - self.t0))
 
     def averaged(self, values: Mapping[str, Estimate]) -> Estimate:
         """Return the selected law's value of a quantity, its uncertainty widened by what admissible laws differ.
@@ -440,3 +446,15 @@ def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8
         gradient[k] = (law.rate(amplitude, theta + shift) - law.rate(amplitude, theta - shift)) / (2.0 * step)
     variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
     return law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _relative_rate(law: Law, theta: F8) -> float:
+    """-dA/dt over A at the first amplitude, 1/s."""
+    return float(law.rate(theta[:1], theta)[0] / theta[0])
+
+
+def mean_squared_rate(fit: LawFit, amplitude: F8) -> float:
+    """Return the mean of :math:`(\\dot A/A)^2` at a law's amplitudes (n,) m, weighted by :math:`A^2`, 1/s^2."""
+    power = float(amplitude @ amplitude)
+    rate = fit.law.rate(amplitude, fit.joint.values)
+    return float(rate @ rate) / power if power > 0.0 else 0.0

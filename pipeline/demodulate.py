@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,7 @@ class Params:
     rounds: int = 3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Demodulated:
     """The oscillation in windows of whole periods: what every later stage works on.
 
@@ -81,7 +82,7 @@ class Demodulated:
     flags: U8
     lost: int
 
-    @property
+    @cached_property
     def noise_m(self) -> float:
         """Standard deviation of one sample over the whole record, m."""
         dof = np.maximum(self.count - 3, 1)
@@ -293,23 +294,43 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     size = np.maximum(np.hypot(a, b), 1e-150)
     along, scale = np.arctan2(b, a), size
     weak = np.zeros(a.size, np.bool_)
-    turned = np.remainder(along - smooth_phase + math.pi, 2.0 * math.pi) - math.pi
+    turned = along - smooth_phase
+    turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
     if smooth_amplitude is not None:
         u = np.sqrt(0.5 * (covariance[:, 1, 1] + covariance[:, 2, 2]))
         weak = smooth_amplitude < WEAK * u
-        along = np.where(weak, smooth_phase, along)
-        scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
     if np.ptp(turned) > math.pi:
         turned[~weak] = np.unwrap(turned[~weak])
-    cosine, sine = np.cos(along), np.sin(along)
-    phase = smooth_phase + np.where(weak, (b * cosine - a * sine) / scale, turned)
-    jacobian = np.zeros((a.size, 3, 3))
-    jacobian[:, 0, 1], jacobian[:, 0, 2] = cosine, sine
-    jacobian[:, 1, 1], jacobian[:, 1, 2] = -sine / scale, cosine / scale
-    jacobian[:, 2, 0] = 1.0
-    covariance = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
-    amplitude = np.where(weak, a * cosine + b * sine, size * (1.0 - 0.5 * covariance[:, 1, 1]))
-    return amplitude, phase, covariance
+    if smooth_amplitude is not None and weak.any():
+        along = np.where(weak, smooth_phase, along)
+        scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
+        cosine, sine = np.cos(along), np.sin(along)
+        turned = np.where(weak, (b * cosine - a * sine) / scale, turned)
+    else:
+        cosine, sine = np.cos(along), np.sin(along)
+    turned_into = _turned(covariance, cosine, sine, scale)
+    amplitude = size * (1.0 - 0.5 * turned_into[:, 1, 1])
+    if weak.any():
+        amplitude = np.where(weak, a * cosine + b * sine, amplitude)
+    return amplitude, smooth_phase + turned, turned_into
+
+
+def _turned(covariance: F8, cosine: F8, sine: F8, scale: F8) -> F8:
+    """Covariances (w, 3, 3) of (offset, a, b) as those of (amplitude, phase, offset)."""
+    oo, oa, ob = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 0, 2]
+    aa, ab, bb = covariance[:, 1, 1], covariance[:, 1, 2], covariance[:, 2, 2]
+    # Products with the two directions: along the phase, and across it over the amplitude.
+    over, under = cosine / scale, sine / scale
+    along_a, along_b = aa * cosine + ab * sine, ab * cosine + bb * sine
+    across_a, across_b = ab * over - aa * under, bb * over - ab * under
+    found = np.empty_like(covariance)
+    found[:, 0, 0] = along_a * cosine + along_b * sine
+    found[:, 0, 1] = found[:, 1, 0] = along_b * over - along_a * under
+    found[:, 0, 2] = found[:, 2, 0] = oa * cosine + ob * sine
+    found[:, 1, 1] = across_b * over - across_a * under
+    found[:, 1, 2] = found[:, 2, 1] = ob * over - oa * under
+    found[:, 2, 2] = oo
+    return found
 
 
 def _residual_of_all(conditioned: Conditioned, windows: Windows, solution: Solution, tuning: Tuning) -> F8:

@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from pipeline.ambient import Ambient
-from pipeline.budget import Budget, Budgets, Inputs, linear
+from pipeline.budget import Budget, Budgets, Inputs, estimate_of, linear, product
 from pipeline.condition import MAD_TO_SIGMA
-from pipeline.curves import Curve, by_parameters, drag_curve, energy_curve
-from pipeline.damping import Damping, LawFit
+from pipeline.curves import Curve, drag_curve, energy_curve
+from pipeline.damping import Damping, LawFit, mean_squared_rate
 from pipeline.demodulate import Demodulated
 from pipeline.effects import ADDED_MASS_SHAPE, Effect
 from pipeline.estimate import Estimate
 from pipeline.instrument import U_CRYSTAL, Instrument
+from pipeline.law_fit import both_of
+from pipeline.median import median_size
 from pipeline.phase import PhaseFit
 from pipeline.rest import Rest
 from pipeline.scene import Scene
@@ -94,7 +96,7 @@ class Derived:
     @cached_property
     def half_stiffness(self) -> Estimate:
         """Mechanical energy over the recorded amplitude's square, N/m; per kilogram where the scene gives no mass."""
-        return _estimate(*self.parts["half_stiffness"])
+        return estimate_of(*self.parts["half_stiffness"])
 
     @cached_property
     def drag_length(self) -> Estimate | None:
@@ -105,7 +107,7 @@ class Derived:
         return self._part("drag_length")
 
     def _part(self, name: str) -> Estimate | None:
-        return _estimate(*self.parts[name]) if name in self.parts else None
+        return estimate_of(*self.parts[name]) if name in self.parts else None
 
     def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve:
         """Return the mechanical energy against time with its band, J; J/kg where no mass is known.
@@ -182,53 +184,53 @@ def derive(
     params = params or Params()
     inputs = Inputs()
     ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
-    laws = _Laws(damping, inputs)
+    laws = _Laws(damping, inputs, demodulated.t - damping.t0)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B")
     scale = ambient.scale(instrument)
-    omega = inputs.add("angular_frequency", phase.angular_frequency, "A") * rate
-    start = (
-        laws.quantity(lambda fit: float(fit.joint.values[0]), lambda fit: np.eye(1, fit.joint.values.size)[0]) * scale
-    )
-    lam = laws.quantity(LawFit.rate_at_start) * rate
-    elapsed = demodulated.t - damping.t0
-    v_rms = omega * scale * laws.quantity(lambda fit: _root_mean_square(fit, elapsed), _slopes_of_it(elapsed))
+    omega = product(1.0, (inputs.add("angular_frequency", phase.angular_frequency, "A"), 1), (rate, 1))
+    start = product(1.0, (laws.start(), 1), (scale, 1))
+    lam = product(1.0, (laws.rate_at_start(), 1), (rate, 1))
+    v_rms = product(1.0, (omega, 1), (scale, 1), (laws.root_mean_square(), 1))
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, "m"), "B")
+    offset = product(1.0, (inputs.add("rest_position", rest.mean, "A"), 1), (scale, 1))
     found: dict[str, tuple[Any, str]] = {
-        "period": (2 * math.pi / omega, "s"),
-        "frequency": (omega / (2 * math.pi), "Hz"),
+        "period": (product(2 * math.pi, (omega, -1)), "s"),
+        "frequency": (product(1.0 / (2 * math.pi), (omega, 1)), "Hz"),
         "angular_frequency": (omega, "rad/s"),
         "amplitude": (start, "m"),
-        "offset": (inputs.add("rest_position", rest.mean, "A") * scale + zero, "m"),
+        "offset": (offset + zero, "m"),
         "phase": (inputs.add("phase", phase.phase, "A"), "rad"),
         "noise": (inputs.add("noise", _noise(demodulated), "A"), "m"),
         "damping_rate": (lam, "1/s"),
         "velocity_rms": (v_rms, "m/s"),
     }
-    if damping.best.rate_at_start() > 0:
-        found["quality_factor"] = (omega / (2 * lam), "")
+    if laws.rate > 0:
+        found["quality_factor"] = (product(0.5, (omega, 1), (lam, -1)), "")
     coefficients = _coefficients(damping, laws, rate, scale)
     diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = None if own is None else own + (0.0 if share is None else share)
-    parts = {"half_stiffness": (0.5 * omega**2 * scale**2 * (1.0 if mass is None else mass), "N/m")}
+    parts = {"half_stiffness": (product(0.5, (omega, 2), (scale, 2), (1.0 if mass is None else mass, 1)), "N/m")}
     for name, x in (("mass", mass), ("own_mass", own), ("spring_share", share)):
         if x is not None:
             parts[name] = x, "kg"
     if mass is not None:
-        found["spring_constant"] = ((omega**2 + damping.squared_rate(demodulated.t) * rate**2) * mass, "N/m")
+        squared = product(1.0, (omega, 2)) + product(laws.squared_rate, (rate, 2))
+        found["spring_constant"] = (product(1.0, (squared, 1), (mass, 1)), "N/m")
     if diameter is not None:
-        found["keulegan_carpenter_number"] = (2 * math.pi * start / diameter, "")
+        found["keulegan_carpenter_number"] = (product(2 * math.pi, (start, 1), (diameter, -1)), "")
         if ambient.known:
-            found["reynolds_number"] = (ambient.density * v_rms * diameter / ambient.viscosity(), "")
+            reynolds = product(1.0, (ambient.density, 1), (v_rms, 1), (diameter, 1), (ambient.viscosity(), -1))
+            found["reynolds_number"] = (reynolds, "")
         if ambient.known and mass is not None:
             # C over beta; the area, the mass and the density are in it once.
-            over_beta = 6 * mass / (omega * ambient.density * diameter**2)
-            parts["drag_length"] = over_beta * rate / scale, "m"
+            over_beta = product(6.0, (mass, 1), (omega, -1), (ambient.density, -1), (diameter, -2))
+            parts["drag_length"] = product(1.0, (over_beta, 1), (rate, 1), (scale, -1)), "m"
             if damping.settled and "beta" in coefficients:
-                found["drag_coefficient"] = (over_beta * coefficients["beta"][0], "")
+                found["drag_coefficient"] = (product(1.0, (over_beta, 1), (coefficients["beta"][0], 1)), "")
     return Derived(
-        estimates={name: _estimate(x, unit) for name, (x, unit) in found.items()},
-        coefficients={name: _estimate(x, unit) for name, (x, unit) in coefficients.items()},
+        estimates={name: estimate_of(x, unit) for name, (x, unit) in found.items()},
+        coefficients={name: estimate_of(x, unit) for name, (x, unit) in coefficients.items()},
         budgets=Budgets(inputs, found | coefficients),
         law_weights=laws.weights,
         parts=parts,
@@ -238,42 +240,48 @@ def derive(
 class _Laws:
     """The damping laws as inputs: the selected one's parameters, and what the other admissible ones say instead."""
 
-    def __init__(self, damping: Damping, inputs: Inputs) -> None:
-        self.damping = damping
-        self.variables = inputs.add_joint("damping_law", damping.best.joint, "A")
+    def __init__(self, damping: Damping, inputs: Inputs, elapsed: F8) -> None:
+        self.best, self.elapsed = damping.best, elapsed
+        self.variables = inputs.add_joint("damping_law", self.best.joint, "A")
         names = damping.admissible or (damping.selected,)
-        odds = {name: math.exp(-0.5 * (damping.fits[name].bic - damping.best.bic)) for name in names}
+        odds = {name: math.exp(-0.5 * (damping.fits[name].bic - self.best.bic)) for name in names}
         total = sum(odds.values())
         self.weights = {name: x / total for name, x in odds.items() if name != damping.selected}
-        self.others = inputs.add_alternatives("choice_of_law", self.weights, "A")
+        alternatives = inputs.add_alternatives("choice_of_law", self.weights, "A")
+        self.others = [(damping.fits[name], z) for name, z in alternatives.items()]
+        self.rate = self.best.rate_at_start()
+        self.amplitude, self.jacobian = both_of(self.best.law, elapsed, self.best.joint.values)
 
-    def quantity(self, f: Callable[[LawFit], float], slopes: Callable[[LawFit], F8] | None = None) -> Any:
-        """Return a function of a law as a variable: linear in the parameters, with the choice of the law.
+    def start(self) -> Any:
+        """Return the amplitude at the first sample as a variable, m."""
+        slopes = [1.0] + [0.0] * (self.best.joint.values.size - 1)
+        return self._quantity(float(self.best.joint.values[0]), slopes, lambda fit: float(fit.joint.values[0]))
 
-        ``slopes`` gives its derivatives by the parameters where they are known in closed form.
-        """
-        best = self.damping.best
-        value = f(best)
-        derivatives = by_parameters(best, f) if slopes is None else slopes(best)
-        terms = list(zip(derivatives.tolist(), self.variables, strict=True))
-        terms += [(f(self.damping.fits[name]) - value, z) for name, z in self.others.items()]
+    def rate_at_start(self) -> Any:
+        """Return the logarithmic rate of the amplitude there as a variable, 1/s."""
+        return self._quantity(self.rate, self.best.slopes_of_rate().tolist(), LawFit.rate_at_start)
+
+    def root_mean_square(self) -> Any:
+        """Return that of the displacement over the windows as a variable, m."""
+        power = math.sqrt(2.0 * self.elapsed.size * float(self.amplitude @ self.amplitude))
+        slopes = (self.amplitude @ self.jacobian / max(power, 1e-300)).tolist()
+        value = _root_mean_square(self.amplitude)
+        return self._quantity(value, slopes, lambda fit: _root_mean_square(fit.amplitude(self.elapsed)))
+
+    @property
+    def squared_rate(self) -> float:
+        """As :meth:`pipeline.damping.Damping.squared_rate` over the windows, 1/s^2."""
+        return mean_squared_rate(self.best, self.amplitude)
+
+    def _quantity(self, value: float, slopes: list[float], of: Callable[[LawFit], float]) -> Any:
+        """A function of a law as a variable: linear in the parameters, with the choice of the law."""
+        terms = list(zip(slopes, self.variables, strict=True))
+        terms += [(of(fit) - value, z) for fit, z in self.others]
         return linear(value, terms)
 
 
-def _root_mean_square(fit: LawFit, elapsed: F8) -> float:
-    """Of the displacement over the windows, m."""
-    return math.sqrt(float(np.mean(fit.amplitude(elapsed) ** 2)) / 2.0)
-
-
-def _slopes_of_it(elapsed: F8) -> Callable[[LawFit], F8]:
-    """The derivatives of :func:`_root_mean_square` by a law's parameters."""
-
-    def slopes(fit: LawFit) -> F8:
-        amplitude = fit.amplitude(elapsed)
-        power = math.sqrt(2.0 * elapsed.size * float(amplitude @ amplitude))
-        return np.asarray(amplitude @ fit.law.jacobian(elapsed, fit.joint.values) / max(power, 1e-300))
-
-    return slopes
+def _root_mean_square(amplitude: F8) -> float:
+    return math.sqrt(float(np.mean(amplitude**2)) / 2.0)
 
 
 def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
@@ -283,7 +291,7 @@ def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[
     for name, unit, x in zip(joint.names, joint.units, laws.variables, strict=True):
         if name in _DIMENSIONS and name != "A0":
             length, per_time = _DIMENSIONS[name]
-            found[name] = (x * scale**length * rate**per_time, unit)
+            found[name] = (product(1.0, (x, 1), (scale, length), (rate, per_time)), unit)
     if "n" in joint.names:
         c, n = (laws.variables[joint.names.index(name)] for name in ("c", "n"))
         found["c"] = (c * rate * scale ** (1 - n), joint.units[joint.names.index("c")])
@@ -306,12 +314,6 @@ def _masses(
     return own, None
 
 
-def _estimate(x: Any, unit: str) -> Estimate:
-    from uncertainties import nominal_value, std_dev
-
-    return Estimate(float(nominal_value(x)), float(std_dev(x)), unit)
-
-
 def _noise(demodulated: Demodulated) -> Estimate:
     """Noise of one sample, m, from the residuals' median.
 
@@ -319,11 +321,11 @@ def _noise(demodulated: Demodulated) -> Estimate:
     holds the difference to the root mean square of the samples used, and what a share e of wide draws like those left
     out does to a median: 0.5 e / (2 phi(0.6745)) = 1.17 e of it.
     """
-    used = (demodulated.flags & UNUSABLE) == 0
-    residual = demodulated.residual[used]
-    residual = residual[np.isfinite(residual)]
+    flags, residual = demodulated.flags, demodulated.residual
+    clean = not flags.any()
+    residual = residual[np.isfinite(residual) & (clean or (flags & UNUSABLE) == 0)]
     dof = float(np.sum(np.maximum(demodulated.count - 3, 1)))
-    value = MAD_TO_SIGMA * float(np.median(np.abs(residual))) * math.sqrt(residual.size / dof)
-    wide = float(np.mean((demodulated.flags & Quality.FALSE_ECHO) != 0))
+    value = MAD_TO_SIGMA * median_size(residual) * math.sqrt(residual.size / dof)
+    wide = 0.0 if clean else float(np.mean((flags & np.uint8(Quality.FALSE_ECHO)) != 0))
     parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)
     return Estimate(value, math.hypot(*parts), "m")

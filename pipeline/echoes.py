@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.demodulate import Demodulated
 from pipeline.track import F8, UNUSABLE, Quality
@@ -38,15 +40,15 @@ class Clusters:
     shift_m: float
 
 
-def find_clusters(demodulated: Demodulated, angle: F8) -> Clusters:
+def find_clusters(demodulated: Demodulated, phase: Callable[[NDArray[np.int64]], F8]) -> Clusters:
     """Count clusters of false echoes.
 
     Parameters
     ----------
     demodulated : Demodulated
         For its flags, and for how far off flagged samples lie.
-    angle : (n,) float64
-        Phase of the oscillation at every sample, rad.
+    phase : callable
+        Gives the phase of the oscillation at some rows (k,) int64 of the record, (k,) float64, rad.
 
     Notes
     -----
@@ -57,10 +59,13 @@ def find_clusters(demodulated: Demodulated, angle: F8) -> Clusters:
     rows = np.flatnonzero(echo)
     if not rows.size:
         return Clusters(0, 0, 0, 0.0)
-    groups = np.split(rows, np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1)
-    clusters = [group for group in groups if group.size >= LEAST]
-    away = np.array([abs(math.remainder(float(angle[group[group.size // 2]]), math.pi)) for group in clusters])
+    angle = phase(rows)
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1])
+    sizes = np.diff(np.concatenate([starts, [rows.size]]))
+    clusters = sizes >= LEAST
+    middles = angle[(starts + sizes // 2)[clusters]]
+    turning = np.abs(middles - math.pi * np.round(middles / math.pi)) <= TURNING
     fitted = np.count_nonzero((demodulated.flags & UNUSABLE) == 0) + rows.size
     residual = np.nan_to_num(demodulated.residual[rows])
-    shift = 2.0 * float(residual @ np.cos(angle[rows])) / fitted
-    return Clusters(len(clusters), sum(group.size for group in clusters), int(np.count_nonzero(away <= TURNING)), shift)
+    shift = 2.0 * float(residual @ np.cos(angle)) / fitted
+    return Clusters(int(np.count_nonzero(clusters)), int(sizes[clusters].sum()), int(np.count_nonzero(turning)), shift)

@@ -24,6 +24,11 @@ from pipeline.waveform import Waveform
 __all__ = ["Finding", "Severity", "by_severity", "count_quality", "judge", "judge_samples", "judge_still"]
 
 GRAVITY_M_PER_S2 = 9.81
+COUNTED = {
+    str(quality.name).lower(): int(quality)
+    for quality in Quality
+    if quality not in (Quality.GAP_BEFORE, Quality.MALFORMED)
+}
 
 Severity = Literal["info", "warning", "error"]
 
@@ -54,12 +59,10 @@ def count_quality(flags: U8) -> dict[str, int]:
     >>> count_quality(np.array([0, 1, 2, 2], np.uint8))["false_echo"]
     2
     """
-    counts = {
-        quality.name.lower(): int(np.count_nonzero(flags & np.uint8(quality)))
-        for quality in Quality
-        if quality.name and quality not in (Quality.GAP_BEFORE, Quality.MALFORMED)
-    }
-    return {**counts, "used": int(np.count_nonzero((flags & UNUSABLE) == 0))}
+    values, counts = np.unique(flags, return_counts=True) if flags.any() else (np.zeros(1, int), np.array([flags.size]))
+    held = list(zip(values.tolist(), counts.tolist(), strict=True))
+    found = {name: sum(count for value, count in held if value & bit) for name, bit in COUNTED.items()}
+    return {**found, "used": sum(count for value, count in held if not value & int(UNUSABLE))}
 
 
 def judge_samples(
@@ -117,7 +120,7 @@ def judge(
     conditioned, cycles, demodulated, damping, phase, rest, waveform, beside
         Outputs of the stages of those names.
     """
-    clusters = find_clusters(demodulated, phase.total(conditioned.track.t))
+    clusters = find_clusters(demodulated, lambda rows: phase.total(conditioned.track.t[rows]))
     findings = [
         *_damping_findings(damping),
         *_motion_findings(cycles, demodulated, phase, rest, waveform),

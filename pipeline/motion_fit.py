@@ -129,9 +129,10 @@ def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
 
     A bob that friction stops early leaves a record in whose spectrum the oscillation drowns.
     """
-    stop = stop_row(conditioned)
+    if (stop := stop_row(conditioned)) is None:
+        return None
     rows = np.flatnonzero(conditioned.used)
-    if stop is None or not np.count_nonzero(rows < stop) < share * rows.size:
+    if not np.count_nonzero(rows < stop) < share * rows.size:
         return None
     track = conditioned.track
     cut = replace(track, t=track.t[:stop], y=track.y[:stop], flags=track.flags[:stop], velocity=None)
@@ -179,7 +180,7 @@ def fit_motion(
     and chosen among as the amplitude's laws are.
     """
     params, laws = params or Params(), laws or DampingParams()
-    ratio = damping.best.damping_rate().value / demodulated.angular_frequency
+    ratio = damping.best.rate_at_start() / demodulated.angular_frequency
     if not _required(damping, demodulated, ratio, params, stopped=stopped):
         return None
     search = Search.of(conditioned, demodulated, damping, params.clip_sigmas)
@@ -224,7 +225,7 @@ def _described(search: Search, damping: Damping, fit: least_squares.Fit) -> Moti
     flags[dropped & ~plateau] |= np.uint8(Quality.FALSE_ECHO)
     count = len(STATE)
     state = Joint(STATE, fit.values[:count], fit.covariance[:count, :count] * search.correlation, STATE_UNITS)
-    law, ratio = LAWS[damping.selected].words, damping.best.damping_rate().value / state["angular_frequency"].value
+    law, ratio = LAWS[damping.selected].words, damping.best.rate_at_start() / state["angular_frequency"].value
     stops = damping.best.amplitude(np.array([np.max(search.elapsed)]))[0] <= 0.0
     why = (
         f"the damping ratio is {ratio:.2g} at the first sample"

@@ -16,6 +16,7 @@ from pipeline.damping import Params as DampingParams
 from pipeline.demodulate import Demodulated
 from pipeline.law_fit import Fitted
 from pipeline.laws import LAWS, Drag
+from pipeline.median import median
 from pipeline.motion_model import COEFFICIENTS, STATE, STEP, FreeMotion
 from pipeline.regression import correlation_length
 from pipeline.track import F8, UNUSABLE
@@ -33,17 +34,25 @@ BLOCK = 25  # samples over which a bob is seen to move or not
 def stop_row(conditioned: Conditioned) -> int | None:
     """Index of the sample by which the bob has stopped for good; None where it moves to the end, or never."""
     rows = np.flatnonzero(conditioned.used)
-    whole = rows.size // BLOCK * BLOCK
-    if whole < 8 * BLOCK or not conditioned.noise_m > 0.0:
+    count = rows.size // BLOCK
+    if count < 8 or not conditioned.noise_m > 0.0:
         return None
-    blocks = conditioned.track.y[rows[:whole]].reshape(-1, BLOCK)
+    y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
     noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)
-    end = float(np.median(blocks[-max(len(blocks) // 10, 2) :]))
-    moving = np.flatnonzero(np.median(np.abs(blocks - end), axis=1) > 2.0 * noise)
-    # A few blocks that deep noise lifts are no motion: of those before the stop a share must stand off.
-    if moving.size < 3 or moving.size < 0.3 * (moving[-1] + 1) or moving[-1] >= len(blocks) - 4:
+    end = median(y[blocks[-max(count // 10, 2) :]].ravel())
+    # Most bobs move at the end of their record, and the last blocks say so.
+    if _away(y[blocks[-4:]], end).max() > 2.0 * noise:
         return None
-    return int(rows[(int(moving[-1]) + 2) * BLOCK])
+    moving = np.flatnonzero(_away(y[blocks], end) > 2.0 * noise)
+    # A few blocks that deep noise lifts are no motion: of those before the stop a share must stand off.
+    if moving.size < 3 or moving.size < 0.3 * (moving[-1] + 1):
+        return None
+    return int(blocks[int(moving[-1]) + 2, 0])
+
+
+def _away(blocks: F8, end: float) -> F8:
+    """Median distance of each block's samples from where the record ends, m."""
+    return np.asarray(np.median(np.abs(blocks - end), axis=1))
 
 
 def fittable(damping: Damping) -> list[str]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from pipeline.quick_start import bridged
 from pipeline.rest import Rest
 from pipeline.track import F8, Quality, Track
 from pipeline.waveform import Waveform
-from pipeline.windows import Windows, ranked, solve
+from pipeline.windows import ranked, solved
 
 C16 = NDArray[np.complex128]
 
@@ -116,17 +117,28 @@ class _Basis:
     @classmethod
     def of(cls, tau: F8, omega: float, decay: float) -> _Basis:
         wave = np.exp((1j * omega - decay) * tau)
-        rows = np.stack([np.ones(tau.size), wave.real, -wave.imag, tau * wave.real, -tau * wave.imag])
-        inverse = np.linalg.inv(rows[:3] @ rows[:3].T)
+        rows = np.empty((5, tau.size))
+        rows[0], rows[1], rows[2] = 1.0, wave.real, -wave.imag
+        np.multiply(rows[1:3], tau, out=rows[3:])
+        inverse = np.asarray(np.linalg.inv(rows[:3] @ rows[:3].T), np.float64)
         solver = inverse @ rows[:3]
         return cls(omega, decay, rows, solver, inverse, solver @ rows[3:].T)
 
-    def fit(self, y: F8, slope: C16) -> F8:
-        """Coefficients (w, 5) of windows y (w, l) whose complex amplitude changes by ``slope`` of itself per second."""
-        found = y @ self.solver.T
+    def drifting(self, found: F8, slope: C16) -> F8:
+        """Coefficients (w, 5) from those of steady waves (w, 3), which change by ``slope`` of themselves a second."""
         change = slope * (found[:, 1] + 1j * found[:, 2])
-        drift = np.stack([change.real, change.imag], axis=1)
-        return np.concatenate([found - drift @ self.leak.T, drift], axis=1)
+        whole = np.empty((len(found), 5))
+        whole[:, 3], whole[:, 4] = change.real, change.imag
+        whole[:, :3] = found - whole[:, 3:] @ self.leak.T
+        return whole
+
+    def weighed(self, y: F8, weights: F8) -> _Weighed:
+        """Fit steady waves to windows y (w, l) with weights (w, l): one basis, so sums are products of matrices."""
+        one, cosine, sine = self.rows[:3]
+        pairs = np.stack([one, cosine, sine, cosine * cosine, cosine * sine, sine * sine])
+        sums = pairs @ weights.T
+        coefficients, inverse, good = solved(sums[0], sums[1:], self.rows[:3] @ (weights * y).T)
+        return _Weighed(coefficients, inverse, good, np.abs(y - coefficients @ self.rows[:3]))
 
 
 def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: int, step: float) -> Quick | None:
@@ -145,7 +157,7 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     squares = np.einsum("wl,wl->w", residual, residual)
     # The calmest quarter of the windows tells the noise: clusters of echoes may sit in all others.
     typical = math.sqrt(float(np.partition(squares, w // 4)[w // 4]) / (length - 3)) + 1e-150
-    clean = ~(bad.any(axis=1) | (np.abs(residual) > OUTLIER_SIGMAS * typical).any(axis=1))
+    clean = ~(bad.any(axis=1) | (np.abs(residual).max(axis=1) > OUTLIER_SIGMAS * typical))
     expected = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
     if typical > EXCESS * expected or np.count_nonzero(clean) < max(CLEAN * w, 5):
         return None
@@ -153,7 +165,10 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     if float(smooth.amplitude.min()) < WEAK * typical * math.sqrt(2.0 / length):
         return None
     slope = smooth.rate - (1j * basis.omega - basis.decay)
-    fits = _Fits.of(basis, y, slope)
+    whole = basis.drifting(coefficients, slope)
+    fitted = whole @ basis.rows
+    inverse = np.broadcast_to(basis.inverse, (w, 3, 3))
+    fits = _Fits(whole, inverse, fitted, y - fitted, np.ones(w, np.bool_))
     if not clean.all():
         fits = _cleaned(fits, np.flatnonzero(~clean), basis, y, bad, slope, smooth, typical)
     if np.count_nonzero(fits.good) < max(0.9 * w, 5):
@@ -161,24 +176,28 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     return _quick(conditioned, part, t, level, basis, fits, smooth)
 
 
+class _Weighed(NamedTuple):
+    """Weighted fits: coefficients (w, 3), inverses (w, 3, 3), who is good (w,), and residuals' sizes (w, l)."""
+
+    coefficients: F8
+    inverse: F8
+    good: NDArray[np.bool_]
+    size: F8
+
+
 @dataclass(slots=True)
 class _Fits:
-    """Coefficients (w, 5), inverse normal matrices (w, 3, 3), residuals (w, l), and which windows are good (w,).
+    """Coefficients (w, 5), inverse normal matrices (w, 3, 3), curves and residuals (w, l), and who is good (w,).
 
     ``weights`` (w, l) are None where every sample counts.
     """
 
     coefficients: F8
     inverse: F8
+    fitted: F8
     residual: F8
     good: NDArray[np.bool_]
     weights: F8 | None = None
-
-    @classmethod
-    def of(cls, basis: _Basis, y: F8, slope: C16) -> _Fits:
-        coefficients = basis.fit(y, slope)
-        inverse = np.broadcast_to(basis.inverse, (len(y), 3, 3))
-        return cls(coefficients, inverse, y - coefficients @ basis.rows, np.ones(len(y), np.bool_))
 
 
 def _cleaned(
@@ -201,36 +220,26 @@ def _cleaned(
     others = np.setdiff1d(np.arange(len(y)), hit)
     offset = np.interp(hit, others, fits.coefficients[others, 0])
     expected = np.stack([offset, z.real, z.imag, drift.real, drift.imag], axis=1)
-    moved = expected[:, 3:] @ basis.rows[3:]
     usable = (~bad[hit]).astype(np.float64)
-    windows = Windows(
-        np.empty((0, 0), np.int64),
-        np.empty((0, 0), np.bool_),
-        usable,
-        np.where(bad[hit], 0.0, y[hit] - moved),
-        np.empty((0, 0)),
-        np.empty(0),
-        0.0,
-        1e-150,
-    )
-    rows = np.empty((hit.size, 4, y.shape[1]))
-    rows[:, :3] = basis.rows[:3]
-    rows[:, 3] = windows.y
-    size = np.abs(windows.y - expected[:, :3] @ basis.rows[:3])
+    held = usable * (y[hit] - expected[:, 3:] @ basis.rows[3:])
+    size = np.abs(held - expected[:, :3] @ basis.rows[:3])
     for _ in range(3):
         spread = np.maximum(ranked(size, usable, 0.3) / THIRD_TO_SIGMA, level)
-        size = np.abs(solve(windows, rows, usable / (1.0 + (size / spread[:, None]) ** 2) ** 2).residual)
+        size = basis.weighed(held, usable / (1.0 + (size / spread[:, None]) ** 2) ** 2).size
     for _ in range(2):
         weights = np.where(size <= 4.0 * level, usable, 0.0)
-        solution = solve(windows, rows, weights)
-        size = np.abs(solution.residual)
+        solution = basis.weighed(held, weights)
+        size = solution.size
     found = np.concatenate([solution.coefficients, expected[:, 3:]], axis=1)
     few = weights.sum(axis=1) < 0.4 * y.shape[1]
-    parts = (fits.coefficients.copy(), fits.inverse.copy(), fits.residual.copy(), fits.good.copy(), np.ones(y.shape))
-    new = (found, solution.inverse, y[hit] - found @ basis.rows, solution.good & ~few, weights)
-    for mine, theirs in zip(parts, new, strict=True):
-        mine[hit] = theirs
-    return _Fits(*parts)
+    curves = found @ basis.rows
+    fits = _Fits(
+        fits.coefficients.copy(), fits.inverse.copy(), fits.fitted.copy(), fits.residual.copy(), fits.good.copy()
+    )
+    fits.weights = np.ones(y.shape)
+    fits.coefficients[hit], fits.inverse[hit], fits.weights[hit] = found, solution.inverse, weights
+    fits.fitted[hit], fits.residual[hit], fits.good[hit] = curves, y[hit] - curves, solution.good & ~few
+    return fits
 
 
 def _neighbours(coefficients: F8, apart_s: float, omega: float) -> tuple[float, float]:
@@ -256,16 +265,25 @@ def _smooth(coefficients: F8, t: F8, omega: float, clean: NDArray[np.bool_]) -> 
     size = np.abs(z) + 1e-150
     since = t - t[0]
     angle = np.angle(z) - omega * since
-    angle[clean] = np.unwrap(angle[clean])
+    angle[clean] = _unwrapped(angle[clean])
     half = 0.5 * float(since[-1])
     x = since / half - 1.0
     order = min(3, max(1, t.size // 6)) + 1
-    powers = np.stack([np.ones_like(x), x, x * x, x**3][:order])
+    powers = np.ones((order, t.size))
+    for k in range(1, order):
+        np.multiply(powers[k - 1], x, out=powers[k])
     weighted = powers * np.where(clean, size, 0.0) ** 2
     curve = np.linalg.solve(weighted @ powers.T, weighted @ np.stack([np.log(size), angle], axis=1))
     level, turned = curve.T @ powers
     rates = (curve[1:] * (np.arange(1, order) / half)[:, None]).T @ powers[:-1]
     return _Smooth(turned + omega * since, np.exp(level), rates[0] + 1j * (rates[1] + omega))
+
+
+def _unwrapped(angle: F8) -> F8:
+    """Angles without jumps of more than half a turn between neighbours."""
+    turns = np.round(np.diff(angle) / (2.0 * math.pi))
+    angle[1:] -= 2.0 * math.pi * np.cumsum(turns)
+    return angle
 
 
 def _quick(
@@ -287,7 +305,7 @@ def _quick(
         smooth.phase[keep],
         smooth.amplitude[keep],
     )
-    position, velocity = _motion(track, part, t, level, basis, coefficients)
+    position, velocity = _motion(track, part, t, level, basis, fits)
     left = track.y - position
     left[: part.start] = left[part.stop :] = np.nan
     flags = conditioned.flags.copy()
@@ -311,15 +329,14 @@ def _quick(
     return Quick(demodulated, position, velocity, length)
 
 
-def _motion(track: Track, part: slice, t: F8, level: float, basis: _Basis, coefficients: F8) -> tuple[F8, F8]:
+def _motion(track: Track, part: slice, t: F8, level: float, basis: _Basis, fits: _Fits) -> tuple[F8, F8]:
     """Position and velocity at every sample as the windows have them; the first and the last reach to the ends."""
-    shape = (t.size, basis.rows.shape[1])
+    coefficients, shape = fits.coefficients, fits.fitted.shape
     rate = 1j * basis.omega - basis.decay
     z = coefficients[:, 1] + 1j * coefficients[:, 2]
     change = z * rate
     position, velocity = np.empty(len(track)), np.empty(len(track))
-    np.matmul(coefficients, basis.rows, out=position[part].reshape(shape))
-    position[part] += level
+    np.add(fits.fitted, level, out=position[part].reshape(shape))
     np.matmul(np.stack([change.real, change.imag], axis=1), basis.rows[1:3], out=velocity[part].reshape(shape))
     for outside, window in ((slice(0, part.start), 0), (slice(part.stop, len(track)), -1)):
         wave = z[window] * np.exp(rate * (track.t[outside] - t[window]))

@@ -7,9 +7,10 @@ that name is then called.
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.damping import BARE_MENTION, Damping, LawFit
 from pipeline.damping import Params as DampingParams
@@ -23,7 +24,10 @@ from pipeline.track import F8
 
 __all__ = ["fit_damping_quickly", "fit_phase_quickly", "fit_rest_quickly"]
 
-NESTED = {"none": (0,), "linear": (0, 1), "quadratic": (0, 2), "linear+quadratic": (0, 1, 2)}
+# Which of (A0, gamma, beta) a law has; the mixture last.
+NESTED = {"none": [0], "linear": [0, 1], "quadratic": [0, 2], "linear+quadratic": [0, 1, 2]}
+CASES = np.array([[True, False, False], [True, True, False], [True, False, True]])
+MIXED = np.ones((1, 3), np.bool_)
 STEPS = 4  # Gauss-Newton's; from curves through the logarithms two suffice
 
 
@@ -52,27 +56,24 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
     u = np.sqrt(demodulated.covariance[:, 0, 0])
     if set(params.laws) != set(NESTED) or t.size < 8 or not y.min() > 5.0 * u.max():
         return None
-    theta = _start(t, y, u)
-    found = _gauss_newton((0, 1, 2), t, y, u, theta)
-    if found is None:
+    weight = 1.0 / u
+    rich = _gauss_newton(MIXED, t, y, weight, _start(t, y, y * weight))
+    if rich is None:
         return None
-    theta, covariance, chi2 = found
-    free = t.size - 3
-    if chi2 > chi2_quantile(0.99, free):
+    chi2 = float(rich.chi2[0])
+    if chi2 > chi2_quantile(0.99, t.size - 3):
         return None
-    if correlation_length((y - _mixture(t, theta)[0]) / u) > 1.0:
+    if correlation_length((y - _mixture(t, rich.theta)[0][0]) * weight) > 1.0:
         return None
-    fits: dict[str, LawFit] = {}
-    for name, slots in NESTED.items():
-        solution: tuple[F8, F8, float] | None = (theta, covariance, chi2)
-        if len(slots) < 3:
-            others = [k for k in range(3) if k not in slots]
-            pull = np.linalg.solve(covariance[np.ix_(others, others)], theta[others])
-            start = theta[list(slots)] - covariance[np.ix_(slots, others)] @ pull
-            solution = _gauss_newton(slots, t, y, u, start)
-        if solution is None:
-            return None
-        fits[name] = _weigh(LAWS[name], *solution, t.size, params)
+    # Where the mixture's chi-square, a parabola about its least, is least without some coefficients.
+    normal = rich.normal[0]
+    right = np.where(CASES, normal @ rich.theta[0], 0.0)
+    start = np.linalg.solve(np.where(_pairs(CASES), normal, np.eye(3)), right[:, :, None])[:, :, 0]
+    cases = _gauss_newton(CASES, t, y, weight, start)
+    if cases is None:
+        return None
+    parts = (np.concatenate(pair) for pair in zip(cases, rich, strict=True))
+    fits = _weigh_all(_Settled(*parts), t.size, params)
     allowed = [name for name in fits if not fits[name].rejected]
     if not allowed:
         return None
@@ -84,72 +85,103 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
     return Damping(t0, fits, selected, admissible, Scatter(u, 0.0, np.ones(t.size, np.bool_), 1.0))
 
 
-def _start(t: F8, y: F8, u: F8) -> F8:
-    """Mixture's parameters from a parabola through the logarithms: its slope is -(gamma + beta A)."""
-    middle = 0.5 * float(t[-1])
-    tau = t - middle
-    design = np.stack([np.ones(t.size), tau, tau**2], axis=1) * (y / u)[:, None]
-    level, slope, bend = np.linalg.lstsq(design, np.log(y) * (y / u), rcond=None)[0]
-    ends = np.array([-middle, float(t[-1]) - middle])
-    amplitude = np.exp(level + slope * ends + bend * ends**2)
-    rates = -(slope + 2.0 * bend * ends)
-    fall = float(amplitude[0] - amplitude[1])
-    beta = float(rates[0] - rates[1]) / fall if abs(fall) > 0.02 * float(amplitude[0]) else 0.0
-    return np.array([amplitude[0], float(rates[0]) - beta * amplitude[0], beta])
+class _Settled(NamedTuple):
+    """Where fits of k laws end: parameters (k, 3), normal matrices and their inverses (k, 3, 3), chi-squares (k,)."""
+
+    theta: F8
+    normal: F8
+    inverse: F8
+    chi2: F8
+
+
+def _start(t: F8, y: F8, weight: F8) -> F8:
+    """Mixture's parameters (1, 3) from a parabola through the logarithms: its slope is -(gamma + beta A)."""
+    middle, half = 0.5 * float(t[-1]), 0.5 * float(t[-1])
+    x = t / half - 1.0
+    design = np.empty((3, t.size))
+    design[0], design[1], design[2] = weight, weight * x, weight * x * x
+    level, slope, bend = np.linalg.solve(design @ design.T, design @ (weight * np.log(y))).tolist()
+    ends = (math.exp(level - slope + bend), math.exp(level + slope + bend))
+    rates = (-(slope - 2.0 * bend) / middle, -(slope + 2.0 * bend) / middle)
+    fall = ends[0] - ends[1]
+    beta = (rates[0] - rates[1]) / fall if abs(fall) > 0.02 * ends[0] else 0.0
+    return np.array([[ends[0], rates[0] - beta * ends[0], beta]])
 
 
 def _mixture(t: F8, theta: F8) -> tuple[F8, F8]:
-    """Amplitude (n,) and derivatives (n, 3) of linear and quadratic drag together, in one pass.
+    """Amplitudes (k, n) and derivatives (k, 3, n) of linear and quadratic drag together, theta (k, 3).
 
-    The general law of :mod:`pipeline.laws` costs five times as much; a test holds the two together.
+    The general law of :mod:`pipeline.laws` costs several times as much; a test holds the two together.
     """
-    start, gamma, beta = theta
-    fall = np.exp(-gamma * t)
-    if abs(gamma) * float(t[-1]) < 1e-4:
-        reach, bend = t - 0.5 * gamma * t**2, t**2 * (gamma * t / 3.0 - 0.5)
-    else:
-        reach = (1.0 - fall) / gamma
-        bend = (t * fall - reach) / gamma
-    below = 1.0 + beta * start * reach
-    amplitude = start * fall / below
-    by = np.stack(
-        [
-            amplitude / (start * below),
-            -amplitude * (t + beta * start * bend / below),
-            -amplitude * start * reach / below,
-        ]
-    )
-    return amplitude, by.T
+    start, gamma, beta = theta.T[:, :, None]
+    turn = gamma * t
+    fall = np.exp(-turn)
+    slow = np.abs(gamma) * t[-1] < 1e-4
+    over = np.where(slow, 1.0, gamma)
+    reach = (1.0 - fall) / over
+    bend = (t * fall - reach) / over
+    if slow.any():
+        reach = np.where(slow, t - 0.5 * turn * t, reach)
+        bend = np.where(slow, t * t * (turn / 3.0 - 0.5), bend)
+    rise = beta * start
+    below = 1.0 + rise * reach
+    share = fall / below
+    amplitude = start * share
+    by = np.empty((*theta.shape, t.size))
+    by[:, 0] = share / below
+    by[:, 1] = -amplitude * (t + rise * bend / below)
+    by[:, 2] = -amplitude * amplitude * reach / fall
+    return amplitude, by
 
 
-def _gauss_newton(slots: tuple[int, ...], t: F8, y: F8, u: F8, theta: F8) -> tuple[F8, F8, float] | None:
-    """Parameters, covariance and chi-square; None where steps do not settle."""
-    for taken in range(STEPS):
-        with np.errstate(all="ignore"):
-            whole = np.zeros(3)
-            whole[list(slots)] = theta
-            amplitude, by = _mixture(t, whole)
-            residual = (y - amplitude) / u
-            jacobian = by[:, slots] / u[:, None]
-            normal, right = jacobian.T @ jacobian, jacobian.T @ residual
-            scale = np.sqrt(normal.diagonal())
-        chi2 = float(residual @ residual)
-        if not (math.isfinite(chi2) and math.isfinite(float(right.sum())) and float(scale.min()) > 0.0):
-            return None
-        try:
-            inverse = np.linalg.inv(normal / (scale[:, None] * scale)) / (scale[:, None] * scale)
-        except np.linalg.LinAlgError:
-            return None
-        step = inverse @ right
-        gain = float(step @ right)
-        theta = theta + step
-        # A thirtieth of a standard uncertainty is left, quadratic convergence takes it away.
-        if 0.0 <= gain <= 1e-3 * max(1.0, chi2 / t.size):
-            return theta, inverse, chi2 - gain
-        # A special case that the record contradicts need not settle: it is rejected either way.
-        if taken and chi2 > 4.0 * t.size and gain < 0.1 * chi2:
-            return theta, inverse, chi2
+def _pairs(free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return free[:, :, None] & free[:, None, :]
+
+
+def _gauss_newton(free: NDArray[np.bool_], t: F8, y: F8, weight: F8, theta: F8) -> _Settled | None:
+    """Fit laws that have the parameters ``free`` (k, 3); None where steps do not settle."""
+    pairs, alone = _pairs(free), np.eye(3)
+    end = _Settled(theta.copy(), np.empty((len(theta), 3, 3)), np.empty((len(theta), 3, 3)), np.empty(len(theta)))
+    waiting = np.ones(len(theta), np.bool_)
+    with np.errstate(all="ignore"):
+        for taken in range(STEPS):
+            amplitude, by = _mixture(t, theta)
+            residual = (y - amplitude) * weight
+            by *= weight
+            chi2 = np.einsum("kn,kn->k", residual, residual)
+            normal = np.where(pairs, by @ by.transpose(0, 2, 1), alone)
+            right = np.where(free, np.einsum("kpn,kn->kp", by, residual), 0.0)
+            scale = np.sqrt(np.einsum("kpp->kp", normal))
+            if not (math.isfinite(float(chi2.sum() + right.sum())) and float(scale.min()) > 0.0):
+                return None
+            both = scale[:, :, None] * scale[:, None, :]
+            try:
+                inverse = np.linalg.inv(normal / both) / both
+            except np.linalg.LinAlgError:
+                return None
+            step = np.einsum("kpq,kq->kp", inverse, right)
+            gain = np.einsum("kp,kp->k", step, right)
+            theta = theta + step
+            # A thirtieth of a standard uncertainty is left, quadratic convergence takes it away.
+            done = (gain >= 0.0) & (gain <= 1e-3 * np.maximum(1.0, chi2 / t.size))
+            # A special case that the record contradicts need not settle: it is rejected either way.
+            hopeless = (chi2 > 4.0 * t.size) & (gain < 0.1 * chi2) & (taken > 0)
+            now = waiting & (done | hopeless)
+            for mine, theirs in zip(end, (theta, normal, inverse, np.where(done, chi2 - gain, chi2)), strict=True):
+                mine[now] = theirs[now]
+            waiting &= ~now
+            if not waiting.any():
+                return end
     return None
+
+
+def _weigh_all(found: _Settled, points: int, params: DampingParams) -> dict[str, LawFit]:
+    """The laws' fits by name, in the order of ``NESTED``."""
+    rows = zip(NESTED.items(), found.theta, found.inverse, found.chi2.tolist(), strict=True)
+    return {
+        name: _weigh(LAWS[name], theta[slots], inverse[slots][:, slots], chi2, points, params)
+        for (name, slots), theta, inverse, chi2 in rows
+    }
 
 
 def _weigh(law: Law, theta: F8, covariance: F8, chi2: float, points: int, params: DampingParams) -> LawFit:
@@ -158,7 +190,7 @@ def _weigh(law: Law, theta: F8, covariance: F8, chi2: float, points: int, params
     rejection: Literal["", "misfit", "negative"] = ""
     if chi2 > chi2_quantile(1.0 - params.rejection, free):
         rejection = "misfit"
-    elif np.any(theta < -3.0 * np.sqrt(np.diag(covariance))):
+    elif (theta < -3.0 * np.sqrt(covariance.diagonal())).any():
         rejection = "negative"
     joint = Joint(law.parameters, theta, covariance, law.units)
     return LawFit(law, joint, chi2 / free, float(free), chi2 + count * math.log(points), True, rejection)

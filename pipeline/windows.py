@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.condition import Conditioned
 from pipeline.track import F8
 
-__all__ = ["Solution", "Windows", "basis_of", "ranked", "solve"]
+__all__ = ["Solution", "Windows", "basis_of", "ranked", "solve", "solved"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,9 +150,27 @@ def solve(windows: Windows, basis: F8, weights: F8) -> Solution:
     weights : (w, l) float64
     """
     sums = (basis[:, :3] * weights[:, None, :]) @ basis.transpose(0, 2, 1)
-    count = np.maximum(sums[:, 0, 0], 1e-300)
+    upper, right = sums[:, (0, 0, 1, 1, 2), (1, 2, 1, 2, 2)].T, sums[:, :, 3].T
+    coefficients, inverse, good = solved(sums[:, 0, 0], upper, right)
+    offset, a, b = coefficients.T[:, :, None]
+    residual = windows.y - offset - a * basis[:, 1] - b * basis[:, 2]
+    return Solution(coefficients, inverse, residual, good)
+
+
+def solved(count: F8, upper: F8, right: F8) -> tuple[F8, F8, NDArray[np.bool_]]:
+    """Return coefficients (w, 3), inverses (w, 3, 3) of the normal matrices, and which of them are good (w,).
+
+    Parameters
+    ----------
+    count : (w,) float64
+        Sums of the weights, the first entry of each normal matrix.
+    upper : (5, w) float64
+        The rest of its upper triangle, row by row.
+    right : (3, w) float64
+    """
+    count = np.maximum(count, 1e-300)
     # Divided by the count: 1, m, n, p, q, r are the upper triangle row by row.
-    (m, n, p, q, r), right = _halves(sums / count[:, None, None])
+    m, n, p, q, r = upper / count
     adjugate = np.array(
         [
             [p * r - q * q, q * n - m * r, m * q - n * p],
@@ -163,16 +181,8 @@ def solve(windows: Windows, basis: F8, weights: F8) -> Solution:
     determinant = adjugate[0, 0] + m * adjugate[0, 1] + n * adjugate[0, 2]
     good = (count >= 6.0) & (determinant > LEAST_DETERMINANT)
     adjugate /= np.where(good, determinant, np.inf)
-    coefficients = np.einsum("ijw,jw->wi", adjugate, right)
-    inverse = adjugate.transpose(2, 0, 1) / count[:, None, None]
-    offset, a, b = coefficients.T[:, :, None]
-    residual = windows.y - offset - a * basis[:, 1] - b * basis[:, 2]
-    return Solution(coefficients, inverse, residual, good)
-
-
-def _halves(sums: F8) -> tuple[F8, F8]:
-    """Upper triangle of the normal matrices less its first entry (5, w), and right-hand sides (3, w)."""
-    return sums[:, (0, 0, 1, 1, 2), (1, 2, 1, 2, 2)].T, sums[:, :, 3].T
+    coefficients = np.einsum("ijw,jw->wi", adjugate, right / count)
+    return coefficients, adjugate.transpose(2, 0, 1) / count[:, None, None], good
 
 
 def ranked(size: F8, usable: F8, share: float) -> F8:

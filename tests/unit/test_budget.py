@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from uncertainties import correlated_values, ufloat
 
 from pipeline.air import U_DENSITY, U_SOUND, U_VISCOSITY
-from pipeline.budget import Budget, Inputs
+from pipeline.budget import Budget, Inputs, product
 from pipeline.damping import fit_damping
 from pipeline.demodulate import Demodulated
 from pipeline.derive import Derived, derive
@@ -279,3 +280,16 @@ def test_one_name_is_one_input() -> None:
     inputs.add("mass", Estimate(0.2, 1e-4), "B")
     with pytest.raises(ValueError, match="'mass' is there already"):
         inputs.add("mass", Estimate(0.3, 1e-4), "B")
+
+
+@pytest.mark.parametrize("zero", [False, True])
+def test_a_product_is_what_arithmetic_with_variables_gives(zero: bool) -> None:
+    """Value, uncertainty and correlation of powers built in one go are the package's own, at a factor of 0 too."""
+    a, b = correlated_values([0.0 if zero else 3.0, 4.0], [[0.01, 0.004], [0.004, 0.09]])
+    c = ufloat(2.0, 0.05)
+    built = product(0.5, (a, 1), (b, -2), (c, 3), (a, 1), (7.0, 1))
+    written = 0.5 * a * b**-2 * c**3 * a * 7.0
+    assert built.nominal_value == pytest.approx(written.nominal_value, rel=1e-14)
+    assert built.std_dev == pytest.approx(written.std_dev, rel=1e-14)
+    assert (built - written).std_dev == pytest.approx(0.0, abs=1e-13)
+    assert product(2.0, (3.0, 2)) == 18.0

@@ -27,7 +27,7 @@ def test_clusters_are_counted_where_they_lie(windows: Windows) -> None:
     angle = 2 * np.pi * np.arange(1520) / 76
     crest, slope = [76, 77, 78, 80, 81], [76 * 5 + 18, 76 * 5 + 19, 76 * 5 + 20]
     single = [76 * 9 + 40, 76 * 10 + 3]
-    found = find_clusters(spoilt(windows, [*crest, *slope, *single], 1e-3), angle)
+    found = find_clusters(spoilt(windows, [*crest, *slope, *single], 1e-3), angle.__getitem__)
     assert (found.count, found.samples, found.turning) == (2, 8, 1)
 
 
@@ -39,11 +39,11 @@ def test_shift_is_what_least_squares_would_have_made_of_them(windows: Windows) -
     false[rows] = 0.01
     design = np.stack([np.ones(1520), np.cos(angle), np.sin(angle)], axis=1)
     expected = np.linalg.lstsq(design, false, rcond=None)[0][1]
-    found = find_clusters(spoilt(windows, rows, 0.01), angle)
+    found = find_clusters(spoilt(windows, rows, 0.01), angle.__getitem__)
     assert found.shift_m == pytest.approx(expected, rel=0.02)
     assert found.turning == found.count == 20
 
 
 def test_no_echo_no_cluster(windows: Windows) -> None:
     """A clean record has none."""
-    assert find_clusters(spoilt(windows, [], 0.0), np.zeros(1520)) == Clusters(0, 0, 0, 0.0)
+    assert find_clusters(spoilt(windows, [], 0.0), np.zeros(1520).__getitem__) == Clusters(0, 0, 0, 0.0)
