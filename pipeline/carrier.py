@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.condition import MAD_TO_SIGMA
 from pipeline.demodulate import Demodulated
+from pipeline.median import median
 from pipeline.track import F8
 
 __all__ = ["Carrier"]
@@ -43,11 +44,13 @@ class Carrier:
         degree, rest_degree = min(8, max(1, t.size // 6)), min(6, max(1, t.size // 10))
         turning = demodulated.phase - omega * (t - start)
         nodes = np.concatenate([[start], t, [end]])
+        centre, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[-1] - t[0])
+        powers = np.polynomial.legendre.legvander((nodes - centre) / half, max(degree, rest_degree))
         return cls(
             nodes,
-            _smooth(t, demodulated.amplitude, degree, nodes),
-            _smooth(t, turning, degree, nodes),
-            _smooth(t, demodulated.offset, rest_degree, nodes),
+            _smooth(powers[:, : degree + 1], demodulated.amplitude),
+            _smooth(powers[:, : degree + 1], turning),
+            _smooth(powers[:, : rest_degree + 1], demodulated.offset),
             omega,
             degree,
             rest_degree,
@@ -70,13 +73,12 @@ class Carrier:
         return np.asarray(np.interp(t, self.t, self.amplitude) / float(np.max(self.amplitude)))
 
 
-def _smooth(t: F8, y: F8, degree: int, nodes: F8) -> F8:
-    """Polynomial through points, without those far off, at the nodes."""
-    centre, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[-1] - t[0])
-    design = np.polynomial.legendre.legvander((t - centre) / half, degree)
+def _smooth(powers: F8, y: F8) -> F8:
+    """Polynomial through points (w,), without those far off, at the points and a node before and after, (w + 2,)."""
+    design, most = powers[1:-1], 2 * powers.shape[1]
     values = np.linalg.lstsq(design, y, rcond=None)[0]
     away = np.abs(y - design @ values)
-    kept = away <= 5.0 * MAD_TO_SIGMA * float(np.median(away))
-    if np.count_nonzero(kept) > 2 * degree + 2 and not kept.all():
+    kept = away <= 5.0 * MAD_TO_SIGMA * median(away)
+    if np.count_nonzero(kept) > most and not kept.all():
         values = np.linalg.lstsq(design[kept], y[kept], rcond=None)[0]
-    return np.asarray(np.polynomial.legendre.legvander((nodes - centre) / half, degree) @ values)
+    return np.asarray(powers @ values)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from pipeline.condition import MAD_TO_SIGMA
 from pipeline.demodulate import Demodulated
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
+from pipeline.fitted_law import LawFit, Rejection, mean_squared_rate
 from pipeline.law_fit import Fitted, fit_laws
 from pipeline.laws import LAWS, Law
 from pipeline.regression import Scatter, chi2_quantile, correlation_length, scatter
@@ -21,7 +22,6 @@ from pipeline.track import F8
 __all__ = ["Damping", "LawFit", "Params", "fit_damping"]
 
 TINY = 1e-100  # stands for zero where something is divided by an uncertainty
-Rejection = Literal["", "misfit", "negative", "not converged"]
 BARE_MENTION = 2.0  # difference of BIC below which evidence is none
 ALIKE = 0.1  # share of the damping that two laws may differ by and still say the same
 SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # of the first amplitude, to which at most and at least it is compared
@@ -51,90 +51,6 @@ class Params:
     rejection: float = 1e-3
     evidence: float = 6.0
     laws: tuple[str, ...] = tuple(LAWS)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LawFit:
-    """One law on one record.
-
-    Parameters
-    ----------
-    law : Law
-    joint : Joint
-        Parameters, the amplitude at the first sample used in front.
-    reduced_chi2 : float
-        Against noise and excess scatter.
-    dof : float
-        Degrees of freedom after correlation between points.
-    bic : float
-        Bayesian information criterion, up to a constant that all laws share, of the law at its best without a
-        coefficient below zero.
-    converged : bool
-    rejection : {"", "misfit", "negative", "not converged"}
-        Why the law is rejected, if it is: chi-square is improbable, a coefficient is negative beyond three standard
-        uncertainties, or the fit did not converge.
-    tried : str
-        What was tried where the fit did not converge.
-    """
-
-    law: Law
-    joint: Joint
-    reduced_chi2: float
-    dof: float
-    bic: float
-    converged: bool
-    rejection: Rejection
-    tried: str = ""
-
-    @property
-    def rejected(self) -> bool:
-        """Whether the record contradicts the law."""
-        return self.rejection != ""
-
-    @property
-    def name(self) -> str:
-        """The law's name."""
-        return self.law.name
-
-    def amplitude(self, t: F8) -> F8:
-        """Return (n,) float64, m, at times since the first sample used, s."""
-        return self.law.amplitude(t, self.joint.values)
-
-    def u_amplitude(self, t: F8) -> F8:
-        """Return the standard uncertainty of :meth:`amplitude`, (n,) float64, m."""
-        jacobian = self.law.jacobian(t, self.joint.values)
-        variance = np.einsum("ni,ij,nj->n", jacobian, self.joint.covariance, jacobian)
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
-
-    def rates(self, amplitude: F8) -> tuple[F8, F8]:
-        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
-        return rates_of(self.law, amplitude, self.joint.values, self.joint.covariance)
-
-    def rate_at_start(self) -> float:
-        """Return the logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
-        return _relative_rate(self.law, self.joint.values)
-
-    def slopes_of_rate(self) -> F8:
-        """Return the derivatives (p,) of :meth:`rate_at_start` by the parameters.
-
-        Central differences over a thousandth of each parameter's uncertainty, so that their error is far below it.
-        """
-        theta = self.joint.values
-        slopes = np.empty(theta.size)
-        variances = self.joint.covariance.diagonal().tolist()
-        for k, (value, variance) in enumerate(zip(theta.tolist(), variances, strict=True)):
-            step = max(1e-3 * math.sqrt(max(variance, 0.0)), 1e-7 * max(abs(value), 1e-9))
-            above, below = theta.copy(), theta.copy()
-            above[k] += step
-            below[k] -= step
-            slopes[k] = (_relative_rate(self.law, above) - _relative_rate(self.law, below)) / (2.0 * step)
-        return slopes
-
-    def damping_rate(self) -> Estimate:
-        """Return :meth:`rate_at_start` with its uncertainty."""
-        slopes = self.slopes_of_rate()
-        variance = float(slopes @ self.joint.covariance @ slopes)
-        return Estimate(self.rate_at_start(), math.sqrt(max(variance, 0.0)), "1/s")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -434,27 +350,3 @@ def choose(fits: Mapping[str, Weighed], params: Params, span: Callable[[str], F8
             if not np.all(np.abs(rate - alone) + 2.0 * u <= ALIKE * alone):
                 idle.remove(name)
     return selected, tuple(name for name in reach if name not in idle)
-
-
-def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
-    """Return a law's -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
-    steps = 1e-6 * np.maximum(np.abs(theta[1:]), 1e-9)
-    gradient = np.zeros((theta.size, amplitude.size))
-    for k, step in enumerate(steps, start=1):
-        shift = np.zeros(theta.size)
-        shift[k] = step
-        gradient[k] = (law.rate(amplitude, theta + shift) - law.rate(amplitude, theta - shift)) / (2.0 * step)
-    variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
-    return law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
-
-
-def _relative_rate(law: Law, theta: F8) -> float:
-    """-dA/dt over A at the first amplitude, 1/s."""
-    return float(law.rate(theta[:1], theta)[0] / theta[0])
-
-
-def mean_squared_rate(fit: LawFit, amplitude: F8) -> float:
-    """Return the mean of :math:`(\\dot A/A)^2` at a law's amplitudes (n,) m, weighted by :math:`A^2`, 1/s^2."""
-    power = float(amplitude @ amplitude)
-    rate = fit.law.rate(amplitude, fit.joint.values)
-    return float(rate @ rate) / power if power > 0.0 else 0.0

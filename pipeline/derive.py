@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,12 +14,13 @@ from pipeline.ambient import Ambient
 from pipeline.budget import Budget, Budgets, Inputs, estimate_of, linear, product
 from pipeline.condition import MAD_TO_SIGMA
 from pipeline.curves import Curve, drag_curve, energy_curve
-from pipeline.damping import Damping, LawFit, mean_squared_rate
+from pipeline.damping import Damping
 from pipeline.demodulate import Demodulated
 from pipeline.effects import ADDED_MASS_SHAPE, Effect
 from pipeline.estimate import Estimate
+from pipeline.fitted_law import mean_squared_rate
 from pipeline.instrument import U_CRYSTAL, Instrument
-from pipeline.law_fit import both_of
+from pipeline.law_fit import evaluate
 from pipeline.median import median_size
 from pipeline.phase import PhaseFit
 from pipeline.rest import Rest
@@ -241,47 +242,44 @@ class _Laws:
     """The damping laws as inputs: the selected one's parameters, and what the other admissible ones say instead."""
 
     def __init__(self, damping: Damping, inputs: Inputs, elapsed: F8) -> None:
-        self.best, self.elapsed = damping.best, elapsed
+        self.best = damping.best
         self.variables = inputs.add_joint("damping_law", self.best.joint, "A")
         names = damping.admissible or (damping.selected,)
         odds = {name: math.exp(-0.5 * (damping.fits[name].bic - self.best.bic)) for name in names}
         total = sum(odds.values())
         self.weights = {name: x / total for name, x in odds.items() if name != damping.selected}
         alternatives = inputs.add_alternatives("choice_of_law", self.weights, "A")
-        self.others = [(damping.fits[name], z) for name, z in alternatives.items()]
+        self.choices = list(alternatives.values())
+        self.fits = (self.best, *(damping.fits[name] for name in alternatives))
         self.rate = self.best.rate_at_start()
-        self.amplitude, self.jacobian = both_of(self.best.law, elapsed, self.best.joint.values)
+        found, slopes = evaluate([fit.law for fit in self.fits], [fit.joint.values for fit in self.fits], elapsed)
+        self.amplitude, self.jacobian = found[0], slopes[0]
+        self.sizes = np.sqrt(np.einsum("kn,kn->k", found, found) / (2.0 * elapsed.size)).tolist()
 
     def start(self) -> Any:
         """Return the amplitude at the first sample as a variable, m."""
         slopes = [1.0] + [0.0] * (self.best.joint.values.size - 1)
-        return self._quantity(float(self.best.joint.values[0]), slopes, lambda fit: float(fit.joint.values[0]))
+        return self._quantity(slopes, [float(fit.joint.values[0]) for fit in self.fits])
 
     def rate_at_start(self) -> Any:
         """Return the logarithmic rate of the amplitude there as a variable, 1/s."""
-        return self._quantity(self.rate, self.best.slopes_of_rate().tolist(), LawFit.rate_at_start)
+        return self._quantity(self.best.slopes_of_rate().tolist(), [fit.rate_at_start() for fit in self.fits])
 
     def root_mean_square(self) -> Any:
         """Return that of the displacement over the windows as a variable, m."""
-        power = math.sqrt(2.0 * self.elapsed.size * float(self.amplitude @ self.amplitude))
-        slopes = (self.amplitude @ self.jacobian / max(power, 1e-300)).tolist()
-        value = _root_mean_square(self.amplitude)
-        return self._quantity(value, slopes, lambda fit: _root_mean_square(fit.amplitude(self.elapsed)))
+        power = 2.0 * self.amplitude.size * self.sizes[0]
+        return self._quantity((self.jacobian @ self.amplitude / max(power, 1e-300)).tolist(), self.sizes)
 
     @property
     def squared_rate(self) -> float:
         """As :meth:`pipeline.damping.Damping.squared_rate` over the windows, 1/s^2."""
         return mean_squared_rate(self.best, self.amplitude)
 
-    def _quantity(self, value: float, slopes: list[float], of: Callable[[LawFit], float]) -> Any:
-        """A function of a law as a variable: linear in the parameters, with the choice of the law."""
+    def _quantity(self, slopes: list[float], values: list[float]) -> Any:
+        """A quantity's value under each law as one variable: linear in the selected law's parameters."""
         terms = list(zip(slopes, self.variables, strict=True))
-        terms += [(of(fit) - value, z) for fit, z in self.others]
-        return linear(value, terms)
-
-
-def _root_mean_square(amplitude: F8) -> float:
-    return math.sqrt(float(np.mean(amplitude**2)) / 2.0)
+        terms += [(other - values[0], z) for other, z in zip(values[1:], self.choices, strict=True)]
+        return linear(values[0], terms)
 
 
 def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
@@ -308,7 +306,7 @@ def _masses(
     own = inputs.add("bob_mass", scene.bob_mass_kg, "B")
     included = {effect.name for effect in effects if effect.included}
     if "added_mass" in included and diameter is not None:
-        own = own + ADDED_MASS_SHAPE * ambient.density * (diameter / 2) ** 3
+        own = own + product(ADDED_MASS_SHAPE / 8.0, (ambient.density, 1), (diameter, 3))
     if "spring_mass" in included and scene.spring_mass_kg is not None:
         return own, inputs.add("spring_mass", scene.spring_mass_kg, "B") / 3
     return own, None

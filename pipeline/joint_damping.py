@@ -10,10 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.damping import NEGATIVE, Damping, Params, choose, rates_of
+from pipeline.damping import NEGATIVE, Damping, Params, choose
 from pipeline.demodulate import Demodulated
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
+from pipeline.fitted_law import rates_of
 from pipeline.law_fit import covariance_or_infinite, minimise
 from pipeline.laws import LAWS, Law
 from pipeline.regression import chi2_quantile

@@ -59,8 +59,8 @@ def count_quality(flags: U8) -> dict[str, int]:
     >>> count_quality(np.array([0, 1, 2, 2], np.uint8))["false_echo"]
     2
     """
-    values, counts = np.unique(flags, return_counts=True) if flags.any() else (np.zeros(1, int), np.array([flags.size]))
-    held = list(zip(values.tolist(), counts.tolist(), strict=True))
+    counts = np.bincount(flags) if flags.any() else np.array([flags.size])
+    held = [(value, count) for value, count in enumerate(counts.tolist()) if count]
     found = {name: sum(count for value, count in held if value & bit) for name, bit in COUNTED.items()}
     return {**found, "used": sum(count for value, count in held if not value & int(UNUSABLE))}
 

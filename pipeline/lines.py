@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.median import median
 from pipeline.track import F8
 
 __all__ = [
@@ -135,7 +136,8 @@ def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
     there = blocks.weight / math.sqrt(blocks.samples)
     size = 1 << (OVERSAMPLING * y.size - 1).bit_length()
     tapered = taper * there
-    power = np.abs(np.fft.rfft(tapered * there * y, size)) ** 2 / float(tapered @ tapered)
+    lines = np.fft.rfft(tapered * there * y, size)
+    power = (lines.real**2 + lines.imag**2) / float(tapered @ tapered)
     frequency = np.asarray(np.fft.rfftfreq(size, blocks.step), np.float64)
     return frequency, np.asarray(power, np.float64)
 
@@ -161,7 +163,7 @@ def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance
     inside = band.inside(frequency)
     if np.count_nonzero(inside) < 8:
         return False
-    usual = float(np.median(power[inside])) / math.log(2.0)
+    usual = median(power[inside]) / math.log(2.0)
     trials = _trials(inside, float(frequency[1]), blocks)
     fixed = np.min(np.abs(frequency[:, None] - np.array(fixed_hz)), axis=1) <= 1.0 / blocks.seconds
     # The taper costs a third of a line's power.

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.condition import MAD_TO_SIGMA
+from pipeline.median import median, median_size
 from pipeline.track import F8
 
 __all__ = ["Line", "Scatter", "chi2_quantile", "correlation_length", "covariance_of", "scatter", "solve_weighted"]
@@ -130,7 +132,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
         line = solve_weighted(design[kept], y[kept], total[kept])
         residual = y - design @ line.values
         # The smaller of two measures: the median is deaf to outliers, the root mean square knows flat patterns.
-        typical = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
+        typical = MAD_TO_SIGMA * median_size(residual)
         spread = share * min(typical, float(np.sqrt(np.mean(residual[kept] ** 2))))
         excess = _excess(residual, u, spread)
         settled = excess == 0.0 and total is u
@@ -145,7 +147,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
 
 
 def _excess(residual: F8, u: F8, spread: float) -> float:
-    typical = float(np.median(u))
+    typical = median(u)
     # Under twice its own error a difference of variances is none: the median deviation is known to 1.17/sqrt(2n).
     doubt = 1.0 + 2.0 * 1.17 / math.sqrt(2.0 * residual.size)
     if spread <= typical * doubt:
@@ -184,6 +186,12 @@ def chi2_quantile(probability: float, dof: float) -> float:
     >>> round(chi2_quantile(0.999, 10), 1)
     29.8
     """
-    z = NormalDist().inv_cdf(probability)
+    z = _normal_quantile(probability)
     shrink = 2.0 / (9.0 * dof)
     return dof * max(1.0 - shrink + z * math.sqrt(shrink), 0.0) ** 3
+
+
+@lru_cache(maxsize=64)
+def _normal_quantile(probability: float) -> float:
+    """Quantile of the normal distribution; a run asks for the same two or three again and again."""
+    return NormalDist().inv_cdf(probability)

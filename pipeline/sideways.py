@@ -13,6 +13,7 @@ from pipeline.condition import MAD_TO_SIGMA, Conditioned
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate
 from pipeline.lines import Band, Blocks, Peak, false_alarm, spectral_density, strongest, worth_a_look
+from pipeline.median import median_size
 from pipeline.modes import Mode, Sideways
 from pipeline.track import F8, UNUSABLE
 
@@ -79,7 +80,7 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
         return Sideways((), None)
     carrier = Carrier.through(demodulated, float(t[0]), float(t[-1]))
     residual = conditioned.track.y[used] - carrier.position(t)
-    spread = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
+    spread = MAD_TO_SIGMA * median_size(residual)
     if spread == 0.0:
         return Sideways((), carrier)
     believed = np.abs(residual) <= 8.0 * spread

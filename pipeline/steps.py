@@ -13,6 +13,7 @@ from pipeline.carrier import Carrier
 from pipeline.condition import MAD_TO_SIGMA, Conditioned
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate
+from pipeline.median import median, median_size
 from pipeline.regression import correlation_length, solve_weighted
 from pipeline.track import F8, UNUSABLE
 
@@ -163,11 +164,11 @@ class _Windows:
         if t.size < 5:
             return cls(t, offset, 1.0)
         around = np.lib.stride_tricks.sliding_window_view(np.pad(offset, 2, mode="edge"), 5)
-        away = np.abs(offset - np.median(around, axis=1))
-        kept = away <= 8.0 * max(MAD_TO_SIGMA * float(np.median(away)), 1e-300)
+        away = np.abs(offset - np.partition(around, 2, axis=1)[:, 2])
+        kept = away <= 8.0 * max(MAD_TO_SIGMA * median(away), 1e-300)
         t, offset = t[kept], offset[kept]
-        stated = float(np.median(np.sqrt(demodulated.covariance[kept, 2, 2])))
-        apart = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(offset)))) / math.sqrt(2.0)
+        stated = median(np.sqrt(demodulated.covariance[kept, 2, 2]))
+        apart = MAD_TO_SIGMA * median_size(np.diff(offset)) / math.sqrt(2.0)
         return cls(t, offset, max(stated, apart, 1e-15 * float(np.max(np.abs(offset))) + 1e-100))
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.condition import Conditioned
+from pipeline.median import median
 from pipeline.track import F8
 
 __all__ = ["Solution", "Windows", "basis_of", "ranked", "solve", "solved"]
@@ -54,7 +55,7 @@ class Windows:
         inside = slots[None, :] < lengths[:, None]
         rows = np.minimum(bounds[:-1, None] + slots[None, :], bounds[-1] - 1)
         usable = conditioned.used[rows] & inside
-        level = float(np.median(track.y[conditioned.used]))
+        level = median(track.y[conditioned.used])
         y = np.where(usable, track.y[rows] - level, 0.0)
         tiny = 1e-12 * float(np.max(np.abs(y))) + 1e-150
         t = np.where(usable, track.t[rows], 0.0)
