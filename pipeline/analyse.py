@@ -17,10 +17,10 @@ from pipeline import fullfit as fullfits
 from pipeline import motion_fit as solutions
 from pipeline import phase as phases
 from pipeline import relaxation as relaxations
-from pipeline.beside import Beside, set_apart
-from pipeline.condition import Conditioned, condition
-from pipeline.cycles import Cycles, NoOscillation, find_cycles
-from pipeline.damping import Damping, fit_damping
+from pipeline.beside import Beside
+from pipeline.condition import Conditioned
+from pipeline.cycles import Cycles, NoOscillation
+from pipeline.damping import Damping
 from pipeline.demodulate import Demodulated, demodulate
 from pipeline.derive import Derived, derive
 from pipeline.effects import Effect, tabulate
@@ -31,17 +31,16 @@ from pipeline.instrument import Instrument
 from pipeline.judge import Finding, by_severity, count_quality, judge, judge_samples, judge_still
 from pipeline.judge_scene import judge_scene
 from pipeline.motion_fit import MotionFit, MotionMisfit, fit_motion, moving_part
-from pipeline.phase import PhaseFit, fit_phase
+from pipeline.phase import PhaseFit
 from pipeline.quick import demodulate_quickly
-from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
-from pipeline.quick_start import condition_quickly, find_cycles_quickly
 from pipeline.regression import correlation_length
 from pipeline.relaxation import Relaxation, find_relaxation, spring_constant
-from pipeline.rest import Rest, fit_rest
+from pipeline.rest import Rest
 from pipeline.scene import Scene
 from pipeline.smoother import Smoothed, smooth
+from pipeline.tiers import models_of, tier_of
 from pipeline.track import U8, Track
-from pipeline.waveform import Waveform, reconstruct
+from pipeline.waveform import Waveform
 
 __all__ = ["Analysis", "Motion", "Params", "analyse"]
 
@@ -177,13 +176,13 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     scene, params = scene or Scene(), params or Params()
     if track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
-    fast = params.accuracy == "fast"
-    conditioned = (condition_quickly if fast else condition)(track, params.condition)
-    cycles = (find_cycles_quickly if fast else find_cycles)(conditioned, params.cycles)
+    tier = tier_of(params.accuracy)
+    conditioned = tier.condition(track, params.condition)
+    cycles = tier.find_cycles(conditioned, params.cycles)
     stopped = False
     share = 0.75 if isinstance(cycles, NoOscillation) else 0.25
     if (moving := moving_part(conditioned, share)) is not None:
-        trimmed = (find_cycles_quickly if fast else find_cycles)(moving, params.cycles)
+        trimmed = tier.find_cycles(moving, params.cycles)
         stopped = not isinstance(trimmed, NoOscillation)
         cycles = trimmed if stopped else cycles
     if isinstance(cycles, NoOscillation):
@@ -192,13 +191,10 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     demodulated = demodulate(conditioned, cycles, params.demodulate) if quick is None else quick.demodulated
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
         return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or why)
-    beside = Beside.nothing(conditioned)
-    if not fast:
-        demodulated, beside = set_apart(conditioned, cycles, demodulated, params.beside, params.demodulate)
+    demodulated, beside = tier.set_apart(conditioned, cycles, demodulated, params.beside, params.demodulate)
+    models = models_of(tier, quick)
     start = float(track.t[np.argmax(conditioned.used)])
-    plain = fast and quick is not None
-    damping = fit_damping_quickly(demodulated, start, params.damping) if plain else None
-    damping = damping or fit_damping(demodulated, start, params.damping)
+    damping = models.fit_damping(demodulated, start, params.damping)
     solved = fit_motion(conditioned, demodulated, damping, params.motion, params.damping, stopped=stopped)
     strong = damping.best.rate_at_start() > params.relaxation.least_damping * demodulated.angular_frequency
     linear = not isinstance(solved, MotionFit) or solved.damping.selected == "linear"
@@ -209,16 +205,11 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         damping, phase, rest = solved.damping, solved.phase(demodulated), solved.rest(demodulated)
         waveform = solved.waveform
     else:
-        phase = (fit_phase_quickly(demodulated, damping) if plain else None) or fit_phase(
-            demodulated, damping, params.phase
-        )
-        rest = (fit_rest_quickly(demodulated) if plain else None) or fit_rest(demodulated)
-        if fast and quick is not None:
-            waveform = quick.waveform(track, damping, phase, rest)
-        else:
-            waveform = reconstruct(beside.conditioned.track, demodulated, phase, rest)
+        phase = models.fit_phase(demodulated, damping, params.phase)
+        rest = models.fit_rest(demodulated)
+        waveform = models.reconstruct(quick, beside.conditioned.track, demodulated, phase, rest)
     full = None
-    if params.accuracy == "best" and not isinstance(solved, MotionFit):
+    if tier.fits_waveform and not isinstance(solved, MotionFit):
         # The record without modes and with their columns: as good as the whole record with them, for the columns span
         # what was taken out. Values and intervals agree to rounding, and put_back serves both tiers.
         extra = beside.columns(track.t)
