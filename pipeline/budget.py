@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
+import numpy as np
+
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
 
@@ -114,7 +116,7 @@ class Inputs:
             )
         if not estimate.u > 0:
             return estimate.value
-        return _library().Variable(estimate.value, estimate.u, (name, estimate.unit))
+        return _variable()(estimate.value, estimate.u, (name, estimate.unit))
 
     def add_joint(self, name: str, joint: Joint, kind: Kind) -> list[Any]:
         """Return parameters estimated together as correlated variables; they are one line in every budget.
@@ -128,10 +130,16 @@ class Inputs:
         """
         self._register(name, kind)
         self._groups.add(name)
-        tags = [(name, "")] * len(joint.names)
-        found = _library().correlated_values(joint.values, joint.covariance, tags=tags)
-        # Slopes as plain floats: everything made of them is, then, and arithmetic with numpy's scalars is slow.
-        return [linear(x.nominal_value, [(slope, v) for v, slope in x.derivatives.items()]) for x in found]
+        # As the package's correlated_values does it, with variables of ours: principal axes of the correlations.
+        u = np.sqrt(joint.covariance.diagonal())
+        scale = np.where(u > 0.0, u, 1.0)
+        variances, axes = np.linalg.eigh(joint.covariance / (scale[:, None] * scale))
+        of_axes = [_variable()(0.0, math.sqrt(max(variance, 0.0)), (name, "")) for variance in variances.tolist()]
+        slopes = (axes * u[:, None]).tolist()
+        return [
+            linear(value, zip(row, of_axes, strict=True))
+            for value, row in zip(joint.values.tolist(), slopes, strict=True)
+        ]
 
     def add_alternatives(self, name: str, weights: Mapping[str, float], kind: Kind) -> dict[str, Any]:
         """Return a variable of mean 0 and variance w for each alternative; they are one line in every budget.
@@ -141,7 +149,7 @@ class Inputs:
         """
         self._register(name, kind)
         self._groups.add(name)
-        variable = _library().Variable
+        variable = _variable()
         return {key: variable(0.0, math.sqrt(w), (name, "")) if w > 0 else 0.0 for key, w in weights.items()}
 
     def budget(self, quantity: str, x: Any, unit: str) -> Budget:
@@ -281,3 +289,9 @@ def _library() -> Any:
     from uncertainties import core
 
     return core
+
+
+@cache
+def _variable() -> Any:
+    """The package's variable with the hash of any object: its own, the same in effect, is the dearest part of a sum."""
+    return type("Variable", (_library().Variable,), {"__slots__": (), "__hash__": object.__hash__})

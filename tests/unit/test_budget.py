@@ -293,3 +293,15 @@ def test_a_product_is_what_arithmetic_with_variables_gives(zero: bool) -> None:
     assert built.std_dev == pytest.approx(written.std_dev, rel=1e-14)
     assert (built - written).std_dev == pytest.approx(0.0, abs=1e-13)
     assert product(2.0, (3.0, 2)) == 18.0
+
+
+def test_parameters_fitted_together_are_the_packages_correlated_values() -> None:
+    """Their sums and differences have the uncertainties that correlated_values gives, with an exact one among them."""
+    covariance = np.array([[4e-10, -3e-9, 0.0], [-3e-9, 9e-8, 0.0], [0.0, 0.0, 0.0]])
+    joint = Joint(("A0", "gamma", "mu"), np.array([0.05, 0.01, 0.0]), covariance, ("m", "1/s", "m/s"))
+    ours = Inputs().add_joint("law", joint, "A")
+    theirs = correlated_values(joint.values, covariance)
+    for weights in ([1.0, 0.0, 0.0], [0.0, 1.0, 2.0], [3.0, 0.5, -1.0], [1.0, -1.0, 0.0]):
+        mine, other = (sum(w * x for w, x in zip(weights, some, strict=True)) for some in (ours, theirs))
+        assert mine.nominal_value == pytest.approx(other.nominal_value, rel=1e-14)
+        assert mine.std_dev == pytest.approx(other.std_dev, rel=1e-12)
