@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
-from acquisition.formats.fixed_point import Page, Span, read_fixed
+from acquisition.formats.fixed_point import Page, read_fixed
 from acquisition.formats.text import parse_number, printed_decimals
 
-__all__ = ["EMPTY", "EXPONENT", "NAN", "UNREAD", "read_column"]
+__all__ = ["EMPTY", "EXPONENT", "NAN", "UNREAD", "read_column", "read_single"]
 
 EXPONENT = 64
 """Added to the decimals in a form where the number has an exponent."""
@@ -28,14 +28,15 @@ I1 = NDArray[np.int8]
 
 
 def read_column(
-    span: Span, usual: int, shift: int, points: bytes, values: F8, forms: I1, padded: bool = False
+    page: Page, begin: I8, end: I8, usual: int, shift: int, points: bytes, values: F8, forms: I1, padded: bool = False
 ) -> tuple[int, bool, bool]:
     """Read the cells of one column of a page.
 
     Parameters
     ----------
-    span : Span
-        Where each of n cells begins and ends; an empty one does both in one place.
+    page : Page
+    begin, end : (n,) int64
+        Where each cell begins and ends; an empty one does both in one place.
     usual : int
         The form that the column had so far; -1: not known yet.
     shift : int
@@ -58,26 +59,27 @@ def read_column(
         Whether every cell is a number of the usual form.
     """
     if usual < 0:
-        usual = _guess(span.page, span.begin, span.end)
+        usual = _guess(page, begin, end)
+    rest = None
     if usual < EXPONENT:
-        _, plain = read_fixed(span, usual, shift, points, out=values)
+        _, plain = read_fixed(page, begin, end, usual, shift, points, out=values)
         forms[:] = usual
         if usual and not padded:
-            padded = bool(((span.before_end(1) == _ZERO) & plain).any())
-        if plain.all():
+            zero = page.raw.take(end - 1, mode="clip") == _ZERO
+            padded = bool((zero if plain is None else zero & plain).any())
+        if plain is None:
             return usual, padded, True
         rest = np.flatnonzero(~plain)
-    else:
-        rest = np.arange(span.count)
-    begin, end = span.begin[rest], span.end[rest]
-    padded |= _read_others(span.page, rest, begin, end, usual, shift, points, values, forms)
+        begin, end = begin[rest], end[rest]
+    rows = np.arange(end.size) if rest is None else rest
+    padded |= _read_others(page, rows, begin, end, usual, shift, points, values, forms)
     return usual, padded, False
 
 
 def _guess(page: Page, begin: I8, end: I8) -> int:
     """Return the form that most cells of a sample have; 0 where none is a number."""
     some = np.linspace(0, end.size - 1, min(end.size, _SAMPLE)).astype(np.int64)
-    found = [form for row in some.tolist() if (form := _single(page, int(begin[row]), int(end[row]), 0)[1]) >= 0]
+    found = [form for row in some.tolist() if (form := read_single(page, int(begin[row]), int(end[row]), 0)[1]) >= 0]
     return max(sorted(set(found), reverse=True), key=found.count) if found else 0
 
 
@@ -111,16 +113,15 @@ def _read_others(
             group = np.flatnonzero(left & (key == each))
             if abs(places - shift - (exponent - 1000)) > _MOST_POWER:
                 continue
-            cells = Span(page, group.size, given=(begin[group], stop[group]))
-            value, plain = read_fixed(cells, places, shift + exponent - 1000, points)
-            done = group[plain]
+            value, plain = read_fixed(page, begin[group], stop[group], places, shift + exponent - 1000, points)
+            done = group if plain is None else group[plain]
             form = places + EXPONENT * scientific
-            values[rows[done]], forms[rows[done]] = value[plain], form
+            values[rows[done]], forms[rows[done]] = value if plain is None else value[plain], form
             left[done] = False
             if form == usual and places:
                 padded |= bool((page.raw[stop[done] - 1] == _ZERO).any())
     for at in np.flatnonzero(left).tolist():
-        values[rows[at]], forms[rows[at]] = _single(page, int(begin[at]), int(end[at]), shift)
+        values[rows[at]], forms[rows[at]] = read_single(page, int(begin[at]), int(end[at]), shift)
     return padded
 
 
@@ -181,8 +182,8 @@ def _decimals(page: Page, begin: I8, stop: I8, points: bytes) -> I8:
     return found
 
 
-def _single(page: Page, begin: int, end: int, shift: int) -> tuple[float, int]:
-    """Read one cell by itself; return its number and its form."""
+def read_single(page: Page, begin: int, end: int, shift: int) -> tuple[float, int]:
+    """Read one cell by itself; return its number, NaN where it is none, and its form."""
     cell = page.raw[begin:end].tobytes().decode("ascii", "replace").strip(" ")
     if len(cell) > 1 and cell[0] == cell[-1] == '"':
         cell = cell[1:-1].strip(" ")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -14,6 +13,7 @@ from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.formats.contents import Channel, Contents, Formula, choose
 from acquisition.formats.pulled import Pulled, pull
 from acquisition.formats.samples import flags_of, place, row_traps, sample_traps, value_traps
+from acquisition.formats.text import says_simulated
 from acquisition.formats.timing import (
     Timing,
     check_rate,
@@ -75,9 +75,7 @@ class ColumnFormat:
         quantum, others = value_traps(samples.distance, samples.flags, pulled.resolution, line, length=length)
         name = PurePath(path).name
         clock = "nominal" if timing.grid is not None else chosen.clock
-        # These forms have no place for it, so the names count too: simulated must not pass for measured.
-        said = f"{contents.title} {chosen.name} {name}"
-        kind: Kind = "simulated" if re.search(r"simulat|synthe", said, re.IGNORECASE) else "replay"
+        kind: Kind = "simulated" if says_simulated(f"{contents.title} {chosen.name} {name}") else "replay"
         info = SourceInfo(kind, name, timing.rate_hz, quantum_m=quantum or None, clock=clock)
         return Recording(
             format=self.name,
@@ -135,15 +133,17 @@ def _power(path: str, channel: Channel, unit: str | None) -> tuple[int, tuple[Tr
 def _timing(path: str, channel: Channel, pulled: Pulled, rate_hz: float | None) -> tuple[Timing, tuple[Trap, ...]]:
     traps: list[Trap] = []
     formula = channel.formula
-    count = pulled.value.size if pulled.rows.remark is None else int(np.count_nonzero(~pulled.rows.remark))
+    count = pulled.rows.samples
     if formula is not None and formula.samples is not None and formula.samples != count:
         message = f"the header declares {formula.samples} samples, {count} rows are there; all are kept"
         traps.append(Trap("stale_header", message, abs(formula.samples - count)))
     timing = None
     if formula is not None:
-        printed = None if pulled.printed is None else np.where(pulled.rows.bad, np.nan, pulled.printed)
-        number = pulled.rows.number()
-        timing = time_by_formula(path, formula.start_s, formula.step_s, printed, pulled.tolerance, number, rate_hz)
+        printed = pulled.printed
+        if printed is not None and pulled.rows.bad.any():
+            printed = np.where(pulled.rows.bad, np.nan, printed)
+        numbers = pulled.rows.numbers()
+        timing = time_by_formula(path, formula.start_s, formula.step_s, printed, pulled.tolerance, numbers, rate_hz)
         if timing is None:
             traps.append(_stale(formula, pulled))
     if timing is None and pulled.printed is not None:
@@ -166,10 +166,11 @@ def _stale(formula: Formula, pulled: Pulled) -> Trap:
 def _samples(
     path: str, channel: Channel, pulled: Pulled, timing: Timing, zeros: int
 ) -> tuple[Block, tuple[Trap, ...], Callable[[int], int | None]]:
-    """Return the samples, what was seen in them, and what gives the line of each."""
+    """Return the samples, what was seen in them, and what gives the line of each; the times printed are used up."""
     rows, value, bad = pulled.rows, pulled.value, pulled.rows.bad
     if pulled.printed is None or timing.by_row:
-        t = row_times(timing, rows.number())
+        room = np.empty(value.size) if pulled.printed is None else np.require(pulled.printed, requirements="W")
+        t = row_times(timing, rows.numbers(), out=room)
         if rows.remark is not None:
             t[rows.remark] = np.nan
     else:

@@ -1,7 +1,7 @@
 """Cells of fixed point turned into numbers all at once, exactly as ``float()`` turns each.
 
-Eight digits are one machine word: a word is loaded that ends where the digits end, what stands before them is
-shifted out, and three multiplications add the digits up.
+Eight digits are one machine word: a word is loaded that ends where the digits end, the decimal mark is closed up, and
+three multiplications add the digits up.
 
 References
 ----------
@@ -11,14 +11,12 @@ doi:10.1002/spe.2984: eight digits in a word.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 
-__all__ = ["Page", "Span", "read_fixed"]
+__all__ = ["Page", "exceeding", "is_fixed", "read_alike", "read_fixed"]
 
 PAD = 16
 """Bytes in front of a page, so that a word may begin before the first cell."""
@@ -26,13 +24,18 @@ PAD = 16
 # Integers of 15 digits and powers of ten up to 22 are exact, so their quotient rounds as float() does.
 MOST_DIGITS = 15
 
+U64 = NDArray[np.uint64]
+
 _U8 = np.uint64
-_MINUS, _ZERO = (ord(c) for c in "-0")
-_ZEROS = _U8(0x3030303030303030)
-_ABOVE_NINE = _U8(0x7676767676767676)
+_WORD = 8
+_MINUS, _ZERO, _NINE = (ord(c) for c in "-09")
+_DIGITS = 0x0F0F0F0F0F0F0F0F
 _TOP_BITS = _U8(0x8080808080808080)
-_PAIRS = _U8(0x000000FF000000FF)
-_HIGH, _LOW = _U8(0x000F424000000064), _U8(0x0000271000000001)
+_ABOVE_NINE, _ABOVE_NOTHING = 0x76, 0x7F
+_SIGN_BIT = _U8(63)
+_ALL = (1 << 64) - 1
+# Of a word's last n bytes, which are its most significant.
+_LAST = np.array([_ALL ^ ((1 << 8 * (_WORD - n)) - 1) for n in range(_WORD + 1)], np.uint64)
 
 
 class Page:
@@ -44,103 +47,102 @@ class Page:
         At least one byte.
     """
 
-    __slots__ = ("_masks", "_padded", "raw", "words")
+    __slots__ = ("_mask", "_padded", "_room", "raw", "words")
 
     raw: NDArray[np.uint8]
-    words: NDArray[np.uint64]
+    words: U64
 
     def __init__(self, text: NDArray[np.uint8]) -> None:
         self._padded = np.zeros(0, np.uint8)
-        self._masks = np.empty((0, 0), bool)
+        self._mask = np.empty(0, bool)
+        self._room = np.empty((2, 0), np.uint64)
         self.fill(text)
 
     def fill(self, text: NDArray[np.uint8]) -> None:
         """Take another text."""
         if PAD + text.size > self._padded.size:
             self._padded = np.zeros(PAD + text.size, np.uint8)
-            self._masks = np.empty((3, text.size), bool)
+            self._mask = np.empty(text.size, bool)
         self.raw = self._padded[PAD : PAD + text.size]
         self.raw[:] = text
         # words[i] holds the eight bytes before byte i of raw, the last of them as the most significant.
-        self.words = np.ndarray((text.size + 1,), "<u8", self._padded.data, PAD - 8, (1,))
+        self.words = np.ndarray((text.size + 1,), "<u8", self._padded.data, PAD - _WORD, (1,))
 
-    def where(self, byte: int, slot: int) -> NDArray[np.bool_]:
-        """Tell where a byte stands; the answer holds until the next one for that slot."""
-        return np.equal(self.raw, byte, out=self._masks[slot, : self.raw.size])
+    def below(self, byte: int) -> NDArray[np.bool_]:
+        """Tell where bytes below another stand; the answer holds until the next one."""
+        return np.less(self.raw, byte, out=self._mask[: self.raw.size])
+
+    def room(self, slot: int, count: int) -> U64:
+        """Return one of two arrays to calculate in; what is in it holds until it is asked for again."""
+        if count > self._room.shape[1]:
+            self._room = np.empty((2, count), np.uint64)
+        return self._room[slot, :count]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Span:
-    """Where some cells of a page begin and end.
+def is_fixed(cell: bytes, decimals: int) -> bool:
+    """Tell whether a number that prints so many decimals is ``-?digits.decimals``, of at most 15 digits.
+
+    Examples
+    --------
+    >>> [is_fixed(cell, 2) for cell in (b"-8.90", b"8,90", b".90", b"+8.90", b" 8.90")]
+    [True, True, False, False, False]
+    """
+    body = cell[cell[:1] == b"-" :]
+    whole = len(body) - decimals - (decimals > 0)
+    digits = body[:whole] + body[len(body) - decimals :]
+    return whole > 0 and len(digits) <= MOST_DIGITS and digits.isdigit()
+
+
+def read_alike(page: Page, count: int, width: int, cell: tuple[int, int], form: tuple[int, int], out: F8) -> None:
+    """Read the same cell of lines that all have the same length, digits in the same places and all else alike.
 
     Parameters
     ----------
     page : Page
-    count : int
-    width : int
-        Bytes from one cell to the next where all lines are laid out alike; 0 where they are not.
-    first, last : int
-        Where the first cell begins and ends, in alike lines.
-    given : ((count,) int64, (count,) int64) or None
-        Where each cell begins and ends, in others.
+    count, width : int
+        Lines, and bytes of each.
+    cell : (int, int)
+        Where the cell of the first line begins and ends; of the form that :func:`is_fixed` demands.
+    form : (int, int)
+        Digits behind the point, and the power of ten that the numbers are multiplied with.
+    out : (count,) float64
+        Receives the numbers, each rounded once.
     """
-
-    page: Page
-    count: int
-    width: int = 0
-    first: int = 0
-    last: int = 0
-    given: tuple[I8, I8] | None = None
-
-    @property
-    def begin(self) -> I8:
-        """Each cell's first byte."""
-        return self._steps(self.first) if self.given is None else self.given[0]
-
-    @property
-    def end(self) -> I8:
-        """The byte behind each cell."""
-        return self._steps(self.last) if self.given is None else self.given[1]
-
-    @property
-    def length(self) -> I8 | int:
-        """Bytes of each cell; one number where all are alike."""
-        return self.last - self.first if self.given is None else self.given[1] - self.given[0]
-
-    def lead(self) -> NDArray[np.uint8]:
-        """Return the first character of each cell."""
-        return self._bytes(self.first, 0) if self.given is None else self.page.raw.take(self.given[0], mode="clip")
-
-    def before_end(self, places: int) -> NDArray[np.uint8]:
-        """Return the character so many places before the end of each cell."""
-        if self.given is None:
-            return self._bytes(self.last, places)
-        return self.page.raw.take(self.given[1] - places, mode="clip")
-
-    def words(self, places: int = 0) -> NDArray[np.uint64]:
-        """Return the eight characters that end so many places before the end of each cell."""
-        words = self.page.words
-        if self.given is None and self.last >= places:
-            return words[self.last - places :: self.width][: self.count].copy()
-        return words[np.maximum(self.end - places, 0)]
-
-    def _steps(self, first: int) -> I8:
-        return np.arange(first, first + self.count * self.width, self.width)
-
-    def _bytes(self, first: int, places: int) -> NDArray[np.uint8]:
-        if first >= places:
-            return self.page.raw[first - places :: self.width][: self.count]
-        return self.page.raw.take(self._steps(first) - places, mode="clip")
+    (begin, end), (decimals, shift) = cell, form
+    negative = int(page.raw[begin]) == _MINUS
+    begin += negative
+    point = end - decimals - 1 if decimals else -1
+    words = page.words[end::width][:count]
+    used = int(_LAST[min(end - begin, _WORD)]) & _DIGITS
+    behind = int(_LAST[min(decimals, _WORD)]) & _DIGITS
+    if 0 < decimals < _WORD:
+        word = np.bitwise_and(words, _U8(used & ((1 << 8 * (_WORD - 1 - decimals)) - 1)), out=page.room(0, count))
+        word <<= _U8(8)
+        word |= np.bitwise_and(words, _U8(behind), out=page.room(1, count))
+    else:
+        word = np.bitwise_and(words, _U8(used), out=page.room(0, count))
+    total = _add_up(word).view(np.int64)
+    rest = [at for at in range(begin, end - _WORD) if at != point]
+    if rest:
+        high = np.zeros(count, np.int64)
+        for at in rest:
+            high *= 10
+            high += page.raw[at::width][:count] & 0x0F
+        high *= 10 ** (_WORD - (point >= end - _WORD))
+        total += high
+    _scale(total, decimals - shift, -1.0 if negative else 1.0, out)
 
 
 def read_fixed(
-    span: Span, decimals: int, shift: int = 0, points: bytes = b".", out: F8 | None = None
-) -> tuple[F8, NDArray[np.bool_]]:
+    page: Page, begin: I8, end: I8, decimals: int, shift: int = 0, points: bytes = b".", out: F8 | None = None
+) -> tuple[F8, NDArray[np.bool_] | None]:
     """Read cells that are ``-?digits.decimals``.
 
     Parameters
     ----------
-    span : Span
+    page : Page
+    begin, end : (m,) int64
+        Where each cell begins and ends.
     decimals : int
         Digits behind the point; 0: no point.
     shift : int
@@ -154,93 +156,131 @@ def read_fixed(
     -------
     value : (m,) float64
         NaN in cells that are not plain.
-    plain : (m,) bool
-        Cells that are of this form.
+    plain : (m,) bool or None
+        Cells that are of this form; None where all are.
 
     Examples
     --------
     >>> page = Page(np.frombuffer(b"-8.90;12.5;NaN;", np.uint8))
-    >>> read_fixed(Span(page, 3, given=(np.array([0, 6, 11]), np.array([5, 10, 14]))), 2)
+    >>> read_fixed(page, np.array([0, 6, 11]), np.array([5, 10, 14]), 2)
     (array([-8.9,  nan,  nan]), array([ True, False, False]))
     """
-    negative = span.lead() == _MINUS
+    value = np.empty(end.size) if out is None else out
+    if not end.size:
+        return value, None
+    if decimals >= MOST_DIGITS:
+        value[:] = np.nan
+        return value, np.zeros(end.size, bool)
+    negative = page.raw.take(begin, mode="clip") == _MINUS
     signed = bool(negative.any())
-    digits = span.length - (decimals > 0)
-    if signed:
-        digits = digits - negative
-    plain = np.ones(span.count, bool)
+    digits = end - begin
     if decimals:
-        point = span.before_end(decimals + 1)
-        plain = point == points[0]
-        for other in points[1:]:
-            if plain.all():
-                break
-            plain |= point == other
-    enough = (digits > decimals) & (digits <= MOST_DIGITS)
-    if not np.all(enough):
-        plain &= enough
-        digits = np.where(enough, digits, decimals + 1)
-    if 0 < decimals < 7 and np.max(digits, initial=0) <= 7:
-        whole = _one_word(span, digits, decimals, plain)
-    else:
-        whole = _words(span, decimals + 1 if decimals else 0, digits - decimals, plain)
-        if decimals:
-            whole *= 10**decimals
-            whole += _words(span, 0, decimals, plain)
-    power = decimals - shift
-    value: F8 = np.divide(whole, 10.0**power, out=out) if power >= 0 else np.multiply(whole, 10.0**-power, out=out)
+        digits -= 1
     if signed:
-        np.negative(value, out=value, where=negative)
-    if not plain.all():
-        value[~plain] = np.nan
-    return value, plain
+        digits -= negative
+    odd: NDArray[np.bool_] | None = None
+    most = int(digits.max())
+    if most > MOST_DIGITS or int(digits.min()) <= decimals:
+        odd = (digits <= decimals) | (digits > MOST_DIGITS)
+        digits[odd] = decimals + 1
+        most = int(digits.max())
+    total, odd = _digits(page, end, digits, most, decimals, points, odd)
+    _scale(total, decimals - shift, 1.0, value)
+    if signed:
+        value.view(np.uint64)[:] ^= negative.astype(np.uint64) << _SIGN_BIT  # no branch, so no wrong guess of one
+    if odd is None:
+        return value, None
+    value[odd] = np.nan
+    return value, ~odd
 
 
-def _one_word(span: Span, digits: I8 | int, decimals: int, plain: NDArray[np.bool_]) -> I8:
-    """Add up at most seven digits around a point: the point is closed up, and all stand in one word."""
-    word = span.words()
-    behind = _U8((1 << 64) - (1 << 8 * (8 - decimals)))
-    before = word & _U8((1 << 8 * (7 - decimals)) - 1)
-    before <<= _U8(8)
-    word &= behind
-    word |= before
-    return _add_up(word, digits, plain)
+def _digits(
+    page: Page, end: I8, digits: I8, most: int, decimals: int, points: bytes, odd: NDArray[np.bool_] | None
+) -> tuple[I8, NDArray[np.bool_] | None]:
+    """Return the digits of each cell as a whole number, and which cells hold anything else."""
+    if decimals < _WORD:  # the point stands in the last word, so seven digits do
+        room = _WORD - (decimals > 0)
+        places, above = _WORD, 0
+        total, found = _word(page, end, np.minimum(digits, room) if most > room else digits, decimals, points)
+    else:
+        room = _WORD
+        total, found = _word(page, end, np.minimum(digits, room), 0, points)
+        places, above = (_WORD, decimals - _WORD) if decimals > _WORD else (_WORD + 1, 0)
+        if not above:
+            mark = page.raw.take(end - places, mode="clip")
+            found = _either(found, ~np.isin(mark, np.frombuffer(points, np.uint8)))
+    odd = _either(odd, found)
+    if most > room:
+        # Where nothing is left before the last word, nothing of this one is used.
+        high, found = _word(page, np.maximum(end - places, 0), np.maximum(digits - room, 0), above, points)
+        odd = _either(odd, found)
+        high *= 10**room
+        total += high
+    return total, odd
 
 
-def _words(span: Span, places: int, digits: I8 | int, plain: NDArray[np.bool_]) -> I8:
-    """Add up at most sixteen digits that end so many places before the end of the cell."""
-    total = _add_up(span.words(places), np.minimum(digits, 8), plain)
-    rest = digits - np.minimum(digits, 8)
-    if not np.any(rest):
-        return total
-    good = np.ones(span.count, bool)
-    high = _add_up(span.words(places + 8), np.maximum(rest, 1), good)
-    more = np.broadcast_to(np.asarray(rest) > 0, span.count)
-    plain &= good | ~more
-    total += np.where(more, high, 0) * 10**8
-    return total
+def _word(page: Page, end: I8, digits: I8, decimals: int, points: bytes) -> tuple[I8, NDArray[np.bool_] | None]:
+    """Add up the digits, at most eight with a point, that end where each word ends; tell which words hold others."""
+    word = page.words[end]
+    template = [_ZERO] * _WORD
+    if decimals:
+        template[_WORD - 1 - decimals] = points[0]
+    word ^= _U8(int.from_bytes(template, "little"))
+    used = _LAST.take(digits + 1 if decimals else digits)
+    word &= used
+    odd = _odd(page, word, decimals)
+    if odd is not None and decimals:
+        for other in points[1:]:
+            there = page.raw.take(end - decimals - 1, mode="clip") == other
+            word[there] ^= _U8((other ^ points[0]) << 8 * (_WORD - 1 - decimals))
+            odd = _odd(page, word, decimals)
+    if decimals:
+        before = np.bitwise_and(word, _U8((1 << 8 * (_WORD - 1 - decimals)) - 1), out=page.room(1, end.size))
+        before *= _U8(255)  # added to itself so many times, a byte moves up by one
+        word += before
+    return _add_up(word).view(np.int64), odd
 
 
-def _add_up(word: NDArray[np.uint64], digits: I8 | int, plain: NDArray[np.bool_]) -> I8:
-    """Return the number that the last ``digits`` characters of each word spell; clear ``plain`` where they do not."""
-    unused = np.asarray((8 - digits) << 3).astype(np.uint64)
-    word ^= _ZEROS
-    if np.any(unused):
-        word >>= unused
-        word <<= unused
-    above = word + _ABOVE_NINE
-    above |= word
-    above &= _TOP_BITS
-    if above.any():
-        plain &= above == 0
-    pairs = word >> _U8(8)
-    word *= _U8(10)
-    word += pairs
-    upper = word >> _U8(16)
-    word &= _PAIRS
-    word *= _HIGH
-    upper &= _PAIRS
-    upper *= _LOW
-    word += upper
+def _odd(page: Page, word: U64, decimals: int) -> NDArray[np.bool_] | None:
+    """Tell words, their template taken off, in which some byte is no digit, or no point; None where none is."""
+    limits = [_ABOVE_NINE] * _WORD
+    if decimals:
+        limits[_WORD - 1 - decimals] = _ABOVE_NOTHING
+    return exceeding(word, _U8(int.from_bytes(limits, "little")), page.room(1, word.size))
+
+
+def exceeding(word: U64, limits: np.uint64, room: U64) -> NDArray[np.bool_] | None:
+    """Tell words of which some byte, added to its limit, reaches 128; None where none does."""
+    np.add(word, limits, out=room)
+    room |= word
+    if not np.bitwise_or.reduce(room) & _TOP_BITS:
+        return None
+    found: NDArray[np.bool_] = (room & _TOP_BITS) != 0
+    return found
+
+
+def _add_up(word: U64) -> U64:
+    """Return the number that the eight digits in each word make, the first the least significant byte, in place."""
+    word *= _U8(2561)  # 10 and 1, a byte apart
+    word >>= _U8(8)
+    word &= _U8(0x00FF00FF00FF00FF)
+    word *= _U8(6553601)  # 100 and 1, two bytes apart
+    word >>= _U8(16)
+    word &= _U8(0x0000FFFF0000FFFF)
+    word *= _U8(42949672960001)  # 10000 and 1, four bytes apart
     word >>= _U8(32)
-    return word.view(np.int64)
+    return word
+
+
+def _scale(total: I8, decimals: int, sign: float, out: F8) -> None:
+    """Put a decimal point into whole numbers, rounded once."""
+    if decimals >= 0:
+        np.divide(total, sign * 10.0**decimals, out=out)
+    else:
+        np.multiply(total, sign * 10.0**-decimals, out=out)
+
+
+def _either(one: NDArray[np.bool_] | None, other: NDArray[np.bool_] | None) -> NDArray[np.bool_] | None:
+    if one is None or other is None:
+        return one if other is None else other
+    return one | other

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -14,9 +13,9 @@ from numpy.typing import NDArray
 from acquisition.block import F8, U8, Flag
 from acquisition.errors import FormatError
 from acquisition.formats.motion_sensor_layout import Layout, ask_columns, find_layout
-from acquisition.formats.samples import Rows, flags_of, place, row_traps, sample_traps, value_traps
+from acquisition.formats.samples import Rows, flags_of, place, row_traps, sample_traps, value_traps, within
 from acquisition.formats.table import Table, read_table
-from acquisition.formats.text import text_of
+from acquisition.formats.text import says_simulated, text_of
 from acquisition.formats.timing import Timing, check_rate, clock_traps, time_by_column
 from acquisition.recording import Trap
 
@@ -71,8 +70,7 @@ class Column:
     @property
     def simulated(self) -> bool:
         """Whether the title or the file's name says that nobody measured this."""
-        # The form has no place for it, so the name counts too: simulated must not pass for measured.
-        return re.search(r"simulat|synthe", f"{self.layout.title} {self.name}", re.IGNORECASE) is not None
+        return says_simulated(f"{self.layout.title} {self.name}")
 
     def tick(self) -> float | None:
         """Return the step that all values are multiples of, m or m/s, if one is evident."""
@@ -98,7 +96,7 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
     )
     printed = table.values[0]
     bad = table.bad
-    if not (printed.size and printed.min() > -_LONGEST_S and printed.max() < _LONGEST_S):  # a NaN is neither
+    if not within(printed, _LONGEST_S):
         bad = bad | ~(np.abs(printed) < _LONGEST_S)
     any_bad = bool(bad.any())
     _demand_rows(path, layout, table, bad)
@@ -106,7 +104,7 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
     rows = Rows(bad, table.line, table.cut, table.last_cell, table.decimals[0])
     t = place(np.where(np.abs(printed) < _LONGEST_S, printed, np.nan) if any_bad else printed, rows, timing)
     told = np.isfinite(t)
-    value = table.values[1]
+    value = np.require(table.values[1], requirements="W")
     if any_bad:
         value = np.where(bad, np.nan, value)
     where = None if told.all() else np.flatnonzero(told)

@@ -154,8 +154,17 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     return step, relative_u
 
 
-def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, NDArray[np.bool_]]:
+def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F8, NDArray[np.bool_]]:
     """Replace each time by its grid point where the two agree within the rounding of the print.
+
+    Parameters
+    ----------
+    t : (n,) float64, s
+    grid : Grid
+    resolution : float
+        Last printed digit, s.
+    out : (n,) float64, s, optional
+        Receives the times; may be ``t`` itself.
 
     Returns
     -------
@@ -163,7 +172,8 @@ def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, NDArray[np.bool_]]:
         Grid points, and times as they were where they do not agree.
     agrees : (n,) bool
     """
-    snapped, agrees = np.empty(t.size), np.empty(t.size, bool)
+    snapped = np.empty(t.size) if out is None else out
+    agrees = np.empty(t.size, bool)
     for start in range(0, t.size, _BLOCK):  # what fits into the cache is done in a fraction of the time
         rows = slice(start, start + _BLOCK)
         exact = grid.time(grid.index(t[rows]))

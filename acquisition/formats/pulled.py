@@ -12,7 +12,7 @@ from acquisition.block import F8
 from acquisition.errors import FormatError
 from acquisition.formats.cells import EMPTY, EXPONENT, UNREAD
 from acquisition.formats.contents import Arrays, Channel, Sheet
-from acquisition.formats.samples import Rows
+from acquisition.formats.samples import Rows, within
 from acquisition.formats.table import Table, read_table
 from acquisition.formats.timing import tolerance_of
 from acquisition.formats.units import time_power
@@ -73,7 +73,7 @@ def pull(path: str, channel: Channel, power: int) -> Pulled:
 
 def _from_arrays(arrays: Arrays, power: int) -> Pulled:
     value = arrays.values / 10.0**-power if power else arrays.values.copy()
-    t = arrays.t
+    t = None if arrays.t is None else arrays.t.copy()  # channels may share it, and it will be written to
     bad = np.zeros(value.size, bool) if t is None else ~np.isfinite(t)
     if bad.any():
         value[bad] = np.nan
@@ -132,8 +132,9 @@ def _of_table(
         time_resolution = _resolution(printed, table.decimals[at], table.exponents[at], powers[0])
         if channel.formula is not None:
             tolerance = tolerance_of(printed, _kept(table.form[at], kept), powers[0], EXPONENT)
-        bad |= ~(np.abs(printed) < _LONGEST_S)
-    value = _kept(table.values[-1], kept)
+        if not within(printed, _LONGEST_S):
+            bad |= ~(np.abs(printed) < _LONGEST_S)
+    value = np.require(_kept(table.values[-1], kept), requirements="W")
     if bad.any():
         value = np.where(bad, np.nan, value)
 

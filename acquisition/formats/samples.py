@@ -13,7 +13,17 @@ from acquisition.formats.nominal import median, place_unread, snap, time_flags
 from acquisition.formats.timing import Timing
 from acquisition.recording import Trap
 
-__all__ = ["IRREGULAR", "UNREAD_FLAGS", "Rows", "flags_of", "place", "row_traps", "sample_traps", "value_traps"]
+__all__ = [
+    "IRREGULAR",
+    "UNREAD_FLAGS",
+    "Rows",
+    "flags_of",
+    "place",
+    "row_traps",
+    "sample_traps",
+    "value_traps",
+    "within",
+]
 
 IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
@@ -23,6 +33,7 @@ _FAR_M, _FAR_SPREADS = 0.5, 10.0
 _SAMPLE = 65536
 _FEWEST = 50  # distances; with fewer, a common step may be chance
 _ZEROS = 10
+_SOME_ROWS = 8192
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,26 +63,48 @@ class Rows:
     decimals: int = 0
     remark: NDArray[np.bool_] | None = None
 
-    def number(self) -> I8:
-        """Return the number of each row as a sample, counted without remarks; theirs is that of the row before."""
-        if self.remark is None:
-            return np.arange(self.bad.size)
-        return np.cumsum(~self.remark) - 1
+    @property
+    def samples(self) -> int:
+        """How many rows are no remarks."""
+        return int(self.bad.size if self.remark is None else np.count_nonzero(~self.remark))
+
+    def numbers(self) -> Iterator[tuple[slice, I8]]:
+        """Yield some rows after the other with their numbers as samples, counted without remarks.
+
+        The number of a remark is that of the row before. What is calculated of some rows stays in the cache.
+        """
+        before = 0
+        for start in range(0, self.bad.size, _SOME_ROWS):
+            rows = slice(start, min(start + _SOME_ROWS, self.bad.size))
+            if self.remark is None:
+                yield rows, np.arange(rows.start, rows.stop)
+            else:
+                number = np.cumsum(~self.remark[rows]) + (before - 1)
+                before = int(number[-1]) + 1
+                yield rows, number
 
 
 def place(printed: F8, rows: Rows, timing: Timing) -> F8:
-    """Return the time of each row, s: snapped to the grid; of a bad row where it is told, else NaN."""
+    """Return the time of each row, s: snapped to the grid; of a bad row where it is told, else NaN.
+
+    Where no row is bad, the times printed are overwritten with those returned if they can be.
+    """
     bad = rows.bad
     any_bad = bool(bad.any())
-    t = printed.copy() if any_bad else printed
+    t = printed.copy() if any_bad else np.require(printed, requirements="W")
     if timing.grid is not None:
         if not any_bad:
-            return snap(printed, timing.grid, timing.resolution_s)[0]
+            return snap(t, timing.grid, timing.resolution_s, out=t)[0]
         t[~bad] = snap(printed[~bad], timing.grid, timing.resolution_s)[0]
     if not any_bad:
         return t
     expected = {bad.size - 1: rows.last_cell} if bad[-1] else {}
     return place_unread(t, bad, timing.grid, expected, rows.decimals)
+
+
+def within(values: F8, limit: float) -> bool:
+    """Tell whether there are values and all of them, no NaN among them, lie within a limit on either side."""
+    return bool(values.size and values.min() > -limit and values.max() < limit)  # a NaN is neither
 
 
 def flags_of(t: F8, value: F8, bad: NDArray[np.bool_], rate_hz: float) -> U8:

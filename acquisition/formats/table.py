@@ -1,33 +1,36 @@
 """Rows of numbers: the one reader of cells behind every text format.
 
-Lines are taken a page at a time. A page's separators are found all at once; cells of the form that a column usually
-has become numbers together, column by column (:mod:`acquisition.formats.fixed_point`), then those of other forms,
-form by form; what is left is read singly. Each cell keeps its form, and by the forms a number that was cut is known.
+Lines are taken a page at a time. Where all of a page are laid out alike, each column is one calculation over the page.
+Else the page's separators are found all at once; cells of the form that a column usually has become numbers together,
+column by column (:mod:`acquisition.formats.fixed_point`), then those of other forms, form by form; what is left is read
+singly. Each cell keeps its form, and by the forms a number that was cut is known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
-from acquisition.formats.cells import EMPTY, EXPONENT, UNREAD, read_column
-from acquisition.formats.fixed_point import Page, Span
+from acquisition.formats.cells import EMPTY, EXPONENT, UNREAD, read_column, read_single
+from acquisition.formats.fixed_point import Page, is_fixed, read_alike
+from acquisition.formats.growing import Growing
+from acquisition.formats.lines import NEWLINE, RETURN, Alike, Lines, alike_lines, next_page
 from acquisition.formats.text import Text
 
 __all__ = ["Table", "read_table"]
 
 I1 = NDArray[np.int8]
 
-_NEWLINE, _RETURN, _TAB, _BLANK = (ord(c) for c in "\n\r\t ")
-_PAGE_ROWS = 12_000  # their columns fit into the cache
+_PAGE_ROWS = 8_000  # their columns fit into the cache
 _PAGE_BYTES = 1 << 15, 1 << 19
 _UNIFORM = 0.9  # a column that prints the same number of decimals in this share of its rows always does
 _MANY, _STRIPPED = 40, 0.03
+_WORD = 8
+_ZERO = ord("0")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,10 +40,11 @@ class Table:
     Parameters
     ----------
     values : tuple of (rows,) float64
-        The columns asked for; NaN where a cell says so, is empty, or could not be read.
+        The columns asked for; NaN where a cell says so, is empty, or could not be read. A column of one number
+        throughout is a view of that one, and read-only.
     form : tuple of (rows,) int8
         The decimals that each cell prints, plus :data:`EXPONENT` where it has an exponent; negative where it is no
-        number: :data:`NAN`, :data:`EMPTY`, :data:`UNREAD`.
+        number: :data:`NAN`, :data:`EMPTY`, :data:`UNREAD`. Read-only where all cells have one form.
     bad : (rows,) bool
         Rows that could not be read: too few or too many cells, a cell that is no number, a number that was cut.
     decimals : tuple of int
@@ -119,160 +123,12 @@ def read_table(
     rows = _Rows(tuple(columns), delimiter, width, tuple(shifts) or (0,) * len(columns))
     at, size = 0, _PAGE_BYTES[0]
     while at < raw.size:
-        page, end = _page(raw, at, size, delimiter)
+        page, end = next_page(raw, at, size, delimiter)
         before = rows.rows
         rows.take(page, (raw.size - at) / (end - at))
         long = (end - at) / max(rows.rows - before, 1)
         at, size = end, int(min(max(long * _PAGE_ROWS, _PAGE_BYTES[0]), _PAGE_BYTES[1]))
-    return rows.table(first_line, ended=not raw.size or int(raw[-1]) in (_NEWLINE, _RETURN))
-
-
-def _page(raw: NDArray[np.uint8], at: int, size: int, delimiter: str) -> tuple[NDArray[np.uint8], int]:
-    """Return about so many bytes of whole lines, ended by LF, and where they end."""
-    end = min(at + size, raw.size)
-    if end < raw.size:
-        end = _line_end(raw, at, end)
-    page = raw[at:end]
-    if page[-1] != _NEWLINE:
-        page = np.append(page, np.uint8(_NEWLINE))
-    return page if delimiter else _tabbed(page), end
-
-
-def _line_end(raw: NDArray[np.uint8], at: int, end: int) -> int:
-    """Return the end of the last line that ends before ``end``, or of the first line if it ends later."""
-    for begin in (max(end - 1024, at), at):
-        found = np.flatnonzero(raw[begin:end] == _NEWLINE)
-        if found.size:
-            return begin + int(found[-1]) + 1
-    size = end - at
-    for step in range(at, raw.size, size):
-        piece = raw[step : step + size]
-        found = np.flatnonzero((piece == _NEWLINE) | (piece == _RETURN))
-        if found.size:
-            # A CR alone ends a line; of CRLF both do.
-            last = step + int(found[-1] if step == at else found[0])
-            pair = raw[last] == _RETURN and last + 1 < raw.size and raw[last + 1] == _NEWLINE
-            return last + 2 if pair else last + 1
-    return int(raw.size)
-
-
-def _tabbed(page: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Put one tab in place of every run of white space, and none at the ends of a line."""
-    blank = (page == _BLANK) | (page == _TAB)
-    ends = (page == _NEWLINE) | (page == _RETURN)
-    after = np.concatenate(([True], (blank | ends)[:-1]))  # behind another blank, or at a line's begin
-    before_end = np.zeros(page.size, bool)
-    # A run that a line ends in: walk back from the end through single blanks left.
-    keep = ~(blank & after)
-    kept = page[keep]
-    blank_kept = blank[keep]
-    before_end[: kept.size - 1] = blank_kept[:-1] & ends[keep][1:]
-    return np.where(blank_kept, np.uint8(_TAB), kept)[~before_end[: kept.size]]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Lines:
-    """Where the lines of a page and their cells are.
-
-    Parameters
-    ----------
-    start, stop : (n,) int64
-    ends : (m,) int64
-        Every separator and line end.
-    first : (n,) int64
-        Of those, the first of each line.
-    cells : (n,) int64
-    regular : int
-        Cells of every line, where all have as many; else 0.
-    width : int
-        Bytes of every line, where all are laid out alike; else 0.
-    """
-
-    start: I8
-    stop: I8
-    ends: I8
-    first: I8
-    cells: I8
-    regular: int
-    width: int = 0
-
-    @classmethod
-    def of(cls, page: Page, mark: int, *, alike: bool = True) -> _Lines | None:
-        """Find the lines; None where a CR stands alone."""
-        raw, newline, marks, returns = page.raw, page.where(_NEWLINE, 0), page.where(mark, 1), page.where(_RETURN, 2)
-        if alike and (found := cls._alike(newline, marks, returns)) is not None:
-            return found
-        ends = np.flatnonzero(newline | marks)
-        count = int(np.count_nonzero(newline))
-        regular = ends.size // count
-        if regular * count == ends.size and newline[ends[regular - 1 :: regular]].all():
-            stop = ends[regular - 1 :: regular]
-            first, cells = np.arange(0, ends.size, regular), np.broadcast_to(np.int64(regular), count)
-        else:
-            regular, last = 0, np.flatnonzero(newline[ends])
-            stop, cells = ends[last], np.diff(last, prepend=-1)
-            first = last - cells + 1
-        start = np.empty_like(stop)
-        start[0] = 0
-        np.add(stop[:-1], 1, out=start[1:])
-        if lone := int(np.count_nonzero(returns)):
-            paired = raw.take(stop - 1, mode="clip") == _RETURN
-            if np.count_nonzero(paired & (stop > start)) != lone:
-                return None
-            stop = stop - paired
-        return cls(start, stop, ends, first, cells, regular)
-
-    @classmethod
-    def _alike(cls, newline: NDArray[np.bool_], marks: NDArray[np.bool_], returns: NDArray[np.bool_]) -> _Lines | None:
-        """Take lines of one length with their separators in the same places, as fixed point gives; None for others."""
-        width = int(newline.argmax()) + 1
-        count = newline.size // width
-        if count * width != newline.size or not newline[width - 1 :: width].all() or np.count_nonzero(newline) != count:
-            return None
-        places = np.flatnonzero(marks[:width])
-        if np.count_nonzero(marks) != places.size * count or not all(marks[at::width].all() for at in places.tolist()):
-            return None
-        paired = bool(width > 1 and returns[width - 2 :: width].all())
-        if np.count_nonzero(returns) != count * paired:
-            return None
-        start = np.arange(0, newline.size, width)
-        ends = np.append(places, width - 1)
-        cells = np.broadcast_to(np.int64(ends.size), count)
-        return cls(start, start + (width - 1 - paired), ends, start, cells, ends.size, width)
-
-    def span(self, page: Page, column: int) -> Span:
-        """Return where the cells of a column are."""
-        if self.width and column < self.regular:
-            first = int(self.ends[column - 1]) + 1 if column else 0
-            last = int(self.stop[0]) if column == self.regular - 1 else int(self.ends[column])
-            return Span(page, self.stop.size, self.width, first, last)
-        return Span(page, self.stop.size, given=self.bounds(column))
-
-    def keep(self, rows: NDArray[np.bool_]) -> _Lines:
-        """Return some of the lines."""
-        return _Lines(self.start[rows], self.stop[rows], self.ends, self.first[rows], self.cells[rows], 0)
-
-    def bounds(self, column: int) -> tuple[I8, I8]:
-        """Return where the cells of a column begin and end; a cell that is not there is empty."""
-        if column < self.regular:
-            begin = self.start if column == 0 else self.ends[column - 1 :: self.regular] + 1
-            return begin, self.stop if column == self.regular - 1 else self.ends[column :: self.regular].copy()
-        at = self.first + column
-        begin = self.start if column == 0 else self.ends.take(at - 1, mode="clip") + 1
-        end = np.minimum(self.ends.take(at, mode="clip"), self.stop)
-        absent = self.cells <= column
-        return np.where(absent, self.stop, begin), np.where(absent, self.stop, end)
-
-
-def _blank(raw: NDArray[np.uint8], lines: _Lines) -> NDArray[np.bool_] | None:
-    """Tell lines that hold nothing but white space; None where there is none."""
-    blank: NDArray[np.bool_] = lines.stop <= lines.start
-    white = np.flatnonzero((raw.take(lines.start, mode="clip") <= _BLANK) & ~blank)
-    if white.size:
-        seen = np.cumsum((raw != _BLANK) & (raw != _TAB))
-        before = np.where(lines.start[white] > 0, seen[lines.start[white] - 1], 0)
-        blank[white] = seen[lines.stop[white] - 1] == before
-    return blank if blank.any() else None
+    return rows.table(first_line, ended=not raw.size or int(raw[-1]) in (NEWLINE, RETURN))
 
 
 class _Rows:
@@ -282,9 +138,9 @@ class _Rows:
         self.columns, self.width, self.shifts = columns, width, shifts
         self.mark = ord(delimiter or "\t")
         self.points = b"." if delimiter == "," else b".,"
-        self.values = [np.empty(0) for _ in columns]
-        self.form = [np.empty(0, np.int8) for _ in columns]
-        self.bad = np.empty(0, bool)
+        self.values = [Growing(np.float64) for _ in columns]
+        self.form = [Growing(np.int8) for _ in columns]
+        self.bad = Growing(np.bool_)
         self.usual = [-1] * len(columns)
         self.padded = [False] * len(columns)
         self.counts = np.zeros((len(columns), 256), np.int64)
@@ -294,71 +150,95 @@ class _Rows:
         self.last = b""
         self.last_cells = 0
 
-    def _make_room(self, more: int, pages: float) -> None:
-        """Grow the columns, to the size that so many pages with so many rows each will need."""
-        if self.rows + more > self.bad.size:
-            size = self.rows + int(more * max(pages, 1.0) * 1.02) + 1
-            self.values = [_grown(each, self.rows, size) for each in self.values]
-            self.form = [_grown(each, self.rows, size) for each in self.form]
-            self.bad = _grown(self.bad, self.rows, size)
-
     def take(self, text: NDArray[np.uint8], pages: float) -> None:
         """Read the rows of one page; ``pages`` like it are left, it included."""
         page = self.page
         page.fill(text)
-        lines = _Lines.of(page, self.mark)
+        alike = alike_lines(page, self.mark)
+        if alike is not None and self._take_alike(alike, pages):
+            return
+        lines = Lines.of(page, self.mark)
         if lines is None:
             unified = text.tobytes().replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-            return self.take(np.frombuffer(unified, np.uint8), pages)
-        blank = _blank(page.raw, lines)
-        if blank is not None or (lines.width and self.width not in (None, lines.regular)):
-            lines = _Lines.of(page, self.mark, alike=False) or lines
+            self.take(np.frombuffer(unified, np.uint8), pages)
+            return
+        blank = lines.blank(page.raw)
         if blank is not None:
             self.skipped.append(np.cumsum(~blank)[blank] + self.rows)
             lines = lines.keep(~blank)
-        count = lines.stop.size
-        if not count:
-            return None
-        self._make_room(count, pages)
-        rows = slice(self.rows, self.rows + count)
-        bad = self._wrong_width(page.raw, lines)
-        odd = bool(bad.any())
+        if lines.stop.size:
+            self._take_lines(lines, pages)
+
+    def _take_alike(self, lines: Alike, pages: float) -> bool:
+        """Read lines laid out alike, if what is asked for of them are plain numbers; tell whether they are."""
+        page, count = self.page, lines.rows
+        if self.width not in (None, len(lines.cells)) or max(self.columns) >= len(lines.cells):
+            return False
+        cells = [lines.cells[column] for column in self.columns]
+        found = [read_single(page, *cell, shift) for cell, shift in zip(cells, self.shifts, strict=True)]
+        for (begin, end), (_, form) in zip(cells, found, strict=True):
+            if not (0 <= form < EXPONENT and is_fixed(page.raw[begin:end].tobytes(), form)):
+                return False
+        expected = self._expected(count, pages)
+        for k, (cell, (value, form)) in enumerate(zip(cells, found, strict=True)):
+            if _is_constant(page, lines, cell):
+                self.values[k].repeat(value, count, expected)
+            else:
+                room = self.values[k].room(count, expected)
+                read_alike(page, count, lines.width, cell, (form, self.shifts[k]), room)
+            self.form[k].repeat(form, count, expected)
+            if self.usual[k] < 0:
+                self.usual[k] = form
+            if form and form == self.usual[k] and not self.padded[k]:
+                self.padded[k] = bool((page.raw[cell[1] - 1 :: lines.width] == _ZERO).any())
+            self.counts[k, form] += count
+        self.bad.repeat(False, count, expected)
+        begin, end = (at + (count - 1) * lines.width for at in lines.cells[0])
+        self._end(count, page.raw[begin:end], len(lines.cells))
+        return True
+
+    def _take_lines(self, lines: Lines, pages: float) -> None:
+        """Read lines, however they are laid out."""
+        page, count = self.page, lines.stop.size
+        expected = self._expected(count, pages)
+        bad = None if self.width is None else lines.not_of_width(page.raw, self.mark, self.width)
+        odd = bad is not None and bool(bad.any())
+        forms = [each.room(count, expected) for each in self.form]
         for k, column in enumerate(self.columns):
-            form = self.form[k][rows]
-            span = lines.span(page, column)
-            usual, padded, plain = read_column(
-                span, self.usual[k], self.shifts[k], self.points, self.values[k][rows], form, self.padded[k]
+            values, form = self.values[k].room(count, expected), forms[k]
+            self.usual[k], self.padded[k], plain = read_column(
+                page, *lines.bounds(column), self.usual[k], self.shifts[k], self.points, values, form, self.padded[k]
             )
-            self.usual[k], self.padded[k] = usual, padded
             if not plain:
-                bad |= form == UNREAD if self.width is None else form <= EMPTY
+                wrong = form == UNREAD if self.width is None else form <= EMPTY
+                bad = wrong if bad is None else bad | wrong
                 odd = True
-        self.bad[rows] = bad
-        for k, form in enumerate(each[rows] for each in self.form):
-            if odd:
+        if bad is None:
+            self.bad.repeat(False, count, expected)
+        else:
+            self.bad.room(count, expected)[:] = bad
+        for k, form in enumerate(forms):
+            if odd and bad is not None:
                 self.counts[k] += np.bincount(form[~bad].view(np.uint8), minlength=256)
             else:
                 self.counts[k, self.usual[k]] += count
-        self.rows += count
-        first = lines.span(page, 0)
-        self.last = page.raw[int(first.begin[-1]) : int(first.end[-1])].tobytes()
-        self.last_cells = int(lines.cells[-1])
-        return None
+        begin, end = lines.bounds(0)
+        self._end(count, page.raw[int(begin[-1]) : int(end[-1])], int(lines.cells[-1]))
 
-    def _wrong_width(self, raw: NDArray[np.uint8], lines: _Lines) -> NDArray[np.bool_]:
-        """Tell rows that have not the cells demanded; separators at the end of a row make no cell."""
-        if self.width is None:
-            return np.zeros(lines.stop.size, bool)
-        bad: NDArray[np.bool_] = lines.cells != self.width
-        for row in np.flatnonzero(lines.cells > self.width).tolist():
-            begin = int(lines.ends[lines.first[row] + self.width - 1])
-            bad[row] = bool(raw[begin : lines.stop[row]].tobytes().strip(bytes((self.mark, _BLANK))))
-        return bad
+    def _expected(self, count: int, pages: float) -> int:
+        """Return how many rows there will be, if so many pages come with as many rows each."""
+        return self.rows + int(count * max(pages, 1.0) * 1.02) + 1
+
+    def _end(self, count: int, cell: NDArray[np.uint8], cells: int) -> None:
+        """Note how a page of rows ended."""
+        self.rows += count
+        self.last, self.last_cells = cell.tobytes(), cells
 
     def table(self, first_line: int, *, ended: bool) -> Table:
-        values = tuple(column[: self.rows] for column in self.values)
-        form = tuple(column[: self.rows] for column in self.form)
-        bad = self.bad[: self.rows]
+        """Return the rows taken, with numbers that were cut marked."""
+        values = [column.whole() for column in self.values]
+        form = [column.whole() for column in self.form]
+        bad = np.require(self.bad.whole(), requirements="W")
         counts = self.counts[:, :EXPONENT], self.counts[:, EXPONENT : 2 * EXPONENT]
         exponents = tuple(bool(e.sum() > f.sum()) for f, e in zip(*counts, strict=True))
         usual = tuple(
@@ -366,17 +246,19 @@ class _Rows:
         )
         for k, each in enumerate(form):
             cut = self._cut(k, each, usual[k], exponents[k])
-            if not ended and self.rows and self._is_cut_last(k, form, usual[k]):
+            if not ended and self.rows and self._is_cut_last(k, each, usual[k]):
                 cut = np.arange(self.rows) == self.rows - 1 if cut is None else cut
                 cut[-1] = True
             if cut is not None:
-                values[k][cut], each[cut] = np.nan, UNREAD
+                values[k] = np.require(values[k], requirements="W")
+                form[k] = np.require(each, requirements="W")
+                values[k][cut], form[k][cut] = np.nan, UNREAD
                 bad |= cut
         skipped = np.concatenate(self.skipped) if self.skipped else np.empty(0, np.int64)
         truncated = bool(self.rows) and not ended and bool(bad[-1])
         decimals = tuple(each % EXPONENT for each in usual)
         last = self.last.strip(b" ").decode("ascii", "replace")
-        return Table(values, form, bad, decimals, exponents, last, truncated, first_line, skipped)
+        return Table(tuple(values), tuple(form), bad, decimals, exponents, last, truncated, first_line, skipped)
 
     def _fixed(self, k: int, usual: int, exponent: bool) -> bool:
         """Tell whether a column always prints the same number of decimals."""
@@ -395,17 +277,17 @@ class _Rows:
         differs: NDArray[np.bool_] = (form >= 0) & (form != usual) & (exponent | (form < EXPONENT))
         return differs if differs.any() else None
 
-    def _is_cut_last(self, k: int, form: tuple[I1, ...], usual: int) -> bool:
+    def _is_cut_last(self, k: int, form: I1, usual: int) -> bool:
         """Tell whether a last row without line end may have stopped within the cell of a column.
 
         A number is whole where something follows it, or where it has all the decimals that its column always
         prints. In a column that prints now more, now fewer, or none, nothing shows that the last number is whole,
         so it counts as cut.
         """
-        if self.last_cells > self.columns[k] + 1 or form[k][-1] < 0:
+        if self.last_cells > self.columns[k] + 1 or form[-1] < 0:
             return False
         if usual not in (0, EXPONENT) and self._fixed(k, usual, usual >= EXPONENT):
-            return int(form[k][-1]) != usual
+            return int(form[-1]) != usual
         return self.rows > 1
 
 
@@ -414,8 +296,15 @@ def _most_frequent(counts: I8) -> int:
     return int(counts.size - 1 - counts[::-1].argmax()) if counts.any() else 0
 
 
-def _grown(column: Any, rows: int, size: int) -> Any:
-    """Return a longer array that begins with the rows of another."""
-    longer = np.empty(size, column.dtype)
-    longer[:rows] = column[:rows]
-    return longer
+def _is_constant(page: Page, lines: Alike, cell: tuple[int, int]) -> bool:
+    """Tell whether a cell of at most eight characters is the same in all lines."""
+    begin, end = cell
+    if end - begin > _WORD:
+        return False
+    first = page.raw[begin:end]
+    for row in (lines.rows - 1, lines.rows // 2):  # most columns are told by these
+        if (page.raw[begin + row * lines.width : end + row * lines.width] != first).any():
+            return False
+    used = np.uint64((1 << 64) - (1 << 8 * (_WORD - end + begin)))
+    differs = np.bitwise_xor(page.words[end :: lines.width][: lines.rows], page.words[end])
+    return not np.bitwise_or.reduce(differs) & used

@@ -17,6 +17,8 @@ __all__ = [
     "guess_delimiter",
     "is_text",
     "parse_number",
+    "printed_decimals",
+    "says_simulated",
     "split_cells",
     "text_of",
     "unify",
@@ -165,6 +167,20 @@ def _utf16(head: bytes) -> str:
     return "utf-16-be" if zero_even > 0.8 and zero_odd < 0.1 else ""
 
 
+def says_simulated(text: str) -> bool:
+    """Tell whether a title or a name says that nobody measured what it stands for.
+
+    Old forms have no other place for it, and simulated must not pass for measured.
+
+    Examples
+    --------
+    >>> says_simulated("Undamped, Simulated"), says_simulated("bench 3")
+    (True, False)
+    """
+    plain = text.lower()
+    return "simulat" in plain or "synthe" in plain
+
+
 def unify(text: str) -> str:
     """Turn every line end (CRLF, CR, LF) into LF.
 
@@ -227,7 +243,8 @@ def guess_delimiter(line: str) -> str:
     if "," not in line:
         return ""
     # "0,43 16,5" is separated by blanks; "0.43, 16.5" by commas.
-    return "" if re.search(r"[^ ,] +[^ ]", line.strip(" ")) and not re.search(r", ", line) else ","
+    by_blanks = any(cell and cell[-1] != "," for cell in line.strip(" ").split(" ")[:-1])
+    return "" if by_blanks and ", " not in line else ","
 
 
 def split_cells(line: str, delimiter: str) -> list[str]:
@@ -236,7 +253,7 @@ def split_cells(line: str, delimiter: str) -> list[str]:
     Only blanks are stripped: any other white space is damage, and a number beside it may have lost digits.
     """
     if not delimiter:
-        return re.findall(r"[^ \t]+", line)
+        return [cell for cell in line.replace("\t", " ").split(" ") if cell]
     cells = [cell.strip(" ") for cell in line.split(delimiter)]
     while cells and not cells[-1]:
         cells.pop()

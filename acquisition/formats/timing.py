@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,7 +100,7 @@ def time_by_formula(
     step_s: float,
     printed: F8 | None,
     tolerance: F8 | None,
-    number: I8,
+    numbers: Iterable[tuple[slice, I8]],
     rate_hz: float | None,
 ) -> Timing | None:
     """Take a header's times ``start_s + i step_s``, if the column of times agrees within its rounding.
@@ -109,8 +109,8 @@ def time_by_formula(
     ----------
     printed, tolerance : (n,) float64, s, or None
         Times of the rows, NaN where unread, and half the last digit of each; None: no column.
-    number : (n,) int64
-        The i of each row.
+    numbers : iterable of (slice, int64 array)
+        The i of some rows after the other.
 
     Returns
     -------
@@ -120,10 +120,11 @@ def time_by_formula(
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
     if printed is not None and tolerance is not None:
-        expected = start_s + step_s * number
-        slack = 1e-9 * np.maximum(np.abs(expected), step_s)
-        if (np.abs(printed - expected) > tolerance * 1.0001 + slack).any():  # never true of a NaN
-            return None
+        for rows, number in numbers:
+            expected = start_s + step_s * number
+            slack = 1e-9 * np.maximum(np.abs(expected), step_s)
+            if (np.abs(printed[rows] - expected) > tolerance[rows] * 1.0001 + slack).any():  # never true of a NaN
+                return None
     rate = 1.0 / step_s
     rounded = float(f"{rate:.9g}")
     rate = rounded if math.isclose(rounded, rate, rel_tol=1e-12) else rate
@@ -162,11 +163,13 @@ def clock_traps(timing: Timing) -> Iterator[Trap]:
         yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the likeliest: {why}")
 
 
-def row_times(timing: Timing, number: I8) -> F8:
-    """Return the times of rows by their numbers on a nominal clock, s."""
+def row_times(timing: Timing, numbers: Iterable[tuple[slice, I8]], out: F8) -> F8:
+    """Put the times of rows, by their numbers on a nominal clock, into an array, s; return it."""
     if timing.grid is None:
         raise ValueError("only a grid has times of rows")
-    return timing.grid.time(number)
+    for rows, number in numbers:
+        out[rows] = timing.grid.time(number)
+    return out
 
 
 def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int) -> F8:

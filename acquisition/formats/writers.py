@@ -13,6 +13,7 @@ import numpy as np
 
 from acquisition.block import F8, Block, Flag
 from acquisition.errors import FormatError
+from acquisition.formats.text import says_simulated
 from acquisition.source import SourceInfo
 
 __all__ = ["WRITERS", "Written", "write_csv", "write_lvm", "write_motion_sensor"]
@@ -178,7 +179,7 @@ def _velocity(samples: Block, rate_hz: float) -> F8:
 
 
 def _said_simulated(title: str, info: SourceInfo) -> str:
-    if info.kind != "simulated" or re.search(r"simulat|synthe", title, re.IGNORECASE):
+    if info.kind != "simulated" or says_simulated(title):
         return title
     return f"{title} (simulated)".strip()
 
