@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 
 from storage import layout
 from storage.errors import NotARun, RunClosed, damaged, one_line, reading
 from storage.header import SCHEMA, Header
+from storage.implied import values_of
 
 __all__ = ["Contents", "open_contents"]
 
@@ -60,6 +62,17 @@ class Contents:
         if is_ != demanded:
             raise damaged(self.path, what, f"type and shape {demanded} were written, got {is_}")
         return found
+
+    def implied(self, name: str) -> Any:
+        """Return a column that the header says a formula for, calculated.
+
+        Raises
+        ------
+        RunClosed
+        """
+        self.file()
+        dtype = next(np.dtype(column.dtype) for column in layout.COLUMNS if column.name == name)
+        return values_of(self.header.implied[name], 0, self.header.samples, dtype)
 
     def check(self, name: str, sha256: str) -> None:
         """Hold a column's digest against the one written.

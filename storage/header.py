@@ -39,6 +39,8 @@ class Header:
         Index of the first sample, and how many there are.
     columns : mapping of str to str
         SHA-256 of every column that the file holds, by name.
+    implied : mapping of str to mapping
+        The formula of every column that one gives bit for bit, by name; see :mod:`storage.implied`.
     originals : tuple of FileEntry
         The original files.
     title, channel, format : str
@@ -55,6 +57,7 @@ class Header:
     first: int
     samples: int
     columns: Mapping[str, str]
+    implied: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
     originals: tuple[FileEntry, ...] = ()
     title: str = ""
     channel: str = "distance"

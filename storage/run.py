@@ -202,8 +202,10 @@ class Run:
         Parameters
         ----------
         digests : bool
-            Whether the columns are held against their SHA-256. Where they are not, damage is an error all the
-            same, by the chunks' checksums, but an array that someone rewrote is not; :meth:`check` finds it later.
+            Whether the columns are held against their SHA-256. Where they are not, damage of what is read is an
+            error all the same, by the chunks' checksums, but an array that someone rewrote is not; :meth:`check`
+            finds it later. Columns that the header gives a formula for are then calculated and not read: they are
+            what was written, whatever became of the array.
 
         Raises
         ------
@@ -211,8 +213,12 @@ class Run:
             If they are not what was written.
         """
         header = self._contents.header
+        implied = {} if digests else header.implied
         values = {}
         for name in (name for name in _BLOCK_COLUMNS if name in header.columns):
+            if name in implied:
+                values[name] = self._contents.implied(name)
+                continue
             column = self._contents.column(name)
             with reading(self.path, f"the column {name!r} from sample 0"):
                 values[name] = column[:]

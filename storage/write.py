@@ -30,6 +30,7 @@ from storage import layout
 from storage.atomic import whole_h5, writing_h5
 from storage.errors import WriteFailed
 from storage.header import FileEntry, Header
+from storage.implied import Implied
 from storage.layout import CHUNK
 from storage.values import stored
 
@@ -95,7 +96,7 @@ def write_run(
     """
     path = Path(path)
     with whole_h5(path, overwrite=overwrite, libver=layout.LIBVER) as file:
-        columns = _Columns(path, file, info.sigma_m)
+        columns = _Columns(path, file, info)
         for block in blocks:
             columns.append(block)
         columns.finish()
@@ -104,6 +105,7 @@ def write_run(
             first=columns.first or 0,
             samples=columns.rows,
             columns={name: digest.hexdigest() for name, digest in columns.digests.items()},
+            implied=columns.implied.kept(),
             originals=tuple(FileEntry(o.name, len(o.data), o.sha256) for o in originals),
             title=title,
             channel=channel,
@@ -122,8 +124,9 @@ def write_run(
 class _Columns:
     """The growing arrays of a run file, written a whole chunk at a time."""
 
-    def __init__(self, path: Path, file: Any, sigma_m: float | None) -> None:
-        self.path, self.file, self.sigma_m = path, file, sigma_m
+    def __init__(self, path: Path, file: Any, info: SourceInfo) -> None:
+        self.path, self.file, self.sigma_m = path, file, info.sigma_m
+        self.implied = Implied(info.rate_hz)
         self.first: int | None = None
         self.rows = 0
         self.digests: dict[str, Any] = {}
@@ -185,6 +188,7 @@ class _Columns:
             _create(self.file, column.path, column.dtype, None if growing else len(values))
             for start in range(0, self._written, CHUNK):  # a column that comes late
                 self._extend(column, start, np.full(CHUNK, column.fill, column.dtype))
+        self.implied.see(column.name, self._written, values)
         self._extend(column, self._written, values)
 
     def _extend(self, column: layout.Column, start: int, values: NDArray[Any]) -> None:
