@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from acquisition.block import Block
 from acquisition.source import SourceInfo
 
-__all__ = ["Inspection", "Original", "Recording", "Survey", "Trap"]
+__all__ = ["Original", "Recording", "Trap"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,45 +103,3 @@ class Recording:
         """Yield the samples in blocks of at most ``size``."""
         for start in range(0, len(self.samples), size):
             yield self.samples[start : start + size]
-
-
-@dataclass(frozen=True, slots=True)
-class Survey:
-    """What one channel of a file is, as far as the file says it by itself.
-
-    Parameters
-    ----------
-    run, channel, unit : str
-        Empty where the file does not say.
-    samples : int
-    rate_hz : float or None
-        None where it must be given.
-    traps : tuple of Trap
-    """
-
-    run: str
-    channel: str
-    unit: str
-    samples: int
-    rate_hz: float | None
-    traps: tuple[Trap, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Inspection:
-    """What a file is and what it holds.
-
-    Parameters
-    ----------
-    format, title : str
-        Name of the family, and one line on it.
-    why : str
-        By what the file was told to be of it.
-    surveys : tuple of Survey
-        One for each channel of each run; empty where the family does not tell.
-    """
-
-    format: str
-    title: str
-    why: str
-    surveys: tuple[Survey, ...]

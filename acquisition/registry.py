@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.formats.base import HEAD_BYTES, Format, PairFormat, SurveyFormat, read_bytes, read_head
-from acquisition.recording import Inspection, Recording
+from acquisition.recording import Recording
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
+
+    from acquisition.inspection import Inspection
 
 __all__ = ["formats", "get_format", "inspect", "open_recording", "sniff"]
 
@@ -129,6 +131,8 @@ def inspect(path: str | os.PathLike[str]) -> Inspection:
     FormatError
         If it cannot be opened, no format recognises it, or its content cannot be read.
     """
+    from acquisition.inspection import Inspection  # of no use to a recording that is read
+
     name = os.fspath(path)
     head = read_head(path)
     reader = _recognise(name, head)

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, BinaryIO, Protocol, runtime_checkable
 
 from acquisition.errors import FormatError
 from acquisition.formats.text import is_text
-from acquisition.recording import Recording, Survey
+from acquisition.recording import Recording
 
 if TYPE_CHECKING:
     import mmap
+
+    from acquisition.inspection import Survey
 
 __all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "read_bytes", "read_head"]
 

@@ -24,7 +24,8 @@ from acquisition.formats.timing import (
     time_by_rate,
 )
 from acquisition.formats.units import LENGTHS, length_power, unit_words
-from acquisition.recording import Original, Recording, Survey, Trap
+from acquisition.inspection import Survey
+from acquisition.recording import Original, Recording, Trap
 from acquisition.source import Kind, SourceInfo
 
 __all__ = ["ColumnFormat"]

@@ -14,6 +14,7 @@ there. What no careful reader may take at face value:
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,8 +25,11 @@ from acquisition.formats.motion_sensor_layout import evidence
 from acquisition.formats.nominal import time_flags
 from acquisition.formats.samples import IRREGULAR, UNREAD_FLAGS
 from acquisition.formats.text import decode, is_text, unify
-from acquisition.recording import Original, Recording, Survey, Trap
+from acquisition.recording import Original, Recording, Trap
 from acquisition.source import SourceInfo
+
+if TYPE_CHECKING:
+    from acquisition.inspection import Survey
 
 __all__ = ["FORMAT", "MotionSensor"]
 
@@ -46,6 +50,8 @@ class MotionSensor:
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Tell what the one channel of a file is; nothing, where the user must say what the numbers are."""
+        from acquisition.inspection import Survey
+
         try:
             column = read_column(path, data, None, None, None)
         except NeedsAnswer:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.formats.text import Text, guess_delimiter, parse_number, split_cells
@@ -18,19 +16,17 @@ Quantity = Literal["distance", "velocity"]
 
 PER_METRE = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 
-_TITLE = re.compile(r"\s*motion sensor data file", re.IGNORECASE)
-_TIME = re.compile(r"time \(s\)", re.IGNORECASE)
-_DISTANCE = re.compile(r"distance \((m|cm|mm)\)", re.IGNORECASE)
-_ERROR = re.compile(r"dist(?:ance)? error \((m|cm|mm)\)", re.IGNORECASE)
-_VELOCITY = re.compile(r"velocity \((m|cm|mm)/s\)", re.IGNORECASE)
+_TITLE, _TIME = "motion sensor data file", "time (s)"
+_DISTANCE = {f"distance ({unit})": unit for unit in PER_METRE}
+_ERROR = {f"{name} error ({unit})": unit for unit in PER_METRE for name in ("dist", "distance")}
+_VELOCITY = {f"velocity ({unit}/s)": unit for unit in PER_METRE}
 _HEAD = 16384
 _HEADER_LINES = 20
 _ROWS_OF_SHAPE = 100
 _REMEDY = 'put the column line "Time (s)<TAB>Distance (cm)" or "Time (s)<TAB>Velocity (cm/s)" above the rows'
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
+class Layout(NamedTuple):
     """Where a file's rows start and what they mean.
 
     Parameters
@@ -67,7 +63,7 @@ def evidence(text: str) -> str:
     """Say why the start of a text, lines ended by LF, is a MotionSensor.vi file; empty where it is not."""
     lines = _head_lines(text)
     for number, line in enumerate(lines[:_HEADER_LINES], 1):
-        if _TITLE.match(line):
+        if _is_title(line):
             return f'line {number} is the title "{line.strip()}"'
     if found := _column_line(lines):
         return f"line {found[0] + 1} is the column line of {found[1].quantity} in {found[1].unit}"
@@ -98,7 +94,7 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
         start, title = at + 1, " / ".join(line.strip() for line in lines[:at] if line.strip())
     else:
         start = _first_row(lines)
-        titled = any(_TITLE.match(line) for line in lines[:_HEADER_LINES])
+        titled = any(_is_title(line) for line in lines[:_HEADER_LINES])
         if start < 0:
             raise _no_rows(path, lines, "rows of two or three numbers")
         layout = _by_shape(path, lines[start:], titled, asked, start + 1)
@@ -112,7 +108,7 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
         raise _no_rows(path, lines, "rows of numbers below the column line")
     delimiter = next((guess_delimiter(row) for row in rows if _is_row(row)), guess_delimiter(rows[0]))
     body = head[start].start
-    return replace(layout, title=title, first_line=start + 1, body=body, delimiter=delimiter)
+    return layout._replace(title=title, first_line=start + 1, body=body, delimiter=delimiter)
 
 
 def ask_columns(path: str, got: str, line: int | None = None) -> NeedsAnswer:
@@ -134,18 +130,21 @@ def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
     for at, line in enumerate(lines[:_HEADER_LINES]):
         if _is_row(line):
             return None
-        cells = [cell.strip() for cell in split_cells(line, guess_delimiter(line) or "\t")]
-        if 2 <= len(cells) <= 3 and _TIME.fullmatch(cells[0]):
-            if (match := _VELOCITY.fullmatch(cells[1])) and len(cells) == 2:
-                return at, _layout("velocity", 2, match[1])
-            error = _ERROR.fullmatch(cells[-1]) if len(cells) == 3 else None
-            if (match := _DISTANCE.fullmatch(cells[1])) and (len(cells) == 2 or (error and error[1] == match[1])):
-                return at, _layout("distance", len(cells), match[1])
+        cells = [cell.strip().lower() for cell in split_cells(line, guess_delimiter(line) or "\t")]
+        if 2 <= len(cells) <= 3 and cells[0] == _TIME:
+            if (unit := _VELOCITY.get(cells[1])) and len(cells) == 2:
+                return at, _layout("velocity", 2, unit)
+            if (unit := _DISTANCE.get(cells[1])) and (len(cells) == 2 or _ERROR.get(cells[2]) == unit):
+                return at, _layout("distance", len(cells), unit)
     return None
 
 
 def _layout(quantity: Quantity, columns: int, unit: str, assumed: str = "") -> Layout:
-    return Layout(quantity, columns, PER_METRE[unit.lower()], unit.lower(), assumed=assumed)
+    return Layout(quantity, columns, PER_METRE[unit], unit, assumed=assumed)
+
+
+def _is_title(line: str) -> bool:
+    return line.lstrip().lower().startswith(_TITLE)
 
 
 def _numbers(line: str) -> list[float | None]:
@@ -163,7 +162,7 @@ def _first_row(lines: Sequence[str]) -> int:
 
 def _title_and_start(lines: Sequence[str], row: int) -> tuple[str, int]:
     """Take the first line above the rows for a title, unless it begins like a row that got damaged."""
-    if row == 0 or (not _TITLE.match(lines[0]) and _begins_with_number(lines[0])):
+    if row == 0 or (not _is_title(lines[0]) and _begins_with_number(lines[0])):
         return "", 0
     return lines[0].strip(), 1
 
@@ -211,7 +210,7 @@ def _with_unit(path: str, layout: Layout, unit: str | None) -> Layout:
         return layout
     if _plain(unit) not in PER_METRE:
         raise FormatError(path, f'unit must be one of m, cm, mm, got "{unit}"', "name one of these")
-    return replace(layout, unit=_plain(unit), per_si=PER_METRE[_plain(unit)])
+    return layout._replace(unit=_plain(unit), per_si=PER_METRE[_plain(unit)])
 
 
 def _plain(unit: str) -> str:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,14 +33,13 @@ def median(values: NDArray[Any]) -> float:
     return float(0.5 * (low + high))
 
 
-@dataclass(frozen=True, slots=True)
-class Grid:
+class Grid(NamedTuple):
     """Times ``origin_s + i / rate_hz`` for integer i."""
 
     rate_hz: float
     origin_s: float = 0.0
 
-    def index(self, t: F8) -> I8:
+    def nearest(self, t: F8) -> I8:
         """Return the nearest i of each time."""
         return np.rint((t - self.origin_s) * self.rate_hz).astype(np.int64)
 
@@ -50,8 +48,7 @@ class Grid:
         return self.origin_s + index / self.rate_hz if self.origin_s else index / self.rate_hz
 
 
-@dataclass(frozen=True, slots=True)
-class Rate:
+class Rate(NamedTuple):
     """What printed times say about the rate.
 
     Parameters
@@ -133,7 +130,7 @@ def _probe(apart: F8) -> F8:
 
 def _every_point(apart: F8, grid: Grid) -> bool:
     """Tell whether times come one grid point after the other, not one every few."""
-    return median(np.diff(grid.index(apart[:_PROBE]))) == 1.0
+    return median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0
 
 
 def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
@@ -176,7 +173,7 @@ def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F
     agrees = np.empty(t.size, bool)
     for start in range(0, t.size, _BLOCK):  # what fits into the cache is done in a fraction of the time
         rows = slice(start, start + _BLOCK)
-        exact = grid.time(grid.index(t[rows]))
+        exact = grid.time(grid.nearest(t[rows]))
         agrees[rows] = np.abs(exact - t[rows]) <= resolution * 0.5001
         snapped[rows] = exact if agrees[rows].all() else np.where(agrees[rows], exact, t[rows])
     return snapped, agrees
@@ -207,7 +204,7 @@ def place_unread(t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dic
         after = float(t[stop]) if stop < t.size else np.nan
         count = stop - start
         if grid is not None and round((after - before) * grid.rate_hz if after > before else 0) == count + 1:
-            first = grid.index(np.array([before]))[0]
+            first = grid.nearest(np.array([before]))[0]
             out[start:stop] = grid.time(first + 1 + np.arange(count))
             continue
         last = before
@@ -216,7 +213,7 @@ def place_unread(t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dic
             guess = _told(float(t[row]), last, after, (before, ahead), behind, grid)
             if np.isnan(guess) and row == t.size - 1 and grid is not None and np.isfinite(last):
                 # The last row may stop within its time: it must be how the next time begins.
-                follows = float(grid.time(grid.index(np.array([last])) + 1)[0])
+                follows = float(grid.time(grid.nearest(np.array([last])) + 1)[0])
                 if expected.get(row, "") and f"{follows:.{decimals}f}".startswith(expected[row]):
                     guess = follows
             out[row] = guess
@@ -232,7 +229,7 @@ def _told(
         return np.nan
     if grid is None:
         return printed if np.isfinite(last) and np.isfinite(after) else np.nan
-    exact = float(grid.time(grid.index(np.array([printed])))[0])
+    exact = float(grid.time(grid.nearest(np.array([printed])))[0])
     if np.isfinite(last) and np.isfinite(after):
         return exact if last < exact < after else np.nan
     origin, steps = before if np.isfinite(before[0]) else (after, -behind)

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from acquisition.errors import FormatError
 
@@ -30,8 +31,7 @@ _LINE_END = re.compile(rb"\r\n|\r|\n")
 _BLANKS = "\t\f "
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(NamedTuple):
     """One line of a text: its one-based number, the bytes where it starts and where the next does, its content."""
 
     number: int

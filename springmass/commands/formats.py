@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import NeedsAnswer
-from acquisition.recording import Inspection, Survey, Trap
+from acquisition.inspection import Inspection, Survey
+from acquisition.recording import Trap
 from acquisition.registry import formats, inspect
 from springmass.commands import completions
 from springmass.errors import OK
