@@ -38,6 +38,12 @@ def rows_oracle() -> ModuleType:
 
 
 @pytest.fixture(scope="session")
+def hunt() -> ModuleType:
+    """Return the hunt guided by coverage, ``tests/hunt.py``."""
+    return _load("hunt")
+
+
+@pytest.fixture(scope="session")
 def synthetic() -> ModuleType:
     """Return the generator of synthetic runs, ``tests/synthetic.py``."""
     return _load("synthetic")

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from acquisition.errors import FormatError
 from acquisition.formats.columns import ColumnFormat
-from acquisition.formats.contents import Contents, Heading, Sheet, channels_of, is_time, name_and_unit, split_heading
-from acquisition.formats.text import decode, is_text, parse_number, text_of, unify
+from acquisition.formats.contents import Contents, Heading, is_time, name_and_unit, split_heading, under_first_line
+from acquisition.formats.text import decode, is_text, parse_number, unify
 
 __all__ = ["FORMAT"]
 
@@ -40,13 +39,7 @@ def _is_of_others(head: bytes) -> bool:
 
 
 def _contents(path: str, data: bytes) -> Contents:
-    text = text_of(path, data)
-    first = next(text.lines(), None)
-    headings, mark = _headings(first.text) if first else ((), "")
-    channels = () if first is None else channels_of(Sheet(text, first.next, text.stop, 2, mark), headings)
-    if not channels:
-        raise FormatError(path, 'expected headings like "Time (s),Distance (m)"', "put them above the rows", line=1)
-    return Contents(channels, zeros=text.zeros)
+    return under_first_line(path, data, _headings, '"Time (s),Distance (m)"')
 
 
 FORMAT = ColumnFormat("csv", "columns under headings with units, times first", _evidence, _contents)

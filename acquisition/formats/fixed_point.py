@@ -179,11 +179,13 @@ def read_fixed(
     if signed:
         digits -= negative
     odd: NDArray[np.bool_] | None = None
-    most = int(digits.max())
-    if most > MOST_DIGITS or int(digits.min()) <= decimals:
+    least, most = int(digits.min()), int(digits.max())
+    if most > MOST_DIGITS or least <= decimals:
         odd = (digits <= decimals) | (digits > MOST_DIGITS)
         digits[odd] = decimals + 1
         most = int(digits.max())
+    elif least == most:
+        digits = digits[:1]  # one number for all cells
     total, odd = _digits(page, end, digits, most, decimals, points, odd)
     _scale(total, decimals - shift, 1.0, value)
     if signed:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 
-from acquisition.errors import FormatError
 from acquisition.formats.columns import ColumnFormat
-from acquisition.formats.contents import Contents, Heading, Sheet, channels_of, is_time, name_and_unit, split_heading
-from acquisition.formats.text import decode, is_text, text_of, unify
+from acquisition.formats.contents import Contents, Heading, is_time, name_and_unit, split_heading, under_first_line
+from acquisition.formats.text import decode, is_text, unify
 
 __all__ = ["FORMAT"]
 
@@ -32,13 +31,7 @@ def _evidence(head: bytes) -> str:
 
 
 def _contents(path: str, data: bytes) -> Contents:
-    text = text_of(path, data)
-    first = next(text.lines(), None)
-    headings, mark = _headings(first.text) if first else ((), "")
-    channels = () if first is None else channels_of(Sheet(text, first.next, text.stop, 2, mark), headings)
-    if not channels:
-        raise FormatError(path, 'expected headings like "Latest: Position (m)"', "export the run again", line=1)
-    return Contents(channels, zeros=text.zeros)
+    return under_first_line(path, data, _headings, '"Latest: Position (m)"')
 
 
 FORMAT = ColumnFormat("logger-pro", "Logger Pro CSV: runs side by side", _evidence, _contents)

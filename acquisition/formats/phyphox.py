@@ -21,11 +21,10 @@ from acquisition.formats.contents import (
     Channel,
     Contents,
     Heading,
-    Sheet,
-    channels_of,
     is_time,
     name_and_unit,
     split_heading,
+    under_first_line,
 )
 from acquisition.formats.text import decode, is_text, parse_number, text_of, unify
 
@@ -65,13 +64,7 @@ def _contents(path: str, data: bytes) -> Contents:
     text = text_of(path, data)
     if _ROOT.match(decode(text.data[text.start : text.start + 8192])):
         return _of_xml(path, text.data[text.start : text.stop])
-    first = next(text.lines(), None)
-    headings, mark = _headings(first.text) if first else ((), "")
-    channels = () if first is None else channels_of(Sheet(text, first.next, text.stop, 2, mark), headings)
-    if not channels:
-        demand = 'expected quoted headings like "Time (s)","Distance (m)"'
-        raise FormatError(path, demand, "export the run again", line=1)
-    return Contents(channels, zeros=text.zeros)
+    return under_first_line(path, data, _headings, '"Time (s)","Distance (m)", in quotes')
 
 
 def _of_xml(path: str, data: bytes) -> Contents:

@@ -11,6 +11,7 @@ from typing import Any
 from pipeline.scene import Scene
 from springmass import __version__
 from springmass.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc
+from springmass.commands import completions
 from springmass.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain
 from springmass.loading import Loaded, load, read_scene
@@ -28,7 +29,8 @@ def run(options: argparse.Namespace) -> int:
     # Scenes first: what is wrong with them is known before an hour of records is read.
     given = _given_scenes(options)
     out = None if options.out is None else make_folder(options.out)
-    loaded = [_load(path, options) for path in options.input]
+    cut = {"from_s": options.from_s, "to_s": options.to_s}
+    loaded = [load(path, **completions(options), **cut) for path in options.input]
     scenes = [_scene(one, scene) for one, scene in zip(loaded, given, strict=True)]
     demand_one_spring(list(zip(names, scenes, strict=True)))
     time_utc = now_utc()
@@ -70,18 +72,6 @@ def _given_scenes(options: argparse.Namespace) -> list[Scene | None]:
         )
     scenes: list[Scene | None] = [read_scene(path) for path in options.scene] or [None]
     return scenes * count if len(scenes) == 1 else scenes
-
-
-def _load(path: str, options: argparse.Namespace) -> Loaded:
-    return load(
-        path,
-        channel=options.channel,
-        run=options.run,
-        rate_hz=options.rate_hz,
-        unit=options.unit,
-        from_s=options.from_s,
-        to_s=options.to_s,
-    )
 
 
 def _scene(loaded: Loaded, given: Scene | None) -> Scene:

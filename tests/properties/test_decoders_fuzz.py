@@ -11,11 +11,10 @@ import importlib.util
 import math
 import random
 import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -248,39 +247,20 @@ def test_describing_bytes_never_fails_and_takes_one_line(data: bytes) -> None:
     assert all(name in FAMILIES for name in probe(data))
 
 
-HUNT = """
-import importlib.util, sys
-import atheris
-with atheris.instrument_imports(include=["acquisition"]):
-    import acquisition.decoders.registry as registry
-    registry.families()
-spec = importlib.util.spec_from_file_location("hunt", sys.argv[1])
-hunt = importlib.util.module_from_spec(spec)
-sys.modules["hunt"] = hunt
-spec.loader.exec_module(hunt)
-NAMES = sorted(hunt.FAMILIES)
-
-def target(data):
+def target(data: bytes) -> None:
+    """What a hunt guided by coverage calls: two bytes say the family and where to cut, the others are the stream."""
     if len(data) > 2:
-        body = data[2:]
-        hunt.check(NAMES[data[0] % len(NAMES)], body, [min(data[1], len(body))])
-
-atheris.Setup([sys.argv[0], *sys.argv[2:]], target)
-atheris.Fuzz()
-"""
+        names, body = sorted(FAMILIES), data[2:]
+        check(names[data[0] % len(names)], body, [min(data[1], len(body))])
 
 
 @pytest.mark.skipif(
     importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
 )
-def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
+def test_a_coverage_guided_hunt_finds_nothing(hunt: ModuleType, tmp_path: Path) -> None:
     """Some thousand inputs, grown from sound streams towards code not yet reached; bounded in number and seconds."""
-    for i, name in enumerate(sorted(FAMILIES)):
-        (tmp_path / name).write_bytes(bytes([i, 40]) + b"".join(own_stream(FAMILIES[name], 0, 3)))
-    bounds = [f"-runs={COVERAGE_RUNS}", "-max_total_time=6", "-seed=1", "-max_len=300"]
-    options = [*bounds, f"-artifact_prefix={tmp_path}/"]
-    done = subprocess.run(
-        [sys.executable, "-c", HUNT, __file__, *options, str(tmp_path)], capture_output=True, text=True, timeout=60
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    assert re.search(r"Done \d{3,} runs", done.stderr), done.stderr[-3000:]
+    names = sorted(FAMILIES)
+    seeds = {name: bytes([i, 40]) + b"".join(own_stream(FAMILIES[name], 0, 3)) for i, name in enumerate(names)}
+    imports = "import acquisition.decoders.registry as r; r.families()"
+    bounds = {"runs": COVERAGE_RUNS, "seconds": 6, "longest": 300}
+    assert hunt.hunt(__file__, "acquisition", imports, seeds, tmp_path, **bounds) >= 100

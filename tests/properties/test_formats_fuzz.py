@@ -11,11 +11,11 @@ import importlib.util
 import io
 import random
 import re
-import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -318,47 +318,23 @@ def test_nptdms_writes_what_is_read(values: list[float], step: float, offset: fl
 
 # Coverage-guided -----------------------------------------------------------------------------------------------
 
-HUNT = """
-import importlib.util, sys
-import atheris
-with atheris.instrument_imports(include=["acquisition.formats"]):
-    import acquisition.registry as registry
-    registry.formats()
-    import acquisition.formats.columns, acquisition.formats.pulled
-spec = importlib.util.spec_from_file_location("hunt", sys.argv[1])
-hunt = importlib.util.module_from_spec(spec)
-sys.modules["hunt"] = hunt
-spec.loader.exec_module(hunt)
 
-def target(data):
+def target(data: bytes) -> None:
+    """What a hunt guided by coverage calls: the first byte says the case, the others are the file."""
     if len(data) > 1:
-        case = hunt.CASES[data[0] % len(hunt.CASES)]
-        hunt.check(case.format, data[1:], hunt.answers(case))
-
-atheris.Setup([sys.argv[0], *sys.argv[2:]], target)
-atheris.Fuzz()
-"""
+        case = CASES[data[0] % len(CASES)]
+        check(case.format, data[1:], answers(case))
 
 
 @pytest.mark.skipif(
     importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
 )
-def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
+def test_a_coverage_guided_hunt_finds_nothing(hunt: ModuleType, tmp_path: Path) -> None:
     """Some thousand inputs, grown from sound files towards code not yet reached; bounded in number and seconds."""
     few = np.arange(6) / 100.0
-    for i, case in enumerate(CASES):
-        (tmp_path / f"{i}").write_bytes(bytes([i]) + case.build(few, np.round(0.2 + few, 5)))
-    bounds = [
-        f"-runs={COVERAGE_RUNS}",
-        "-max_total_time=12",
-        "-seed=1",
-        "-max_len=1200",
-        "-timeout=20",
-        "-rss_limit_mb=2048",
-    ]
-    options = [*bounds, f"-artifact_prefix={tmp_path}/"]
-    done = subprocess.run(
-        [sys.executable, "-c", HUNT, __file__, *options, str(tmp_path)], capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    assert re.search(r"Done \d{2,} runs", done.stderr), done.stderr[-3000:]
+    seeds = {f"{i}": bytes([i]) + case.build(few, np.round(0.2 + few, 5)) for i, case in enumerate(CASES)}
+    imports = "import acquisition.registry as r; r.formats(); import acquisition.formats.columns"
+    watched = "acquisition.formats"
+    options = ["-timeout=20", "-rss_limit_mb=2048"]
+    bounds = {"runs": COVERAGE_RUNS, "seconds": 12, "longest": 1200}
+    assert hunt.hunt(__file__, watched, imports, seeds, tmp_path, options=options, **bounds) >= 10
