@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from decimal import Decimal
 from itertools import pairwise
@@ -257,3 +258,43 @@ def test_a_cell_is_read_as_float_reads_it(cell: str) -> None:
     """Taking digits as an integer over a power of ten loses nothing against ``float()``."""
     assert read_table(Text.of(f"{cell}\n".encode()), (0,), "\t", width=1).values[0][0] == float(cell)
     assert parse_number(cell.replace(".", ",")) == float(cell)
+
+
+@st.composite
+def fixed_columns(draw: st.DrawFn) -> tuple[list[str], str]:
+    """Draw numbers of one column, of up to 17 digits with as many decimals each, all of one width or not."""
+    decimals = draw(st.integers(0, 14))
+    digits = draw(st.integers(decimals + 1, 17))
+    low = 10 ** (digits - 1) if draw(st.booleans()) else 0
+    sign = draw(st.sampled_from(["", "-", None]))
+    numbers = draw(st.lists(st.integers(low, 10**digits - 1), min_size=1, max_size=40))
+    printed = [f"{n:0{decimals + 1}d}" for n in numbers]
+    cells = [f"{n[: len(n) - decimals]}.{n[len(n) - decimals :]}" if decimals else n for n in printed]
+    return [(draw(st.sampled_from(["", "-"])) if sign is None else sign) + cell for cell in cells], draw(
+        st.sampled_from(["\n", "\r\n"])
+    )
+
+
+@settings(max_examples=400, deadline=None)
+@given(column=fixed_columns(), beside=st.sampled_from(["", "0.239\t", "1\t"]), shift=st.sampled_from([0, -2, -3, 2]))
+def test_fixed_point_is_read_bit_for_bit(column: tuple[list[str], str], beside: str, shift: int) -> None:
+    """Lines laid out alike and lines that are not: every digit, sign and power of ten as one correct rounding."""
+    cells, newline = column
+    text = "".join(f"{beside}{cell}{newline}" for cell in cells)
+    table = read_table(Text.of(text.encode()), (beside.count("\t"),), "\t", shifts=(shift,))
+    assert not table.bad.any()
+    for cell, value in zip(cells, np.asarray(table.values[0]).tolist(), strict=True):
+        exact = float(Decimal(cell).scaleb(shift))
+        assert (value, math.copysign(1.0, value)) == (exact, math.copysign(1.0, exact))
+
+
+def test_a_column_of_one_number_takes_no_room() -> None:
+    """A constant column is a view of one number; zeros of either sign and a late change are kept apart."""
+    rows = [f"{i / 100:07.3f}\t0.239" for i in range(30_000)]
+    constant = read_table(Text.of("\n".join([*rows, ""]).encode()), (0, 1), "\t").values[1]
+    assert (constant.strides, set(constant.tolist())) == ((0,), {0.239})
+    rows[-1] = rows[-1].replace("0.239", "0.240")
+    changed = read_table(Text.of("\n".join([*rows, ""]).encode()), (0, 1), "\t").values[1]
+    assert (changed[-1], set(changed[:-1].tolist())) == (0.240, {0.239})
+    zeros = read_table(Text.of(b"00000.000\n" * 40_000 + b"-0000.000\n" * 40_000), (0,), "\t").values[0]
+    assert np.count_nonzero(np.signbit(zeros)) == 40_000
