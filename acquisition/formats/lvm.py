@@ -29,6 +29,7 @@ __all__ = ["FORMAT"]
 
 _MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"
+_SEPARATOR = "Separator"
 _MOST_HEADER_LINES = 500
 _MOST_SEGMENTS = 10_000
 
@@ -79,9 +80,10 @@ def _separator(path: str, text: Text) -> str:
         demand = f'expected "{_MAGIC}" in the first line'
         raise FormatError(path, demand, "check that this is an LVM file", line=1)
     for line in text.lines():
-        found = re.match(r"\s*Separator(\W)", line.text)
-        if found:
-            return found[1]
+        tag = line.text.lstrip()
+        mark = tag.removeprefix(_SEPARATOR)[:1]
+        if tag.startswith(_SEPARATOR) and mark and not (mark.isalnum() or mark == "_"):
+            return mark
         if line.text.startswith(_END) or line.number > _MOST_HEADER_LINES:
             break
     return first.text.lstrip()[len(_MAGIC) :][:1] or "\t"

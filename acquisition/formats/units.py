@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 __all__ = ["LENGTHS", "TIMES", "length_power", "time_power", "unit_words"]
 
 LENGTHS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
@@ -52,7 +50,7 @@ def unit_words(unit: str) -> str:
     >>> unit_words(" centimeters "), unit_words("m/s^2")
     ('cm', 'm/s^2')
     """
-    plain = re.sub(r"\s+", " ", unit).strip().strip(".")
+    plain = " ".join(unit.split()).strip(".")
     lower = plain.lower()
     found = _WORDS.get(lower) or _WORDS.get(lower.removesuffix("s"))
     if found:
