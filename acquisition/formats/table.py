@@ -27,6 +27,7 @@ I1 = NDArray[np.int8]
 
 _PAGE_ROWS = 8_000  # their columns fit into the cache
 _PAGE_BYTES = 1 << 15, 1 << 19
+_KEPT_BYTES = 1 << 21
 _UNIFORM = 0.9  # a column that prints the same number of decimals in this share of its rows always does
 _MANY, _STRIPPED = 40, 0.03
 _WORD = 8
@@ -121,6 +122,9 @@ def read_table(
     stop = text.stop if stop is None else stop
     raw = np.frombuffer(text.data, np.uint8)[start:stop]
     rows = _Rows(tuple(columns), delimiter, width, tuple(shifts) or (0,) * len(columns))
+    # glibc hands back what is freed on top of its heap, unless a larger block was freed once; to fetch it anew, page
+    # after page, costs more than to calculate in it.
+    np.empty(_KEPT_BYTES, np.uint8)
     at, size = 0, _PAGE_BYTES[0]
     while at < raw.size:
         page, end = next_page(raw, at, size, delimiter)
