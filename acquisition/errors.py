@@ -50,7 +50,9 @@ class FormatError(AcquisitionError):
     def __init__(self, path: str, demand: str, remedy: str, *, line: int | None = None) -> None:
         self.path, self.demand, self.remedy, self.line = path, demand, remedy, line
         where = path if line is None else f"{path}, line {line}"
-        super().__init__(f"{where}: {demand}; {remedy}")
+        text = f"{where}: {demand}; {remedy}"
+        # Names and units come out of the file, line ends and all.
+        super().__init__(text if text.isprintable() else "".join(c if c.isprintable() else "\ufffd" for c in text))
 
 
 class UnknownFormat(FormatError):

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from acquisition.errors import NeedsAnswer
 from acquisition.recording import Recording
 from acquisition.registry import get_format
 
@@ -135,6 +136,19 @@ def test_tdms_is_scaled_and_placed_as_its_properties_say() -> None:
     recording = get_format("tdms").read("run.tdms", file.getvalue())
     assert recording.samples.distance.tolist() == [2.0, 3.0, 4.0, 5.0]
     np.testing.assert_allclose(recording.samples.t, [1.5, 1.52, 1.54, 1.56], rtol=1e-12)
+
+
+def test_a_unit_with_line_ends_is_refused_in_one_line() -> None:
+    """What a damaged file gives for a name or a unit cannot break the line that quotes it."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    file = io.BytesIO()
+    with TdmsWriter(file) as writer:
+        facts = {"wf_increment": 0.02, "unit_string": "m\n\x1b[1m"}
+        writer.write_segment([ChannelObject("G", "x", np.arange(4.0), facts)])
+    with pytest.raises(NeedsAnswer) as caught:
+        get_format("tdms").read("run.tdms", file.getvalue())
+    assert str(caught.value).isprintable()
 
 
 def test_capstone_decides_decimal_mark_and_exponent_cell_by_cell() -> None:
