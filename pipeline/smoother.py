@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.beside import Beside
 from pipeline.chain import Chain
+from pipeline.damping import LawFit
 from pipeline.demodulate import Demodulated
 from pipeline.errors import AnalysisError
 from pipeline.lines import Blocks, smooth_density
@@ -19,7 +20,7 @@ from pipeline.track import F8, UNUSABLE, Track
 __all__ = ["Params", "Smoothed", "smooth"]
 
 LONGEST = 100_000  # periods, beyond which noise is taken for white
-LEAST_WEIGHT = 0.01  # of the likeliest memory's likelihood, that another must have to count
+LEAST_WEIGHT = 0.01  # of the likeliest memory's (or law's) likelihood, that another must have to count
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +58,8 @@ class Smoothed:
     noise_m : float
         Standard deviation of one sample about the smoothed motion, m.
     memory_s : float
-        How long a stretch, before and after, speaks on a sample at the largest amplitude, s: the likeliest.
+        How long a stretch, before and after, speaks on a sample at the largest amplitude, s: the likeliest, with the
+        likeliest law.
     """
 
     t: F8
@@ -82,8 +84,7 @@ class _Carried:
     decay: F8  # logarithmic, 1/s
 
     @classmethod
-    def at(cls, t: F8, phase: PhaseFit, last: float) -> _Carried:
-        law = phase.damping.best
+    def at(cls, t: F8, phase: PhaseFit, law: LawFit, last: float) -> _Carried:
         amplitude = law.amplitude(np.clip(t, phase.t0, last) - phase.t0)
         largest = float(np.max(law.amplitude(np.array([0.0, last - phase.t0]))))
         if not largest > 0.0:
@@ -148,8 +149,10 @@ def smooth(
 
     The strength of the force, hence the memory, is averaged over by its likelihood, and the noise comes with it. A
     record that follows its law to the end has the memory of all its samples: then this is the global fit. What
-    frequency and law are uncertain by is a polynomial in time added to z, one power for each of their parameters, whose
-    coefficients are estimated along; so the ends, with one side missing, carry their larger uncertainty.
+    frequency and law are uncertain by is added to z, a shape for each of their parameters, whose sizes are estimated
+    along; so the ends, with one side missing, carry their larger uncertainty.
+    A short record admits several laws, which part most at its ends. So each of them, up to the selected one's number
+    of parameters, is smoothed about, and they too are averaged by their likelihood.
     Where noise is correlated samples count by its spectral density near the oscillation's frequency.
     Clock and speed of sound, which scale everything alike, are not in these uncertainties.
     """
@@ -162,35 +165,76 @@ def smooth(
     swing = track.y[used] - rest.at(t)
     if beside is not None and beside.modelled:
         swing = swing - beside.sideways.position(t)
-    used_carrier = _Carried.at(t, phase, float(t[-1]))
-    walk = _Walk.of(t, swing, used_carrier, phase.angular_frequency.value, params)
-    powers = max(len(phase.damping.best.law.parameters), phase.coefficients.size, 2) - 1
-    mean, covariance, noise_m, memory_s = walk.coloured(t, swing, used_carrier, track.rate_hz).smooth(
-        track.rate_hz, powers, params
-    )
     at = np.where(known, track.t, t[0])
-    carried = _Carried.at(at, phase, float(t[-1]))
-    rows = carried.rows()
-    z = np.array([np.interp(at, walk.t, each) for each in mean])
-    spread = {(i, j): np.interp(at, walk.t, covariance[i, j]) for i, j in ((0, 0), (0, 1), (1, 1))}
-    values, uncertainties = list[F8](), list[F8]()
-    for row in rows:
-        variance = row[0] ** 2 * spread[0, 0] + 2.0 * row[0] * row[1] * spread[0, 1] + row[1] ** 2 * spread[1, 1]
-        values.append(np.where(known, row[0] * z[0] + row[1] * z[1], np.nan))
-        uncertainties.append(np.where(known, np.sqrt(variance), np.nan))
-    values[0] = values[0] + np.where(known, rest.at(at), np.nan)
-    uncertainties[0] = np.hypot(uncertainties[0], rest.mean.u)
-    return Smoothed(
-        track.t,
-        values[0],
-        uncertainties[0],
-        values[1],
-        uncertainties[1],
-        values[2],
-        uncertainties[2],
-        noise_m,
-        memory_s,
-    )
+    last, best = float(t[-1]), phase.damping.best
+    colour, each = None, list[_Followed]()
+    for law in phase.damping.considered.values():  # the selected one first
+        if len(law.law.parameters) > len(best.law.parameters):
+            continue  # it holds simpler ones, and would only say again what these leave open
+        carried = _Carried.at(t, phase, law, last)
+        walk = _Walk.of(t, swing, carried, phase.angular_frequency.value, params)
+        colour = colour or walk.colour(t, swing, carried, track.rate_hz)
+        freedom = _freedom(walk.t, phase, law, last)
+        each.append(
+            walk.seen_through(colour).smooth(freedom, _Carried.at(at, phase, law, last), at, track.rate_hz, params)
+        )
+    mean, variance = _averaged(each)
+    mean[0] += rest.at(at)
+    variance[0] += rest.mean.u**2
+    x, v, a = np.where(known, mean, np.nan)
+    u_x, u_v, u_a = np.where(known, np.sqrt(variance), np.nan)
+    likeliest = max(each, key=lambda followed: followed.likelihood)
+    return Smoothed(track.t, x, u_x, v, u_v, a, u_a, likeliest.noise_m, likeliest.memory_s)
+
+
+def _freedom(t: F8, phase: PhaseFit, law: LawFit, last: float) -> F8:
+    """Return how the walk's nodes may move together (2, a, w), since law and frequency are not known exactly.
+
+    In phase as the law's amplitude moves with its parameters, at right angles to that by powers of time, one for each
+    coefficient of the phase. What only turns or scales the motion is left out: any walk may begin where it likes.
+    """
+    x = _centred(t)
+    turning = np.array([x**power for power in range(1, max(phase.coefficients.size, 2))])
+    gain = _Carried.at(t, phase, law, last).gain
+    slopes = law.law.jacobian(np.clip(t, phase.t0, last) - phase.t0, law.joint.values)
+    slopes = slopes / np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+    # A law says the same in any unit of length: the plain scale is a sum of its slopes.
+    slopes -= np.outer(gain, gain @ slopes) / (gain @ gain)
+    growing = (np.linalg.svd(slopes, full_matrices=False)[0] / gain[:, None])[:, : slopes.shape[1] - 1].T
+    growing = growing if len(growing) else x[None, :]
+    moved = np.zeros((2, len(growing) + len(turning), t.size))
+    moved[0, : len(growing)], moved[1, len(growing) :] = growing, turning
+    return moved
+
+
+def _centred(t: F8) -> F8:
+    """Return times from -1/2 to 1/2."""
+    return np.asarray((t - t.mean()) / max(float(np.ptp(t)), 1e-300))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Followed:
+    """What smoothing about one law gave: position about rest, velocity and acceleration (3, n), and their variances.
+
+    ``likelihood`` is its logarithm, up to a constant that laws share.
+    """
+
+    mean: F8
+    variance: F8
+    likelihood: float
+    noise_m: float
+    memory_s: float
+
+
+def _averaged(each: list[_Followed]) -> tuple[F8, F8]:
+    """Return means and variances over the laws."""
+    likelihoods = np.array([followed.likelihood for followed in each])
+    weights = np.exp(likelihoods - likelihoods.max())
+    weights /= weights.sum()
+    means = np.array([followed.mean for followed in each])
+    variances = np.array([followed.variance for followed in each])
+    mean = np.einsum("k,kin->in", weights, means)
+    return mean, np.einsum("k,kin->in", weights, variances + (means - mean) ** 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,34 +266,41 @@ class _Walk:
         gain = np.bincount(index, weights=carried.gain) / count
         return cls(middle, information, score, gain, float(swing @ swing), t.size, period)
 
-    def coloured(self, t: F8, swing: F8, carried: _Carried, rate_hz: float) -> _Walk:
-        """Return the walk with what was seen weakened where noise is stronger near the oscillation than on the whole.
+    def colour(self, t: F8, swing: F8, carried: _Carried, rate_hz: float) -> tuple[float, float | None]:
+        """Return by how much noise is stronger near the oscillation than on the whole, in variance, and the noise, m.
 
-        Else intervals would be those of as many independent samples. The density is read off half and
-        twice the frequency, on what the shortest memory leaves, so that motion which wanders does not pass for noise.
+        The density is read off half and twice the frequency, on what the shortest memory leaves, so that motion which
+        wanders does not pass for noise. Records too short or too long to tell give 1 and None.
         """
         if t.size < 64 or float(t[-1] - t[0]) > LONGEST * self.period:
-            return self
-        trial = _Trial.of(self, self.period, rate_hz, 1)
+            return 1.0, None
+        trial = _Trial.of(self, self.period, rate_hz, _centred(self.t) * np.eye(2)[:, :, None])
         z = np.array([np.interp(t, self.t, each) for each in trial.mean])
         residual = swing - carried.gain * (carried.cosine * z[0] - carried.sine * z[1])
         blocks = Blocks.of(t, residual, self.period / 12.0, rate_hz)
         turn = blocks.step / self.period
         density = math.sqrt(smooth_density(blocks.y, 0.5 * turn) * smooth_density(blocks.y, 2.0 * turn))
-        excess = max(1.0, density * blocks.samples / max(trial.noise_m**2, 1e-300))
-        return replace(self, information=self.information / excess, score=self.score / excess, noise_m=trial.noise_m)
+        return max(1.0, density * blocks.samples / max(trial.noise_m**2, 1e-300)), trial.noise_m
 
-    def smooth(self, rate_hz: float, powers: int, params: Params) -> tuple[F8, F8, float, float]:
+    def seen_through(self, colour: tuple[float, float | None]) -> _Walk:
+        """Return the walk with what was seen weakened by coloured noise.
+
+        Else intervals would be those of as many independent samples.
+        """
+        excess, noise_m = colour
+        return replace(self, information=self.information / excess, score=self.score / excess, noise_m=noise_m)
+
+    def smooth(self, freedom: F8, carried: _Carried, at: F8, rate_hz: float, params: Params) -> _Followed:
         """Smooth with every memory that the record admits and average them by their likelihood.
 
-        Returns means (2, w), m, covariances (2, 2, w), m^2, which hold what memories differ by, the noise of a sample,
-        m, and the likeliest memory, s.
+        ``carried`` is the fitted oscillation at the times ``at`` that are asked for.
         """
         span = max(float(self.t[-1] - self.t[0]), self.period)
         memories = np.geomspace(self.period, 30.0 * span, params.memories)
-        trials = [_Trial.of(self, float(memory_s), rate_hz, powers) for memory_s in memories]
+        trials = [_Trial.of(self, float(memory_s), rate_hz, freedom) for memory_s in memories]
         costs = np.array([trial.cost for trial in trials])
         weights = np.exp(-0.5 * (costs - costs.min()))
+        likelihood = math.log(float(np.sum(weights))) - 0.5 * float(costs.min())
         believed = np.flatnonzero(weights > LEAST_WEIGHT)
         weights = weights[believed] / weights[believed].sum()
         means = np.array([trials[k].mean for k in believed])
@@ -257,8 +308,17 @@ class _Walk:
         covariance = np.einsum("k,kiw,kjw->ijw", weights, means - mean, means - mean)
         for k, weight in zip(believed, weights, strict=True):
             covariance += weight * trials[k].noise_m ** 2 * trials[k].covariance()
+        rows = np.array(carried.rows())
+        z = np.array([np.interp(at, self.t, each) for each in mean])
+        spread = np.array([[np.interp(at, self.t, each) for each in row] for row in covariance])
         best = int(np.argmin(costs))
-        return mean, covariance, trials[best].noise_m, float(memories[best])
+        return _Followed(
+            np.einsum("kin,in->kn", rows, z),
+            np.einsum("kin,ijn,kjn->kn", rows, spread, rows),
+            likelihood,
+            trials[best].noise_m,
+            float(memories[best]),
+        )
 
     def bond(self, memory_s: float, rate_hz: float) -> F8:
         """Reciprocal variances of the walk's steps, noise of one sample being 1.
@@ -272,25 +332,21 @@ class _Walk:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trial:
-    """The walk smoothed with one memory, and a polynomial in time beside it whose coefficients are not known before.
+    """The walk smoothed with one memory, and moves of all its nodes together, of sizes that are not known before.
 
-    The polynomial is eliminated by its Schur complement; ``cost`` is minus twice the logarithm of the likelihood that
+    These are eliminated by their Schur complement; ``cost`` is minus twice the logarithm of the likelihood that
     is left, up to a constant, the noise as known before or else at its best value.
     """
 
     chain: Chain
     mean: F8
-    beyond: F8  # (2, 2 powers, w): what a coefficient of 1 does to the walk and itself together
+    beyond: F8  # (2, a, w): what a move of size 1 does to the walk and itself together
     inverse: F8
     noise_m: float
     cost: float
 
     @classmethod
-    def of(cls, walk: _Walk, memory_s: float, rate_hz: float, powers: int) -> _Trial:
-        x = (walk.t - walk.t.mean()) / max(float(np.ptp(walk.t)), 1e-300)
-        shapes = np.array([x**power for power in range(1, powers + 1)])
-        # One column for either dimension of each power: the walk moved by it, and what is seen of that.
-        moved = np.einsum("pw,ij->ijpw", shapes, np.eye(2)).reshape(2, 2 * powers, -1)
+    def of(cls, walk: _Walk, memory_s: float, rate_hz: float, moved: F8) -> _Trial:
         seen = np.einsum("ijw,jaw->iaw", walk.information, moved)
         bond = walk.bond(memory_s, rate_hz)
         chain = Chain(walk.information, np.concatenate([walk.score[:, None], seen], axis=1), bond)
@@ -311,7 +367,7 @@ class _Trial:
         return cls(chain, mean, beyond, inverse, noise_m, 2.0 * dof * math.log(noise_m) + determinants)
 
     def covariance(self) -> F8:
-        """Return the covariances of walk and polynomial together, (2, 2, w), in units of the noise squared."""
+        """Return the covariances of walk and moves together, (2, 2, w), in units of the noise squared."""
         spread = self.chain.solve(covariance=True).covariance
         assert spread is not None
         return np.asarray(spread + np.einsum("iaw,ab,jbw->ijw", self.beyond, self.inverse, self.beyond))

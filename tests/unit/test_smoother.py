@@ -23,6 +23,13 @@ def velocity_of(truth: object, t: F8) -> F8:
     return (truth.position(t + h) - truth.position(t - h)) / (2 * h)  # type: ignore[attr-defined, no-any-return]
 
 
+def acceleration_of(truth: object, t: F8) -> F8:
+    """Return the truth's acceleration by a second difference, good to 1e-5 of its greatest value."""
+    h = 1e-3
+    before, here, after = (truth.position(at) for at in (t - h, t, t + h))  # type: ignore[attr-defined]
+    return (before - 2.0 * here + after) / h**2  # type: ignore[no-any-return]
+
+
 def analysed(synthetic: ModuleType, seconds: float, sigma_m: float, seed: int = 1, **truth: float) -> Analysis:
     """Return the analysis of a run of linear drag."""
     t = synthetic.times(seconds)
@@ -50,14 +57,15 @@ def test_velocity_beats_differences_and_polynomials(
 
 
 def test_intervals_of_velocity_and_acceleration_hold_the_truth(synthetic: ModuleType) -> None:
-    """Over 60 runs 68 and 95 % intervals of position, velocity and acceleration hold, in the middle and at the ends."""
+    """Over 60 runs of three laws 68 and 95 % intervals of all three hold, at the ends as often as they state."""
     t, inside = synthetic.times(10.0), []
     for seed in range(60):
         phase = float(np.random.default_rng((seed, 1)).uniform(-3.0, 3.0))
-        truth = synthetic.Truth(gamma=0.01463, phase=phase)
+        # Ten seconds do not tell these laws apart: of one record in three another one is selected.
+        law = ({"gamma": 0.01463}, {"beta": 0.01463 / 0.05}, {"mu": 0.01463 * 0.05})[seed % 3]
+        truth = synthetic.Truth(phase=phase, **law)
         found = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, 3e-4, seed))).smoothed()
-        x, v = truth.position(t), velocity_of(truth, t)
-        a = -2 * truth.gamma * v - (truth.omega**2 + truth.gamma**2) * (x - truth.offset)
+        x, v, a = truth.position(t), velocity_of(truth, t), acceleration_of(truth, t)
         pulls = np.abs(
             [
                 (found.position - x) / found.u_position,
@@ -67,11 +75,12 @@ def test_intervals_of_velocity_and_acceleration_hold_the_truth(synthetic: Module
         )
         ends = pulls[:, [*range(40), *range(-40, 0)]]
         inside.append([np.mean(part <= bound) for part in (*pulls, ends) for bound in (1.0, 1.96)])
+    # Samples of one run err together, so shares scatter from run to run.
     shares, scatter = np.mean(inside, axis=0), np.std(inside, axis=0) / np.sqrt(len(inside))
-    assert np.all(shares[::2] > 0.62)
-    assert np.all(shares[::2] < 0.82)
-    # The ends of sixty runs are few independent values: their share is known to 0.017.
-    assert np.all(shares[1::2] > np.minimum(0.92, 0.95 - 3.0 * scatter[1::2]))
+    # Inside the record, too, what laws differ by counts, and makes intervals wide there.
+    low, high = np.array([0.66, 0.94] * 4), np.array([0.80, 0.985] * 3 + [0.74, 0.96])
+    assert np.all(shares >= low - 3.0 * scatter), shares
+    assert np.all(shares <= high + 3.0 * scatter), shares
 
 
 def test_ends_carry_the_larger_uncertainty(synthetic: ModuleType) -> None:
