@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -150,7 +150,8 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     The excess is measured against a smooth curve that no law restricts, so that a wrong law cannot hide its misfit
     in it; where friction stops the motion at a corner that no smooth curve follows, a law that leaves less than
     half of it takes the curve's place. Points that are correlated count as fewer: chi-square, BIC and degrees of
-    freedom are divided and the covariance is multiplied by the correlation length.
+    freedom are divided and the covariance is multiplied by the correlation length. The covariance of a law that
+    chi-square rejects is by its own residuals: times its reduced chi-square, and with their correlation length.
 
     Coefficients of drag are not negative, yet their estimates may be by chance, and unbounded estimates are unbiased
     with intervals that hold. So fits are unbounded; a law with a coefficient below zero by more than three standard
@@ -205,9 +206,18 @@ def _fit_all(
         else:
             unfitted[law.name] = why
     least = least_chi2(sound)
-    return {
-        name: weigh(LAWS[name], fit, least[name], y.size, spread.correlation, params) for name, fit in sound.items()
-    }
+    weighed = {}
+    for name, fit in sound.items():
+        weighed[name] = weigh(LAWS[name], fit, least[name], y.size, spread.correlation, params)
+        if weighed[name].rejection == "misfit":
+            weighed[name] = _widened(weighed[name], (y - weighed[name].amplitude(t)) / u, spread.correlation)
+    return weighed
+
+
+def _widened(fit: LawFit, residual: F8, correlation: float) -> LawFit:
+    """Return a law that does not fit with uncertainties by its own residuals: their size and how they hang together."""
+    widening = fit.reduced_chi2 * max(correlation_length(residual) / correlation, 1.0)
+    return replace(fit, joint=replace(fit.joint, covariance=widening * fit.joint.covariance), widening=widening)
 
 
 def _astray(law: Law, fit: Fitted, t: F8, y: F8) -> str | None:

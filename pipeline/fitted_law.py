@@ -40,6 +40,8 @@ class LawFit:
         uncertainties, or the fit did not converge.
     tried : str
         What was tried where the fit did not converge.
+    widening : float
+        Factor on the covariance, of what a law that chi-square rejects leaves over what was expected.
     """
 
     law: Law
@@ -50,6 +52,7 @@ class LawFit:
     converged: bool
     rejection: Rejection
     tried: str = ""
+    widening: float = 1.0
 
     @property
     def rejected(self) -> bool:
