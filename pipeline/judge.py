@@ -15,6 +15,8 @@ from pipeline.cycles import Cycles, NoOscillation
 from pipeline.damping import Damping
 from pipeline.demodulate import Demodulated
 from pipeline.echoes import Clusters, find_clusters
+from pipeline.laws import LAWS
+from pipeline.mixed import MixedDrag, find_mixed
 from pipeline.phase import PhaseFit, words_on_exponent
 from pipeline.relaxation import Relaxation
 from pipeline.rest import Rest
@@ -192,11 +194,28 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
             "law_rejected", "error", "every damping law tried is rejected: none describes the amplitude's fall"
         )
     yield from _rejections(damping)
+    if (mixed := find_mixed(damping)) is not None:
+        yield Finding("mixed_drag", "info", _words_on_mixed(mixed, damping))
     drags = [name for name in damping.admissible if name != "none"]
     if len(damping.admissible) > 1:
         names = ", ".join(damping.admissible)
         tail = "" if drags == list(damping.admissible) else "; it does not even show for certain that there is any"
         yield Finding("laws_not_separable", "info", f"the record cannot tell these damping laws apart: {names}{tail}")
+
+
+def _words_on_mixed(mixed: MixedDrag, damping: Damping) -> str:
+    fit = mixed.fit
+    terms = " and ".join(f"{name} = {fit.joint[name]}" for name in fit.law.parameters[1:])
+    alone = ", ".join(f"{LAWS[name].words} by {_number(excess)}" for name, excess in mixed.against.items())
+    words = f"{fit.law.words}: {terms}; the BIC of one term alone is higher, of {alone}"
+    if not fit.rejected:
+        return words
+    power = damping.fits.get("power")
+    free = "" if power is None else f"; a free power of the amplitude is n = {power.joint['n']}"
+    return (
+        f"{words}. Constant coefficients do not hold from the first amplitude to the last (reduced chi-square "
+        f"{_number(fit.reduced_chi2)}): uncertainties and BIC are by what they leave{free}"
+    )
 
 
 def _rejections(damping: Damping) -> Iterator[Finding]:

@@ -32,6 +32,7 @@ CODES = {
     "stated_error_is_not_noise",
     "law_rejected",
     "laws_not_separable",
+    "mixed_drag",
     "correlated_residuals",
     "amplitude_dependent_frequency",
     "rest_drift",

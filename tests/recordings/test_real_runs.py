@@ -11,12 +11,14 @@ import pytest
 
 from pipeline.analyse import Analysis, Motion, analyse
 from pipeline.compare import Comparison, SpringRun, compare_springs
+from pipeline.mixed import find_mixed
 from pipeline.scene import Scene
 from pipeline.track import Track
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 BARE = "AyushPandhi__Pandhi_Ayush_PHY224/position data.txt"
 DISC = "AyushPandhi__Pandhi_Ayush_PHY224/damped position.txt"
+LARGE_DISC = "filo0509__smorzamento/molla_durissima_discopieno_14.91945_0.2016_1.csv"
 OTHERS = (
     "pankaj9um__PHY224/undamped_point_data.txt",
     "pankaj9um__PHY224/undamped_point_data_set2.txt",
@@ -36,6 +38,14 @@ def analysed(name: str) -> Analysis:
     y = np.array([float(row[1]) / 100.0 for row in rows])
     track = Track(t, y, np.zeros(t.size, np.uint8), 100.0, quantum_m=TICK_M, stated_error_m=0.00239)
     return analyse(track)
+
+
+@lru_cache
+def analysed_capstone(first_s: float = 0.0) -> Analysis:
+    """Read the Capstone recording of a disc in plain Python, from a time on, and analyse it."""
+    rows = [line.split(";") for line in (RECORDINGS / LARGE_DISC).read_text("utf-8").splitlines()[1:]]
+    t, y = (np.array([float(row[k]) for row in rows]) for k in (0, 1))
+    return analyse(Track.from_arrays(t[t >= first_s], y[t >= first_s]))
 
 
 def motion_of(result: Analysis) -> Motion:
@@ -87,6 +97,41 @@ def test_disc_drags_both_ways() -> None:
     assert 0.0055 <= joint["gamma"].value <= 0.0075
     assert 0.17 <= joint["beta"].value <= 0.23
     assert "law_rejected" in codes(analysed(DISC))
+
+
+def test_mixed_drag_on_every_disc_run_of_two_minutes() -> None:
+    """Both runs demand linear and quadratic drag together: each beyond five uncertainties, each alone far worse."""
+    for result in (analysed(DISC), analysed_capstone()):
+        mixed = find_mixed(motion_of(result).damping)
+        assert mixed is not None
+        assert mixed.fit.name == "linear+quadratic"
+        assert all(mixed.fit.joint[name].value > 5.0 * mixed.fit.joint[name].u for name in ("gamma", "beta"))
+        assert min(mixed.against[name] for name in ("linear", "quadratic", "friction")) > 100.0
+        assert "mixed_drag" in codes(result)
+
+
+def test_large_disc_rejects_constant_coefficients() -> None:
+    """At 71 mm every law is rejected, and the mixture's uncertainties are twenty times the formal ones for it."""
+    damping = motion_of(analysed_capstone()).damping
+    assert damping.admissible == ()
+    mixed = damping.fits["linear+quadratic"]
+    assert 50.0 < mixed.reduced_chi2 < 200.0
+    assert mixed.widening > 300.0
+    assert 0.009 < mixed.joint["gamma"].value < 0.013
+    assert 0.44 < mixed.joint["beta"].value < 0.60
+    assert damping.fits["power"].joint["n"].value == pytest.approx(1.54, abs=0.05)
+    errors = [finding.code for finding in analysed_capstone().findings if finding.severity == "error"]
+    assert errors == ["law_rejected"]
+
+
+def test_large_discs_drag_changes_with_amplitude() -> None:
+    """From 34 mm on the misfit is a fourteenth of the whole run's and beta half as large again: it is no transient."""
+    whole, later = (
+        motion_of(each).damping.fits["linear+quadratic"] for each in (analysed_capstone(), analysed_capstone(21.0))
+    )
+    assert later.reduced_chi2 < whole.reduced_chi2 / 5.0
+    assert later.joint["beta"].value - whole.joint["beta"].value > 3.0 * whole.joint["beta"].u
+    assert later.joint["gamma"].value < whole.joint["gamma"].value
 
 
 def test_disc_shows_what_simulations_lack() -> None:

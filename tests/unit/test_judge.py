@@ -121,6 +121,12 @@ MAKERS: dict[str, tuple[str, str, str, Maker]] = {
     ),
     "law rejected": ("law_rejected", "info", "hyperbola", record),
     "every law rejected": ("law_rejected", "error", "every damping law", growing),
+    "mixed": (
+        "mixed_drag",
+        "info",
+        "linear and quadratic drag together: gamma = 0.007",
+        lambda s: record(s, 120.0, gamma=0.0073, beta=0.235),
+    ),
     "not separable": ("laws_not_separable", "info", "linear", lambda s: record(s, 10.0, gamma=0.003)),
     "short": ("short_record", "warning", "ten and more", lambda s: record(s, 2.0)),
     "bent": (
