@@ -9,9 +9,19 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Truth", "fisher_bounds", "noisy", "times"]
+__all__ = ["LAW_TRUTHS", "Truth", "fisher_bounds", "noisy", "times"]
 
 F8 = NDArray[np.float64]
+# Of each law that takes part in the choice, coefficients of a disc like those recorded.
+LAW_TRUTHS = {
+    "linear": {"gamma": 0.01463},
+    "quadratic": {"beta": 0.45},
+    "friction": {"mu": 2e-4},
+    "linear+quadratic": {"gamma": 0.0073, "beta": 0.235},
+    "linear+friction": {"gamma": 0.0073, "mu": 1.5e-4},
+    "quadratic+friction": {"beta": 0.3, "mu": 1e-4},
+    "power": {"c": 0.07, "n": 1.5},
+}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from trials import QUANTITIES, Case, Outcome, bounds, evaluate, record
+from trials import QUANTITIES, Case, Outcome, bounds, evaluate, record, synthetic
 
 from pipeline.accuracy import TIERS
 from pipeline.classic import classic
@@ -22,15 +22,6 @@ __all__ = ["CHECKS", "Bench", "Line"]
 NOISES_M = (3e-4, 2.39e-3)
 EFFICIENCY = {"standard": 1.10, "best": 1.05}
 SIGMAS = 3.0
-LAWS = {
-    "linear": {"gamma": 0.01463},
-    "quadratic": {"beta": 0.45},
-    "friction": {"mu": 2e-4},
-    "linear+quadratic": {"gamma": 0.0073, "beta": 0.235},
-    "linear+friction": {"gamma": 0.0073, "mu": 1.5e-4},
-    "quadratic+friction": {"beta": 0.3, "mu": 1e-4},
-    "power": {"c": 0.07, "n": 1.5},
-}
 SINGLE = ("linear", "quadratic", "friction")
 
 
@@ -159,7 +150,7 @@ def damping_bias(bench: Bench) -> Iterator[Line]:
 def laws(bench: Bench) -> Iterator[Line]:
     """The true law is picked in long records, and among the admissible ones in short ones."""
     for noise in NOISES_M:
-        for law, truth in LAWS.items():
+        for law, truth in synthetic.LAW_TRUTHS.items():
             case = Case(noise_m=noise, truth=truth)
             outcomes = bench.run(case, "standard")
             picked = float(np.mean([o.selected == law for o in outcomes]))
