@@ -26,7 +26,7 @@ __all__ = ["Search", "fittable", "stop_row"]
 NAMES = (*STATE, *COEFFICIENTS)
 PRECISION = 0.01  # of the standard uncertainties, at which a fit stops
 FEW = 6  # windows under which the laws of the amplitude say too little to start from
-COARSE = 0.2  # step while a start is looked for, rad
+COARSE, ROUGH, FIRST_STEPS = 0.2, 0.1, 12  # step in rad, precision and most steps while a start is looked for
 HOPELESS = 1000.0  # rise of chi-square, to first order, from which a law is not fitted any more
 BLOCK = 25  # samples over which a bob is seen to move or not
 
@@ -121,13 +121,25 @@ class Search:
         best = np.argsort(np.where(np.isfinite(costs), costs, np.inf))[
             : 4 if self.stopped or demodulated.t.size < FEW else 1
         ]
-        ends = [self.fit(self.richest, starts[i], steps=12) for i in best]
+        ends = [self.fit(self.richest, starts[i], ROUGH, FIRST_STEPS) for i in best]
         end = min(ends, key=lambda end: end.cost)
         if self.stopped:
             # Where friction ends the motion the number of swings is whole, and each number has a minimum of its own.
-            others = [self.fit(self.richest, x, steps=12) for x in self.exchanged(self.full(self.richest, end.values))]
-            end = min([end, *others], key=lambda end: end.cost)
+            others = self.exchanged(self.full(self.richest, end.values)) + self.by_friction(starts[int(best[0])])
+            tried = [self.fit(self.richest, start, ROUGH, FIRST_STEPS) for start in others]
+            end = min([end, *tried], key=lambda end: end.cost)
         return self.full(self.richest, end.values)
+
+    def by_friction(self, theta: F8) -> list[F8]:
+        """Return where the simpler laws with friction end: none of their terms hides in another's negative."""
+        slot = NAMES.index("mu")
+        # Friction alone that takes as much as all terms do, at half the first amplitude.
+        share = (0.5 * self.size_m) ** np.array([0.0, 1.0, 2.0])
+        start = theta.copy()
+        start[len(STATE) :] = 0.0
+        start[slot] = float(np.maximum(theta[len(STATE) :], 0.0) @ share)
+        names = [n for n in fittable(self.damping) if "mu" in LAWS[n].parameters and n != self.richest]
+        return [self.full(name, self.fit(name, start, ROUGH, FIRST_STEPS).values) for name in names]
 
     def exchanged(self, theta: F8) -> list[F8]:
         """Return starts with one kind of damping put in place of another, alike at half the first amplitude."""
@@ -202,7 +214,7 @@ class Search:
         theta[self.slots(name)] = values
         return theta
 
-    def fit(self, name: str, start: F8, steps: int = 30) -> least_squares.Fit:
+    def fit(self, name: str, start: F8, precision: float = PRECISION, steps: int = 30) -> least_squares.Fit:
         """Fit one law to the samples used, in units of their noise."""
         model, slots = self.model(), self.slots(name)
         y = self.conditioned.track.y[self.used]
@@ -213,7 +225,7 @@ class Search:
         def jacobian(values: F8) -> F8:
             return np.asarray(model.derivatives(self.full(name, values), slots) / self.noise_m)
 
-        options = least_squares.Params(precision=PRECISION, steps=steps)
+        options = least_squares.Params(precision=precision, steps=steps)
         return least_squares.minimise(residuals, start[slots], jacobian, options)
 
     def choose(self, laws: DampingParams) -> tuple[Damping, least_squares.Fit] | None:

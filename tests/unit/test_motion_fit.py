@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,6 +19,7 @@ from pipeline.track import Track
 OMEGA, START, ANGLE, MASS = 8.3, 0.1, 0.4, 0.2
 SPRING = Scene.from_mapping({"bob": {"mass_kg": {"value": MASS, "u": 1e-9}}})
 T = np.arange(2000) / 100.0
+TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "12"))
 
 
 @lru_cache
@@ -95,6 +98,68 @@ def test_strong_damping_gives_law_spring_constant_and_coefficients(law: str, coe
     assert np.count_nonzero(found) >= 7
     assert np.max(np.abs(pulls)) < 4.0
     assert 0.6 < math.sqrt(float(np.mean(np.square(pulls)))) < 1.5
+
+
+@pytest.mark.parametrize(
+    "coefficients",
+    [
+        (0.0, 0.0, 0.0),
+        (0.0, 0.02, 0.03),
+        (0.02, 0.02, 0.0),
+        (0.01, -0.005, 0.03),
+        (-0.001, 0.02, 0.03),
+        (-0.001, 0.01, -0.002),
+    ],
+)
+def test_derivatives_are_those_of_differences(coefficients: tuple[float, float, float]) -> None:
+    """Those by the state and the frequency, which come from no difference, agree with central ones to 1e-4."""
+    model = FreeMotion(T, OMEGA, START)
+    mu, gamma, beta = (x * OMEGA * START**power for x, power in zip(coefficients, (1, 0, -1), strict=True))
+    theta = np.array([0.0, START * math.cos(ANGLE), -START * OMEGA * math.sin(ANGLE), OMEGA, mu, gamma, beta])
+    slots = [*range(4), *(slot for slot in (4, 5, 6) if theta[slot])]
+    for slot, column in zip(slots, model.derivatives(theta, slots).T, strict=True):
+        step = np.zeros(7)
+        step[slot] = 1e-5 * model.scale[slot]
+        difference = (model.position(theta + step) - model.position(theta - step)) / (2.0 * step[slot])
+        assert np.linalg.norm(column - difference) < 1e-4 * np.linalg.norm(difference), slot
+
+
+@pytest.mark.trials
+@pytest.mark.parametrize(
+    ("law", "coefficients"),
+    [
+        ("linear+quadratic", {"gamma": 0.015 * OMEGA, "beta": 0.015 * OMEGA / START}),
+        ("quadratic", {"beta": 0.1 * OMEGA / START}),
+        ("friction", {"mu": 0.03 * OMEGA * START}),
+    ],
+)
+def test_intervals_hold_under_strong_damping(law: str, coefficients: dict[str, float]) -> None:
+    """At damping ratios of 0.03 and 0.1 intervals of 68 and 95 % hold so often, for k and for each coefficient."""
+    true = {"spring_constant": OMEGA**2 * MASS, "amplitude": START, "offset": 0.3} | coefficients
+    pulls = []
+    for seed in range(TRIALS):
+        y = 0.3 + moved(coefficients.get("gamma", 0.0), coefficients.get("beta", 0.0), coefficients.get("mu", 0.0))
+        y = y + 3e-4 * np.random.default_rng((seed, 5)).standard_normal(T.size)
+        result = analyse(replace(Track.from_arrays(T, y), clock="device"), SPRING)
+        assert isinstance(result.motion, Motion)
+        # Without the scale's and the sound's uncertainties, which do not scatter from run to run.
+        found = result.motion.derived.statistical | result.motion.damping.fits[law].joint.estimates()
+        pulls.append([abs(found[name].value - x) / found[name].u for name, x in true.items()])
+    for level, width in ((0.6827, 1.0), (0.95, 1.959964)):
+        shares = dict(zip(true, np.mean(np.array(pulls) <= width, axis=0).round(3).tolist(), strict=True))
+        print(f"{law} {coefficients}: of {TRIALS} intervals of {level:.0%} hold {shares}")
+        slack = 0.03 + 3.3 * math.sqrt(level * (1.0 - level) / TRIALS)
+        assert all(level - slack <= share <= level + slack for share in shares.values()), shares
+
+
+@pytest.mark.parametrize("seed", [2, 6, 9, 14])
+def test_friction_is_not_mistaken_for_a_drag_that_drives(seed: int) -> None:
+    """Friction is found on records whose fit once ended at linear drag below zero, quadratic drag and friction."""
+    y = 0.3 + moved(0.0, 0.0, 0.03 * OMEGA * START) + 3e-4 * np.random.default_rng((seed, 5)).standard_normal(T.size)
+    result = analyse(Track.from_arrays(T, y))
+    assert "strongly_damped" in {finding.code for finding in result.findings}
+    assert isinstance(result.motion, Motion)
+    assert result.motion.damping.selected == "friction"
 
 
 def test_weak_damping_is_left_to_the_amplitude() -> None:
