@@ -216,7 +216,9 @@ def _fit_all(
 
 def _widened(fit: LawFit, residual: F8, correlation: float) -> LawFit:
     """Return a law that does not fit with uncertainties by its own residuals: their size and how they hang together."""
-    widening = fit.reduced_chi2 * max(correlation_length(residual) / correlation, 1.0)
+    # A law that runs away between its fit's points and these has no residuals to go by.
+    own = correlation_length(residual) if np.isfinite(residual).all() else correlation
+    widening = fit.reduced_chi2 * max(own / correlation, 1.0)
     return replace(fit, joint=replace(fit.joint, covariance=widening * fit.joint.covariance), widening=widening)
 
 
