@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipeline.beside import Beside, set_apart
 from pipeline.beside import Params as BesideParams
@@ -62,7 +62,9 @@ def models_of(tier: Tier, quick: Quick | None) -> Models:
 
 
 def _fit_damping(demodulated: Demodulated, t0: float, params: DampingParams) -> Damping:
-    return fit_damping_quickly(demodulated, t0, params) or fit_damping(demodulated, t0, params)
+    found = fit_damping_quickly(demodulated, t0, params) or fit_damping(demodulated, t0, params)
+    # Few laws are tried for speed; where none of them holds, a wrong one would be stated.
+    return found if found.admissible else fit_damping(demodulated, t0, replace(params, laws=DampingParams().laws))
 
 
 def _fit_phase(demodulated: Demodulated, damping: Damping, params: PhaseParams) -> PhaseFit:
