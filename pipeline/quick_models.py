@@ -10,7 +10,6 @@ import math
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.damping import BARE_MENTION, Damping, LawFit
 from pipeline.damping import Params as DampingParams
@@ -26,8 +25,7 @@ __all__ = ["fit_damping_quickly", "fit_phase_quickly", "fit_rest_quickly"]
 
 # Which of (A0, gamma, beta) a law has; the mixture last.
 NESTED = {"none": [0], "linear": [0, 1], "quadratic": [0, 2], "linear+quadratic": [0, 1, 2]}
-CASES = np.array([[True, False, False], [True, True, False], [True, False, True]])
-MIXED = np.ones((1, 3), np.bool_)
+MIXTURE = "linear+quadratic"
 STEPS = 4  # Gauss-Newton's; from curves through the logarithms two suffice
 
 
@@ -57,23 +55,16 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
     if set(params.laws) != set(NESTED) or t.size < 8 or not y.min() > 5.0 * u.max():
         return None
     weight = 1.0 / u
-    rich = _gauss_newton(MIXED, t, y, weight, _start(t, y, y * weight))
+    rich = _settled(NESTED[MIXTURE], t, y, weight, _start(t, y, y * weight))
     if rich is None:
         return None
-    chi2 = float(rich.chi2[0])
-    if chi2 > chi2_quantile(0.99, t.size - 3):
+    if rich.chi2 > chi2_quantile(0.99, t.size - 3) or correlation_length(rich.residual) > 1.0:
         return None
-    if correlation_length((y - _mixture(t, rich.theta)[0][0]) * weight) > 1.0:
+    settled = {name: _special(slots, t, y, weight, rich) for name, slots in NESTED.items() if name != MIXTURE}
+    settled[MIXTURE] = rich
+    fits = {name: _weigh(LAWS[name], each, t.size, params) for name, each in settled.items() if each is not None}
+    if len(fits) < len(NESTED):
         return None
-    # Where the mixture's chi-square, a parabola about its least, is least without some coefficients.
-    normal = rich.normal[0]
-    right = np.where(CASES, normal @ rich.theta[0], 0.0)
-    start = np.linalg.solve(np.where(_pairs(CASES), normal, np.eye(3)), right[:, :, None])[:, :, 0]
-    cases = _gauss_newton(CASES, t, y, weight, start)
-    if cases is None:
-        return None
-    parts = (np.concatenate(pair) for pair in zip(cases, rich, strict=True))
-    fits = _weigh_all(_Settled(*parts), t.size, params)
     allowed = [name for name in fits if not fits[name].rejected]
     if not allowed:
         return None
@@ -86,16 +77,21 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
 
 
 class _Settled(NamedTuple):
-    """Where fits of k laws end: parameters (k, 3), normal matrices and their inverses (k, 3, 3), chi-squares (k,)."""
+    """Where a law's fit of p parameters ends.
+
+    Parameters (p,), normal matrix and its inverse (p, p), chi-square, and residuals (n,) over their uncertainty before
+    the last step, which is small.
+    """
 
     theta: F8
     normal: F8
     inverse: F8
-    chi2: F8
+    chi2: float
+    residual: F8
 
 
 def _start(t: F8, y: F8, weight: F8) -> F8:
-    """Mixture's parameters (1, 3) from a parabola through the logarithms: its slope is -(gamma + beta A)."""
+    """Mixture's parameters (3,) from a parabola through the logarithms: its slope is -(gamma + beta A)."""
     middle, half = 0.5 * float(t[-1]), 0.5 * float(t[-1])
     x = t / half - 1.0
     design = np.empty((3, t.size))
@@ -105,95 +101,80 @@ def _start(t: F8, y: F8, weight: F8) -> F8:
     rates = (-(slope - 2.0 * bend) / middle, -(slope + 2.0 * bend) / middle)
     fall = ends[0] - ends[1]
     beta = (rates[0] - rates[1]) / fall if abs(fall) > 0.02 * ends[0] else 0.0
-    return np.array([[ends[0], rates[0] - beta * ends[0], beta]])
+    return np.array([ends[0], rates[0] - beta * ends[0], beta])
 
 
-def _mixture(t: F8, theta: F8) -> tuple[F8, F8]:
-    """Amplitudes (k, n) and derivatives (k, 3, n) of linear and quadratic drag together, theta (k, 3).
+def _mixture(t: F8, start: float, gamma: float, beta: float) -> tuple[F8, F8]:
+    """Amplitudes (n,) and derivatives (3, n) of linear and quadratic drag together.
 
     The general law of :mod:`pipeline.laws` costs several times as much; a test holds the two together.
     """
-    start, gamma, beta = theta.T[:, :, None]
     turn = gamma * t
     fall = np.exp(-turn)
-    slow = np.abs(gamma) * t[-1] < 1e-4
-    over = np.where(slow, 1.0, gamma)
-    reach = (1.0 - fall) / over
-    bend = (t * fall - reach) / over
-    if slow.any():
-        reach = np.where(slow, t - 0.5 * turn * t, reach)
-        bend = np.where(slow, t * t * (turn / 3.0 - 0.5), bend)
+    if abs(gamma) * t[-1] < 1e-4:
+        reach = t - 0.5 * turn * t
+        bend = t * t * (turn / 3.0 - 0.5)
+    else:
+        reach = (1.0 - fall) / gamma
+        bend = (t * fall - reach) / gamma
     rise = beta * start
     below = 1.0 + rise * reach
     share = fall / below
     amplitude = start * share
-    by = np.empty((*theta.shape, t.size))
-    by[:, 0] = share / below
-    by[:, 1] = -amplitude * (t + rise * bend / below)
-    by[:, 2] = -amplitude * amplitude * reach / fall
+    by = np.empty((3, t.size))
+    np.divide(share, below, out=by[0])
+    np.multiply(-amplitude, t + rise * bend / below, out=by[1])
+    np.multiply(-amplitude * amplitude, reach / fall, out=by[2])
     return amplitude, by
 
 
-def _pairs(free: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    return free[:, :, None] & free[:, None, :]
+def _special(slots: list[int], t: F8, y: F8, weight: F8, rich: _Settled) -> _Settled | None:
+    """Fit a special case of the mixture, from where the mixture's chi-square, a parabola about its least, is least."""
+    theta = np.zeros(3)
+    theta[slots] = np.linalg.solve(rich.normal[slots][:, slots], rich.normal[slots] @ rich.theta)
+    return _settled(slots, t, y, weight, theta)
 
 
-def _gauss_newton(free: NDArray[np.bool_], t: F8, y: F8, weight: F8, theta: F8) -> _Settled | None:
-    """Fit laws that have the parameters ``free`` (k, 3); None where steps do not settle."""
-    pairs, alone = _pairs(free), np.eye(3)
-    end = _Settled(theta.copy(), np.empty((len(theta), 3, 3)), np.empty((len(theta), 3, 3)), np.empty(len(theta)))
-    waiting = np.ones(len(theta), np.bool_)
+def _settled(slots: list[int], t: F8, y: F8, weight: F8, theta: F8) -> _Settled | None:
+    """Fit the law that has the parameters ``slots`` of ``theta`` (3,); None where steps do not settle."""
     with np.errstate(all="ignore"):
         for taken in range(STEPS):
-            amplitude, by = _mixture(t, theta)
+            amplitude, by = _mixture(t, *theta.tolist())
             residual = (y - amplitude) * weight
-            by *= weight
-            chi2 = np.einsum("kn,kn->k", residual, residual)
-            normal = np.where(pairs, by @ by.transpose(0, 2, 1), alone)
-            right = np.where(free, np.einsum("kpn,kn->kp", by, residual), 0.0)
-            scale = np.sqrt(np.einsum("kpp->kp", normal))
-            if not (math.isfinite(float(chi2.sum() + right.sum())) and float(scale.min()) > 0.0):
+            slopes = by[slots] * weight
+            chi2 = float(residual @ residual)
+            normal, right = slopes @ slopes.T, slopes @ residual
+            scale = np.sqrt(normal.diagonal())
+            if not (math.isfinite(chi2 + float(right.sum())) and float(scale.min()) > 0.0):
                 return None
-            both = scale[:, :, None] * scale[:, None, :]
+            both = np.outer(scale, scale)
             try:
                 inverse = np.linalg.inv(normal / both) / both
             except np.linalg.LinAlgError:
                 return None
-            step = np.einsum("kpq,kq->kp", inverse, right)
-            gain = np.einsum("kp,kp->k", step, right)
-            theta = theta + step
+            step = inverse @ right
+            gain = float(step @ right)
+            theta = theta.copy()
+            theta[slots] += step
             # A thirtieth of a standard uncertainty is left, quadratic convergence takes it away.
-            done = (gain >= 0.0) & (gain <= 1e-3 * np.maximum(1.0, chi2 / t.size))
+            if 0.0 <= gain <= 1e-3 * max(1.0, chi2 / t.size):
+                return _Settled(theta[slots], normal, inverse, chi2 - gain, residual)
             # A special case that the record contradicts need not settle: it is rejected either way.
-            hopeless = (chi2 > 4.0 * t.size) & (gain < 0.1 * chi2) & (taken > 0)
-            now = waiting & (done | hopeless)
-            for mine, theirs in zip(end, (theta, normal, inverse, np.where(done, chi2 - gain, chi2)), strict=True):
-                mine[now] = theirs[now]
-            waiting &= ~now
-            if not waiting.any():
-                return end
+            if taken and chi2 > 4.0 * t.size and gain < 0.1 * chi2:
+                return _Settled(theta[slots], normal, inverse, chi2, residual)
     return None
 
 
-def _weigh_all(found: _Settled, points: int, params: DampingParams) -> dict[str, LawFit]:
-    """The laws' fits by name, in the order of ``NESTED``."""
-    rows = zip(NESTED.items(), found.theta, found.inverse, found.chi2.tolist(), strict=True)
-    return {
-        name: _weigh(LAWS[name], theta[slots], inverse[slots][:, slots], chi2, points, params)
-        for (name, slots), theta, inverse, chi2 in rows
-    }
-
-
-def _weigh(law: Law, theta: F8, covariance: F8, chi2: float, points: int, params: DampingParams) -> LawFit:
-    count = len(law.parameters)
-    free = points - count
+def _weigh(law: Law, found: _Settled, points: int, params: DampingParams) -> LawFit:
+    free = points - found.theta.size
     rejection: Literal["", "misfit", "negative"] = ""
-    if chi2 > chi2_quantile(1.0 - params.rejection, free):
+    if found.chi2 > chi2_quantile(1.0 - params.rejection, free):
         rejection = "misfit"
-    elif (theta < -3.0 * np.sqrt(covariance.diagonal())).any():
+    elif (found.theta < -3.0 * np.sqrt(found.inverse.diagonal())).any():
         rejection = "negative"
-    joint = Joint(law.parameters, theta, covariance, law.units)
-    return LawFit(law, joint, chi2 / free, float(free), chi2 + count * math.log(points), True, rejection)
+    joint = Joint(law.parameters, found.theta, found.inverse, law.units)
+    bic = found.chi2 + found.theta.size * math.log(points)
+    return LawFit(law, joint, found.chi2 / free, float(free), bic, True, rejection)
 
 
 def fit_phase_quickly(demodulated: Demodulated, damping: Damping) -> PhaseFit | None:

@@ -182,6 +182,6 @@ def test_the_mixture_is_the_law(gamma: float, beta: float) -> None:
     """Amplitude and derivatives of the quick mixture are those of the general law."""
     t, theta = np.linspace(0.3, 120.0, 50), np.array([0.05, gamma, beta])
     law = LAWS["linear+quadratic"]
-    amplitude, by = _mixture(t, theta[None])
-    np.testing.assert_allclose(amplitude[0], law.amplitude(t, theta), rtol=1e-9)
-    np.testing.assert_allclose(by[0].T, law.jacobian(t, theta), rtol=1e-5, atol=1e-12)
+    amplitude, by = _mixture(t, *theta.tolist())
+    np.testing.assert_allclose(amplitude, law.amplitude(t, theta), rtol=1e-9)
+    np.testing.assert_allclose(by.T, law.jacobian(t, theta), rtol=1e-5, atol=1e-12)
