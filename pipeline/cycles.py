@@ -203,4 +203,4 @@ def _bounds(t: F8, used: NDArray[np.bool_], frequency_hz: float, rate_hz: float,
     latest = np.maximum.accumulate(np.where(np.isfinite(t), t, -np.inf))
     bounds: NDArray[np.int64] = np.searchsorted(latest, edges).astype(np.int64)
     bounds[-1] = last + 1
-    return np.unique(bounds)
+    return bounds[np.flatnonzero(np.diff(bounds, prepend=-1) > 0)]

@@ -20,7 +20,6 @@ from pipeline.effects import ADDED_MASS_SHAPE, Effect
 from pipeline.estimate import Estimate
 from pipeline.fitted_law import mean_squared_rate
 from pipeline.instrument import U_CRYSTAL, Instrument
-from pipeline.law_fit import evaluate
 from pipeline.median import median_size
 from pipeline.phase import PhaseFit
 from pipeline.rest import Rest
@@ -252,9 +251,9 @@ class _Laws:
         self.choices = list(alternatives.values())
         self.fits = (self.best, *(damping.fits[name] for name in alternatives))
         self.rate = self.best.rate_at_start()
-        found, slopes = evaluate([fit.law for fit in self.fits], [fit.joint.values for fit in self.fits], elapsed)
-        self.amplitude, self.jacobian = found[0], slopes[0]
-        self.sizes = np.sqrt(np.einsum("kn,kn->k", found, found) / (2.0 * elapsed.size)).tolist()
+        self.amplitude, self.jacobian = self.best.law.both(elapsed, self.best.joint.values)
+        each = (self.amplitude, *(fit.amplitude(elapsed) for fit in self.fits[1:]))
+        self.sizes = [math.sqrt(float(amplitude @ amplitude) / (2.0 * elapsed.size)) for amplitude in each]
 
     def start(self) -> Any:
         """Return the amplitude at the first sample as a variable, m."""
@@ -268,7 +267,7 @@ class _Laws:
     def root_mean_square(self) -> Any:
         """Return that of the displacement over the windows as a variable, m."""
         power = 2.0 * self.amplitude.size * self.sizes[0]
-        return self._quantity((self.jacobian @ self.amplitude / max(power, 1e-300)).tolist(), self.sizes)
+        return self._quantity((self.amplitude @ self.jacobian / max(power, 1e-300)).tolist(), self.sizes)
 
     @property
     def squared_rate(self) -> float:

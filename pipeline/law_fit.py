@@ -9,11 +9,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.laws import Drag, Law, Power
+from pipeline.laws import Drag, Law
 from pipeline.laws.drag import guesses, jacobians_of
 from pipeline.track import F8
 
-__all__ = ["Fitted", "Minimum", "Model", "covariance_or_infinite", "evaluate", "fit_laws", "minimise"]
+__all__ = ["Fitted", "Minimum", "Model", "covariance_or_infinite", "fit_laws", "minimise"]
 
 STEPS = 40
 PATIENCE, IDLE = 10, 0.01  # steps after which a fit that gains less than this in chi-square a step is given up
@@ -93,23 +93,10 @@ class _Batch:
         for k, row in enumerate(rows.tolist()):
             if drags[k]:
                 continue
-            law, slots = self.laws[row], self.slots[row]
-            if isinstance(law, Power):
-                amplitude[k], by = law.both(self.t, theta[k, slots])
-            else:
-                amplitude[k], by = law.amplitude(self.t, theta[k, slots]), law.jacobian(self.t, theta[k, slots])
+            slots = self.slots[row]
+            amplitude[k], by = self.laws[row].both(self.t, theta[k, slots])
             jacobian[k, slots] = by.T
         return amplitude, jacobian
-
-
-def evaluate(laws: Sequence[Law], thetas: Sequence[F8], t: F8) -> tuple[F8, list[F8]]:
-    """Return the amplitudes (k, n) of k laws and their derivatives by their parameters, each (p, n), in one go."""
-    batch = _Batch(laws, t)
-    theta = np.zeros(batch.free.shape)
-    for row, values in enumerate(thetas):
-        theta[row, batch.slots[row]] = values
-    amplitude, jacobian = batch.evaluate(np.arange(len(laws)), theta)
-    return amplitude, [by[slots] for by, slots in zip(jacobian, batch.slots, strict=True)]
 
 
 def fit_laws(laws: Sequence[Law], t: F8, y: F8, u: F8) -> list[Fitted]:

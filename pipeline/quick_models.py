@@ -16,6 +16,7 @@ from pipeline.damping import Params as DampingParams
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate, Joint
 from pipeline.laws import LAWS, Law
+from pipeline.laws.drag import fading
 from pipeline.phase import PhaseFit, wrapped
 from pipeline.regression import Scatter, chi2_quantile, correlation_length
 from pipeline.rest import Rest
@@ -104,30 +105,6 @@ def _start(t: F8, y: F8, weight: F8) -> F8:
     return np.array([ends[0], rates[0] - beta * ends[0], beta])
 
 
-def _mixture(t: F8, start: float, gamma: float, beta: float) -> tuple[F8, F8]:
-    """Amplitudes (n,) and derivatives (3, n) of linear and quadratic drag together.
-
-    The general law of :mod:`pipeline.laws` costs several times as much; a test holds the two together.
-    """
-    turn = gamma * t
-    fall = np.exp(-turn)
-    if abs(gamma) * t[-1] < 1e-4:
-        reach = t - 0.5 * turn * t
-        bend = t * t * (turn / 3.0 - 0.5)
-    else:
-        reach = (1.0 - fall) / gamma
-        bend = (t * fall - reach) / gamma
-    rise = beta * start
-    below = 1.0 + rise * reach
-    share = fall / below
-    amplitude = start * share
-    by = np.empty((3, t.size))
-    np.divide(share, below, out=by[0])
-    np.multiply(-amplitude, t + rise * bend / below, out=by[1])
-    np.multiply(-amplitude * amplitude, reach / fall, out=by[2])
-    return amplitude, by
-
-
 def _special(slots: list[int], t: F8, y: F8, weight: F8, rich: _Settled) -> _Settled | None:
     """Fit a special case of the mixture, from where the mixture's chi-square, a parabola about its least, is least."""
     theta = np.zeros(3)
@@ -139,7 +116,7 @@ def _settled(slots: list[int], t: F8, y: F8, weight: F8, theta: F8) -> _Settled 
     """Fit the law that has the parameters ``slots`` of ``theta`` (3,); None where steps do not settle."""
     with np.errstate(all="ignore"):
         for taken in range(STEPS):
-            amplitude, by = _mixture(t, *theta.tolist())
+            amplitude, by = fading(t, *theta.tolist())
             residual = (y - amplitude) * weight
             slopes = by[slots] * weight
             chi2 = float(residual @ residual)

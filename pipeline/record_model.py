@@ -178,10 +178,11 @@ def _amplitudes(state: State, elapsed: F8) -> tuple[F8, F8]:
     Straight lines between 1025 points of a chunk err by 1e-5 of the amplitude where it falls by e^10 in the chunk.
     """
     if elapsed.size < 4 * TABLE:
-        return state.law.amplitude(elapsed, state.theta), state.law.jacobian(elapsed, state.theta).T
+        amplitude, by = state.law.both(elapsed, state.theta)
+        return amplitude, by.T
     grid = np.linspace(float(elapsed.min()), float(elapsed.max()), TABLE)
-    by = [np.interp(elapsed, grid, column) for column in state.law.jacobian(grid, state.theta).T]
-    return np.interp(elapsed, grid, state.law.amplitude(grid, state.theta)), np.stack(by)
+    amplitude, by = state.law.both(grid, state.theta)
+    return np.interp(elapsed, grid, amplitude), np.stack([np.interp(elapsed, grid, column) for column in by.T])
 
 
 def _rows(record: Record, state: State, part: slice) -> tuple[F8, F8]:

@@ -45,6 +45,10 @@ class Law(Protocol):
         """Return (n, p) float64: derivatives of the amplitude by each parameter."""
         ...
 
+    def both(self, t: F8, theta: F8) -> tuple[F8, F8]:
+        """Return amplitude and jacobian, which share most of their work."""
+        ...
+
     def rate(self, amplitude: F8, theta: F8) -> F8:
         """Return -dA/dt, (n,) float64, m/s, at amplitudes (n,) in m."""
         ...

@@ -1,4 +1,4 @@
-"""What one fitted law says of its record: rates and their derivatives, and laws evaluated together."""
+"""What one fitted law says of its record: rates and their derivatives."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import pytest
 
 from pipeline.estimate import Joint
 from pipeline.fitted_law import LawFit
-from pipeline.law_fit import evaluate
 from pipeline.laws import LAWS
 
 VALUES = {"A0": 0.05, "mu": 2e-4, "gamma": 0.007, "beta": 0.2, "c": 0.03, "n": 1.4}
@@ -33,12 +32,3 @@ def test_the_rate_at_the_start_and_its_slopes(name: str) -> None:
     steps = np.diag(1e-5 * theta)
     rises = [fitted(theta + step).rate_at_start() - fitted(theta - step).rate_at_start() for step in steps]
     np.testing.assert_allclose(fitted(theta).slopes_of_rate(), np.array(rises) / (2e-5 * theta), rtol=1e-6, atol=1e-9)
-
-
-def test_laws_evaluated_together_are_the_laws() -> None:
-    """Amplitudes and derivatives of all nine in one go are those of each by itself."""
-    t, names = np.linspace(0.3, 100.0, 40), list(LAWS)
-    found, slopes = evaluate([LAWS[name] for name in names], [parameters(name) for name in names], t)
-    for name, amplitude, by in zip(names, found, slopes, strict=True):
-        np.testing.assert_allclose(amplitude, LAWS[name].amplitude(t, parameters(name)), rtol=1e-12)
-        np.testing.assert_allclose(by.T, LAWS[name].jacobian(t, parameters(name)), rtol=1e-9, atol=1e-12)

@@ -13,10 +13,9 @@ from pipeline.cycles import Cycles, find_cycles
 from pipeline.cycles import Params as CyclesParams
 from pipeline.damping import Params as DampingParams
 from pipeline.damping import fit_damping
-from pipeline.laws import LAWS
 from pipeline.phase import fit_phase
 from pipeline.quick import Quick, demodulate_quickly
-from pipeline.quick_models import _mixture, fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
+from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
 from pipeline.quick_start import condition_quickly, find_cycles_quickly
 from pipeline.rest import fit_rest
 from pipeline.track import Quality, Track
@@ -175,13 +174,3 @@ def test_what_is_not_smooth_needs_the_stages(synthetic: ModuleType) -> None:
     assert fit_damping_quickly(d, 0.0, laws) is None
     assert fit_phase_quickly(d, fit_damping(d, 0.0, laws)) is None
     assert fit_rest_quickly(d) is None
-
-
-@pytest.mark.parametrize(("gamma", "beta"), [(0.0, 0.0), (1e-7, 0.3), (0.0146, 0.0), (0.0065, 0.2), (-0.001, 0.1)])
-def test_the_mixture_is_the_law(gamma: float, beta: float) -> None:
-    """Amplitude and derivatives of the quick mixture are those of the general law."""
-    t, theta = np.linspace(0.3, 120.0, 50), np.array([0.05, gamma, beta])
-    law = LAWS["linear+quadratic"]
-    amplitude, by = _mixture(t, *theta.tolist())
-    np.testing.assert_allclose(amplitude, law.amplitude(t, theta), rtol=1e-9)
-    np.testing.assert_allclose(by.T, law.jacobian(t, theta), rtol=1e-5, atol=1e-12)
