@@ -10,6 +10,7 @@ from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.exact import EXACT, rounding_error
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
 from pipeline.dynamics.pilot import in_own_units
+from pipeline.dynamics.runge_kutta import RK4
 from pipeline.dynamics.solve_ivp import SolveIvp
 from pipeline.dynamics.strang import STRANG
 from pipeline.dynamics.taylor import TAYLOR, Taylor
@@ -18,16 +19,17 @@ from pipeline.errors import DynamicsError
 
 __all__ = ["AUTO", "Choice", "choose", "cost_ns", "fit_step", "least_tolerance"]
 
-AUTO: tuple[Integrator, ...] = (EXACT, AVERAGED, STRANG, TAYLOR)
-"""What is chosen from. On 12 of 10,000 random scenes another method, mostly Runge-Kutta, costs less than half of it."""
+AUTO: tuple[Integrator, ...] = (EXACT, AVERAGED, STRANG, TAYLOR, RK4)
+"""What is chosen from."""
 
 KNOWN: tuple[Integrator, ...] = (EXACT, TAYLOR)
 """Those of them whose error is known without a pilot."""
 
 MOST_PARTS = 100_000
 MOST_TRIES = 12
-SAFETY = 1.35  # what a prediction may be short of the truth
-SAFETY_WITHOUT_STEP = 1.05  # where it is not carried from one step to another
+SAFETY = 1.25  # what a prediction may be short of the truth
+SAFETY_UNLOCATED = 1.5  # where turning points lie within steps
+SAFETY_WITHOUT_STEP = 1.01  # where it is not carried from one step to another
 
 # Nanoseconds on the machine of the notes: of a run, of a step and of a kept state where that is what counts.
 _RUN_NS = 1e5
@@ -41,6 +43,7 @@ _STEP_NS = {
 }
 _STATE_NS = {"exact": 6.0, "averaged": 90.0}
 _AVERAGED_NS = 3e5
+RADIAN_BY_RK4_NS = 2.5e4  # what its three pilots cost
 _TURN_NS = 1.3e4  # a turning point located by Strang
 
 
@@ -126,7 +129,9 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     # First those whose error is known without a pilot, then by what each costs at least: the dear need no prediction.
     for integrator in sorted(AUTO, key=lambda each: (each not in KNOWN, cost_ns(each, reduced, 1, count, seconds))):
         most = math.inf if best is None else best.cost_ns
-        safety = SAFETY if integrator.order else SAFETY_WITHOUT_STEP
+        if integrator is RK4 and not _worth_a_pilot(reduced, seconds, most):
+            continue
+        safety = SAFETY_UNLOCATED if integrator is RK4 else SAFETY if integrator.order else SAFETY_WITHOUT_STEP
         best = fit_step(integrator, reduced, spacing_s, count, room / safety, most) or best
     if best is None:
         raise DynamicsError(
@@ -134,6 +139,12 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
             "ask for a larger tolerance or a shorter run"
         )
     return replace(best, terms=terms)
+
+
+def _worth_a_pilot(problem: Problem, seconds: float, most_ns: float) -> bool:
+    """Whether Runge-Kutta, which friction keeps from its order, may cost less by more than its own pilot does."""
+    eq = problem.equation
+    return not (eq.is_linear or eq.has_friction) and RADIAN_BY_RK4_NS * eq.angular_frequency_per_s * seconds < most_ns
 
 
 def demand_tolerance(problem: Problem, seconds: float, tolerance: float) -> None:
@@ -171,24 +182,23 @@ def fit_step(
         integrator = replace(integrator, tolerance=min(tolerance, 1e-3))
     if cost_ns(integrator, problem, 1, count, seconds) >= most_ns:
         return None
-    parts = _least_parts(integrator, problem, spacing_s)
-    found, too_few = None, 0
+    parts = least = _least_parts(integrator, problem, spacing_s)
+    found, tried = None, set[int]()
     for _ in range(MOST_TRIES):
         cost = cost_ns(integrator, problem, parts, count, seconds)
-        if parts > MOST_PARTS or cost >= most_ns:
+        if parts > MOST_PARTS or cost >= (most_ns if found is None else found.cost_ns):
             break
         error = integrator.predicted_error(problem, spacing_s / parts, seconds)
+        tried.add(parts)
         if error <= tolerance:
             found = Choice(integrator, parts, spacing_s / parts, error, cost, problem)
-        else:
-            too_few = parts
-        if not integrator.order or (found is not None and found.parts <= too_few + 1):
+        if not integrator.order:
             break
-        # The power law leads near; what is known to be too few or enough bounds it.
+        # The power law leads near. A resonance may make it lead too far at first: then it leads back.
         ratio = (error / tolerance) ** (1.0 / integrator.order) if 0.0 < error < math.inf else 4.0 if error else 0.5
-        parts = max(too_few + 1, math.ceil(parts * min(ratio, 100.0)))
-        if found is not None and parts >= found.parts:
-            break
+        parts = max(least, math.ceil(parts * min(ratio, 100.0)))
+        while parts in tried:
+            parts += 1
     return found
 
 
@@ -215,7 +225,8 @@ def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, se
     moving = min(seconds, float(stopping_time(problem.amplitude_m(), *eq.laws()))) if friction else seconds
     radians = float(eq.angular_frequency_per_s * moving)
     if isinstance(integrator, Taylor):
-        return _RUN_NS + radians * _taylor_ns(eq, integrator.order_of(problem, seconds)) + 100.0 * count
+        a_radian = _taylor_ns(eq, integrator.order_of(problem, seconds))
+        return _RUN_NS + radians * a_radian + 100.0 * count * moving / seconds
     if isinstance(integrator, SolveIvp):
         return float(3e5 * radians * (integrator.rtol(problem, seconds) / 1e-9) ** -0.1)
     steps = parts * count

@@ -43,6 +43,10 @@ class Integrator(Protocol):
     which the error falls; 0 where the step is only the spacing of what is kept.
     """
 
+    def __hash__(self) -> int:
+        """Predictions are remembered by method."""
+        ...
+
     @property
     def name(self) -> str:
         """Name on the command line."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.dynamics.equation import Problem
+from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 __all__ = ["in_own_units", "predicted_by_pilot"]
 
 FINE = 0.25  # radians a step, of the spring, of drag and of quadratic drag together: there the power law holds
-NEAR = 4.0  # with friction a pilot's step is at most so many planned ones, and the fine one over it at least
-SCATTER = 1.5  # where in a step it turns sets a cubic spring's energy, and with that its pace, a little at random
+PLAIN_SHARES = (1.0, 0.9, 0.5)  # of a pilot's step: where in it a bob turns sets the error of a method that is not told
 STIFF = 10.0  # drag over spring beyond which a pilot cannot have steps that fine all along
 MOST_STIFF_STEPS = 20_000
+FEW_PARTS = 4
 MOST_PARTS = 16  # of a step, for the truth beside it
 MOST_STEPS = 2_000_000  # of a truth in many parts
 
@@ -46,8 +46,9 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     difference counts by :math:`(h/H)^p` with the method's order p. A pilot of the whole motion costs a few steps a
     radian, and holds whatever adds up along it: the phase, the pace of a cubic spring, the stop.
 
-    With friction each turning point splits a step, and what that adds falls faster than the power law says. There the
-    pilot's step is at most four planned ones, down to a quarter of H.
+    What a pilot in another step cannot hold is a resonance of the planned one; for Strang splitting it is added. The
+    error of a method that does not locate turning points scatters with where in a step they lie: there the largest of
+    three pilots counts.
     """
     if problem.amplitude_m() == 0.0:
         return 0.0
@@ -56,28 +57,54 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     fine = longest = _fine_step(problem)
     if integrator.order:
         longest = min(longest, 0.5 * integrator.stable_step(problem))
-        if problem.equation.has_friction:
-            longest = min(longest, max(NEAR * step_s, fine / NEAR))
     pilot = max(step_s, min(longest, seconds / 4.0))
     # The kink of drag at a turning point keeps a high order from what its power promises.
-    order = min(integrator.order, 3)
+    order = min(integrator.order, 3) if _kinked(problem.equation) else integrator.order
     if integrator is not STRANG and integrator.order and omega * pilot * MOST_STIFF_STEPS < 2.0 * math.pi:
         return math.inf  # far too stiff for a method with a limit
     if fine * omega < FINE / STIFF and pilot < seconds / MOST_STIFF_STEPS:
         pilot, order = seconds / MOST_STIFF_STEPS, min(order, 1)
-    share = float((step_s / pilot) ** order)
-    if order and problem.equation.has_friction and problem.equation.cubic_per_m2_s2:
-        share *= SCATTER
     parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
-    if parts > NEAR and seconds / pilot * parts > MOST_STEPS:
+    if parts > FEW_PARTS and seconds / pilot * parts > MOST_STEPS:
         return math.inf  # so coarse that to see its error takes many times the run
-    return share * _largest_error(integrator, problem, pilot, parts, seconds) / float(start)
+    shares = PLAIN_SHARES if order and integrator is not STRANG and pilot > step_s else (1.0,)
+    error = max(
+        float((step_s / (share * pilot)) ** order) * _largest_error(integrator, problem, share * pilot, parts, seconds)
+        for share in shares
+    ) / float(start)
+    return error + _resonance(problem, step_s, seconds) if integrator is STRANG else error
 
 
 @functools.lru_cache(maxsize=8)
 def in_own_units(problem: Problem) -> Problem:
     """Return the problem in units of its amplitude: the same object for the same, so that its truth is remembered."""
     return problem.scaled()[0]
+
+
+def _kinked(eq: Equation) -> bool:
+    return bool(eq.drag_per_m > 0.0 or eq.friction_m_per_s2 > 0.0)
+
+
+def _resonance(problem: Problem, step_s: float, seconds: float) -> float:
+    """Return what quadratic drag in kicks adds up where N steps make a cycle, N next to an even number.
+
+    The kicks see the harmonics of |sin| sin, 8 / (pi k (k^2 - 4)) for odd k. Those next to N act as the first one does:
+    they change the amplitude by 8 / (pi N^3) of the drag, for as long as they stay in step. Next to 2 N and so on too.
+    Where turning points are located, with friction, there is no such harmonic.
+    """
+    eq, start = problem.equation, problem.amplitude_m()
+    pace = eq.angular_frequency_per_s**2 - eq.gamma_per_s**2 + 0.75 * eq.cubic_per_m2_s2 * start * start
+    if eq.has_friction or not eq.drag_per_m or pace <= 0.0:
+        return 0.0
+    pace = math.sqrt(pace)
+    gamma, beta, _ = eq.laws()
+    longest = pace * min(seconds, 1.0 / (gamma + beta * start))
+    total = 0.0
+    for multiple in (1, 2, 3):
+        steps = multiple * 2.0 * math.pi / (pace * step_s)
+        off = abs(steps - 2.0 * round(0.5 * steps))
+        total += 8.0 / (math.pi * steps**3) * min(longest, 2.0 / off if off else math.inf)
+    return float(total * eq.drag_per_m * start)
 
 
 def _fine_step(problem: Problem) -> float:
@@ -87,6 +114,7 @@ def _fine_step(problem: Problem) -> float:
     return float(FINE / (hard + eq.gamma_per_s + 2.0 * eq.drag_per_m * hard * start))
 
 
+@functools.lru_cache(maxsize=8)
 def _largest_error(integrator: Integrator, problem: Problem, pilot: float, parts: int, seconds: float) -> float:
     """Return the largest error of a run in steps of the pilot, m."""
     coarse, truth = _truth(problem, pilot, parts, seconds)
@@ -97,7 +125,17 @@ def _largest_error(integrator: Integrator, problem: Problem, pilot: float, parts
             found = integrator.run(problem, pilot, len(truth) - 1).y
         except DynamicsError:
             return math.inf  # it ran away: that is its error
-    return float(np.max(np.abs(found - truth)))
+    return _peak(np.abs(found - truth))
+
+
+def _peak(error: F8) -> float:
+    """Return the largest of a sampled curve: the top of the parabola through its largest samples."""
+    top = int(np.argmax(error))
+    if not 0 < top < len(error) - 1:
+        return float(error[top])
+    before, most, after = error[top - 1 : top + 2].tolist()
+    bend = before - 2.0 * most + after
+    return float(most - 0.125 * (after - before) ** 2 / bend if bend < 0.0 else most)
 
 
 @functools.lru_cache(maxsize=4)

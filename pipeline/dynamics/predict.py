@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["predicted_by_average"]
 
 POINTS = 1500
-STRONG = 0.02  # damping a radian beyond which the linear oscillator is no measure of the error
+STRONG = 0.02  # damping a radian, or cubic spring, beyond which the linear oscillator is no measure of the error
 
 
 def predicted_by_average(method: OneStep, problem: Problem, step_s: float, seconds: float) -> float:
@@ -78,7 +78,8 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     # The spring as stiff as it is on average at this amplitude.
     omega = math.sqrt(max(omega**2 + 0.75 * eq.cubic_per_m2_s2 * start**2, 0.1 * omega**2))
     friction = eq.friction_m_per_s2 * h / (omega * start) * math.sqrt(1.0 + omega * h * steps / math.pi) if mu else 0.0
-    if gamma + beta * start > STRONG * omega:
+    bent = 0.75 * abs(eq.cubic_per_m2_s2) * start * start / omega
+    if gamma + beta * start + bent > STRONG * omega:
         if h > method.stable_step(problem):
             return math.inf
         return predicted_by_pilot(method, problem, h, h * steps) + float(friction)
