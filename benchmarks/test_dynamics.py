@@ -46,7 +46,9 @@ def test_every_ratio_can_be_taken(dynamics):
     assert together.y.shape == (13, 4096)
     assert alone.y.shape == (13,)
     choices, runs = found["choosing for 60 scenes"]
-    assert [choice.integrator.name in ("exact", "averaged", "strang", "taylor") for choice in choices] == [True] * 60
+    assert [choice.integrator.name in ("exact", "averaged", "strang", "taylor", "rk4") for choice in choices] == [
+        True
+    ] * 60
     assert [len(run.y) for run in runs] == [scene[2] + 1 for scene in dynamics.spread_scenes(60)]
 
 

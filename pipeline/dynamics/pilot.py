@@ -86,10 +86,10 @@ def _kinked(eq: Equation) -> bool:
 
 
 def _resonance(problem: Problem, step_s: float, seconds: float) -> float:
-    """Return what quadratic drag in kicks adds up where N steps make a cycle, N next to an even number.
+    """Return the most that quadratic drag in kicks adds up where N steps make a cycle, N next to an even number.
 
     The kicks see the harmonics of |sin| sin, 8 / (pi k (k^2 - 4)) for odd k. Those next to N act as the first one does:
-    they change the amplitude by 8 / (pi N^3) of the drag, for as long as they stay in step. Next to 2 N and so on too.
+    they turn the phase by up to 8 / (pi N^3) of the drag, for as long as they stay in step. Next to 2 N and so on too.
     Where turning points are located, with friction, there is no such harmonic.
     """
     eq, start = problem.equation, problem.amplitude_m()

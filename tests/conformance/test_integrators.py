@@ -80,6 +80,43 @@ def test_the_order_is_what_the_slope_says(name: str) -> None:
     assert slope == pytest.approx(integrator.order, abs=0.12)
 
 
+@pytest.mark.parametrize(
+    ("drag_per_m", "cubic_per_m2_s2"), [(0.0, 0.002), (0.0, -0.05), (0.05, 0.0), (0.002, 0.05)], ids=str
+)
+def test_located_turning_points_leave_the_order_as_it_is(drag_per_m: float, cubic_per_m2_s2: float) -> None:
+    """With friction Strang's error over fifty turning points falls as the square of the step, within a tenth."""
+    problem = Problem(
+        Equation(
+            angular_frequency_per_s=1.0,
+            drag_per_m=drag_per_m,
+            friction_m_per_s2=0.001,
+            cubic_per_m2_s2=cubic_per_m2_s2,
+        ),
+        0.9,
+        0.3,
+    )
+    strang, truth = get_integrator("strang"), get_integrator("taylor").run(problem, 0.1, 1600).y
+    errors = [
+        float(np.max(np.abs(strang.run(problem, 0.1 / parts, 1600 * parts, every=parts).y - truth)))
+        for parts in (1, 2, 4, 8)
+    ]
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.1)
+
+
+def test_a_resonance_of_kicks_and_cycle_is_predicted() -> None:
+    """Where 42 steps make a cycle quadratic drag in kicks errs five times what it does at 41.3; both are predicted."""
+    strang = get_integrator("strang")
+    problem = Problem(Equation(angular_frequency_per_s=1.0, drag_per_m=1e-4), 0.8, 0.6)
+    found = []
+    for steps in (41.3, 42.0):
+        step, count = 2.0 * math.pi / steps, round(60 * steps)
+        truth = get_integrator("taylor").run(problem, step, count).y
+        found.append(float(np.max(np.abs(strang.run(problem, step, count).y - truth))))
+        predicted = strang.predicted_error(problem, step, step * count)
+        assert 0.5 * predicted <= found[-1] <= predicted
+    assert found[1] > 5.0 * found[0]
+
+
 @pytest.mark.parametrize("name", sorted(set(INTEGRATORS) - set(FIXED)))
 def test_without_an_order_the_spacing_changes_nothing(name: str) -> None:
     """Where the step is only the spacing of what is kept, a wider one gives the same states."""
