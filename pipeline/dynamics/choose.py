@@ -9,7 +9,7 @@ from pipeline.dynamics.averaged import AVERAGED, stopping_time
 from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.exact import EXACT, rounding_error
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
-from pipeline.dynamics.pilot import in_own_units
+from pipeline.dynamics.pilot import fine_step, in_own_units
 from pipeline.dynamics.runge_kutta import RK4
 from pipeline.dynamics.solve_ivp import SolveIvp
 from pipeline.dynamics.strang import STRANG
@@ -43,7 +43,7 @@ _STEP_NS = {
 }
 _STATE_NS = {"exact": 6.0, "averaged": 90.0}
 _AVERAGED_NS = 3e5
-RADIAN_BY_RK4_NS = 2.5e4  # what its three pilots cost
+_LIMIT_NS, _PILOTS = 2e6, 3.1  # of its limit of stability searched for; its three pilots in steps of the first
 _TURN_NS = 1.3e4  # a turning point located by Strang
 
 
@@ -142,9 +142,10 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
 
 
 def _worth_a_pilot(problem: Problem, seconds: float, most_ns: float) -> bool:
-    """Whether Runge-Kutta, which friction keeps from its order, may cost less by more than its own pilot does."""
-    eq = problem.equation
-    return not (eq.is_linear or eq.has_friction) and RADIAN_BY_RK4_NS * eq.angular_frequency_per_s * seconds < most_ns
+    """Whether Runge-Kutta, which friction keeps from its order, may save more than its pilots cost."""
+    if problem.equation.is_linear or problem.equation.has_friction:
+        return False
+    return _LIMIT_NS + _PILOTS * _STEP_NS["rk4"] * seconds / fine_step(in_own_units(problem)) < most_ns
 
 
 def demand_tolerance(problem: Problem, seconds: float, tolerance: float) -> None:

@@ -16,7 +16,7 @@ from pipeline.track import F8
 if TYPE_CHECKING:
     from pipeline.dynamics.integrator import Integrator
 
-__all__ = ["in_own_units", "predicted_by_pilot"]
+__all__ = ["fine_step", "in_own_units", "predicted_by_pilot"]
 
 FINE = 0.25  # radians a step, of the spring, of drag and of quadratic drag together: there the power law holds
 PLAIN_SHARES = (1.0, 0.9, 0.5)  # of a pilot's step: where in it a bob turns sets the error of a method that is not told
@@ -54,7 +54,7 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
         return 0.0
     problem = in_own_units(problem)
     start, omega = problem.amplitude_m(), problem.equation.angular_frequency_per_s
-    fine = longest = _fine_step(problem)
+    fine = longest = fine_step(problem)
     if integrator.order:
         longest = min(longest, 0.5 * integrator.stable_step(problem))
     pilot = max(step_s, min(longest, seconds / 4.0))
@@ -107,7 +107,7 @@ def _resonance(problem: Problem, step_s: float, seconds: float) -> float:
     return float(total * eq.drag_per_m * start)
 
 
-def _fine_step(problem: Problem) -> float:
+def fine_step(problem: Problem) -> float:
     """Return the step at which Strang's error follows its power law, s."""
     eq, start = problem.equation, problem.amplitude_m()
     hard = math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * start * start)
