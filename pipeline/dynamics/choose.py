@@ -9,7 +9,7 @@ from pipeline.dynamics.averaged import AVERAGED, stopping_time
 from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.exact import EXACT, rounding_error
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
-from pipeline.dynamics.pilot import fine_step, in_own_units
+from pipeline.dynamics.pilot import fine_step, in_own_units, predicted_by_pilot
 from pipeline.dynamics.runge_kutta import RK4
 from pipeline.dynamics.solve_ivp import SolveIvp
 from pipeline.dynamics.strang import STRANG
@@ -43,7 +43,7 @@ _STEP_NS = {
 }
 _STATE_NS = {"exact": 6.0, "averaged": 90.0}
 _AVERAGED_NS = 3e5
-_LIMIT_NS, _PILOTS = 2e6, 3.1  # of its limit of stability searched for; its three pilots in steps of the first
+_LIMIT_NS = 2e6  # a limit of stability searched for
 _TURN_NS = 1.3e4  # a turning point located by Strang
 
 
@@ -129,9 +129,9 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     # First those whose error is known without a pilot, then by what each costs at least: the dear need no prediction.
     for integrator in sorted(AUTO, key=lambda each: (each not in KNOWN, cost_ns(each, reduced, 1, count, seconds))):
         most = math.inf if best is None else best.cost_ns
-        if integrator is RK4 and not _worth_a_pilot(reduced, seconds, most):
-            continue
         safety = SAFETY_UNLOCATED if integrator is RK4 else SAFETY if integrator.order else SAFETY_WITHOUT_STEP
+        if integrator is RK4 and not _may_pay(reduced, spacing_s, count, room / safety, most):
+            continue
         best = fit_step(integrator, reduced, spacing_s, count, room / safety, most) or best
     if best is None:
         raise DynamicsError(
@@ -141,11 +141,15 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     return replace(best, terms=terms)
 
 
-def _worth_a_pilot(problem: Problem, seconds: float, most_ns: float) -> bool:
-    """Whether Runge-Kutta, which friction keeps from its order, may save more than its pilots cost."""
-    if problem.equation.is_linear or problem.equation.has_friction:
+def _may_pay(problem: Problem, spacing_s: float, count: int, tolerance: float, most_ns: float) -> bool:
+    """Whether Runge-Kutta, which friction keeps from its order, may cost less, as the first of its pilots has it."""
+    seconds = spacing_s * count
+    if problem.equation.is_linear or problem.equation.has_friction or not math.isfinite(most_ns):
         return False
-    return _LIMIT_NS + _PILOTS * _STEP_NS["rk4"] * seconds / fine_step(in_own_units(problem)) < most_ns
+    if _LIMIT_NS + _STEP_NS["rk4"] * seconds / fine_step(in_own_units(problem)) >= most_ns:
+        return False  # the pilot alone costs more
+    parts = math.floor((most_ns - _RUN_NS) / (_STEP_NS["rk4"] * count))
+    return parts > 0 and predicted_by_pilot(RK4, problem, spacing_s / parts, seconds, pilots=1) <= tolerance
 
 
 def demand_tolerance(problem: Problem, seconds: float, tolerance: float) -> None:

@@ -27,7 +27,9 @@ MOST_PARTS = 16  # of a step, for the truth beside it
 MOST_STEPS = 2_000_000  # of a truth in many parts
 
 
-def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, seconds: float) -> float:
+def predicted_by_pilot(
+    integrator: Integrator, problem: Problem, step_s: float, seconds: float, pilots: int = 3
+) -> float:
     """Return the expected largest error of the displacement over the starting amplitude.
 
     Parameters
@@ -38,6 +40,8 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
         Of one trajectory.
     step_s, seconds : float
         Of the run that is planned, s.
+    pilots : int
+        How many at most; see Notes.
 
     Notes
     -----
@@ -67,7 +71,7 @@ def predicted_by_pilot(integrator: Integrator, problem: Problem, step_s: float, 
     parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
     if parts > FEW_PARTS and seconds / pilot * parts > MOST_STEPS:
         return math.inf  # so coarse that to see its error takes many times the run
-    shares = PLAIN_SHARES if order and integrator is not STRANG and pilot > step_s else (1.0,)
+    shares = PLAIN_SHARES[:pilots] if order and integrator is not STRANG and pilot > step_s else (1.0,)
     error = max(
         float((step_s / (share * pilot)) ** order) * _largest_error(integrator, problem, share * pilot, parts, seconds)
         for share in shares
