@@ -233,9 +233,12 @@ class Search:
         """Fit every law and choose among them; None where no fit converged."""
         unfitted = {n: "it has no equation of motion" for n in self.damping.fits if n not in fittable(self.damping)}
         whole = self.fit(self.richest, self.theta)
+        # Where the richest law ended at a term that drives, say, the way from there to the others is no straight one.
+        own = self.weigh({self.richest: whole}, laws) if np.all(np.isfinite(whole.covariance)) else {}
+        holds = bool(own) and not own[self.richest].rejected
         fits: dict[str, least_squares.Fit] = {}
         for name in reversed(fittable(self.damping)):
-            start, rise = self.without(name, whole)
+            start, rise = self.without(name, whole) if holds else (self.full(self.richest, whole.values), 0.0)
             if rise > HOPELESS * self.correlation:
                 unfitted[name] = f"in the equation of motion it would raise chi-square by about {rise:.2g}"
                 continue
@@ -257,7 +260,7 @@ class Search:
         """Return where a special case of the richest law should end, and the rise of chi-square, to first order."""
         slots = self.slots(self.richest)
         absent = [i for i, slot in enumerate(slots) if slot not in self.slots(name)]
-        if not absent or not np.all(np.isfinite(whole.covariance)):
+        if not absent:
             return self.full(self.richest, whole.values), 0.0
         pull = np.linalg.solve(whole.covariance[np.ix_(absent, absent)], whole.values[absent])
         values = whole.values - whole.covariance[:, absent] @ pull
