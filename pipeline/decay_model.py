@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.track import F8
 
@@ -23,39 +22,41 @@ class Decay:
     Parameters
     ----------
     t : (n,) float64, s
-    free : (k, 5) bool
-        Which parameters each row has.
     critical : bool
-        Whether w is held at g^2 in every row.
+        Whether w is g^2; parameters are then the first four.
     """
 
-    def __init__(self, t: F8, free: NDArray[np.bool_], *, critical: bool = False) -> None:
-        self.t, self.free, self.critical = t, free, critical
+    def __init__(self, t: F8, *, critical: bool = False) -> None:
+        self.t, self.critical = t, critical
 
-    def evaluate(self, rows: NDArray[np.int64], theta: F8) -> tuple[F8, F8]:  # noqa: ARG002 - rows are alike
-        """Return values (k, n) and derivatives (k, 5, n)."""
+    def evaluate(self, theta: F8) -> tuple[F8, F8]:
+        """Return values (n,) and derivatives (n, p)."""
         t = self.t
-        offset, a, v = theta.T[:3, :, None]
+        offset, a, v = theta[:3].tolist()
         with np.errstate(over="ignore"):
-            rate, stiffness = np.exp(theta.T[3:, :, None])
-            square = np.zeros_like(rate) if self.critical else rate * rate - stiffness
-        cosine, sine = basis(t, rate, square)
-        near = np.abs(square) * t * t < 1e-4
+            rate = float(np.exp(theta[RATE]))
+            stiffness = rate * rate if self.critical else float(np.exp(theta[STIFFNESS]))
+        square = rate * rate - stiffness
+        cosine, sine = (row[0] for row in basis(t, np.array([[rate]]), np.array([[square]])))
+        b = v + rate * a
+        swing = a * cosine + b * sine
+        by_rate = a * sine - t * swing
+        jacobian = np.empty((theta.size, t.size))
+        jacobian[OFFSET] = 1.0
+        jacobian[START], jacobian[VELOCITY] = cosine + rate * sine, sine
+        if self.critical:
+            jacobian[RATE] = rate * by_rate
+            return offset + swing, jacobian.T
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            closed = (t * cosine - sine) / (2.0 * square)
+            closed = (t * cosine - sine) / (2.0 * square) if square else sine
             # What the closed form tends to: e^(-gt) (t^3/6 + q t^5/60).
+            near = np.abs(square) * t * t < 1e-4
             sine_slope = np.where(near, sine * t * t * (1.0 / 6.0 - square * t * t * (1.0 / 90.0)), closed)
-            b = v + rate * a
-            swing = a * cosine + b * sine
             by_square = 0.5 * a * t * sine + b * sine_slope
-            by_rate = a * sine - t * swing
-            jacobian = np.empty((theta.shape[0], 5, t.size))
-            jacobian[:, OFFSET] = 1.0
-            jacobian[:, START], jacobian[:, VELOCITY] = cosine + rate * sine, sine
-            # At constant q; otherwise q changes with g.
-            jacobian[:, RATE] = rate * (by_rate if self.critical else by_rate + 2.0 * rate * by_square)
-            jacobian[:, STIFFNESS] = 0.0 if self.critical else -stiffness * by_square
-        return offset + swing, jacobian
+            # At constant q the rate would do this; otherwise q changes with it.
+            jacobian[RATE] = rate * (by_rate + 2.0 * rate * by_square)
+            jacobian[STIFFNESS] = -stiffness * by_square
+        return offset + swing, jacobian.T
 
 
 class Exponentials:
@@ -66,27 +67,22 @@ class Exponentials:
     Parameters
     ----------
     t : (n,) float64, s
-    rows : int
-        Fits at once.
-    count : int
-        Of exponentials.
     """
 
-    def __init__(self, t: F8, rows: int, count: int) -> None:
-        self.t, self.count = t, count
-        self.free = np.ones((rows, 1 + 2 * count), np.bool_)
+    def __init__(self, t: F8) -> None:
+        self.t = t
 
-    def evaluate(self, rows: NDArray[np.int64], theta: F8) -> tuple[F8, F8]:  # noqa: ARG002 - rows are alike
-        """Return values (k, n) and derivatives (k, p, n)."""
-        jacobian = np.ones((theta.shape[0], theta.shape[1], self.t.size))
-        value = np.broadcast_to(theta[:, :1], (theta.shape[0], self.t.size)).copy()
+    def evaluate(self, theta: F8) -> tuple[F8, F8]:
+        """Return values (n,) and derivatives (n, p)."""
+        jacobian = np.ones((theta.size, self.t.size))
+        value = np.full(self.t.size, theta[0])
         with np.errstate(over="ignore", invalid="ignore"):
-            for k in range(self.count):
-                part, rate = theta[:, 1 + 2 * k, None], np.exp(theta[:, 2 + 2 * k, None])
+            for k in range(1, theta.size, 2):
+                part, rate = theta[k], np.exp(theta[k + 1])
                 fall = np.exp(-rate * self.t)
-                jacobian[:, 1 + 2 * k], jacobian[:, 2 + 2 * k] = fall, -part * rate * self.t * fall
+                jacobian[k], jacobian[k + 1] = fall, -part * rate * self.t * fall
                 value += part * fall
-        return value, jacobian
+        return value, jacobian.T
 
 
 def basis(t: F8, rate: F8, square: F8) -> tuple[F8, F8]:

@@ -44,11 +44,14 @@ class Params:
         Most Jacobians to evaluate in one attempt; a second, cautious one follows a first that failed.
     damping : float
         At the start, relative to the scaled normal matrix: small for a guess that is near.
+    again : bool
+        Whether a first attempt that failed is followed by a cautious one; not needed where starts are many.
     """
 
     precision: float = 1e-4
     steps: int = 200
     damping: float = 1e-4
+    again: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,7 +148,7 @@ def minimise(
             raise ValueError(f"a fit needs as many residuals as parameters, got {residual.size} for {theta.size}")
         search = _Search(residuals, jacobian or _central(residuals), params)
         first = search.attempt(theta, residual, params.damping)
-        if first.converged or not np.all(np.isfinite(residual)):
+        if first.converged or not params.again or not np.all(np.isfinite(residual)):
             return first
         second = search.attempt(theta, residual, CAUTIOUS_DAMPING)
     better = second if second.converged or second.cost < first.cost else first

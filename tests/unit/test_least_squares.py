@@ -117,6 +117,17 @@ def test_a_start_without_a_value_is_told() -> None:
     assert "no finite value" in fit.tried
 
 
+def test_one_attempt_is_enough_where_it_is_said() -> None:
+    """Without a second, cautious attempt a fit that failed ends after its first, and says no more."""
+    steps = {}
+    for again in (True, False):
+        fit = minimise(lambda b: b[0] * np.exp(-b[1] * T) - T, [1.0, 1.0], params=Params(steps=2, again=again))
+        assert not fit.converged
+        assert ("again with short steps" in fit.tried) == again
+        steps[again] = fit.steps
+    assert steps == {True: 4, False: 2}
+
+
 def test_steps_into_the_void_are_not_taken() -> None:
     """Where a step leaves the model's domain a shorter one is tried."""
     x = np.linspace(0.1, 2.0, 30)

@@ -138,6 +138,13 @@ def test_a_lone_exponential_is_named_but_not_believed() -> None:
     assert "one exponential, at 0.8" in found.why
 
 
+@pytest.mark.parametrize(("name", "sigma_m", "seed"), [("step", 2.39e-3, 1), ("early step", 2.39e-3, 0)])
+def test_a_fall_between_two_samples_has_no_rate(name: str, sigma_m: float, seed: int) -> None:
+    """A step gives no rate above half the sampling rate, in words or as an estimate."""
+    assert find_relaxation(condition(track(SHAPES[name], sigma_m, seed))) is None
+    assert find_relaxation(condition(track(SHAPES["early step"], 3e-4, 2))) is None
+
+
 def test_an_analysis_says_what_it_found() -> None:
     """Overdamped records carry a finding with both rates, estimates and a spring constant, and no error."""
     result = analyse(track(released(1.5), 3e-4, 1), SPRING)
