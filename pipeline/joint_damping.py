@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline import least_squares
 from pipeline.damping import NEGATIVE, Damping, Params, choose
 from pipeline.demodulate import Demodulated
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
 from pipeline.fitted_law import rates_of
-from pipeline.law_fit import covariance_or_infinite, minimise
+from pipeline.law_fit import covariance_or_infinite
 from pipeline.laws import LAWS, Law
 from pipeline.regression import chi2_quantile
 from pipeline.track import F8
@@ -23,6 +23,8 @@ from pipeline.track import F8
 __all__ = ["JointDamping", "JointFit", "fit_joint"]
 
 Rejection = Literal["", "misfit", "differ", "negative", "not converged"]
+
+PRECISION = 0.01  # of the standard uncertainties, at which a fit stops
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,24 +188,20 @@ def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:
     return _Points(tuple(times), np.concatenate(values), np.concatenate(errors), tuple(parts))
 
 
-class _Shared:
-    """One law on all runs: parameters are the runs' amplitudes, then the coefficients."""
+def _curve(law: Law, points: _Points, theta: F8) -> F8:
+    """Amplitudes of all runs, (n,); parameters are the runs' amplitudes, then the coefficients."""
+    count = len(points.t)
+    return np.concatenate([law.amplitude(t, np.append(theta[run], theta[count:])) for run, t in enumerate(points.t)])
 
-    def __init__(self, law: Law, points: _Points) -> None:
-        self.law, self.points = law, points
-        self.free = np.ones((1, len(points.t) + len(law.parameters) - 1), np.bool_)
 
-    def evaluate(self, rows: NDArray[np.int64], theta: F8) -> tuple[F8, F8]:  # noqa: ARG002 - there is one row
-        """Return the amplitudes (1, n) and their derivatives (1, p, n)."""
-        count = len(self.points.t)
-        amplitude = np.empty((1, self.points.y.size))
-        jacobian = np.zeros((1, theta.shape[1], self.points.y.size))
-        for run, (t, part) in enumerate(zip(self.points.t, self.points.parts, strict=True)):
-            own = np.concatenate([theta[0, run : run + 1], theta[0, count:]])
-            amplitude[0, part] = self.law.amplitude(t, own)
-            by = self.law.jacobian(t, own).T
-            jacobian[0, run, part], jacobian[0, count:, part] = by[0], by[1:]
-        return amplitude, jacobian
+def _slopes(law: Law, points: _Points, theta: F8) -> F8:
+    """Their derivatives, (n, p)."""
+    count = len(points.t)
+    slopes = np.zeros((points.y.size, theta.size))
+    for run, (t, part) in enumerate(zip(points.t, points.parts, strict=True)):
+        by = law.jacobian(t, np.append(theta[run], theta[count:]))
+        slopes[part, run], slopes[part, count:] = by[:, 0], by[:, 1:]
+    return slopes
 
 
 def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Points, params: Params) -> JointFit:
@@ -211,13 +209,17 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
     own = [damping.fits[law.name] for _, _, damping in runs]
     length = float(np.sqrt(np.mean(points.y**2))) or 1.0
     theta = _scaled(law, _start([fit.joint for fit in own]), length, count)
-    model = _Shared(law, points)
-    end = minimise(model, points.y / length, length / points.u, theta[None, :])
-    values = _scaled(law, end.theta[0], 1.0 / length, count)
+    y, u = points.y / length, points.u / length
+    end = least_squares.minimise(
+        lambda at: (_curve(law, points, at) - y) / u,
+        theta,
+        lambda at: _slopes(law, points, at) / u[:, None],
+        least_squares.Params(precision=PRECISION),
+    )
+    values = _scaled(law, end.values, 1.0 / length, count)
     with np.errstate(all="ignore"):
-        jacobian = model.evaluate(np.zeros(1, np.int64), values[None, :])[1][0] / points.u
-    covariance = covariance_or_infinite(jacobian)
-    chi2 = float(end.chi2[0])
+        covariance = covariance_or_infinite((_slopes(law, points, values) / points.u[:, None]).T)
+    chi2 = end.cost
     size = sum(float(t.size) / damping.scatter.correlation for t, (_, _, damping) in zip(points.t, runs, strict=True))
     dof = max(size - values.size, 0.0)
     separate = sum(
@@ -233,7 +235,7 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
         rejection = "differ"
     elif np.any(values < -NEGATIVE * deviation):
         rejection = "negative"
-    elif not end.converged[0]:
+    elif not end.converged:
         rejection = "not converged"
     amplitudes = tuple(
         Estimate(float(a), float(u), "m") for a, u in zip(values[:count], deviation[:count], strict=True)
