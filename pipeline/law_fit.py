@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from pipeline.laws import Drag, Law
 from pipeline.laws.drag import guesses, jacobians_of
 from pipeline.track import F8
 
-__all__ = ["Fitted", "Minimum", "Model", "covariance_or_infinite", "fit_laws", "minimise"]
+__all__ = ["Fitted", "covariance_or_infinite", "fit_laws"]
 
 STEPS = 40
 PATIENCE, IDLE = 10, 0.01  # steps after which a fit that gains less than this in chi-square a step is given up
@@ -44,21 +43,11 @@ class Fitted:
     tried: str
 
 
-class Model(Protocol):
-    """What :func:`minimise` fits: k rows of parameters, each with a curve of its own through the same points.
-
-    ``free`` is (k, p) bool: which parameters a row has.
-    """
-
-    free: NDArray[np.bool_]
-
-    def evaluate(self, rows: NDArray[np.int64], theta: F8) -> tuple[F8, F8]:
-        """Return values (r, n) of some rows and their derivatives (r, p, n); theta is (r, p)."""
-        ...
-
-
 class _Batch:
-    """Amplitudes and derivatives of several laws, each row one law; laws of drag share one evaluation."""
+    """Amplitudes and derivatives of several laws, each row one law; laws of drag share one evaluation.
+
+    ``free`` is (k, width) bool: which parameters a row has.
+    """
 
     def __init__(self, laws: Sequence[Law], t: F8) -> None:
         self.laws, self.t = laws, t
@@ -123,7 +112,7 @@ def fit_laws(laws: Sequence[Law], t: F8, y: F8, u: F8) -> list[Fitted]:
     length = float(np.sqrt(np.mean(y * y))) or 1.0
     batch = _Batch(laws, t)
     scaled, weight = y / length, length / u
-    end = minimise(batch, scaled, weight, batch.guess(scaled))
+    end = _minimise(batch, scaled, weight, batch.guess(scaled))
     covariances = _covariances(end.jacobian, batch.free)
     fitted = []
     for row, law in enumerate(laws):
@@ -206,8 +195,8 @@ def covariance_or_infinite(jacobian: F8) -> F8:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Minimum:
-    """Where :func:`minimise` ended.
+class _Minimum:
+    """Where :func:`_minimise` ended.
 
     Parameters
     ----------
@@ -226,18 +215,16 @@ class Minimum:
     converged: NDArray[np.bool_]
 
 
-def minimise(model: Model, y: F8, weight: F8, theta: F8, *, most_steps: int = STEPS) -> Minimum:
+def _minimise(model: _Batch, y: F8, weight: F8, theta: F8) -> _Minimum:
     """Minimise every row's chi-square by Levenberg and Marquardt's method.
 
     Parameters
     ----------
-    model : Model
+    model : _Batch
     y, weight : (n,) float64
         Points and reciprocals of their standard uncertainties.
     theta : (k, p) float64
         Start values.
-    most_steps : int
-        After which a row is given up.
     """
     count, width = theta.shape
     theta = theta.copy()
@@ -276,11 +263,11 @@ def minimise(model: Model, y: F8, weight: F8, theta: F8, *, most_steps: int = ST
             converged[active[done]] = True
             # In a valley without a floor, where no gain counts, more steps find nothing.
             idle = better & (steps[active] >= PATIENCE) & (gain < IDLE * np.maximum(1.0, chi2[active] / y.size))
-            active = active[~done & ~idle & sound & (damping[active] <= 1e10) & (steps[active] < most_steps)]
-    return Minimum(theta, chi2, jacobian, steps, converged)
+            active = active[~done & ~idle & sound & (damping[active] <= 1e10) & (steps[active] < STEPS)]
+    return _Minimum(theta, chi2, jacobian, steps, converged)
 
 
-def _linearised(model: Model, rows: NDArray[np.int64], theta: F8, y: F8, weight: F8) -> tuple[F8, F8, F8]:
+def _linearised(model: _Batch, rows: NDArray[np.int64], theta: F8, y: F8, weight: F8) -> tuple[F8, F8, F8]:
     """Weighted residuals (k, n), derivatives of the law (k, width, n) with fixed parameters zero, and chi-square."""
     amplitude, jacobian = model.evaluate(rows, theta)
     residual = (y - amplitude) * weight
