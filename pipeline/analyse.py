@@ -201,7 +201,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     if strong and linear and isinstance(relaxed := find_relaxation(conditioned, params.relaxation), Relaxation):
         return _still(track, scene, params, conditioned, relaxed)
     if isinstance(solved, MotionFit):
-        demodulated, beside = replace(demodulated, flags=solved.flags), Beside.nothing(conditioned)
+        demodulated, beside = solved.windows(demodulated), Beside.nothing(conditioned)
         damping, phase, rest = solved.damping, solved.phase(demodulated), solved.rest(demodulated)
         waveform = solved.waveform
     else:

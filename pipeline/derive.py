@@ -321,7 +321,7 @@ def _noise(demodulated: Demodulated) -> Estimate:
     flags, residual = demodulated.flags, demodulated.residual
     clean = not flags.any()
     residual = residual[np.isfinite(residual) & (clean or (flags & UNUSABLE) == 0)]
-    dof = float(np.sum(np.maximum(demodulated.count - 3, 1)))
+    dof = float(max(residual.size - 3 * demodulated.count.size, demodulated.count.size))
     value = MAD_TO_SIGMA * median_size(residual) * math.sqrt(residual.size / dof)
     wide = 0.0 if clean else float(np.mean((flags & np.uint8(Quality.FALSE_ECHO)) != 0))
     parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)

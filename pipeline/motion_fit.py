@@ -118,6 +118,11 @@ class MotionFit:
             self.damping,
         )
 
+    def windows(self, demodulated: Demodulated) -> Demodulated:
+        """Return the windows with what the solution leaves: a sinusoid of their own fails where the bob stops."""
+        noise = np.full(demodulated.noise.shape, self.waveform.rms_m)
+        return replace(demodulated, flags=self.flags, residual=self.waveform.residual, noise=noise)
+
     def rest(self, demodulated: Demodulated) -> Rest:
         """Return the rest position, one for the whole record: where friction holds the bob is another."""
         rest = self.state["rest"]

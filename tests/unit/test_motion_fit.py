@@ -91,6 +91,8 @@ def test_strong_damping_gives_law_spring_constant_and_coefficients(law: str, coe
         found.append(damping.selected == law)
         e, joint = result.estimates, damping.fits[law].joint
         assert damping.fits[law].reduced_chi2 == pytest.approx(1.0, abs=0.05)
+        assert abs(e["noise"].value - 3e-4) < 4.0 * e["noise"].u
+        assert e["noise"].u < 0.2 * 3e-4
         true = {"spring_constant": OMEGA**2 * MASS, "amplitude": START, "offset": 0.3}
         if damping.selected == law:
             pulls += [(e[name].value - x) / e[name].u for name, x in true.items()]
