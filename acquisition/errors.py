@@ -50,9 +50,10 @@ class FormatError(AcquisitionError):
     def __init__(self, path: str, demand: str, remedy: str, *, line: int | None = None) -> None:
         self.path, self.demand, self.remedy, self.line = path, demand, remedy, line
         where = path if line is None else f"{path}, line {line}"
-        text = f"{where}: {demand}; {remedy}"
-        # Names and units come out of the file, line ends and all.
-        super().__init__(text if text.isprintable() else "".join(c if c.isprintable() else "\ufffd" for c in text))
+        said = f"{demand}; {remedy}"
+        # Names and units come out of the file, line ends and all. The path is the user's own and stays as it is.
+        said = said if said.isprintable() else "".join(c if c.isprintable() else "\ufffd" for c in said)
+        super().__init__(f"{where}: {said}")
 
 
 class UnknownFormat(FormatError):
