@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from pipeline.track import F8
 
-__all__ = ["Drag", "amplitudes", "fading", "guesses", "jacobians", "jacobians_of"]
+__all__ = ["Drag", "amplitudes", "fading", "guesses", "jacobians_of"]
 
 UNITS = {"A0": "m", "mu": "m/s", "gamma": "1/s", "beta": "1/(m s)"}
 POWERS = {"mu": 0, "gamma": 1, "beta": 2}
@@ -241,13 +241,8 @@ def _amplitudes(flow: _Flow) -> F8:
     return np.where(np.isnan(flow.ends), values, flow.ends)
 
 
-def jacobians(t: F8, theta: F8) -> F8:
-    """Return (k, 4, n) float64: derivatives of :func:`amplitudes` by A0, mu, gamma and beta."""
-    return jacobians_of(t, theta)[1]
-
-
 def jacobians_of(t: F8, theta: F8) -> tuple[F8, F8]:
-    """Return :func:`amplitudes` and :func:`jacobians`, which share most of their work."""
+    """Return :func:`amplitudes` and their derivatives (k, 4, n) by A0, mu, gamma and beta, which share much work."""
     flow = _flow(t, theta)
     start, mu, gamma, beta = theta.T[:, :, None]
     # Everything below carries the factor e^(-2st) that D^-2 brings along.
