@@ -16,7 +16,8 @@ from pipeline.damping import Params as DampingParams
 from pipeline.demodulate import Demodulated
 from pipeline.estimate import Estimate, Joint
 from pipeline.laws import LAWS, Law
-from pipeline.laws.drag import fading
+from pipeline.laws.drag import FADING
+from pipeline.normal_matrix import inverse_of
 from pipeline.phase import PhaseFit, wrapped
 from pipeline.regression import Scatter, chi2_quantile, correlation_length
 from pipeline.rest import Rest
@@ -24,9 +25,8 @@ from pipeline.track import F8
 
 __all__ = ["fit_damping_quickly", "fit_phase_quickly", "fit_rest_quickly"]
 
-# Which of (A0, gamma, beta) a law has; the mixture last.
-NESTED = {"none": [0], "linear": [0, 1], "quadratic": [0, 2], "linear+quadratic": [0, 1, 2]}
-MIXTURE = "linear+quadratic"
+LAWS_TRIED = ("none", "linear", "quadratic", "linear+quadratic")
+MIXTURE = LAWS_TRIED[-1]
 STEPS = 4  # Gauss-Newton's; from curves through the logarithms two suffice
 
 
@@ -53,25 +53,26 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
     """
     t, y = demodulated.t - t0, demodulated.amplitude
     u = np.sqrt(demodulated.covariance[:, 0, 0])
-    if set(params.laws) != set(NESTED) or t.size < 8 or not y.min() > 5.0 * u.max():
+    if set(params.laws) != set(LAWS_TRIED) or t.size < 8 or not y.min() > 5.0 * u.max():
         return None
     weight = 1.0 / u
-    rich = _settled(NESTED[MIXTURE], t, y, weight, _start(t, y, y * weight))
+    start = _start(t, y, y * weight)
+    rich = None if start is None else _settled(MIXTURE, t, y, weight, start)
     if rich is None:
         return None
     if rich.chi2 > chi2_quantile(0.99, t.size - 3) or correlation_length(rich.residual) > 1.0:
         return None
-    settled = {name: _special(slots, t, y, weight, rich) for name, slots in NESTED.items() if name != MIXTURE}
+    settled = {name: _special(name, t, y, weight, rich) for name in LAWS_TRIED[:-1]}
     settled[MIXTURE] = rich
     fits = {name: _weigh(LAWS[name], each, t.size, params) for name, each in settled.items() if each is not None}
-    if len(fits) < len(NESTED):
+    if len(fits) < len(LAWS_TRIED):
         return None
     allowed = [name for name in fits if not fits[name].rejected]
     if not allowed:
         return None
     least = min(fits[name].bic for name in allowed)
     ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
-    selected = min(ties, key=lambda name: (len(NESTED[name]), list(fits).index(name)))
+    selected = min(ties, key=lambda name: (len(LAWS[name].parameters), list(fits).index(name)))
     order = sorted(allowed, key=lambda name: (name != selected, fits[name].bic))
     admissible = tuple(name for name in order if fits[name].bic - least <= params.evidence)
     return Damping(t0, fits, selected, admissible, Scatter(u, 0.0, np.ones(t.size, np.bool_), 1.0))
@@ -91,13 +92,18 @@ class _Settled(NamedTuple):
     residual: F8
 
 
-def _start(t: F8, y: F8, weight: F8) -> F8:
+def _start(t: F8, y: F8, weight: F8) -> F8 | None:
     """Mixture's parameters (3,) from a parabola through the logarithms: its slope is -(gamma + beta A)."""
     middle, half = 0.5 * float(t[-1]), 0.5 * float(t[-1])
     x = t / half - 1.0
     design = np.empty((3, t.size))
-    design[0], design[1], design[2] = weight, weight * x, weight * x * x
-    level, slope, bend = np.linalg.solve(design @ design.T, design @ (weight * np.log(y))).tolist()
+    design[0] = weight
+    np.multiply(weight, x, out=design[1])
+    np.multiply(design[1], x, out=design[2])
+    inverse = inverse_of(design @ design.T)
+    if inverse is None:
+        return None
+    level, slope, bend = (inverse @ (design @ (weight * np.log(y)))).tolist()
     ends = (math.exp(level - slope + bend), math.exp(level + slope + bend))
     rates = (-(slope - 2.0 * bend) / middle, -(slope + 2.0 * bend) / middle)
     fall = ends[0] - ends[1]
@@ -105,40 +111,37 @@ def _start(t: F8, y: F8, weight: F8) -> F8:
     return np.array([ends[0], rates[0] - beta * ends[0], beta])
 
 
-def _special(slots: list[int], t: F8, y: F8, weight: F8, rich: _Settled) -> _Settled | None:
+def _special(name: str, t: F8, y: F8, weight: F8, rich: _Settled) -> _Settled | None:
     """Fit a special case of the mixture, from where the mixture's chi-square, a parabola about its least, is least."""
-    theta = np.zeros(3)
-    theta[slots] = np.linalg.solve(rich.normal[slots][:, slots], rich.normal[slots] @ rich.theta)
-    return _settled(slots, t, y, weight, theta)
+    slots = [LAWS[MIXTURE].parameters.index(parameter) for parameter in LAWS[name].parameters]
+    rows = rich.normal[slots]
+    inverse = inverse_of(rows[:, slots])
+    return None if inverse is None else _settled(name, t, y, weight, inverse @ (rows @ rich.theta))
 
 
-def _settled(slots: list[int], t: F8, y: F8, weight: F8, theta: F8) -> _Settled | None:
-    """Fit the law that has the parameters ``slots`` of ``theta`` (3,); None where steps do not settle."""
+def _settled(name: str, t: F8, y: F8, weight: F8, theta: F8) -> _Settled | None:
+    """Fit a law from parameters (p,); None where steps do not settle."""
+    form, p = FADING[LAWS[name].parameters], theta.size
     with np.errstate(all="ignore"):
         for taken in range(STEPS):
-            amplitude, by = fading(t, *theta.tolist())
-            residual = (y - amplitude) * weight
-            slopes = by[slots] * weight
-            chi2 = float(residual @ residual)
-            normal, right = slopes @ slopes.T, slopes @ residual
-            scale = np.sqrt(normal.diagonal())
-            if not (math.isfinite(chi2 + float(right.sum())) and float(scale.min()) > 0.0):
-                return None
-            both = np.outer(scale, scale)
-            try:
-                inverse = np.linalg.inv(normal / both) / both
-            except np.linalg.LinAlgError:
+            amplitude, by = form(t, *theta.tolist())
+            rows = np.empty((p + 1, t.size))  # slopes and residual over the uncertainty
+            np.multiply(by, weight, out=rows[:p])
+            residual = np.multiply(y - amplitude, weight, out=rows[p])
+            # All sums of products at once.
+            gram = rows @ rows.T
+            normal, right, chi2 = gram[:p, :p], gram[:p, p], float(gram[p, p])
+            inverse = inverse_of(normal)
+            if inverse is None or not math.isfinite(chi2):
                 return None
             step = inverse @ right
             gain = float(step @ right)
-            theta = theta.copy()
-            theta[slots] += step
+            theta = theta + step
             # A thirtieth of a standard uncertainty is left, quadratic convergence takes it away.
             if 0.0 <= gain <= 1e-3 * max(1.0, chi2 / t.size):
-                return _Settled(theta[slots], normal, inverse, chi2 - gain, residual)
-            # A special case that the record contradicts need not settle: it is rejected either way.
+                return _Settled(theta, normal, inverse, chi2 - gain, residual)
             if taken and chi2 > 4.0 * t.size and gain < 0.1 * chi2:
-                return _Settled(theta[slots], normal, inverse, chi2, residual)
+                return _Settled(theta, normal, inverse, chi2, residual)
     return None
 
 

@@ -25,7 +25,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -34,12 +34,11 @@ from numpy.typing import NDArray
 
 from pipeline.track import F8
 
-__all__ = ["Drag", "amplitudes", "fading", "guesses", "jacobians_of"]
+__all__ = ["FADING", "Drag", "amplitudes", "fading", "guesses", "jacobians_of"]
 
 UNITS = {"A0": "m", "mu": "m/s", "gamma": "1/s", "beta": "1/(m s)"}
 POWERS = {"mu": 0, "gamma": 1, "beta": 2}
 SLOTS = tuple(UNITS)  # where each parameter stands in the full set of four
-FADING = ("A0", "gamma", "beta")
 FLOOR = 1e-3  # share of the greatest amplitude below which a start value divides by nothing smaller
 
 
@@ -91,9 +90,8 @@ class Drag:
     def both(self, t: F8, theta: F8) -> tuple[F8, F8]:
         """Return amplitude and jacobian, which share most of their work."""
         if self._fades(t, theta):
-            start, _, gamma, beta = self.full(theta)[0].tolist()
-            amplitude, by = fading(t, start, gamma, beta)
-            return amplitude, np.ascontiguousarray(by[[FADING.index(name) for name in self.parameters]].T)
+            amplitude, by = FADING[self.parameters](t, *theta.tolist())
+            return amplitude, np.ascontiguousarray(by.T)
         amplitudes, by = jacobians_of(t, self.full(theta))
         return amplitudes[0], np.ascontiguousarray(by[0, list(self.slots)].T)
 
@@ -214,6 +212,39 @@ def fading(t: F8, start: float, gamma: float, beta: float) -> tuple[F8, F8]:
     np.multiply(-amplitude, t + rise * bend / below, out=by[1])
     np.multiply(-amplitude * start, reach / below, out=by[2])
     return amplitude, by
+
+
+def _constant(t: F8, start: float) -> tuple[F8, F8]:
+    return np.full(t.size, start), np.ones((1, t.size))
+
+
+def _exponential(t: F8, start: float, gamma: float) -> tuple[F8, F8]:
+    by = np.empty((2, t.size))
+    fall = np.exp(-gamma * t, out=by[0])
+    amplitude = start * fall
+    np.multiply(amplitude, -t, out=by[1])
+    return amplitude, by
+
+
+def _hyperbola(t: F8, start: float, beta: float) -> tuple[F8, F8]:
+    by = np.empty((2, t.size))
+    share = 1.0 / (1.0 + (beta * start) * t)
+    amplitude = start * share
+    np.multiply(share, share, out=by[0])
+    np.multiply(amplitude * amplitude, -t, out=by[1])
+    return amplitude, by
+
+
+FADING: dict[tuple[str, ...], Callable[..., tuple[F8, F8]]] = {
+    ("A0",): _constant,
+    ("A0", "gamma"): _exponential,
+    ("A0", "beta"): _hyperbola,
+    ("A0", "gamma", "beta"): fading,
+}
+"""Of each law without friction: amplitudes (n,) and derivatives (p, n) from times (n,) and the p parameters.
+
+What :func:`fading` becomes where a coefficient is zero, without the work that then comes to nothing.
+"""
 
 
 def amplitudes(t: F8, theta: F8) -> F8:
