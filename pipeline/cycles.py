@@ -108,9 +108,10 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     params = params or Params()
     track, used = conditioned.track, conditioned.used
     t, y = track.t[used], track.y[used]
-    spread = float(np.ptp(y))
+    low, high = float(y.min()), float(y.max())
+    spread = high - low
     resolution = conditioned.quantum_m or 0.0
-    if spread <= max(3.0 * resolution, 1e-12 * max(float(y.max()), -float(y.min()))):
+    if spread <= max(3.0 * resolution, 1e-12 * max(high, -low)):
         return NoOscillation(
             f"the distance stays within {spread * 1e3:.3g} mm: nothing moves, or the sensor reads one fixed object"
         )
@@ -137,19 +138,27 @@ def _spectral_line(t: F8, y: F8, rate_hz: float, false_alarm: float) -> tuple[fl
     n = max(round(float(t[-1] - t[0]) * rate_hz) + 1, 8)
     if n > 50 * t.size:
         return NoOscillation(f"{t.size} samples are spread over {n} sample intervals: too thin to find a period")
-    grid = t[0] + np.arange(n) / rate_hz
-    values = np.interp(grid, t, y)
-    centred = np.arange(n) - 0.5 * (n - 1)
-    values -= values.mean()
+    ordinal = np.arange(n, dtype=np.float64)
+    grid = t[0] + ordinal / rate_hz
+    # Times that are equally spaced but for rounding need no interpolation.
+    regular = t.size == n and float(np.abs(t - grid).max()) <= 1e-9 / rate_hz
+    values = y if regular else np.interp(grid, t, y)
+    centred = ordinal - 0.5 * (n - 1)
+    values = values - values.sum() / n
     values -= centred * (float(centred @ values) / float(centred @ centred))
     threshold = math.log(n / false_alarm)
     # Without a window lines are narrow, and between two bins one may be lost: they must lie closer.
-    for shape, finer in ((np.hanning, 1), (np.ones, 4)):
-        window = shape(n)
+    for shape, finer in ((_hann, 1), (np.ones_like, 4)):
+        window = shape(centred)
         frequency_hz, power, ratio = _peak(values * window, rate_hz, finer)
         if ratio >= threshold:
             return frequency_hz, 2.0 * math.sqrt(power) / float(window.sum())
     return NoOscillation("no line stands out of the spectrum's noise: there is no oscillation to be seen")
+
+
+def _hann(centred: F8) -> F8:
+    """The raised cosine that is 0 at the first and the last of n places counted from their middle."""
+    return 0.5 + 0.5 * np.cos(centred * (2.0 * math.pi / (centred.size - 1)))
 
 
 def _peak(values: F8, rate_hz: float, finer: int) -> tuple[float, float, float]:
@@ -194,8 +203,7 @@ def _least_left(t: F8, y: F8, about_hz: float) -> float:
 
 
 def _bounds(t: F8, used: NDArray[np.bool_], frequency_hz: float, rate_hz: float, periods: int) -> NDArray[np.int64]:
-    rows = np.flatnonzero(used)
-    first, last = int(rows[0]), int(rows[-1])
+    first, last = int(used.argmax()), used.size - 1 - int(used[::-1].argmax())
     duration_s = float(t[last] - t[first]) + 1.0 / rate_hz
     windows = max(1, int(duration_s * frequency_hz / periods + 1e-6))
     edges = t[first] + duration_s * np.arange(windows + 1) / windows - 0.5 / rate_hz
@@ -203,4 +211,5 @@ def _bounds(t: F8, used: NDArray[np.bool_], frequency_hz: float, rate_hz: float,
     latest = np.maximum.accumulate(np.where(np.isfinite(t), t, -np.inf))
     bounds: NDArray[np.int64] = np.searchsorted(latest, edges).astype(np.int64)
     bounds[-1] = last + 1
-    return bounds[np.flatnonzero(np.diff(bounds, prepend=-1) > 0)]
+    ahead = bounds[1:] > bounds[:-1]
+    return bounds if ahead.all() else bounds[np.concatenate([[True], ahead])]

@@ -18,6 +18,7 @@ from pipeline.condition import Conditioned
 from pipeline.cycles import Cycles
 from pipeline.damping import Damping
 from pipeline.demodulate import THIRD_TO_SIGMA, WEAK, Demodulated, polar
+from pipeline.normal_matrix import inverse_of
 from pipeline.phase import PhaseFit
 from pipeline.quick_start import bridged
 from pipeline.rest import Rest
@@ -55,11 +56,13 @@ class Quick:
         """Return the windows' motion with the root mean square that the smooth model leaves."""
         found = self.demodulated
         amplitude = damping.best.amplitude(found.t - damping.t0)
-        expected = amplitude * np.exp(1j * (phase.total(found.t) - found.phase))
-        swing = 0.5 * float(np.mean(np.abs(found.amplitude - expected) ** 2))
-        shift = float(np.mean((found.offset - rest.at(found.t)) ** 2))
-        inside = float(np.mean(found.noise**2)) * (1.0 - 3.0 / self.length)
-        return Waveform(self.position, self.velocity, track.y - self.position, math.sqrt(inside + swing + shift))
+        # Squared distance of two phasors: by their lengths and by the angle between them.
+        longer, turned = found.amplitude - amplitude, np.sin(0.5 * (phase.total(found.t) - found.phase))
+        swing = 0.5 * float(longer @ longer) + 2.0 * float((found.amplitude * amplitude) @ (turned * turned))
+        shift = found.offset - rest.at(found.t)
+        inside = float(found.noise @ found.noise) * (1.0 - 3.0 / self.length)
+        rms_m = math.sqrt((inside + swing + float(shift @ shift)) / found.t.size)
+        return Waveform(self.position, self.velocity, track.y - self.position, rms_m)
 
 
 def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None:
@@ -89,14 +92,17 @@ def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None
     windows = len(cycles.bounds) - 1
     if conditioned.plateaus_m or windows < 6 or used < 0.8 * n or not step > 0.0:
         return None
-    off = track.t[first : last + 1] - track.t[first] - step * np.arange(n)
+    off = np.arange(n, dtype=np.float64)
+    off *= -step
+    off += track.t[first : last + 1]
     off = off if rows is None else off[rows - first]
-    if not max(float(off.max()), -float(off.min())) <= 0.02 * step:
+    start = float(track.t[first])
+    if not max(float(off.max()) - start, start - float(off.min())) <= 0.02 * step:
         return None
     # Samples left over at the end are lost, and in windows of part periods rest position and swing share samples.
     counts = np.arange(max(windows - max(windows // 8, 1), 5), windows + 1)
     spans = (n // counts) * step * cycles.frequency_hz
-    w = int(counts[np.argmin(1.5 * (n % counts) / n + 4.0 * (spans - np.round(spans)) ** 2)])
+    w = int(counts[np.argmin(1.5 * (n % counts) / n + 4.0 * (spans - np.rint(spans)) ** 2)])
     length = n // w
     if length > 4096 or length < 12:
         return None
@@ -115,12 +121,15 @@ class _Basis:
     leak: F8
 
     @classmethod
-    def of(cls, tau: F8, omega: float, decay: float) -> _Basis:
+    def of(cls, tau: F8, omega: float, decay: float) -> _Basis | None:
+        """Return the basis; None where times (l,) s do not tell its waves apart."""
         wave = np.exp((1j * omega - decay) * tau)
         rows = np.empty((5, tau.size))
         rows[0], rows[1], rows[2] = 1.0, wave.real, -wave.imag
         np.multiply(rows[1:3], tau, out=rows[3:])
-        inverse = np.asarray(np.linalg.inv(rows[:3] @ rows[:3].T), np.float64)
+        inverse = inverse_of(rows[:3] @ rows[:3].T)
+        if inverse is None:
+            return None
         solver = inverse @ rows[:3]
         return cls(omega, decay, rows, solver, inverse, solver @ rows[3:].T)
 
@@ -146,18 +155,25 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     part = slice(first, first + w * length)
     bad = conditioned.flags[part].reshape(w, length) != 0
     values = bridged(track.y[part], bad.ravel())
-    level = float(values.mean())
+    level = float(values.sum()) / values.size
     y = values.reshape(w, length) - level
     tau: F8 = step * (np.arange(length, dtype=np.float64) - 0.5 * (length - 1))
     t: F8 = float(track.t[first]) + step * (0.5 * (length - 1) + length * np.arange(w, dtype=np.float64))
-    basis = _Basis.of(tau, 2.0 * math.pi * cycles.frequency_hz, 0.0)
-    basis = _Basis.of(tau, *_neighbours(y @ basis.solver.T, step * length, basis.omega))
+    rough = _Basis.of(tau, 2.0 * math.pi * cycles.frequency_hz, 0.0)
+    if rough is None:
+        return None
+    basis = _Basis.of(tau, *_neighbours(y @ rough.solver.T, step * length, rough.omega))
+    if basis is None:
+        return None
     coefficients = y @ basis.solver.T
-    residual = y - coefficients @ basis.rows[:3]
+    residual = coefficients @ basis.rows[:3]
+    np.subtract(y, residual, out=residual)
     squares = np.einsum("wl,wl->w", residual, residual)
     # The calmest quarter of the windows tells the noise: clusters of echoes may sit in all others.
     typical = math.sqrt(float(np.partition(squares, w // 4)[w // 4]) / (length - 3)) + 1e-150
-    clean = ~(bad.any(axis=1) | (np.abs(residual).max(axis=1) > OUTLIER_SIGMAS * typical))
+    clean, bound = ~bad.any(axis=1), OUTLIER_SIGMAS * typical
+    if max(float(residual.max()), -float(residual.min())) > bound:
+        clean &= np.abs(residual).max(axis=1) <= bound
     expected = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
     if typical > EXCESS * expected or np.count_nonzero(clean) < max(CLEAN * w, 5):
         return None
@@ -167,7 +183,8 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     slope = smooth.rate - (1j * basis.omega - basis.decay)
     whole = basis.drifting(coefficients, slope)
     fitted = whole @ basis.rows
-    inverse = np.broadcast_to(basis.inverse, (w, 3, 3))
+    inverse = np.empty((w, 3, 3))
+    inverse[:] = basis.inverse
     fits = _Fits(whole, inverse, fitted, y - fitted, np.ones(w, np.bool_))
     if not clean.all():
         fits = _cleaned(fits, np.flatnonzero(~clean), basis, y, bad, slope, smooth, typical)
@@ -261,10 +278,10 @@ class _Smooth:
 
 
 def _smooth(coefficients: F8, t: F8, omega: float, clean: NDArray[np.bool_]) -> _Smooth:
-    z = coefficients[:, 1] + 1j * coefficients[:, 2]
-    size = np.abs(z) + 1e-150
+    _, a, b = coefficients.T
+    size = np.hypot(a, b) + 1e-150
     since = t - t[0]
-    angle = np.angle(z) - omega * since
+    angle = np.arctan2(b, a) - omega * since
     angle[clean] = _unwrapped(angle[clean])
     half = 0.5 * float(since[-1])
     x = since / half - 1.0
@@ -273,7 +290,7 @@ def _smooth(coefficients: F8, t: F8, omega: float, clean: NDArray[np.bool_]) -> 
     for k in range(1, order):
         np.multiply(powers[k - 1], x, out=powers[k])
     weighted = powers * np.where(clean, size, 0.0) ** 2
-    curve = np.linalg.solve(weighted @ powers.T, weighted @ np.stack([np.log(size), angle], axis=1))
+    curve = np.linalg.solve(weighted @ powers.T, weighted @ np.array([np.log(size), angle]).T)
     level, turned = curve.T @ powers
     rates = (curve[1:] * (np.arange(1, order) / half)[:, None]).T @ powers[:-1]
     return _Smooth(turned + omega * since, np.exp(level), rates[0] + 1j * (rates[1] + omega))
@@ -281,8 +298,8 @@ def _smooth(coefficients: F8, t: F8, omega: float, clean: NDArray[np.bool_]) -> 
 
 def _unwrapped(angle: F8) -> F8:
     """Angles without jumps of more than half a turn between neighbours."""
-    turns = np.round(np.diff(angle) / (2.0 * math.pi))
-    angle[1:] -= 2.0 * math.pi * np.cumsum(turns)
+    turns = np.rint((angle[1:] - angle[:-1]) / (2.0 * math.pi))
+    angle[1:] -= 2.0 * math.pi * turns.cumsum()
     return angle
 
 
@@ -293,10 +310,12 @@ def _quick(
     counts = np.full(len(t), length) if fits.weights is None else np.sum(fits.weights, axis=1).astype(np.int64)
     weighted = fits.residual if fits.weights is None else fits.weights * fits.residual
     squares = np.einsum("wl,wl->w", fits.residual, weighted)
-    noise = np.sqrt(squares / np.maximum(counts - 3, 1))
-    keep = fits.good
-    pooled = float(np.sum(squares[keep])) / float(np.sum(counts[keep] - 3))
-    variance = (30.0 * pooled + counts * noise**2) / (30.0 + counts)
+    free = counts - 3
+    spread = squares / np.maximum(free, 1)
+    noise = np.sqrt(spread)
+    keep = slice(None) if fits.good.all() else fits.good
+    pooled = float(squares[keep].sum()) / float(free[keep].sum())
+    variance = (30.0 * pooled + counts * spread) / (30.0 + counts)
     coefficients = fits.coefficients
     amplitude, phase, covariance = polar(
         coefficients[keep, 1],
@@ -324,7 +343,7 @@ def _quick(
         -smooth.rate.real[keep],
         left,
         flags,
-        int(np.count_nonzero(~keep)),
+        int(np.count_nonzero(~fits.good)),
     )
     return Quick(demodulated, position, velocity, length)
 
@@ -339,7 +358,8 @@ def _motion(track: Track, part: slice, t: F8, level: float, basis: _Basis, fits:
     np.add(fits.fitted, level, out=position[part].reshape(shape))
     np.matmul(np.stack([change.real, change.imag], axis=1), basis.rows[1:3], out=velocity[part].reshape(shape))
     for outside, window in ((slice(0, part.start), 0), (slice(part.stop, len(track)), -1)):
-        wave = z[window] * np.exp(rate * (track.t[outside] - t[window]))
-        position[outside] = level + coefficients[window, 0] + wave.real
-        velocity[outside] = (wave * rate).real
+        if outside.start < outside.stop:
+            wave = z[window] * np.exp(rate * (track.t[outside] - t[window]))
+            position[outside] = level + coefficients[window, 0] + wave.real
+            velocity[outside] = (wave * rate).real
     return position, velocity

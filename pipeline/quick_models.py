@@ -167,24 +167,26 @@ def fit_phase_quickly(demodulated: Demodulated, damping: Damping) -> PhaseFit | 
     """
     t, u = demodulated.t, np.sqrt(demodulated.covariance[:, 1, 1])
     weight = 1.0 / np.maximum(u, 1e-12) ** 2
-    middle = float(weight @ t / weight.sum())
+    total = float(weight.sum())
+    middle = float(weight @ t) / total
     tau = t - middle
+    square, torque = tau * tau, weight * tau
     turning = demodulated.phase - demodulated.angular_frequency * tau
-    level = float(weight @ turning / weight.sum())
-    power = float(weight @ tau**2)
-    slope = float((weight * tau) @ turning) / power
+    level = float(weight @ turning) / total
+    power = float(torque @ tau)
+    slope = float(torque @ turning) / power
     residual = turning - level - slope * tau
     pulls = residual / u
     free = t.size - 2
     # What a parabola beyond the line would take away: the bend of an amplitude-dependent frequency shows there first.
-    curve = tau**2 - float(weight @ tau**2) / weight.sum() - tau * float(weight @ tau**3) / power
-    bend = float((weight * curve) @ residual) ** 2 / float(weight @ curve**2)
+    curve = square - power / total - tau * (float(torque @ square) / power)
+    bend = float((weight * curve) @ residual) ** 2 / float(weight @ (curve * curve))
     chi2 = float(pulls @ pulls)
     if bend > 9.0 or chi2 > chi2_quantile(0.99, free) or correlation_length(pulls) > 1.0:
         return None
     omega = demodulated.angular_frequency + slope
     before = damping.t0 - middle
-    u_level, u_slope = 1.0 / math.sqrt(float(weight.sum())), 1.0 / math.sqrt(power)
+    u_level, u_slope = 1.0 / math.sqrt(total), 1.0 / math.sqrt(power)
     return PhaseFit(
         damping.t0,
         Estimate(omega, u_slope, "rad/s"),
@@ -211,12 +213,13 @@ def fit_rest_quickly(demodulated: Demodulated) -> Rest | None:
     if not u.min() > 0.0:
         return None
     weight = 1.0 / u**2
-    mean = float(weight @ offset / weight.sum())
+    total = float(weight.sum())
+    mean = float(weight @ offset) / total
     pulls = (offset - mean) / u
-    tau = (t - float(t.mean())) / float(np.ptp(t))
-    trend = float((tau / u) @ pulls) ** 2 / float((tau / u) @ (tau / u))
+    slope = (t - float(t.sum()) / t.size) / u
+    trend = float(slope @ pulls) ** 2 / float(slope @ slope)
     chi2 = float(pulls @ pulls)
     if trend > 9.0 or chi2 > chi2_quantile(0.99, t.size - 1) or correlation_length(pulls) > 1.0:
         return None
-    estimate = Estimate(mean, 1.0 / math.sqrt(float(weight.sum())), "m")
+    estimate = Estimate(mean, 1.0 / math.sqrt(total), "m")
     return Rest(estimate, 0.0, False, t, np.full(t.size, mean))

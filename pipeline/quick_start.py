@@ -34,19 +34,24 @@ def condition_quickly(track: Track, params: ConditionParams) -> Conditioned:
     (a spike of seven standard deviations makes one), and at neither end of the range a band with three times as many
     samples as the next one or eight that are equal.
     """
-    y = track.y
-    if len(track) < 64 or track.flags.any() or not (np.isfinite(y).all() and np.isfinite(track.t).all()):
+    y, t = track.y, track.t
+    if len(track) < 64 or track.flags.any():
         return condition(track, params)
-    second = y[2:] - 2.0 * y[1:-1] + y[:-2]
+    # Extremes are no numbers where one value is none, and a time that is none makes steps that are none.
+    low, high = float(y.min()), float(y.max())
+    if not (math.isfinite(low) and math.isfinite(high) and math.isfinite(t[0]) and math.isfinite(t[-1])):
+        return condition(track, params)
+    second = -2.0 * y[1:-1]
+    second += y[2:]
+    second += y[:-2]
     typical = median_size(second[:: max(second.size // 2000, 1)])
     extreme = max(float(second.max()), -float(second.min()))
-    if not (np.diff(track.t).min() > 0.0 and 0.0 < extreme <= SMOOTH * typical):
+    if not ((t[1:] - t[:-1]).min() > 0.0 and 0.0 < extreme <= SMOOTH * typical):
         return condition(track, params)
     some = max((second.size - 2) // 4000, 1)
     fourth = second[2::some] - 2.0 * second[1:-1:some] + second[:-2:some]
     noise_m = float(MAD_TO_SIGMA * median_size(fourth) / FOURTH_DIFFERENCE_GAIN)
     width = 8.0 * max(noise_m, 0.5 * (track.quantum_m or 0.0))
-    low, high = float(y.min()), float(y.max())
     if max(np.count_nonzero(y == low), np.count_nonzero(y == high)) >= 8:
         return condition(track, params)
     for inside, both in (
@@ -64,7 +69,7 @@ def find_cycles_quickly(conditioned: Conditioned, params: CyclesParams) -> Cycle
     track = conditioned.track
     block = len(track) // 2000
     bad = conditioned.flags != 0
-    if block >= 2 and np.isfinite(track.t).all() and np.count_nonzero(bad) < 0.2 * bad.size:
+    if block >= 2 and np.count_nonzero(bad) < 0.2 * bad.size and np.isfinite(track.t).all():
         whole = len(track) // block * block
         equal = np.full(block, 1.0 / block)
         few = replace(

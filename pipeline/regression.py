@@ -158,9 +158,11 @@ def _excess(residual: F8, u: F8, spread: float) -> float:
 def correlation_length(residual: F8) -> float:
     """How many consecutive points count as one: :math:`1 + 2\\sum_k \\rho_k` up to the first insignificant lag."""
     n = residual.size
-    centred = residual - residual.mean()
+    if n < 8:
+        return 1.0
+    centred = residual - residual.sum() / n
     power = float(centred @ centred)
-    if n < 8 or power == 0.0:
+    if power == 0.0:
         return 1.0
     total = 1.0
     for lag in range(1, n // 3):
