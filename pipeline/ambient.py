@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 from pipeline.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
-from pipeline.budget import Inputs
+from pipeline.budget import Inputs, estimate_of, function, linear, product
 from pipeline.estimate import Estimate
 from pipeline.instrument import Instrument
 from pipeline.scene import Scene
@@ -56,11 +55,11 @@ class Ambient:
     def density(self) -> Any:
         """Density of the air, kg/m^3."""
         air = (self._temperature, self._pressure, self._humidity)
-        return _of_variables(air_density)(*air) * self._density_formula
+        return product(1.0, (function(air_density, *air), 1), (self._density_formula, 1))
 
     def viscosity(self) -> Any:
         """Return the dynamic viscosity of the air, Pa s."""
-        return _of_variables(air_viscosity)(self._temperature) * self._viscosity_formula
+        return product(1.0, (function(air_viscosity, self._temperature), 1), (self._viscosity_formula, 1))
 
     def scale(self, instrument: Instrument) -> Any:
         """Return the factor on all distances: 1, with what the speed of sound or a calibration leaves uncertain.
@@ -71,25 +70,19 @@ class Ambient:
         temperature, pressure, humidity and its formula; and where the record was made with another speed than the
         scene's air has, the difference, which is not corrected, is the half-width of a rectangle.
         """
-        from uncertainties import nominal_value
-
         if instrument.u_scale > 0:
             return self._inputs.add("calibrated_scale", Estimate(1.0, instrument.u_scale), "B")
         if not self.known:
             return 1.0
-        sound = _of_variables(speed_of_sound)(self._temperature, self._pressure, self._humidity)
-        actual = float(nominal_value(sound))
-        factor = sound / actual * self._inputs.add("speed_of_sound_formula", Estimate(1.0, U_SOUND), "B")
+        sound = function(speed_of_sound, self._temperature, self._pressure, self._humidity)
+        actual = estimate_of(sound, "m/s").value
+        # Factors that are 1 but for their uncertainty: to first order their deviations add.
+        terms = [
+            (1.0 / actual, sound),
+            (1.0, self._inputs.add("speed_of_sound_formula", Estimate(1.0, U_SOUND), "B")),
+        ]
         if instrument.speed_of_sound_m_per_s is not None:
             half = abs(actual / instrument.speed_of_sound_m_per_s - 1.0)
-            factor = factor * self._inputs.add("recorded_speed_of_sound", Estimate(1.0, half / math.sqrt(3.0)), "B")
-        return factor
-
-
-@cache
-def _of_variables(f: Callable[..., float]) -> Callable[..., Any]:
-    """A function of numbers as one of variables; kept, for looking at its signature takes longer than calling it."""
-    from uncertainties import wrap
-
-    wrapped: Callable[..., Any] = wrap(f)
-    return wrapped
+            recorded = Estimate(1.0, half / math.sqrt(3.0))
+            terms.append((1.0, self._inputs.add("recorded_speed_of_sound", recorded, "B")))
+        return linear(1.0, terms)

@@ -7,19 +7,31 @@ ordinary arithmetic knows what it came from, correlations included.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
-import numpy as np
-
 from pipeline.errors import AnalysisError
 from pipeline.estimate import Estimate, Joint
 
-__all__ = ["Budget", "Budgets", "Contribution", "Inputs", "Kind", "estimate_of", "linear", "product"]
+__all__ = [
+    "Budget",
+    "Budgets",
+    "Contribution",
+    "Inputs",
+    "Kind",
+    "added",
+    "estimate_of",
+    "function",
+    "linear",
+    "product",
+]
 
 Kind = Literal["A", "B"]
+
+ROOT_OF_ROUNDING = math.sqrt(sys.float_info.epsilon)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,15 +142,11 @@ class Inputs:
         """
         self._register(name, kind)
         self._groups.add(name)
-        # As the package's correlated_values does it, with variables of ours: principal axes of the correlations.
-        u = np.sqrt(joint.covariance.diagonal())
-        scale = np.where(u > 0.0, u, 1.0)
-        variances, axes = np.linalg.eigh(joint.covariance / (scale[:, None] * scale))
-        of_axes = [_variable()(0.0, math.sqrt(max(variance, 0.0)), (name, "")) for variance in variances.tolist()]
-        slopes = (axes * u[:, None]).tolist()
+        root = _root(joint.covariance.tolist())
+        independent = [_variable()(0.0, 1.0, (name, "")) for _ in root]
         return [
-            linear(value, zip(row, of_axes, strict=True))
-            for value, row in zip(joint.values.tolist(), slopes, strict=True)
+            linear(value, zip(row, independent, strict=False))
+            for value, row in zip(joint.values.tolist(), root, strict=True)
         ]
 
     def add_alternatives(self, name: str, weights: Mapping[str, float], kind: Kind) -> dict[str, Any]:
@@ -217,7 +225,9 @@ class Budgets(Mapping[str, Budget]):
 def estimate_of(x: Any, unit: str) -> Estimate:
     """Return value and standard uncertainty of a variable, or of an exact number."""
     if isinstance(x, _library().AffineScalarFunc):
-        return Estimate(x.nominal_value, x.std_dev, unit)
+        # As the package's std_dev, without the dictionary of components.
+        variance = sum((slope * variable.std_dev) ** 2 for variable, slope in x.derivatives.items())
+        return Estimate(x.nominal_value, math.sqrt(variance), unit)
     return Estimate(float(x), 0.0, unit)
 
 
@@ -243,6 +253,53 @@ def linear(value: float, terms: Iterable[tuple[float, Any]]) -> Any:
             for variable, own in x.derivatives.items():
                 slopes[variable] = slopes.get(variable, 0.0) + float(slope) * own
     return library.AffineScalarFunc(value, library.LinearCombination(slopes))
+
+
+def added(*xs: Any) -> Any:
+    """Return the sum of variables and numbers, built in one go; a number where all are exact.
+
+    Examples
+    --------
+    >>> from uncertainties import ufloat
+    >>> print(added(ufloat(1.0, 0.3), 2.0, ufloat(3.0, 0.4)))
+    6.0+/-0.5
+    """
+    variable = _library().AffineScalarFunc
+    if not any(isinstance(x, variable) for x in xs):
+        return sum(xs)
+    value = sum(x.nominal_value if isinstance(x, variable) else x for x in xs)
+    return linear(value, [(1.0, x) for x in xs])
+
+
+def function(f: Callable[..., float], *xs: Any) -> Any:
+    """Return a smooth function of variables and numbers as a variable, built in one go; a number where all are exact.
+
+    Parameters
+    ----------
+    f : callable
+        Of as many numbers as are given.
+    *xs : variable or number
+
+    Notes
+    -----
+    Central differences over the root of the rounding, relative, as the package's ``wrap`` takes them.
+
+    Examples
+    --------
+    >>> from uncertainties import ufloat
+    >>> print(function(math.hypot, ufloat(3.0, 0.05), 4.0))
+    5.000+/-0.030
+    """
+    variable = _library().AffineScalarFunc
+    numbers = [x.nominal_value if isinstance(x, variable) else x for x in xs]
+    terms = []
+    for i, x in enumerate(xs):
+        if isinstance(x, variable):
+            step = ROOT_OF_ROUNDING * (abs(numbers[i]) or 1.0)
+            above = f(*numbers[:i], numbers[i] + step, *numbers[i + 1 :])
+            below = f(*numbers[:i], numbers[i] - step, *numbers[i + 1 :])
+            terms.append(((above - below) / (2.0 * step), x))
+    return linear(f(*numbers), terms) if terms else f(*numbers)
 
 
 def product(factor: float, *powers: tuple[Any, int]) -> Any:
@@ -281,6 +338,22 @@ def product(factor: float, *powers: tuple[Any, int]) -> Any:
         for variable, own in derivatives.items():
             slopes[variable] = slopes.get(variable, 0.0) + slope * own
     return library.AffineScalarFunc(value, library.LinearCombination(slopes))
+
+
+def _root(covariance: list[list[float]]) -> list[list[float]]:
+    """Lower triangle L, row by row, with L L^T the covariance (p, p); a parameter that others determine adds nothing.
+
+    Cholesky's, whose error is the rounding of each parameter's own variance, whatever units the parameters have.
+    """
+    root: list[list[float]] = []
+    for i, row in enumerate(covariance):
+        mine: list[float] = []
+        for j, other in enumerate(root):
+            rest = row[j] - sum(a * b for a, b in zip(mine, other, strict=False))
+            mine.append(rest / other[j] if other[j] > 0.0 else 0.0)
+        mine.append(math.sqrt(max(row[i] - sum(a * a for a in mine), 0.0)))
+        root.append(mine)
+    return root
 
 
 @cache

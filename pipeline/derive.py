@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.ambient import Ambient
-from pipeline.budget import Budget, Budgets, Inputs, estimate_of, linear, product
+from pipeline.budget import Budget, Budgets, Inputs, added, estimate_of, linear, product
 from pipeline.condition import MAD_TO_SIGMA
 from pipeline.curves import Curve, drag_curve, energy_curve
 from pipeline.damping import Damping
@@ -198,7 +198,7 @@ def derive(
         "frequency": (product(1.0 / (2 * math.pi), (omega, 1)), "Hz"),
         "angular_frequency": (omega, "rad/s"),
         "amplitude": (start, "m"),
-        "offset": (offset + zero, "m"),
+        "offset": (added(offset, zero), "m"),
         "phase": (inputs.add("phase", phase.phase, "A"), "rad"),
         "noise": (inputs.add("noise", _noise(demodulated), "A"), "m"),
         "damping_rate": (lam, "1/s"),
@@ -209,13 +209,13 @@ def derive(
     coefficients = _coefficients(damping, laws, rate, scale)
     diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
-    mass = None if own is None else own + (0.0 if share is None else share)
+    mass = own if share is None else added(own, share)
     parts = {"half_stiffness": (product(0.5, (omega, 2), (scale, 2), (1.0 if mass is None else mass, 1)), "N/m")}
     for name, x in (("mass", mass), ("own_mass", own), ("spring_share", share)):
         if x is not None:
             parts[name] = x, "kg"
     if mass is not None:
-        squared = product(1.0, (omega, 2)) + product(laws.squared_rate, (rate, 2))
+        squared = added(product(1.0, (omega, 2)), product(laws.squared_rate, (rate, 2)))
         found["spring_constant"] = (product(1.0, (squared, 1), (mass, 1)), "N/m")
     if diameter is not None:
         found["keulegan_carpenter_number"] = (product(2 * math.pi, (start, 1), (diameter, -1)), "")
@@ -262,7 +262,8 @@ class _Laws:
 
     def rate_at_start(self) -> Any:
         """Return the logarithmic rate of the amplitude there as a variable, 1/s."""
-        return self._quantity(self.best.slopes_of_rate().tolist(), [fit.rate_at_start() for fit in self.fits])
+        others = [fit.rate_at_start() for fit in self.fits[1:]]
+        return self._quantity(self.best.slopes_of_rate().tolist(), [self.rate, *others])
 
     def root_mean_square(self) -> Any:
         """Return that of the displacement over the windows as a variable, m."""
@@ -305,9 +306,9 @@ def _masses(
     own = inputs.add("bob_mass", scene.bob_mass_kg, "B")
     included = {effect.name for effect in effects if effect.included}
     if "added_mass" in included and diameter is not None:
-        own = own + product(ADDED_MASS_SHAPE / 8.0, (ambient.density, 1), (diameter, 3))
+        own = added(own, product(ADDED_MASS_SHAPE / 8.0, (ambient.density, 1), (diameter, 3)))
     if "spring_mass" in included and scene.spring_mass_kg is not None:
-        return own, inputs.add("spring_mass", scene.spring_mass_kg, "B") / 3
+        return own, product(1.0 / 3.0, (inputs.add("spring_mass", scene.spring_mass_kg, "B"), 1))
     return own, None
 
 
@@ -320,9 +321,11 @@ def _noise(demodulated: Demodulated) -> Estimate:
     """
     flags, residual = demodulated.flags, demodulated.residual
     clean = not flags.any()
-    residual = residual[np.isfinite(residual) & (clean or (flags & UNUSABLE) == 0)]
-    dof = float(max(residual.size - 3 * demodulated.count.size, demodulated.count.size))
-    value = MAD_TO_SIGMA * median_size(residual) * math.sqrt(residual.size / dof)
+    if not clean:
+        residual = residual[(flags & UNUSABLE) == 0]
+    used = int(np.count_nonzero(np.isfinite(residual)))
+    dof = float(max(used - 3 * demodulated.count.size, demodulated.count.size))
+    value = MAD_TO_SIGMA * median_size(residual, used) * math.sqrt(used / dof)
     wide = 0.0 if clean else float(np.mean((flags & np.uint8(Quality.FALSE_ECHO)) != 0))
     parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)
     return Estimate(value, math.hypot(*parts), "m")

@@ -20,20 +20,29 @@ def median(values: F8) -> float:
     return _middle(values.copy())
 
 
-def median_size(values: F8) -> float:
+def median_size(values: F8, count: int | None = None) -> float:
     """Return the median of the absolute values of finite values (n,), n at least 1.
+
+    Parameters
+    ----------
+    values : (n,) float64
+    count : int, optional
+        How many of them are finite, at least 1, where not all are; the others, infinite or NaN, are left out.
 
     Examples
     --------
     >>> median_size(np.array([-3.0, 1.0, 2.0]))
     2.0
+    >>> median_size(np.array([-3.0, np.nan, 1.0, 2.0, np.nan]), 3)
+    2.0
     """
-    return _middle(np.abs(values))
+    return _middle(np.abs(values), count)
 
 
-def _middle(values: F8) -> float:
-    """The median of values that may be reordered."""
-    half = values.size // 2
+def _middle(values: F8, count: int | None = None) -> float:
+    """The median of values that may be reordered; what is not finite sorts last."""
+    count = values.size if count is None else count
+    half = count // 2
     values.partition(half)
     upper = float(values[half])
-    return upper if values.size % 2 else 0.5 * (float(values[:half].max()) + upper)
+    return upper if count % 2 else 0.5 * (float(values[:half].max()) + upper)

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from pipeline import damping
 from pipeline.demodulate import Demodulated
-from pipeline.laws import LAWS, Law
+from pipeline.laws import LAWS, Law, drag
 from pipeline.laws.drag import Drag, amplitudes, fading, jacobians_of
 
 # Rows of coefficients; a law takes those that its parameters name.
@@ -109,6 +109,17 @@ def test_the_short_form_without_friction_is_the_closed_form(gamma: float, beta: 
     whole, derivatives = jacobians_of(t, np.array([[0.05, 0.0, gamma, beta]]))
     np.testing.assert_allclose(amplitude, whole[0], rtol=1e-13)
     np.testing.assert_allclose(by, derivatives[0, [0, 2, 3]], rtol=1e-8, atol=1e-12 * np.abs(by).max())
+
+
+@pytest.mark.parametrize("parameters", list(drag.FADING))
+def test_a_lone_coefficients_form_is_the_short_form_at_zero(parameters: tuple[str, ...]) -> None:
+    """Without damping, with linear and with quadratic drag alone: the mixture's form with the others zero."""
+    t = np.linspace(0.0, 120.0, 50)
+    theta = {"A0": 0.05, "gamma": 0.0146, "beta": 0.5}
+    amplitude, by = drag.FADING[parameters](t, *(theta[name] for name in parameters))
+    whole, derivatives = fading(t, *(theta[name] if name in parameters else 0.0 for name in theta))
+    np.testing.assert_allclose(amplitude, whole, rtol=1e-13)
+    np.testing.assert_allclose(by, derivatives[[list(theta).index(name) for name in parameters]], rtol=1e-13)
 
 
 @pytest.mark.parametrize("bench", [*BENCHES, *STOPPING])

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from uncertainties import correlated_values, ufloat
+from uncertainties import correlated_values, ufloat, wrap
 
-from pipeline.air import U_DENSITY, U_SOUND, U_VISCOSITY
-from pipeline.budget import Budget, Inputs, product
+from pipeline.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density
+from pipeline.budget import Budget, Inputs, added, function, product
 from pipeline.damping import fit_damping
 from pipeline.demodulate import Demodulated
 from pipeline.derive import Derived, derive
@@ -305,3 +305,33 @@ def test_parameters_fitted_together_are_the_packages_correlated_values() -> None
         mine, other = (sum(w * x for w, x in zip(weights, some, strict=True)) for some in (ours, theirs))
         assert mine.nominal_value == pytest.approx(other.nominal_value, rel=1e-14)
         assert mine.std_dev == pytest.approx(other.std_dev, rel=1e-12)
+
+
+def test_parameters_that_determine_each_other_count_once() -> None:
+    """With a correlation of one the weighted difference is exact, whatever the units and though a pivot is zero."""
+    u = np.array([1e-6, 2e3, 0.5])
+    sign = np.array([1.0, -1.0, 1.0])
+    x, y, z = Inputs().add_joint(
+        "law", Joint(("x", "y", "z"), np.ones(3), np.outer(sign * u, sign * u), ("",) * 3), "A"
+    )
+    for one, expected in ((x, u[0]), (y, u[1]), (z, u[2])):
+        assert one.std_dev == pytest.approx(expected, rel=1e-12)
+    assert (x / u[0] + y / u[1]).std_dev < 3e-8
+    assert (x / u[0] + z / u[2]).std_dev == pytest.approx(2.0, rel=1e-12)
+
+
+def test_functions_and_sums_are_what_the_package_gives() -> None:
+    """Air's density and a sum have the derivatives by each input that the package's wrap and arithmetic find."""
+    celsius, pascal, humidity = ufloat(20.0, 1.5), ufloat(1e5, 800.0), ufloat(0.0, 0.1)
+    ours = function(air_density, celsius, pascal, humidity)
+    theirs = wrap(air_density)(celsius, pascal, humidity)
+    assert ours.nominal_value == theirs.nominal_value
+    for variable in (celsius, pascal, humidity):
+        assert ours.derivatives[variable] == pytest.approx(theirs.derivatives[variable], rel=1e-7)
+    assert function(air_density, 20.0, pascal, 0.5).std_dev == pytest.approx(
+        wrap(air_density)(20.0, pascal, 0.5).std_dev, rel=1e-7
+    )
+    assert function(air_density, 20.0) == air_density(20.0)
+    whole, plain = added(celsius, 2.0, pascal, celsius), celsius + 2.0 + pascal + celsius
+    assert (whole.nominal_value, whole.derivatives) == (plain.nominal_value, plain.derivatives)
+    assert added(1.0, 2.0) == 3.0

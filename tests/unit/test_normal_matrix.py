@@ -1,5 +1,7 @@
 """The inverse of a small normal matrix, against numpy's."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from pipeline.normal_matrix import inverse_of
 
 
 @pytest.mark.parametrize("p", [1, 2, 3])
-def test_inverse_agrees_with_numpy_within_rounding_times_the_condition(p):
+def test_inverse_agrees_with_numpy_within_rounding_times_the_condition(p: int) -> None:
     """Columns of any units and nearly dependent ones: the error in natural units is a few roundings times cond."""
     rng = np.random.default_rng(p)
     for _ in range(300):
@@ -34,6 +36,6 @@ def test_inverse_agrees_with_numpy_within_rounding_times_the_condition(p):
         np.diag([1.0, np.nan, 1.0]),
     ],
 )
-def test_what_is_not_positive_definite_has_no_inverse(matrix):
+def test_what_is_not_positive_definite_has_no_inverse(matrix: np.ndarray) -> None:
     """Zero, negative and NaN pivots give None and no warning."""
     assert inverse_of(matrix) is None
