@@ -81,8 +81,11 @@ class PhaseFit:
 
     def total(self, t: F8) -> F8:
         """Return the model's total phase at times t (n,), rad."""
-        exponent = self.exponent if self.coefficients.size == 3 else None
-        return np.asarray(_design(t, self.middle, self.damping, exponent) @ self.coefficients)
+        level, slope, *bend = self.coefficients.tolist()
+        total = level + slope * (t - self.middle)
+        if bend:
+            total += bend[0] * _integral_at(t, self.middle, self.damping, self.exponent)
+        return np.asarray(total)
 
     def rate(self, t: F8) -> F8:
         """Return the model's angular frequency at times t (n,), rad/s."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -109,7 +110,7 @@ def demodulate_quickly(conditioned: Conditioned, cycles: Cycles) -> Quick | None
     return _fit(conditioned, cycles, first, w, length, step)
 
 
-@dataclass(slots=True)
+@dataclass
 class _Basis:
     """Rest position, cosine, minus sine, and the latter two times time: the common basis of all windows."""
 
@@ -119,6 +120,12 @@ class _Basis:
     solver: F8
     inverse: F8
     leak: F8
+
+    @cached_property
+    def pairs(self) -> F8:
+        """(6, l): products of the first three rows, the upper triangle of their normal matrix sample by sample."""
+        one, cosine, sine = self.rows[:3]
+        return np.stack([one, cosine, sine, cosine * cosine, cosine * sine, sine * sine])
 
     @classmethod
     def of(cls, tau: F8, omega: float, decay: float) -> _Basis | None:
@@ -143,9 +150,7 @@ class _Basis:
 
     def weighed(self, y: F8, weights: F8) -> _Weighed:
         """Fit steady waves to windows y (w, l) with weights (w, l): one basis, so sums are products of matrices."""
-        one, cosine, sine = self.rows[:3]
-        pairs = np.stack([one, cosine, sine, cosine * cosine, cosine * sine, sine * sine])
-        sums = pairs @ weights.T
+        sums = self.pairs @ weights.T
         coefficients, inverse, good = solved(sums[0], sums[1:], self.rows[:3] @ (weights * y).T)
         return _Weighed(coefficients, inverse, good, np.abs(y - coefficients @ self.rows[:3]))
 
@@ -187,7 +192,7 @@ def _fit(conditioned: Conditioned, cycles: Cycles, first: int, w: int, length: i
     inverse[:] = basis.inverse
     fits = _Fits(whole, inverse, fitted, y - fitted, np.ones(w, np.bool_))
     if not clean.all():
-        fits = _cleaned(fits, np.flatnonzero(~clean), basis, y, bad, slope, smooth, typical)
+        fits = _cleaned(fits, clean, basis, y, bad, slope, smooth, typical)
     if np.count_nonzero(fits.good) < max(0.9 * w, 5):
         return None
     return _quick(conditioned, part, t, level, basis, fits, smooth)
@@ -219,7 +224,7 @@ class _Fits:
 
 def _cleaned(
     fits: _Fits,
-    hit: NDArray[np.int64],
+    clean: NDArray[np.bool_],
     basis: _Basis,
     y: F8,
     bad: NDArray[np.bool_],
@@ -232,9 +237,10 @@ def _cleaned(
     They start from what the clean windows' curves foretell; weights of Cauchy's form let go of clusters, and what is
     left beyond four standard deviations is taken out for good.
     """
+    hit = np.flatnonzero(~clean)
     z = smooth.amplitude[hit] * np.exp(1j * smooth.phase[hit])
     drift = slope[hit] * z
-    others = np.setdiff1d(np.arange(len(y)), hit)
+    others = np.flatnonzero(clean)
     offset = np.interp(hit, others, fits.coefficients[others, 0])
     expected = np.stack([offset, z.real, z.imag, drift.real, drift.imag], axis=1)
     usable = (~bad[hit]).astype(np.float64)

@@ -90,5 +90,7 @@ def bridged(y: F8, bad: NDArray[np.bool_]) -> F8:
     """Return distances (n,) with straight lines across the bad ones (n,)."""
     if not bad.any():
         return y
-    good = np.flatnonzero(~bad)
-    return np.interp(np.arange(y.size), good, y[good])
+    good, lost = np.flatnonzero(~bad), np.flatnonzero(bad)
+    whole = y.copy()
+    whole[lost] = np.interp(lost, good, y[good])
+    return whole

@@ -81,7 +81,10 @@ class Drag:
 
     def amplitude(self, t: F8, theta: F8) -> F8:
         """Return the closed form."""
-        return self.both(t, theta)[0] if self._fades(t, theta) else np.asarray(amplitudes(t, self.full(theta))[0])
+        if self._fades(t, theta):
+            start, _, gamma, beta = self.full(theta)[0].tolist()
+            return _faded(t, start, gamma, beta)
+        return np.asarray(amplitudes(t, self.full(theta))[0])
 
     def jacobian(self, t: F8, theta: F8) -> F8:
         """Return the derivatives by A0 and the coefficients."""
@@ -197,11 +200,10 @@ def fading(t: F8, start: float, gamma: float, beta: float) -> tuple[F8, F8]:
     """
     turn = gamma * t
     fall = np.exp(-turn)
-    if float(np.abs(turn).max(initial=0.0)) < 1e-3:  # the next terms of the series are below 1e-14
-        reach = t * (1.0 - turn * (0.5 - turn * (1.0 / 6.0 - turn / 24.0)))
+    reach = _reach(t, turn, gamma)
+    if _slight(turn):
         bend = t * t * (turn * (1.0 / 3.0 - turn * (0.125 - turn / 30.0)) - 0.5)
     else:
-        reach = np.expm1(-turn) / -gamma
         bend = (t * fall - reach) / gamma
     rise = beta * start
     below = 1.0 + rise * reach
@@ -212,6 +214,25 @@ def fading(t: F8, start: float, gamma: float, beta: float) -> tuple[F8, F8]:
     np.multiply(-amplitude, t + rise * bend / below, out=by[1])
     np.multiply(-amplitude * start, reach / below, out=by[2])
     return amplitude, by
+
+
+def _faded(t: F8, start: float, gamma: float, beta: float) -> F8:
+    """The amplitudes of :func:`fading` alone."""
+    turn = gamma * t
+    fall = start * np.exp(-turn)
+    return fall / (1.0 + beta * start * _reach(t, turn, gamma)) if beta else fall
+
+
+def _reach(t: F8, turn: F8, gamma: float) -> F8:
+    """R, which is t where there is no linear drag."""
+    if _slight(turn):
+        return np.asarray(t * (1.0 - turn * (0.5 - turn * (1.0 / 6.0 - turn / 24.0))))
+    return np.asarray(np.expm1(-turn) / -gamma)
+
+
+def _slight(turn: F8) -> bool:
+    """Whether the next terms of the series in gamma t are below 1e-14."""
+    return float(np.abs(turn).max(initial=0.0)) < 1e-3
 
 
 def _constant(t: F8, start: float) -> tuple[F8, F8]:
