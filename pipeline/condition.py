@@ -174,10 +174,10 @@ def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
         What stands where values do not repeat, or show no coarser step.
     """
     steps = np.diff(ordered)
-    apart = steps[steps > 1e-9]
-    if not apart.size or apart.size > 0.5 * ordered.size:
+    apart = steps > 1e-9
+    if not 0 < np.count_nonzero(apart) <= 0.5 * ordered.size:
         return stated_m
-    least = float(apart.min())
+    least = float(steps[apart].min())
     return least if stated_m is None or least > 1.5 * stated_m else stated_m
 
 
@@ -211,14 +211,14 @@ def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
     return flags
 
 
-def _least_noise(y: F8) -> tuple[float, bool]:
+def _least_noise(second: F8) -> tuple[float, bool]:
     """Noise that a third of the fourth differences still shows, and whether even so many are not clean.
+
+    From the second differences, three at least.
 
     A fifth of the samples being spikes leaves a third of the fourth differences clean, two fifths leave a twelfth.
     """
-    if y.size < 5:
-        return 0.0, False
-    size = np.abs(np.diff(y, 4))
+    size = np.abs(np.diff(second, 2))
     few, many = size.size // 20, size.size // 4
     ordered = np.partition(size, (few, many))
     gain = float(FOURTH_DIFFERENCE_GAIN)
@@ -233,13 +233,13 @@ def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
     spikes = np.zeros(y.size, np.bool_)
     if y.size < 8:
         return spikes
-    noise_m, flooded = _least_noise(y)
+    second = np.diff(y, 2)
+    noise_m, flooded = _least_noise(second)
     # What curvature alone does: a quantile of the second differences that spikes on a fifth of the samples spare; of
     # a cosine's second differences 0.15 lie within 0.40 of what 0.4 of them do.
     share, gain = (0.15, 2.5) if flooded else (0.4, 1.0)
-    second = np.abs(np.diff(y, 2))
     rank = int(share * second.size)
-    bound = sigmas * max(noise_m, half_step) + 5.0 * gain * float(np.partition(second, rank)[rank])
+    bound = sigmas * max(noise_m, half_step) + 5.0 * gain * float(np.partition(np.abs(second), rank)[rank])
     smooth = y
     for _ in range(4):
         away = _off_median(smooth)

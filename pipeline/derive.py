@@ -326,6 +326,6 @@ def _noise(demodulated: Demodulated) -> Estimate:
     used = int(np.count_nonzero(np.isfinite(residual)))
     dof = float(max(used - 3 * demodulated.count.size, demodulated.count.size))
     value = MAD_TO_SIGMA * median_size(residual, used) * math.sqrt(used / dof)
-    wide = 0.0 if clean else float(np.mean((flags & np.uint8(Quality.FALSE_ECHO)) != 0))
+    wide = 0.0 if clean else np.count_nonzero(flags & np.uint8(Quality.FALSE_ECHO)) / flags.size
     parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)
     return Estimate(value, math.hypot(*parts), "m")

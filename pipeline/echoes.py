@@ -66,6 +66,7 @@ def find_clusters(demodulated: Demodulated, phase: Callable[[NDArray[np.int64]],
     middles = angle[(starts + sizes // 2)[clusters]]
     turning = np.abs(middles - math.pi * np.round(middles / math.pi)) <= TURNING
     fitted = np.count_nonzero((demodulated.flags & UNUSABLE) == 0) + rows.size
-    residual = np.nan_to_num(demodulated.residual[rows])
+    residual = demodulated.residual[rows]
+    residual[~np.isfinite(residual)] = 0.0
     shift = 2.0 * float(residual @ np.cos(angle)) / fitted
     return Clusters(int(np.count_nonzero(clusters)), int(sizes[clusters].sum()), int(np.count_nonzero(turning)), shift)

@@ -172,13 +172,11 @@ def solved(count: F8, upper: F8, right: F8) -> tuple[F8, F8, NDArray[np.bool_]]:
     count = np.maximum(count, 1e-300)
     # Divided by the count: 1, m, n, p, q, r are the upper triangle row by row.
     m, n, p, q, r = upper / count
-    adjugate = np.array(
-        [
-            [p * r - q * q, q * n - m * r, m * q - n * p],
-            [q * n - m * r, r - n * n, m * n - q],
-            [m * q - n * p, m * n - q, p - m * m],
-        ]
-    )
+    adjugate = np.empty((3, 3, count.size))
+    adjugate[0, 0], adjugate[1, 1], adjugate[2, 2] = p * r - q * q, r - n * n, p - m * m
+    adjugate[0, 1] = adjugate[1, 0] = q * n - m * r
+    adjugate[0, 2] = adjugate[2, 0] = m * q - n * p
+    adjugate[1, 2] = adjugate[2, 1] = m * n - q
     determinant = adjugate[0, 0] + m * adjugate[0, 1] + n * adjugate[0, 2]
     good = (count >= 6.0) & (determinant > LEAST_DETERMINANT)
     adjugate /= np.where(good, determinant, np.inf)
