@@ -293,16 +293,16 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     """
     size = np.maximum(np.hypot(a, b), 1e-150)
     along, scale = np.arctan2(b, a), size
-    weak, some = np.zeros(a.size, np.bool_), False
+    weak, any_weak = np.zeros(a.size, np.bool_), False
     turned = along - smooth_phase
     turned -= 2.0 * math.pi * np.rint(turned / (2.0 * math.pi))
     if smooth_amplitude is not None:
         u = np.sqrt(0.5 * (covariance[:, 1, 1] + covariance[:, 2, 2]))
         weak = smooth_amplitude < WEAK * u
-        some = bool(weak.any())
+        any_weak = bool(weak.any())
     if turned.max() - turned.min() > math.pi:
         turned[~weak] = np.unwrap(turned[~weak])
-    if smooth_amplitude is not None and some:
+    if smooth_amplitude is not None and any_weak:
         along = np.where(weak, smooth_phase, along)
         scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
         cosine, sine = np.cos(along), np.sin(along)
@@ -311,7 +311,7 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
         cosine, sine = np.cos(along), np.sin(along)
     turned_into = _turned(covariance, cosine, sine, scale)
     amplitude = size * (1.0 - 0.5 * turned_into[:, 1, 1])
-    if some:
+    if any_weak:
         amplitude = np.where(weak, a * cosine + b * sine, amplitude)
     return amplitude, smooth_phase + turned, turned_into
 

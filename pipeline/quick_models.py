@@ -170,16 +170,16 @@ def fit_phase_quickly(demodulated: Demodulated, damping: Damping) -> PhaseFit | 
     total = float(weight.sum())
     middle = float(weight @ t) / total
     tau = t - middle
-    square, torque = tau * tau, weight * tau
+    square, moment = tau * tau, weight * tau
     turning = demodulated.phase - demodulated.angular_frequency * tau
     level = float(weight @ turning) / total
-    power = float(torque @ tau)
-    slope = float(torque @ turning) / power
+    power = float(moment @ tau)
+    slope = float(moment @ turning) / power
     residual = turning - level - slope * tau
     pulls = residual / u
     free = t.size - 2
     # What a parabola beyond the line would take away: the bend of an amplitude-dependent frequency shows there first.
-    curve = square - power / total - tau * (float(torque @ square) / power)
+    curve = square - power / total - tau * (float(moment @ square) / power)
     bend = float((weight * curve) @ residual) ** 2 / float(weight @ (curve * curve))
     chi2 = float(pulls @ pulls)
     if bend > 9.0 or chi2 > chi2_quantile(0.99, free) or correlation_length(pulls) > 1.0:
@@ -216,8 +216,8 @@ def fit_rest_quickly(demodulated: Demodulated) -> Rest | None:
     total = float(weight.sum())
     mean = float(weight @ offset) / total
     pulls = (offset - mean) / u
-    slope = (t - float(t.sum()) / t.size) / u
-    trend = float(slope @ pulls) ** 2 / float(slope @ slope)
+    lever = (t - float(t.sum()) / t.size) / u
+    trend = float(lever @ pulls) ** 2 / float(lever @ lever)
     chi2 = float(pulls @ pulls)
     if trend > 9.0 or chi2 > chi2_quantile(0.99, t.size - 1) or correlation_length(pulls) > 1.0:
         return None
