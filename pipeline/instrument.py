@@ -13,7 +13,10 @@ __all__ = ["U_CRYSTAL", "Instrument"]
 
 U_CRYSTAL = 50e-6 / math.sqrt(3.0)
 """Relative standard uncertainty of a crystal's rate: 50 ppm as the half-width of a rectangle."""
-CONTRADICTION = 3.0  # standard uncertainties at which the host's clock overrules the sensor's
+CONTRADICTION = 3.0  # standard uncertainties at which the host's clock contradicts the sensor's
+HOST_DELAY_S = 0.02
+"""Time by which a host's stamps may drift within a record though both clocks are right, s: a USB bridge holds bytes for
+up to 16 ms (FTDI AN232B-04), and a host that becomes busy wakes its readers later than before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +67,10 @@ class Instrument:
         sensor's clock with the host's tells two crystals apart and not which of them is right, so it changes nothing
         as long as both can keep their specification. Where it contradicts that by more than three standard
         uncertainties (a ceramic resonator is off by thousands of ppm) the host is the reference: frequencies are
-        multiplied by 1 + r, and what remains is the host's own crystal and the comparison's scatter.
+        multiplied by 1 + r, and what remains is the host's own crystal and the comparison's scatter. Where all that the
+        clocks drifted apart within the record is less than a host's delays may change (20 ms), nobody can tell a wrong
+        clock from a host that became busy: nothing is corrected, and the difference counts as the half-width of a
+        rectangle.
 
         Examples
         --------
@@ -99,6 +105,13 @@ def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str]:
         )
     told = f"the device's clock runs {track.rate_error * 1e6:+.0f} ppm against the host's (u {u * 1e6:.0f} ppm)"
     if abs(track.rate_error) > CONTRADICTION * math.hypot(u, math.sqrt(2.0) * u_crystal):
+        apart_s = abs(track.rate_error) * float(track.t[-1] - track.t[0])
+        if apart_s < HOST_DELAY_S:
+            return (
+                Estimate(1.0, math.hypot(u_crystal, track.rate_error / math.sqrt(3.0))),
+                f"{told}, {apart_s * 1e3:.2g} ms in all, which the host's delays may be too: nothing is corrected, and "
+                "the difference stands in every frequency's uncertainty",
+            )
         rate = Estimate(1.0 + track.rate_error, (1.0 + track.rate_error) * math.hypot(u, u_crystal))
         return (
             rate,

@@ -15,6 +15,7 @@ from pipeline.instrument import U_CRYSTAL, Instrument
 from pipeline.track import Track
 
 PLAIN = Track.from_arrays(np.arange(100) / 100.0, np.zeros(100))
+LONG = Track.from_arrays(np.arange(3000) / 100.0, np.zeros(3000))
 
 
 @pytest.mark.parametrize("clock", ["nominal", "device", "host"])
@@ -34,7 +35,7 @@ def test_two_crystals_may_differ() -> None:
 
 def test_a_ceramic_resonator_is_corrected_to_the_host() -> None:
     """3000 ppm are no crystal's: frequencies are multiplied by 1.003, and the host's crystal remains."""
-    found = Instrument.of(replace(PLAIN, clock="device", rate_error=3e-3, u_rate_error=2e-5))
+    found = Instrument.of(replace(LONG, clock="device", rate_error=3e-3, u_rate_error=2e-5))
     assert found.clock_rate.value == 1.003
     assert found.clock_rate.u == pytest.approx(1.003 * math.hypot(2e-5, U_CRYSTAL))
     assert "corrected" in found.clock_words
@@ -44,6 +45,17 @@ def test_a_comparison_too_coarse_to_tell_changes_nothing() -> None:
     """A second of stamps knows the rate to a part in a hundred: it overrules nobody."""
     found = Instrument.of(replace(PLAIN, clock="device", rate_error=8e-3, u_rate_error=1e-2))
     assert (found.clock_rate.value, found.clock_rate.u) == (1.0, U_CRYSTAL)
+
+
+def test_a_host_that_became_busy_overrules_nobody() -> None:
+    """Stamps that drift by 3.6 ms in three seconds are no clock's fault: the difference is an uncertainty only."""
+    short = Track.from_arrays(np.arange(301) / 100.0, np.zeros(301))
+    found = Instrument.of(replace(short, clock="device", rate_error=1.2e-3, u_rate_error=1e-5))
+    assert found.clock_rate.value == 1.0
+    assert found.clock_rate.u == pytest.approx(math.hypot(1.2e-3 / math.sqrt(3), U_CRYSTAL))
+    assert "3.6 ms" in found.clock_words
+    # The same rate over half a minute is 36 ms: more than any delay.
+    assert Instrument.of(replace(LONG, clock="device", rate_error=1.2e-3, u_rate_error=1e-5)).clock_rate.value > 1.001
 
 
 def test_period_is_corrected(synthetic: ModuleType) -> None:
