@@ -4,9 +4,10 @@
 line protocol to pseudo-terminals, with the moment of sending as the device's clock; so the processor time counted is
 the reader's alone, and each sample tells how long it took from the wire until it was parsed.
 
-Both designs give each port's bytes to a chain of its own, from which the samples are taken ten times a second. One is
-what `springmass record` does: one thread reads, then decodes (`springmass/reads.py`). The other is a thread for each
-port that reads what is there and decodes it as it comes.
+Each design gives a port's bytes to a chain of its own, from which the samples are taken ten times a second. One is
+what `springmass record` does: one thread reads, then decodes (`springmass/reads.py`). Beside it stand two with a thread
+for each port that reads what is there and decodes it as it comes: pyserial's own `serial.threaded.ReaderThread`, and
+the leanest such thread that we could write, which leaves out most of what pyserial does around each read.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ from typing import Protocol
 
 import numpy as np
 import serial
+from serial.serialposix import PosixPollSerial
+from serial.threaded import Protocol as PortProtocol
+from serial.threaded import ReaderThread
 
 from acquisition.block import Block
 from acquisition.chain import SensorChain
@@ -137,7 +141,55 @@ class OneThread:
             self._recorder.close()
 
 
-class ThreadPerPort:
+class LockedChains:
+    """Chains that threads of their own feed, each behind a lock."""
+
+    def __init__(self, chains: Sequence[SensorChain]) -> None:
+        self._chains = [(chain, threading.Lock()) for chain in chains]
+
+    def take(self, channel: int, data: bytes) -> None:
+        """Decode what one port sent."""
+        chain, lock = self._chains[channel]
+        with lock:
+            chain.take(time.monotonic_ns(), data)
+
+    def blocks(self) -> list[tuple[int, Block]]:
+        """Return the samples since the last call."""
+        found = []
+        for channel, (chain, lock) in enumerate(self._chains):
+            with lock:
+                if len(chain):
+                    found.append((channel, chain.block()))
+        return found
+
+
+class ReaderThreads:
+    """pyserial's ReaderThread for each port, over its class that waits with ``poll``: ``select`` ends at 1024."""
+
+    def __init__(self, paths: Sequence[str], chains: Sequence[SensorChain]) -> None:
+        locked = LockedChains(chains)
+
+        class Feeding(PortProtocol):  # type: ignore[misc]
+            def __init__(self, channel: int) -> None:
+                self._channel = channel
+
+            def data_received(self, data: bytes) -> None:
+                locked.take(self._channel, bytes(data))
+
+        self._threads = [
+            ReaderThread(PosixPollSerial(path, BAUD), partial(Feeding, channel)) for channel, path in enumerate(paths)
+        ]
+        for thread in self._threads:
+            thread.start()
+        self.blocks = locked.blocks
+
+    def stop(self) -> None:
+        """Stop all threads."""
+        for thread in self._threads:
+            thread.close()
+
+
+class LeanThreads:
     """A thread for each port that reads what is there or waits for a byte, and decodes it.
 
     The calls are those of pyserial's ``read(in_waiting or 1)``, but for ``poll`` in place of its ``select``, which
@@ -147,31 +199,20 @@ class ThreadPerPort:
     def __init__(self, paths: Sequence[str], chains: Sequence[SensorChain]) -> None:
         self._stop = threading.Event()
         self._ports = [serial.Serial(path, BAUD, timeout=0) for path in paths]
-        self._chains = chains
-        self._locks = [threading.Lock() for _ in paths]
+        self._locked = LockedChains(chains)
         self._threads = [threading.Thread(target=self._read, args=(i,), daemon=True) for i in range(len(paths))]
         for thread in self._threads:
             thread.start()
+        self.blocks = self._locked.blocks
 
     def _read(self, channel: int) -> None:
-        port, chain, lock = self._ports[channel], self._chains[channel], self._locks[channel]
+        port = self._ports[channel]
         ready = select.poll()
         ready.register(port.fileno(), select.POLLIN)
         while not self._stop.is_set():
             size = port.in_waiting or 1
             if ready.poll(250):
-                data = os.read(port.fileno(), size)
-                with lock:
-                    chain.take(time.monotonic_ns(), data)
-
-    def blocks(self) -> list[tuple[int, Block]]:
-        """Return the samples since the last call."""
-        found = []
-        for channel, (chain, lock) in enumerate(zip(self._chains, self._locks, strict=True)):
-            with lock:
-                if len(chain):
-                    found.append((channel, chain.block()))
-        return found
+                self._locked.take(channel, os.read(port.fileno(), size))
 
     def stop(self) -> None:
         """Stop all threads."""
@@ -183,7 +224,8 @@ class ThreadPerPort:
 
 
 Design = Callable[[Sequence[str], Sequence[SensorChain]], Running]
-DESIGNS: dict[str, Design] = {"one thread": OneThread, "thread per port": ThreadPerPort}
+THREADS: dict[str, Design] = {"pyserial's ReaderThread": ReaderThreads, "lean threads": LeanThreads}
+DESIGNS: dict[str, Design] = {"one thread": OneThread, **THREADS}
 
 
 def measure(design: Design, *, ports: int, rate_hz: float, seconds: float, decode: bool) -> Figures:
@@ -277,7 +319,7 @@ def main() -> int:
 
 
 def compare(ports: int, rate_hz: float, seconds: float) -> int:
-    """Print one port, both designs on many, and the trade of the cadence; return 1 where this project lost samples."""
+    """Print one port, every design on many, and the trade of the cadence; return 1 where this project lost samples."""
 
     def figures(name: str, design: Design, count: int = ports, rate: float = rate_hz, decode: bool = True) -> Figures:
         found = measure(design, ports=count, rate_hz=rate, seconds=seconds, decode=decode)
@@ -287,15 +329,17 @@ def compare(ports: int, rate_hz: float, seconds: float) -> int:
     ours = [figures("decoded, one thread", OneThread, 1, 100.0), figures("decoded, one thread", OneThread, 1, 1000.0)]
     for what, decode in (("decoded", True), ("read", False)):
         one = figures(f"{what}, one thread", OneThread, decode=decode)
-        other = figures(f"{what}, thread per port", ThreadPerPort, decode=decode)
-        print(f"one thread over a thread per port: {one.cpu_share / other.cpu_share:.2f} x", flush=True)
+        for name, design in THREADS.items():
+            other = figures(f"{what}, {name}", design, decode=decode)
+            print(f"  one thread over {name}: {one.cpu_share / other.cpu_share:.2f} x", flush=True)
         ours.append(one)
     with tempfile.TemporaryDirectory() as folder:
         ours.append(figures("recorded and decoded", partial(OneThread, log=Path(folder) / "run.wire")))
-    reference = figures("decoded, thread per port", ThreadPerPort)
+    references = {name: figures(f"decoded, {name}", design) for name, design in THREADS.items()}
     for cadence_ms in CADENCES_MS:
         one = figures(f"decoded, cadence {cadence_ms:g} ms", partial(OneThread, cadence_ns=round(cadence_ms * 1e6)))
-        print(f"  over a thread per port: {one.cpu_share / reference.cpu_share:.2f} x", flush=True)
+        for name, reference in references.items():
+            print(f"  over {name}: {one.cpu_share / reference.cpu_share:.2f} x", flush=True)
         ours.append(one)
     return int(any(one.received != one.expected for one in ours))
 
