@@ -99,7 +99,7 @@ class Tee:
             if self._asked_often or self._waiting_bytes >= ROUND_BYTES:
                 self._decode_piece()
             if self._recorder is not None:
-                self._recorder.wake()
+                self._recorder.append()
             return self._waiting_bytes >= ROUND_BYTES or (self._asked_often and bool(self._waiting))
 
     def blocks(self) -> list[tuple[int, Block]]:

@@ -167,7 +167,8 @@ class Session:
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
         self._chains = [sensor.chain() for sensor in self.sensors]
         self._shown.clear()
-        recorder = Recorder(log, self._header(), self._clock)
+        own_clocks = all(sensor.family.has_device_time for sensor in self.sensors)
+        recorder = Recorder(log, self._header(), self._clock, own_clocks=own_clocks)
         start_ns = self._clock.now_ns()
         try:
             self._tee.start(recorder, self._chains, since_ns)

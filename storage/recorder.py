@@ -5,7 +5,11 @@ them to the wire log at once, so that a killed process loses no more than the re
 once a second: that may take as long as the disk likes, and neither of the others waits for it.
 
 The second thread is woken when the reading thread has nothing else to do (:meth:`Recorder.enqueue`,
-:meth:`Recorder.wake`): woken earlier, the two would contend for the interpreter while ports wait.
+:meth:`Recorder.append`): woken earlier, the two would contend for the interpreter while ports wait.
+
+Where it harms nobody that a write may wait for the disk, the reading thread appends by itself (``own_clocks``): waking
+another thread for it costs more than the appending. It does so only while no sync has the file, and hands over to the
+second thread for a while once a write took long.
 """
 
 from __future__ import annotations
@@ -29,6 +33,11 @@ __all__ = ["DiskNearlyFull", "Recorder", "RecorderStatus", "check_disk"]
 
 QUEUE_BYTES = 16 << 20
 """Three quarters of an hour of one sensor at 100 Hz, four seconds of 200 ports in a flood at 115200 baud."""
+
+SLOW_NS = 5_000_000
+"""A write that takes longer waited for the disk."""
+PATIENCE_NS = 10_000_000_000
+"""After a slow write the reading thread writes nothing for so long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +99,9 @@ class Recorder:
         Between syncs, s.
     queue_bytes : int
         Bound of the queue. What comes while it is full is counted, and told by an event in the log.
+    own_clocks : bool
+        Whether every sensor sends the time of its readings by a clock of its own. A late stamp of the host's does no
+        harm then, and :meth:`append` may write on the thread that calls it.
     open_file : callable
         Makes the log's file: the seam for tests.
 
@@ -107,6 +119,7 @@ class Recorder:
         *,
         sync_every_s: float = 1.0,
         queue_bytes: int = QUEUE_BYTES,
+        own_clocks: bool = False,
         open_file: Callable[[Path], LogFile] = open_log_file,
     ) -> None:
         self._log = WireLogWriter(path, header, open_file=open_file)
@@ -114,16 +127,21 @@ class Recorder:
         self._clock = clock
         self._sync_every_ns = int(sync_every_s * 1e9)
         self._limit = queue_bytes
+        self._own_clocks = own_clocks
+        self._hands_over_until_ns = clock.now_ns()
         self._lock = threading.Lock()
         self._done = threading.Condition(self._lock)
         # Held while the appender may rest. A lock costs a third of a condition's wake-up, of which there is one a read.
         self._rest = threading.Lock()
+        # Held by whoever takes records out of the queue until they are in the log: they stand there in their order.
+        self._order = threading.Lock()
         self._queue: list[Item] = []
         self._queued_bytes = 0
         self._appending = False
         self._overflows: dict[int, _Overflow] = {}
         self._dropped_records = self._dropped_bytes = 0
         self._error: WriteFailed | None = None
+        self._stopped = False
         self._closing = self._closed = False
         self._stop_sync = threading.Event()
         self._appender = threading.Thread(target=self._append_all, name="springmass-log", daemon=True)
@@ -159,11 +177,16 @@ class Recorder:
     data = put  # as a sink calls it
 
     def enqueue(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Take the bytes of one read as :meth:`put` does, to be appended at the next :meth:`wake` at the latest."""
+        """Take the bytes of one read as :meth:`put` does, to be appended at the next :meth:`append` at the latest."""
         self._offer(Kind.DATA, channel, host_ns, data)
 
+    def append(self) -> None:
+        """Append what is queued: on this thread, with ``own_clocks`` and while the disk is quick, else on another."""
+        if not (self._own_clocks and self._append_here()):
+            self.wake()
+
     def wake(self) -> None:
-        """Have what is queued appended; costs nothing where there is nothing."""
+        """Have what is queued appended by another thread; costs nothing where there is nothing."""
         with self._lock:
             if (self._queue or self._overflows or self._closing) and self._rest.locked():
                 self._rest.release()
@@ -232,34 +255,53 @@ class Recorder:
                 lost.records += 1
                 lost.bytes += len(payload)
 
-    def _take(self) -> list[Item]:
-        """Wait for records and take all of them; none when the recording closes.
+    def _append_here(self) -> bool:
+        """Append on the caller's thread; False where that is for the other one."""
+        began_ns = self._clock.now_ns()
+        if self._log.syncing or began_ns < self._hands_over_until_ns or not self._order.acquire(blocking=False):
+            return False
+        try:
+            if not self._stopped:
+                self._append_queued()
+        finally:
+            self._order.release()
+        ended_ns = self._clock.now_ns()
+        if ended_ns - began_ns > SLOW_NS:
+            self._hands_over_until_ns = ended_ns + PATIENCE_NS
+        return True
+
+    def _append_all(self) -> None:
+        while not self._stopped:
+            with self._order:
+                appended = self._append_queued()
+            if appended:
+                continue
+            with self._lock:
+                if self._closing and not (self._queue or self._overflows):
+                    return
+            # Whoever queues or closes releases it after that, so nothing since the look just now is slept over.
+            self._rest.acquire()
+
+    def _append_queued(self) -> bool:
+        """Append all that is queued, False where there was nothing; the caller holds ``_order``.
 
         What overflowed came after everything queued and before everything to come: its events stand in its place.
         """
-        while True:
-            with self._lock:
-                if self._queue or self._overflows:
-                    taken, self._queue, self._queued_bytes = self._queue, [], 0
-                    if self._overflows:
-                        taken += [lost.event(channel) for channel, lost in self._overflows.items()]
-                        self._overflows.clear()
-                    self._appending = True
-                    return taken
-                self._appending = False
-                self._done.notify_all()
-                if self._closing:
-                    return []
-            # Whoever queues releases it after that, so a record put since the look just now is not slept over.
-            self._rest.acquire()
-
-    def _append_all(self) -> None:
-        while taken := self._take():
+        with self._lock:
+            taken, self._queue, self._queued_bytes = self._queue, [], 0
+            if self._overflows:
+                taken += [lost.event(channel) for channel, lost in self._overflows.items()]
+                self._overflows.clear()
+            self._appending = bool(taken)
+        if taken:
             try:
                 self._log.extend(taken)
             except Exception as error:  # a defect, too, must stop the recording and not look like one
                 self._stop(self._one_line(error), taken[self._log.extended :])
-                return
+        with self._lock:
+            self._appending = False
+            self._done.notify_all()
+        return bool(taken)
 
     def _one_line(self, error: Exception) -> WriteFailed:
         if isinstance(error, WriteFailed):
@@ -270,13 +312,12 @@ class Recorder:
         """Keep what there is: what was appended can still be synced, though no more can be appended."""
         with self._lock:
             self._error = self._error or error
+            self._stopped = True
             left += self._queue
             self._queue = []
             self._queued_bytes = 0
             self._dropped_records += len(left)
             self._dropped_bytes += sum(len(payload) for *_, payload in left)
-            self._appending = False
-            self._done.notify_all()
         self._sync()
 
     def _sync_often(self) -> None:

@@ -34,7 +34,7 @@ class Log:
 
     enqueue = data
 
-    def wake(self) -> None:
+    def append(self) -> None:
         """Remember up to where it was to be appended."""
         self.awake = len(self.reads)
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import errno
 import shutil
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from acquisition.clock import VirtualClock
+from acquisition.clock import Clock, VirtualClock
 from acquisition.wired import Sink
 from storage.disk import DiskNearlyFull
 from storage.errors import RunExists, WriteFailed
@@ -34,6 +35,7 @@ class Disk:
         self.write_trouble: OSError | None = None
         self.sync_trouble: OSError | None = None
         self.room = 1 << 30
+        self.takes: Callable[[], None] = lambda: None
         self.threads: dict[str, set[str]] = {"write": set(), "sync": set()}
 
     def __call__(self, path: Path) -> LogFile:
@@ -43,6 +45,7 @@ class Disk:
     def write(self, data: bytes | memoryview) -> int:
         """Take what there is room for."""
         self._pass("write", self.writes_pass)
+        self.takes()
         taken = min(len(data), self.room - len(self.data))
         if self.write_trouble or not taken:
             raise self.write_trouble or OSError(errno.ENOSPC, "No space left on device")
@@ -65,10 +68,23 @@ class Disk:
             assert gate.wait(WAIT_S)
 
 
-def recorder(disk: Disk, *, sync_every_s: float = HOUR_S, queue_bytes: int = 1 << 20) -> Recorder:
+def recorder(
+    disk: Disk,
+    *,
+    sync_every_s: float = HOUR_S,
+    queue_bytes: int = 1 << 20,
+    own_clocks: bool = False,
+    clock: Clock | None = None,
+) -> Recorder:
     """Return a recorder to a file in memory."""
     return Recorder(
-        "run.wire", HEADER, VirtualClock(7), sync_every_s=sync_every_s, queue_bytes=queue_bytes, open_file=disk
+        "run.wire",
+        HEADER,
+        clock or VirtualClock(7),
+        sync_every_s=sync_every_s,
+        queue_bytes=queue_bytes,
+        own_clocks=own_clocks,
+        open_file=disk,
     )
 
 
@@ -134,6 +150,87 @@ def test_what_is_enqueued_is_appended_when_the_log_is_woken() -> None:
     recording.enqueue(0, 10, b"last")
     recording.close()
     assert [record.payload for record in parse_log(bytes(disk.data)) if record.kind is Kind.DATA][-1] == b"last"
+
+
+def test_what_needs_no_host_stamp_is_appended_by_the_thread_that_asks() -> None:
+    """Where sensors have clocks of their own the records are in the log when the call returns, in one write."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=True)
+    for number in range(10):
+        recording.enqueue(0, number, b"x")
+    recording.append()
+    assert (recording.status.queued_records, recording.status.records) == (0, 11)
+    recording.close()
+    assert disk.threads["write"] == {"MainThread"}
+
+
+def test_the_thread_that_asks_does_not_wait_for_a_sync() -> None:
+    """While fdatasync has the file, another thread appends."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=True, sync_every_s=1e-4)
+    disk.syncs_pass.clear()
+    recording.enqueue(0, 0, b"first")
+    recording.append()
+    assert disk.held.wait(WAIT_S)
+    disk.writes_pass.clear()
+    recording.enqueue(0, 1, b"second")
+    recording.append()
+    assert recording.status.queued_records + recording.status.records >= 2
+    disk.writes_pass.set()
+    assert recording.drain().records == 3
+    assert disk.threads["write"] == {"MainThread", "springmass-log"}
+    disk.syncs_pass.set()
+    recording.close()
+
+
+def test_after_a_slow_write_another_thread_appends_for_a_while() -> None:
+    """A write that took 6 ms hands the next ten seconds over; then the thread that asks appends again."""
+    disk, clock = Disk(), VirtualClock()
+    recording = recorder(disk, own_clocks=True, clock=clock)
+
+    def threads_of(seconds: float) -> set[str]:
+        """Append one record that takes so long, and tell on which thread."""
+        disk.threads["write"].clear()
+        disk.takes = lambda: clock.sleep_until_ns(clock.now_ns() + round(seconds * 1e9))
+        recording.enqueue(0, 0, b"x")
+        recording.append()
+        recording.drain()
+        return disk.threads["write"]
+
+    assert threads_of(0.001) == {"MainThread"}
+    assert threads_of(0.006) == {"MainThread"}
+    assert threads_of(9.99) == {"springmass-log"}
+    assert threads_of(0.011) == {"springmass-log"}
+    assert threads_of(0.0) == {"MainThread"}
+    recording.close()
+
+
+def test_records_stand_in_their_order_whichever_thread_appends(tmp_path: Path) -> None:
+    """A mark wakes the other thread while the reading thread appends: the log keeps the queue's order."""
+    recording = Recorder(tmp_path / "run.wire", HEADER, VirtualClock(), own_clocks=True, sync_every_s=1e-4)
+    for number in range(3000):
+        recording.enqueue(0, number, b"%d" % number)
+        if number % 3 == 0:
+            recording.mark(str(number), host_ns=number)
+        recording.append()
+    recording.close()
+    records = [r for r in read_log(tmp_path / "run.wire") if r.kind in (Kind.DATA, Kind.MARK)]
+    assert [r.mono_ns for r in records] == sorted(r.mono_ns for r in records)
+    assert [int(r.payload) for r in records if r.kind is Kind.DATA] == list(range(3000))
+
+
+def test_a_full_disk_stops_the_appending_of_the_thread_that_asks() -> None:
+    """It is told by the status and by closing, and never raised to the thread that reads ports."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=True)
+    disk.room = len(disk.data) + 50
+    for number in range(5):
+        recording.enqueue(0, number, b"R%04d\r" % number)
+        recording.append()
+    assert "No space left on device" in recording.status.error
+    assert (recording.status.queued_records, recording.status.records + recording.status.dropped_records) == (0, 6)
+    with pytest.raises(WriteFailed, match="could not be written further"):
+        recording.close()
 
 
 def test_a_slow_sync_holds_up_no_write() -> None:
