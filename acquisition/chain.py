@@ -35,6 +35,8 @@ class SensorChain:
     calibration : Calibration, optional
     """
 
+    __slots__ = ("_broken", "_held", "_next", "calibration", "decoder", "family", "last", "timebase")
+
     def __init__(
         self,
         family: Family,

@@ -81,6 +81,21 @@ class Timebase:
     the host clock, and the first reading after it is flagged.
     """
 
+    __slots__ = (
+        "_anchor_s",
+        "_clock",
+        "_count",
+        "_last_host_ns",
+        "_last_raw",
+        "_latest_s",
+        "_longest_s",
+        "_period_s",
+        "_ticks",
+        "gaps",
+        "rate_hz",
+        "restarts",
+    )
+
     def __init__(self, rate_hz: float) -> None:
         if not (math.isfinite(rate_hz) and rate_hz > 0):
             raise ValueError(f"rate_hz must be positive and finite, got {rate_hz}")

@@ -55,6 +55,8 @@ class LineProtocolDecoder:
     ``unknown_record``.
     """
 
+    __slots__ = ("_faults", "_lines")
+
     def __init__(self) -> None:
         self._faults = {"garbage_bytes": 0, "bad_checksum": 0, "bad_frame": 0, "unknown_record": 0, "comment": 0}
         self._lines = LineSplitter(b"\n", LONGEST, self._faults)

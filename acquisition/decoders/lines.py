@@ -26,6 +26,8 @@ class LineSplitter:
         Whether the next byte begins a line, and one that is not to be dropped.
     """
 
+    __slots__ = ("_end", "_faults", "_held", "_limit", "_overlong", "_skip", "_skip_first", "between")
+
     def __init__(self, end: bytes, limit: int, faults: dict[str, int], *, skip_first: bool = False) -> None:
         self._end = end
         self._limit = limit
