@@ -5,10 +5,10 @@ from __future__ import annotations
 from pipeline.analyse import Params
 from pipeline.damping import Params as DampingParams
 from pipeline.errors import AnalysisError
+from pipeline.quick_models import FAST_LAWS
 
 __all__ = ["TIERS", "params_for"]
 
-FAST_LAWS = ("none", "linear", "quadratic", "linear+quadratic")
 TIERS = ("fast", "standard", "best")
 
 

@@ -23,10 +23,10 @@ from pipeline.regression import Scatter, chi2_quantile, correlation_length
 from pipeline.rest import Rest
 from pipeline.track import F8
 
-__all__ = ["fit_damping_quickly", "fit_phase_quickly", "fit_rest_quickly"]
+__all__ = ["FAST_LAWS", "fit_damping_quickly", "fit_phase_quickly", "fit_rest_quickly"]
 
-LAWS_TRIED = ("none", "linear", "quadratic", "linear+quadratic")
-MIXTURE = LAWS_TRIED[-1]
+FAST_LAWS = ("none", "linear", "quadratic", "linear+quadratic")
+MIXTURE = FAST_LAWS[-1]
 STEPS = 4  # Gauss-Newton's; from curves through the logarithms two suffice
 
 
@@ -53,7 +53,7 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
     """
     t, y = demodulated.t - t0, demodulated.amplitude
     u = np.sqrt(demodulated.covariance[:, 0, 0])
-    if set(params.laws) != set(LAWS_TRIED) or t.size < 8 or not y.min() > 5.0 * u.max():
+    if set(params.laws) != set(FAST_LAWS) or t.size < 8 or not y.min() > 5.0 * u.max():
         return None
     weight = 1.0 / u
     start = _start(t, y, y * weight)
@@ -62,10 +62,10 @@ def fit_damping_quickly(demodulated: Demodulated, t0: float, params: DampingPara
         return None
     if rich.chi2 > chi2_quantile(0.99, t.size - 3) or correlation_length(rich.residual) > 1.0:
         return None
-    settled = {name: _special(name, t, y, weight, rich) for name in LAWS_TRIED[:-1]}
+    settled = {name: _special(name, t, y, weight, rich) for name in FAST_LAWS[:-1]}
     settled[MIXTURE] = rich
     fits = {name: _weigh(LAWS[name], each, t.size, params) for name, each in settled.items() if each is not None}
-    if len(fits) < len(LAWS_TRIED):
+    if len(fits) < len(FAST_LAWS):
         return None
     allowed = [name for name in fits if not fits[name].rejected]
     if not allowed:
@@ -140,6 +140,7 @@ def _settled(name: str, t: F8, y: F8, weight: F8, theta: F8) -> _Settled | None:
             # A thirtieth of a standard uncertainty is left, quadratic convergence takes it away.
             if 0.0 <= gain <= 1e-3 * max(1.0, chi2 / t.size):
                 return _Settled(theta, normal, inverse, chi2 - gain, residual)
+            # A special case that the record contradicts need not settle: it is rejected either way.
             if taken and chi2 > 4.0 * t.size and gain < 0.1 * chi2:
                 return _Settled(theta, normal, inverse, chi2, residual)
     return None

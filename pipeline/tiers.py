@@ -18,7 +18,7 @@ from pipeline.demodulate import Params as DemodulateParams
 from pipeline.phase import Params as PhaseParams
 from pipeline.phase import PhaseFit, fit_phase
 from pipeline.quick import Quick
-from pipeline.quick_models import fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
+from pipeline.quick_models import FAST_LAWS, fit_damping_quickly, fit_phase_quickly, fit_rest_quickly
 from pipeline.quick_start import condition_quickly, find_cycles_quickly
 from pipeline.rest import Rest, fit_rest
 from pipeline.track import Track
@@ -63,8 +63,10 @@ def models_of(tier: Tier, quick: Quick | None) -> Models:
 
 def _fit_damping(demodulated: Demodulated, t0: float, params: DampingParams) -> Damping:
     found = fit_damping_quickly(demodulated, t0, params) or fit_damping(demodulated, t0, params)
+    if found.admissible or set(params.laws) != set(FAST_LAWS):
+        return found
     # Few laws are tried for speed; where none of them holds, a wrong one would be stated.
-    return found if found.admissible else fit_damping(demodulated, t0, replace(params, laws=DampingParams().laws))
+    return fit_damping(demodulated, t0, replace(params, laws=DampingParams().laws))
 
 
 def _fit_phase(demodulated: Demodulated, damping: Damping, params: PhaseParams) -> PhaseFit:
