@@ -138,7 +138,7 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
             raise FormatError(name, "expected a file, got a directory", "name a recording inside it")
         if not stat.S_ISREG(mode):
             raise FormatError(name, "expected a regular file, got a device or pipe", "save it to a file first")
-        with open(name, "rb") as file:
+        with open(name, "rb", buffering=0) as file:  # what is read at once needs no copy
             head = file.read(HEAD_BYTES)
             if not head:
                 raise FormatError(name, "expected a recording, got an empty file", "check that the export ended")

@@ -177,12 +177,13 @@ def _samples(
     else:
         t = place(pulled.printed, rows, timing)
     told = np.isfinite(t)
-    if np.isnan(value[told]).all():
+    every = bool(told.all())
+    if np.isnan(value if every else value[told]).all():
         demand = f'expected numbers as "{channel.name}", got NaN in all {value.size} rows'
         raise FormatError(path, demand, "record the run again")
     traps = tuple(row_traps(rows, told, zeros))
     where = None
-    if not told.all():
+    if not every:
         where = np.flatnonzero(told)
         t, value, bad = t[where], value[where], bad[where]
 

@@ -67,8 +67,8 @@ def evidence(text: str) -> str:
             return f'line {number} is the title "{line.strip()}"'
     if found := _column_line(lines):
         return f"line {found[0] + 1} is the column line of {found[1].quantity} in {found[1].unit}"
-    start = _first_row(lines)
-    shape = _shape(lines[start:]) if 0 <= start <= 1 else None
+    start = _first_row(lines[:2])
+    shape = _shape(lines[start:]) if start >= 0 else None
     return f"the rows have the shape of {shape.assumed}" if shape else ""
 
 
@@ -127,6 +127,8 @@ def _head_lines(text: str) -> list[str]:
 
 def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
     """Find the column line above the first row."""
+    if not any(_TIME in line.lower() for line in lines[:_HEADER_LINES]):
+        return None
     for at, line in enumerate(lines[:_HEADER_LINES]):
         if _is_row(line):
             return None
