@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 
-__all__ = ["Page", "exceeding", "is_fixed", "read_alike", "read_fixed"]
+__all__ = ["Page", "exceeding", "is_fixed", "read_alike", "read_fixed", "read_signed"]
 
 PAD = 16
 """Bytes in front of a page, so that a word may begin before the first cell."""
@@ -34,6 +34,8 @@ _TOP_BITS = _U8(0x8080808080808080)
 _ABOVE_NINE, _ABOVE_NOTHING = 0x76, 0x7F
 _SIGN_BIT = _U8(63)
 _ALL = (1 << 64) - 1
+# Times a word of which byte n is 1 and all others 0: its last byte becomes n.
+_PLACE = _U8(int.from_bytes(range(_WORD), "big"))
 # Of a word's last n bytes, which are its most significant.
 _LAST = np.array([_ALL ^ ((1 << 8 * (_WORD - n)) - 1) for n in range(_WORD + 1)], np.uint64)
 
@@ -54,23 +56,53 @@ class Page:
 
     def __init__(self, text: NDArray[np.uint8]) -> None:
         self._padded = np.zeros(0, np.uint8)
-        self._mask = np.empty(0, bool)
+        self._mask = np.zeros(0, bool)
         self._room = np.empty((2, 0), np.uint64)
         self.fill(text)
 
     def fill(self, text: NDArray[np.uint8]) -> None:
-        """Take another text."""
+        """Take a copy of another text."""
         if PAD + text.size > self._padded.size:
             self._padded = np.zeros(PAD + text.size, np.uint8)
-            self._mask = np.empty(text.size, bool)
-        self.raw = self._padded[PAD : PAD + text.size]
-        self.raw[:] = text
+        self._padded[PAD : PAD + text.size] = text
+        self._show(self._padded, PAD, PAD + text.size)
+
+    def show(self, text: NDArray[np.uint8], begin: int, end: int) -> None:
+        """Take a piece of another text: where it stands, if there is enough before it, for a copy costs memory anew."""
+        if begin < _WORD:
+            self.fill(text[begin:end])
+        else:
+            self._show(text, begin, end)
+
+    def _show(self, text: NDArray[np.uint8], begin: int, end: int) -> None:
+        self.raw = text[begin:end]
         # words[i] holds the eight bytes before byte i of raw, the last of them as the most significant.
-        self.words = np.ndarray((text.size + 1,), "<u8", self._padded.data, PAD - _WORD, (1,))
+        self.words = np.ndarray((end - begin + 1,), "<u8", text.data, begin - _WORD, (1,))
+        if self.raw.size > self._mask.size:
+            self._mask = np.zeros(-(-self.raw.size // _WORD) * _WORD, bool)
 
     def below(self, byte: int) -> NDArray[np.bool_]:
         """Tell where bytes below another stand; the answer holds until the next one."""
         return np.less(self.raw, byte, out=self._mask[: self.raw.size])
+
+    def equal(self, byte: int) -> NDArray[np.bool_]:
+        """Tell where a byte stands; the answer holds until the next one."""
+        return np.equal(self.raw, byte, out=self._mask[: self.raw.size])
+
+    def places(self, byte: int) -> I8:
+        """Return where a byte stands, fastest if it does so a few dozen bytes apart."""
+        found = self.equal(byte)
+        self._mask[found.size :] = False
+        words = self._mask[: -(-found.size // _WORD) * _WORD].view("<u8")
+        at = np.flatnonzero(words != 0)
+        one = words.take(at)
+        if (one & (one - _U8(1))).any():  # some words hold two of them
+            return np.flatnonzero(found)
+        one *= _PLACE
+        one >>= _U8(8 * (_WORD - 1))
+        at <<= 3
+        at += one.view(np.int64)
+        return at
 
     def room(self, slot: int, count: int) -> U64:
         """Return one of two arrays to calculate in; what is in it holds until it is asked for again."""
@@ -168,32 +200,68 @@ def read_fixed(
     value = np.empty(end.size) if out is None else out
     if not end.size:
         return value, None
-    if decimals >= MOST_DIGITS:
-        value[:] = np.nan
-        return value, np.zeros(end.size, bool)
     negative = page.raw.take(begin, mode="clip") == _MINUS
-    signed = bool(negative.any())
-    digits = end - begin
-    if decimals:
-        digits -= 1
-    if signed:
-        digits -= negative
+    length = end - begin
+    if negative.any():
+        length -= negative
+        return value, read_signed(page, end, length, negative, (decimals, shift), points, value)
+    return value, read_signed(page, end, length, None, (decimals, shift), points, value)
+
+
+def read_signed(
+    page: Page,
+    end: I8,
+    length: I8,
+    negative: NDArray[np.bool_] | None,
+    form: tuple[int, int],
+    points: bytes,
+    out: F8,
+) -> NDArray[np.bool_] | None:
+    """Read cells that are ``-?digits.decimals``, their signs and lengths known.
+
+    Parameters
+    ----------
+    page : Page
+    end : (m,) int64
+        Where each cell ends; at least one.
+    length : (m,) or (1,) int64
+        Characters of each, without a minus; one number if all have as many.
+    negative : (m,) bool or None
+        Cells that begin with a minus; None where none does.
+    form : (int, int)
+        Digits behind the point, and the power of ten that the numbers are multiplied with.
+    points : bytes
+        What is a decimal mark.
+    out : (m,) float64
+        Receives the values, each rounded once; NaN in cells that are not plain.
+
+    Returns
+    -------
+    (m,) bool or None
+        Cells that are of this form; None where all are.
+    """
+    decimals, shift = form
+    if decimals >= MOST_DIGITS:
+        out[:] = np.nan
+        return np.zeros(end.size, bool)
+    digits = length - 1 if decimals else length.copy()
     odd: NDArray[np.bool_] | None = None
     least, most = int(digits.min()), int(digits.max())
     if most > MOST_DIGITS or least <= decimals:
         odd = (digits <= decimals) | (digits > MOST_DIGITS)
         digits[odd] = decimals + 1
         most = int(digits.max())
+        odd = np.broadcast_to(odd, end.shape)
     elif least == most:
         digits = digits[:1]  # one number for all cells
     total, odd = _digits(page, end, digits, most, decimals, points, odd)
-    _scale(total, decimals - shift, 1.0, value)
-    if signed:
-        value.view(np.uint64)[:] ^= negative.astype(np.uint64) << _SIGN_BIT  # no branch, so no wrong guess of one
+    _scale(total, decimals - shift, 1.0, out)
+    if negative is not None:
+        out.view(np.uint64)[:] ^= negative.astype(np.uint64) << _SIGN_BIT  # no branch, so no wrong guess of one
     if odd is None:
-        return value, None
-    value[odd] = np.nan
-    return value, ~odd
+        return None
+    out[odd] = np.nan
+    return ~odd
 
 
 def _digits(

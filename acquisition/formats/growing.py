@@ -61,6 +61,10 @@ class Growing(Generic[_T]):
             self._one = None
         return self._array[start : self._rows]
 
+    def drop(self, count: int) -> None:
+        """Take so many rows off the end."""
+        self._rows -= count
+
     def whole(self) -> NDArray[_T]:
         """Return all rows; a read-only view of one number where it is the same in all."""
         if self._one is not None:

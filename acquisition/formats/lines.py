@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from acquisition.block import I8
 from acquisition.formats.fixed_point import Page, exceeding
 
-__all__ = ["NEWLINE", "RETURN", "Alike", "Lines", "alike_lines", "next_page"]
+__all__ = ["NEWLINE", "RETURN", "Alike", "Lines", "alike_lines", "next_page", "starts_of"]
 
 NEWLINE, RETURN = ord("\n"), ord("\r")
 _TAB, _BLANK = ord("\t"), ord(" ")
@@ -21,15 +21,20 @@ U8 = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
 
-def next_page(raw: U8, at: int, size: int, delimiter: str) -> tuple[U8, int]:
-    """Return about so many bytes of whole lines, ended by LF, and where they end."""
+def next_page(raw: U8, at: int, size: int, delimiter: str, page: Page) -> int:
+    """Put about so many bytes of whole lines, ended by LF, on a page, and return where they end."""
     end = min(at + size, raw.size)
     if end < raw.size:
         end = _line_end(raw, at, end)
-    page = raw[at:end]
-    if page[-1] != NEWLINE:
-        page = np.append(page, np.uint8(NEWLINE))
-    return page if delimiter else _tabbed(page), end
+    text = raw[at:end]
+    ended = text[-1] == NEWLINE
+    if ended and delimiter:
+        page.show(raw, at, end)
+        return end
+    if not ended:
+        text = np.append(text, np.uint8(NEWLINE))
+    page.fill(text if delimiter else _tabbed(text))
+    return end
 
 
 def _line_end(raw: U8, at: int, end: int) -> int:
@@ -136,7 +141,7 @@ class Lines(NamedTuple):
         ends, newline = ends[kept], newline[kept]
         last = np.flatnonzero(newline)
         stop, cells = ends[last], np.diff(last, prepend=-1)
-        start = _starts(stop)
+        start = starts_of(stop)
         if returns:
             paired = page.raw.take(stop - 1, mode="clip") == RETURN
             if np.count_nonzero(paired & (stop > start)) != returns:
@@ -162,7 +167,7 @@ class Lines(NamedTuple):
             return None
         every = ends.reshape(count, size)[:, :cells]
         first = np.arange(0, count * cells, cells)
-        return cls(_starts(newlines), stop, every.ravel(), first, np.broadcast_to(np.int64(cells), count), cells)
+        return cls(starts_of(newlines), stop, every.ravel(), first, np.broadcast_to(np.int64(cells), count), cells)
 
     def keep(self, rows: Mask) -> Lines:
         """Return some of the lines."""
@@ -212,7 +217,8 @@ def _may_end(page: Page, mark: int) -> Mask:
     return found
 
 
-def _starts(newlines: I8) -> I8:
+def starts_of(newlines: I8) -> I8:
+    """Return where lines start, from where each ends."""
     start = np.empty_like(newlines)
     start[0] = 0
     np.add(newlines[:-1], 1, out=start[1:])

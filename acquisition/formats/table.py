@@ -1,9 +1,11 @@
 """Rows of numbers: the one reader of cells behind every text format.
 
 Lines are taken a page at a time. Where all of a page are laid out alike, each column is one calculation over the page.
-Else the page's separators are found all at once; cells of the form that a column usually has become numbers together,
-column by column (:mod:`acquisition.formats.fixed_point`), then those of other forms, form by form; what is left is read
-singly. Each cell keeps its form, and by the forms a number that was cut is known.
+Where they are not, but hold numbers of the forms they held before, cells are walked to from the start of each line
+(:mod:`acquisition.formats.walk`). Else the page's separators are found all at once; cells of the form that a column
+usually has become numbers together, column by column (:mod:`acquisition.formats.fixed_point`), then those of other
+forms, form by form; what is left is read singly. Each cell keeps its form, and by the forms a number that was cut is
+known.
 """
 
 from __future__ import annotations
@@ -16,10 +18,11 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 from acquisition.formats.cells import EMPTY, EXPONENT, UNREAD, read_column, read_single
-from acquisition.formats.fixed_point import Page, is_fixed, read_alike
+from acquisition.formats.fixed_point import Page, is_fixed, read_alike, read_signed
 from acquisition.formats.growing import Growing
 from acquisition.formats.lines import NEWLINE, RETURN, Alike, Lines, alike_lines, next_page
 from acquisition.formats.text import Text
+from acquisition.formats.walk import Walk
 
 __all__ = ["Table", "read_table"]
 
@@ -120,19 +123,19 @@ def read_table(
     """
     start = text.start if start is None else start
     stop = text.stop if stop is None else stop
-    raw = np.frombuffer(text.data, np.uint8)[start:stop]
+    raw = np.frombuffer(text.data, np.uint8)[:stop]
     rows = _Rows(tuple(columns), delimiter, width, tuple(shifts) or (0,) * len(columns))
     # glibc hands back what is freed on top of its heap, unless a larger block was freed once; to fetch it anew, page
     # after page, costs more than to calculate in it.
     np.empty(_KEPT_BYTES, np.uint8)
-    at, size = 0, _PAGE_BYTES[0]
-    while at < raw.size:
-        page, end = next_page(raw, at, size, delimiter)
+    at, size = start, _PAGE_BYTES[0]
+    while at < stop:
+        end = next_page(raw, at, size, delimiter, rows.page)
         before = rows.rows
-        rows.take(page, (raw.size - at) / (end - at))
+        rows.take((stop - at) / (end - at))
         long = (end - at) / max(rows.rows - before, 1)
         at, size = end, int(min(max(long * _PAGE_ROWS, _PAGE_BYTES[0]), _PAGE_BYTES[1]))
-    return rows.table(first_line, ended=not raw.size or int(raw[-1]) in (NEWLINE, RETURN))
+    return rows.table(first_line, ended=start >= stop or int(raw[-1]) in (NEWLINE, RETURN))
 
 
 class _Rows:
@@ -153,18 +156,22 @@ class _Rows:
         self.page = Page(np.zeros(1, np.uint8))
         self.last = b""
         self.last_cells = 0
+        # Pages that are not walked, and how many will not be when one could not be walked.
+        self.halt, self.halts = 0, 1
 
-    def take(self, text: NDArray[np.uint8], pages: float) -> None:
-        """Read the rows of one page; ``pages`` like it are left, it included."""
+    def take(self, pages: float) -> None:
+        """Read the rows on the page; ``pages`` like it are left, it included."""
         page = self.page
-        page.fill(text)
         alike = alike_lines(page, self.mark)
         if alike is not None and self._take_alike(alike, pages):
             return
+        if self._take_walking(pages):
+            return
         lines = Lines.of(page, self.mark)
         if lines is None:
-            unified = text.tobytes().replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-            self.take(np.frombuffer(unified, np.uint8), pages)
+            unified = page.raw.tobytes().replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+            page.fill(np.frombuffer(unified, np.uint8))
+            self.take(pages)
             return
         blank = lines.blank(page.raw)
         if blank is not None:
@@ -198,7 +205,43 @@ class _Rows:
             self.counts[k, form] += count
         self.bad.repeat(False, count, expected)
         begin, end = (at + (count - 1) * lines.width for at in lines.cells[0])
-        self._end(count, page.raw[begin:end], len(lines.cells))
+        self._end(count, page.raw[begin:end].tobytes(), len(lines.cells))
+        return True
+
+    def _take_walking(self, pages: float) -> bool:
+        """Read lines whose first columns are asked for, if each cell has the form that its column had; tell whether."""
+        if self.width not in (None, len(self.columns)) or self.columns != tuple(range(len(self.columns))):
+            return False
+        if not all(0 <= usual < EXPONENT for usual in self.usual):
+            return False
+        if self.halt:
+            self.halt -= 1
+            return False
+        walk = Walk.of(self.page, self.mark, len(self.columns))
+        if walk is None or (self.width is not None and walk.closers[-1] == self.mark) or not self._walk(walk, pages):
+            self.halt, self.halts = self.halts, 2 * self.halts
+            return False
+        self.halts = 1
+        return True
+
+    def _walk(self, walk: Walk, pages: float) -> bool:
+        """Read the cells that a walk finds, or nothing; tell whether all are numbers of their columns' usual forms."""
+        page, count = self.page, walk.start.size
+        expected = self._expected(count, pages)
+        for k, (cells, usual) in enumerate(zip(walk.columns(), self.usual, strict=True)):
+            room = self.values[k].room(count, expected)
+            if cells is None or read_signed(page, *cells, (usual, self.shifts[k]), self.points, room) is not None:
+                for column in self.values[: k + 1]:
+                    column.drop(count)
+                return False
+            if usual and not self.padded[k]:
+                self.padded[k] = bool((page.raw.take(cells.end - 1, mode="clip") == _ZERO).any())
+        for k, form in enumerate(self.form):
+            form.repeat(self.usual[k], count, expected)
+            self.counts[k, self.usual[k]] += count
+        self.bad.repeat(False, count, expected)
+        last = page.raw[int(walk.start[-1]) : -1].tobytes().removesuffix(b"\r").split(bytes((self.mark,)))
+        self._end(count, last[0], len(last))
         return True
 
     def _take_lines(self, lines: Lines, pages: float) -> None:
@@ -227,16 +270,16 @@ class _Rows:
             else:
                 self.counts[k, self.usual[k]] += count
         begin, end = lines.bounds(0)
-        self._end(count, page.raw[int(begin[-1]) : int(end[-1])], int(lines.cells[-1]))
+        self._end(count, page.raw[int(begin[-1]) : int(end[-1])].tobytes(), int(lines.cells[-1]))
 
     def _expected(self, count: int, pages: float) -> int:
         """Return how many rows there will be, if so many pages come with as many rows each."""
         return self.rows + int(count * max(pages, 1.0) * 1.02) + 1
 
-    def _end(self, count: int, cell: NDArray[np.uint8], cells: int) -> None:
-        """Note how a page of rows ended."""
+    def _end(self, count: int, cell: bytes, cells: int) -> None:
+        """Note how a page of rows ended: the first cell of the last, and how many it has."""
         self.rows += count
-        self.last, self.last_cells = cell.tobytes(), cells
+        self.last, self.last_cells = cell, cells
 
     def table(self, first_line: int, *, ended: bool) -> Table:
         """Return the rows taken, with numbers that were cut marked."""

@@ -15,6 +15,9 @@ from hypothesis import strategies as st
 
 from acquisition.errors import FormatError
 from acquisition.formats import cells
+from acquisition.formats import table as table_module
+from acquisition.formats.fixed_point import Page
+from acquisition.formats.lines import Lines
 from acquisition.formats.motion_sensor import FORMAT
 from acquisition.formats.table import Table, read_table
 from acquisition.formats.text import Text, decode, parse_number, split_cells, unify
@@ -160,9 +163,10 @@ def bodies(draw: st.DrawFn) -> tuple[str, int, str]:
     return body + draw(st.sampled_from(["", "\n", "\n\n", "\t"])), columns, delimiter
 
 
-def read_both(oracle: ModuleType, body: str, columns: int, delimiter: str) -> Table:
+def read_both(oracle: ModuleType, body: str, columns: int, delimiter: str, newline: str = "\n") -> Table:
     """Demand that the reader of pages gives what plain Python gives row by row, bit for bit; return its table."""
-    table = read_table(Text.of(body.encode()), range(columns), delimiter, width=columns, first_line=7)
+    text = Text.of(body.replace("\n", newline).encode())
+    table = read_table(text, range(columns), delimiter, width=columns, first_line=7)
     expected = oracle.read_rows(body.rstrip("\0"), columns, delimiter, 7)  # zero bytes at the end are no text
     assert [table.line(row) for row in range(len(table))] == expected.line
     # Beyond what cannot be read at all the table also refuses numbers that were cut.
@@ -230,6 +234,76 @@ def test_a_file_of_many_pages_has_no_seams(rows_oracle: ModuleType, delimiter: s
         assert table.values[1].tolist() == [row[1] for row in expected.values]
         assert table.values[0].tolist() == [row[0] for row in expected.values]
         assert (table.line(39_999), int(table.bad.sum())) == (40_000, 0)
+
+
+@st.composite
+def signed_columns(draw: st.DrawFn) -> tuple[list[str], int, str]:
+    """Draw rows whose columns print the same decimals throughout, but for a few; how many columns, and a delimiter."""
+    delimiter = draw(st.sampled_from("\t;, "))
+    decimals = draw(st.lists(st.integers(0, 7), min_size=1, max_size=3))
+    sizes = draw(st.sampled_from([(1.0,), (1.0, 9.0), (1.0, 9.0, 99.0, 12345.0), (1e7, 1e9)]))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count = draw(st.integers(20, 80))
+    columns = [rng.uniform(-1, 1, count) * rng.choice(sizes, count) for _ in decimals]
+    rows = [[f"{x:.{places}f}" for x, places in zip(row, decimals, strict=True)] for row in zip(*columns, strict=True)]
+    for _ in range(draw(st.integers(0, 2))):
+        row = rows[draw(st.integers(0, count - 1))]
+        row[draw(st.integers(0, len(row) - 1))] = draw(st.one_of(ODD_CELL, PLAIN_CELL))
+    lines = [delimiter.join(row) for row in rows]
+    for _ in range(draw(st.integers(0, 2))):
+        odd = draw(st.sampled_from(["", "text", "0.1", f"1.5{delimiter}2.5{delimiter}3.5{delimiter}4.5", delimiter]))
+        lines.insert(draw(st.integers(0, count)), odd)
+    if draw(st.booleans()):
+        lines = [line + delimiter for line in lines]
+    return lines, len(decimals), delimiter.strip(" ")
+
+
+@settings(max_examples=400, deadline=None)
+@given(drawn=signed_columns(), newline=st.sampled_from(["\n", "\r\n", "\r"]), cut=st.integers(0, 9))
+def test_cells_that_are_walked_to_are_read_as_plain_python_reads_rows(
+    rows_oracle: ModuleType, drawn: tuple[list[str], int, str], newline: str, cut: int
+) -> None:
+    """Signs, lengths that change, odd cells and lines in the midst of short pages: every number and line as by rows."""
+    lines, columns, delimiter = drawn
+    body = "\n".join(lines)
+    body = body[: len(body) - cut]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(table_module, "_PAGE_BYTES", (64, 160))
+        read_both(rows_oracle, body, columns, delimiter, newline)
+        # Ragged rows: the last column asked for first is never walked to.
+        text = Text.of(body.replace("\n", newline).encode())
+        order = list(range(columns))
+        walked, searched = (read_table(text, each, delimiter) for each in (order, order[::-1]))
+    assert walked.bad.tobytes() == searched.bad.tobytes()
+    assert (walked.last_cell, walked.cut, walked.decimals) == (
+        searched.last_cell,
+        searched.cut,
+        searched.decimals[::-1],
+    )
+    for column in order:
+        assert walked.values[column].tobytes() == searched.values[-1 - column].tobytes()
+        assert walked.form[column].tobytes() == searched.form[-1 - column].tobytes()
+
+
+@pytest.mark.parametrize("end", [",\n", "\n", ",\r\n"])
+def test_pages_of_signed_numbers_are_walked(monkeypatch: pytest.MonkeyPatch, end: str) -> None:
+    """Separators are searched for on the first page and where a row is odd, not on the others."""
+    searched: list[int] = []
+    of = Lines.of
+
+    def counting(page: Page, mark: int) -> Lines | None:
+        searched.append(page.raw.size)
+        return of(page, mark)
+
+    monkeypatch.setattr(Lines, "of", counting)
+    values = np.random.default_rng(5).normal(0, 8, (40_000, 2))
+    lines = [f"{i / 100:.3f},{a:.6f},{b:.6f}{end}" for i, (a, b) in enumerate(values)]
+    table = read_table(Text.of("".join(lines).encode()), (0, 1), ",")
+    assert table.values[1].tolist() == [float(f"{a:.6f}") for a, _ in values]
+    assert len(searched) == 1
+    lines[20_000] = f"here I touched it{end}"
+    assert np.flatnonzero(read_table(Text.of("".join(lines).encode()), (0, 1), ",").form[0] < 0).tolist() == [20_000]
+    assert len(searched) <= 4
 
 
 EXPONENT_CELL = st.builds(

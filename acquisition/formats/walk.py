@@ -1,0 +1,117 @@
+"""Cells found without a search for separators: from the start of each line on, by the lengths of the first one's cells.
+
+Where a column prints fixed point, its cells differ in length by a sign and now and then by a digit. So a cell ends
+where the first line's would, or a character or two beside, and a separator stands there. That none stands before,
+reading the cell shows: what lies between is digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.block import I8
+from acquisition.formats.fixed_point import Page
+from acquisition.formats.lines import NEWLINE, RETURN, starts_of
+
+__all__ = ["Cells", "Walk"]
+
+_LONGEST_LINE = 512
+_MINUS = ord("-")
+_BESIDE = 1, -1, 2, -2
+
+Mask = NDArray[np.bool_]
+
+
+class Cells(NamedTuple):
+    """Where the cells of one column may be; they are there if each holds a number and nothing else.
+
+    Parameters
+    ----------
+    end : (n,) int64
+    length : (n,) or (1,) int64
+        Characters of each, without a minus; one number if all have as many.
+    negative : (n,) bool or None
+        Cells that begin with a minus; None where none does.
+    """
+
+    end: I8
+    length: I8
+    negative: Mask | None
+
+
+class Walk(NamedTuple):
+    """Lines of a page, and the cells at the begin of the first.
+
+    Parameters
+    ----------
+    page : Page
+    start : (n,) int64
+        Where each line starts.
+    lengths : tuple of int
+        Characters of each cell of the first line, without a minus.
+    closers : tuple of int
+        The byte behind each of them.
+    """
+
+    page: Page
+    start: I8
+    lengths: tuple[int, ...]
+    closers: tuple[int, ...]
+
+    @classmethod
+    def of(cls, page: Page, mark: int, columns: int) -> Walk | None:
+        """Find the lines; None where the first has fewer cells, or a CR stands alone."""
+        line = page.raw[:_LONGEST_LINE].tobytes()
+        line = line[: line.find(b"\n") + 1]
+        content = line.removesuffix(b"\n").removesuffix(b"\r")
+        cells = content.split(bytes((mark,)))
+        if not line or len(cells) < columns:
+            return None
+        closers = [mark] * (len(cells) - 1) + [line[len(content)]]
+        returns = int(np.count_nonzero(page.equal(RETURN)))
+        ends = page.places(NEWLINE)
+        if returns and (returns != ends.size or (page.raw.take(ends - 1, mode="clip") != RETURN).any()):
+            return None
+        lengths = [len(cell) - cell.startswith(b"-") for cell in cells]
+        return cls(page, starts_of(ends), tuple(lengths[:columns]), tuple(closers[:columns]))
+
+    def columns(self) -> Iterator[Cells | None]:
+        """Yield the cells of one column after the other; None, and no more, where some are not to be found."""
+        raw, begin = self.page.raw, self.start
+        for length, closer in zip(self.lengths, self.closers, strict=True):
+            negative = raw.take(begin, mode="clip") == _MINUS
+            signed = bool(negative.any())
+            end = begin + length
+            if signed:
+                end += negative
+            missed = raw.take(end, mode="clip") != closer
+            lengths = np.array([length])
+            if missed.any():
+                if not _look_beside(self.page, end, missed, closer):
+                    yield None
+                    return
+                lengths = end - begin
+                if signed:
+                    lengths -= negative
+            if int(end.max()) >= raw.size:
+                yield None
+                return
+            yield Cells(end, lengths, negative if signed else None)
+            begin = end + 1
+
+
+def _look_beside(page: Page, end: I8, missed: Mask, closer: int) -> bool:
+    """Move the ends of cells that do not end there, in place; tell whether an end was found for all."""
+    rows = np.flatnonzero(missed)
+    for step in _BESIDE:
+        at = end[rows] + step
+        found = page.raw.take(at, mode="clip") == closer
+        end[rows[found]] = at[found]
+        rows = rows[~found]
+        if not rows.size:
+            return True
+    return False
