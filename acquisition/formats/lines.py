@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from acquisition.block import I8
 from acquisition.formats.fixed_point import Page, exceeding
 
-__all__ = ["NEWLINE", "RETURN", "Alike", "Lines", "alike_lines", "next_page", "starts_of"]
+__all__ = ["NEWLINE", "RETURN", "Alike", "Lines", "alike_lines", "first_cells", "next_page", "starts_of"]
 
 NEWLINE, RETURN = ord("\n"), ord("\r")
 _TAB, _BLANK = ord("\t"), ord(" ")
@@ -101,9 +101,15 @@ def alike_lines(page: Page, mark: int) -> Alike | None:
         differs = np.bitwise_xor(page.words[at::width][:count], word, out=page.room(0, count))
         if exceeding(differs, limit, page.room(1, count)) is not None:
             return None
-    content = line.removesuffix(b"\n").removesuffix(b"\r")
+    return Alike(count, width, first_cells(page, mark))
+
+
+def first_cells(page: Page, mark: int) -> tuple[tuple[int, int], ...]:
+    """Return where each cell of a page's first line begins and ends; none of a very long line."""
+    line = page.raw[:_LONGEST_ALIKE].tobytes()
+    content = line[: line.find(b"\n") + 1].removesuffix(b"\n").removesuffix(b"\r")
     ends = [at for at, byte in enumerate(content) if byte == mark] + [len(content)]
-    return Alike(count, width, tuple(zip([0, *(end + 1 for end in ends[:-1])], ends, strict=True)))
+    return tuple(zip([0, *(end + 1 for end in ends[:-1])], ends, strict=True))
 
 
 class Lines(NamedTuple):

@@ -20,7 +20,7 @@ from acquisition.block import F8, I8
 from acquisition.formats.cells import EMPTY, EXPONENT, UNREAD, read_column, read_single
 from acquisition.formats.fixed_point import Page, is_fixed, read_alike, read_signed
 from acquisition.formats.growing import Growing
-from acquisition.formats.lines import NEWLINE, RETURN, Alike, Lines, alike_lines, next_page
+from acquisition.formats.lines import NEWLINE, RETURN, Alike, Lines, alike_lines, first_cells, next_page
 from acquisition.formats.text import Text
 from acquisition.formats.walk import Walk
 
@@ -210,25 +210,31 @@ class _Rows:
 
     def _take_walking(self, pages: float) -> bool:
         """Read lines whose first columns are asked for, if each cell has the form that its column had; tell whether."""
-        if self.width not in (None, len(self.columns)) or self.columns != tuple(range(len(self.columns))):
+        page, count = self.page, len(self.columns)
+        if self.halt or self.columns != tuple(range(count)) or self.width not in (None, count):
+            self.halt = max(self.halt - 1, 0)
             return False
-        if not all(0 <= usual < EXPONENT for usual in self.usual):
+        first = first_cells(page, self.mark)
+        if len(first) < count or (self.width is not None and len(first) > count):
             return False
-        if self.halt:
-            self.halt -= 1
-            return False
-        walk = Walk.of(self.page, self.mark, len(self.columns))
-        if walk is None or (self.width is not None and walk.closers[-1] == self.mark) or not self._walk(walk, pages):
+        usual = self.usual.copy()
+        for k, (begin, end) in enumerate(first[:count]):
+            if usual[k] < 0:
+                usual[k] = read_single(page, begin, end, 0)[1]
+            if not (0 <= usual[k] < EXPONENT and is_fixed(page.raw[begin:end].tobytes(), usual[k])):
+                return False
+        walk = Walk.of(page, first[:count])
+        if walk is None or not self._walk(walk, usual, pages):
             self.halt, self.halts = self.halts, 2 * self.halts
             return False
-        self.halts = 1
+        self.usual, self.halts = usual, 1
         return True
 
-    def _walk(self, walk: Walk, pages: float) -> bool:
-        """Read the cells that a walk finds, or nothing; tell whether all are numbers of their columns' usual forms."""
+    def _walk(self, walk: Walk, forms: list[int], pages: float) -> bool:
+        """Read the cells that a walk finds, or nothing; tell whether all have the forms of their columns."""
         page, count = self.page, walk.start.size
         expected = self._expected(count, pages)
-        for k, (cells, usual) in enumerate(zip(walk.columns(), self.usual, strict=True)):
+        for k, (cells, usual) in enumerate(zip(walk.columns(), forms, strict=True)):
             room = self.values[k].room(count, expected)
             if cells is None or read_signed(page, *cells, (usual, self.shifts[k]), self.points, room) is not None:
                 for column in self.values[: k + 1]:
@@ -236,9 +242,9 @@ class _Rows:
                 return False
             if usual and not self.padded[k]:
                 self.padded[k] = bool((page.raw.take(cells.end - 1, mode="clip") == _ZERO).any())
-        for k, form in enumerate(self.form):
-            form.repeat(self.usual[k], count, expected)
-            self.counts[k, self.usual[k]] += count
+        for k, usual in enumerate(forms):
+            self.form[k].repeat(usual, count, expected)
+            self.counts[k, usual] += count
         self.bad.repeat(False, count, expected)
         last = page.raw[int(walk.start[-1]) : -1].tobytes().removesuffix(b"\r").split(bytes((self.mark,)))
         self._end(count, last[0], len(last))

@@ -157,9 +157,9 @@ def decode(data: bytes) -> str:
 def _utf16(head: bytes) -> str:
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16-le" if head.startswith(codecs.BOM_UTF16_LE) else "utf-16-be"
-    even, odd = head[::2], head[1::2]
-    if len(odd) < 4:
+    if len(head) < 8 or b"\0" not in head:
         return ""
+    even, odd = head[::2], head[1::2]
     # Digits in UTF-16 have one zero byte each, always on the same side.
     zero_even, zero_odd = even.count(0) / len(even), odd.count(0) / len(odd)
     if zero_odd > 0.8 and zero_even < 0.1:

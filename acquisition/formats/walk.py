@@ -19,7 +19,6 @@ from acquisition.formats.lines import NEWLINE, RETURN, starts_of
 
 __all__ = ["Cells", "Walk"]
 
-_LONGEST_LINE = 512
 _MINUS = ord("-")
 _BESIDE = 1, -1, 2, -2
 
@@ -49,40 +48,30 @@ class Walk(NamedTuple):
     Parameters
     ----------
     page : Page
+    first : tuple of (int, int)
+        Where the cells of the first line begin and end that are walked to in every line.
     start : (n,) int64
         Where each line starts.
-    lengths : tuple of int
-        Characters of each cell of the first line, without a minus.
-    closers : tuple of int
-        The byte behind each of them.
     """
 
     page: Page
+    first: tuple[tuple[int, int], ...]
     start: I8
-    lengths: tuple[int, ...]
-    closers: tuple[int, ...]
 
     @classmethod
-    def of(cls, page: Page, mark: int, columns: int) -> Walk | None:
-        """Find the lines; None where the first has fewer cells, or a CR stands alone."""
-        line = page.raw[:_LONGEST_LINE].tobytes()
-        line = line[: line.find(b"\n") + 1]
-        content = line.removesuffix(b"\n").removesuffix(b"\r")
-        cells = content.split(bytes((mark,)))
-        if not line or len(cells) < columns:
-            return None
-        closers = [mark] * (len(cells) - 1) + [line[len(content)]]
+    def of(cls, page: Page, first: tuple[tuple[int, int], ...]) -> Walk | None:
+        """Find the lines; None where a CR stands alone."""
         returns = int(np.count_nonzero(page.equal(RETURN)))
         ends = page.places(NEWLINE)
         if returns and (returns != ends.size or (page.raw.take(ends - 1, mode="clip") != RETURN).any()):
             return None
-        lengths = [len(cell) - cell.startswith(b"-") for cell in cells]
-        return cls(page, starts_of(ends), tuple(lengths[:columns]), tuple(closers[:columns]))
+        return cls(page, first, starts_of(ends))
 
     def columns(self) -> Iterator[Cells | None]:
         """Yield the cells of one column after the other; None, and no more, where some are not to be found."""
         raw, begin = self.page.raw, self.start
-        for length, closer in zip(self.lengths, self.closers, strict=True):
+        for first_begin, first_end in self.first:
+            length, closer = first_end - first_begin - int(raw[first_begin] == _MINUS), raw[first_end]
             negative = raw.take(begin, mode="clip") == _MINUS
             signed = bool(negative.any())
             end = begin + length
@@ -104,7 +93,7 @@ class Walk(NamedTuple):
             begin = end + 1
 
 
-def _look_beside(page: Page, end: I8, missed: Mask, closer: int) -> bool:
+def _look_beside(page: Page, end: I8, missed: Mask, closer: np.uint8) -> bool:
     """Move the ends of cells that do not end there, in place; tell whether an end was found for all."""
     rows = np.flatnonzero(missed)
     for step in _BESIDE:

@@ -216,11 +216,11 @@ def test_a_few_odd_cells_do_not_send_the_others_down_the_slow_path(monkeypatch: 
     lines = regular_lines()
     read_table(Text.of("\n".join(lines).encode()), range(3), "\t", width=3)
     sampled = len(singly)
-    assert sampled < 100
+    assert sampled < 10
     lines[700:700] = ["text in the middle"]
     table = read_table(Text.of("\n".join(lines).encode()[:-3]), range(3), "\t", width=3)
     assert table.bad.nonzero()[0].tolist() == [700, 3000]
-    assert len(singly) - sampled < sampled + 10
+    assert len(singly) - sampled < 3 * 12 + 10  # a dozen of each column tell its form
 
 
 @pytest.mark.parametrize("delimiter", ["\t", ";", "  "])
@@ -287,7 +287,7 @@ def test_cells_that_are_walked_to_are_read_as_plain_python_reads_rows(
 
 @pytest.mark.parametrize("end", [",\n", "\n", ",\r\n"])
 def test_pages_of_signed_numbers_are_walked(monkeypatch: pytest.MonkeyPatch, end: str) -> None:
-    """Separators are searched for on the first page and where a row is odd, not on the others."""
+    """Separators are searched for where a row is odd, not in thousands that are not."""
     searched: list[int] = []
     of = Lines.of
 
@@ -300,10 +300,10 @@ def test_pages_of_signed_numbers_are_walked(monkeypatch: pytest.MonkeyPatch, end
     lines = [f"{i / 100:.3f},{a:.6f},{b:.6f}{end}" for i, (a, b) in enumerate(values)]
     table = read_table(Text.of("".join(lines).encode()), (0, 1), ",")
     assert table.values[1].tolist() == [float(f"{a:.6f}") for a, _ in values]
-    assert len(searched) == 1
+    assert not searched
     lines[20_000] = f"here I touched it{end}"
     assert np.flatnonzero(read_table(Text.of("".join(lines).encode()), (0, 1), ",").form[0] < 0).tolist() == [20_000]
-    assert len(searched) <= 4
+    assert len(searched) == 2  # its page, and the next in case that more follow
 
 
 EXPONENT_CELL = st.builds(
