@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 
 from acquisition.errors import FormatError
 from acquisition.formats.columns import ColumnFormat
@@ -191,11 +192,18 @@ def _formula(segment: _Header, column: int) -> Formula | None:
 
 def _start_time(segment: _Header, column: int) -> str:
     date, time = (segment.of_column(key, column) or segment.first_of(key) for key in ("Date", "Time"))
-    found = re.fullmatch(r"(\d{4})/(\d\d)/(\d\d)", date)
-    if not found or int(found[1]) <= 1904:
+    if not _is_digits(date, "/", [4, 2, 2]) or int(date[:4]) <= 1904:
         return ""
-    clock = re.match(r"\d\d:\d\d:\d\d(?:[.,]\d{1,6})?", time)
-    return "-".join(found.groups()) + (f"T{clock[0].replace(',', '.')}" if clock else "")
+    start, clock = date.replace("/", "-"), time[:8]
+    if not _is_digits(clock, ":", [2, 2, 2]):
+        return start
+    fraction = "".join(takewhile(str.isdecimal, time[9:15])) if time[8:9] in (".", ",") else ""
+    return f"{start}T{clock}.{fraction}" if fraction else f"{start}T{clock}"
+
+
+def _is_digits(text: str, mark: str, sizes: list[int]) -> bool:
+    """Tell whether a text is so many digits between marks; a pattern would be compiled for the one line it is for."""
+    return [len(part) for part in text.split(mark)] == sizes and text.replace(mark, "").isdecimal()
 
 
 def _title(top: _Header, segment: _Header) -> str:

@@ -121,7 +121,8 @@ def time_by_formula(
     if printed is not None and tolerance is not None:
         for rows, number in numbers:
             expected = start_s + step_s * number
-            apart = np.abs(printed[rows] - expected)
+            apart = printed[rows] - expected
+            np.abs(apart, out=apart)
             if apart.max() <= tolerance[rows].min() * 1.0001:  # the usual case; never true of a NaN
                 continue
             slack = 1e-9 * np.maximum(np.abs(expected), step_s)
