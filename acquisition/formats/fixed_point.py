@@ -63,7 +63,7 @@ class Page:
     def fill(self, text: NDArray[np.uint8]) -> None:
         """Take a copy of another text."""
         if PAD + text.size > self._padded.size:
-            self._padded = np.zeros(PAD + text.size, np.uint8)
+            self._padded = np.zeros(_roomy(PAD + text.size), np.uint8)
         self._padded[PAD : PAD + text.size] = text
         self._show(self._padded, PAD, PAD + text.size)
 
@@ -78,8 +78,8 @@ class Page:
         self.raw = text[begin:end]
         # words[i] holds the eight bytes before byte i of raw, the last of them as the most significant.
         self.words = np.ndarray((end - begin + 1,), "<u8", text.data, begin - _WORD, (1,))
-        if self.raw.size > self._mask.size:
-            self._mask = np.zeros(-(-self.raw.size // _WORD) * _WORD, bool)
+        if self.raw.size + _WORD > self._mask.size:
+            self._mask = np.empty(_roomy(self.raw.size + _WORD), bool)
 
     def below(self, byte: int) -> NDArray[np.bool_]:
         """Tell where bytes below another stand; the answer holds until the next one."""
@@ -92,11 +92,12 @@ class Page:
     def places(self, byte: int) -> I8:
         """Return where a byte stands, fastest if it does so a few dozen bytes apart."""
         found = self.equal(byte)
-        self._mask[found.size :] = False
-        words = self._mask[: -(-found.size // _WORD) * _WORD].view("<u8")
+        whole = -(-found.size // _WORD) * _WORD
+        self._mask[found.size : whole] = False
+        words = self._mask[:whole].view("<u8")
         at = np.flatnonzero(words != 0)
         one = words.take(at)
-        if (one & (one - _U8(1))).any():  # some words hold two of them
+        if np.bitwise_or.reduce(one & (one - _U8(1))):  # some words hold two of them
             return np.flatnonzero(found)
         one *= _PLACE
         one >>= _U8(8 * (_WORD - 1))
@@ -107,8 +108,13 @@ class Page:
     def room(self, slot: int, count: int) -> U64:
         """Return one of two arrays to calculate in; what is in it holds until it is asked for again."""
         if count > self._room.shape[1]:
-            self._room = np.empty((2, count), np.uint64)
+            self._room = np.empty((2, _roomy(count)), np.uint64)
         return self._room[slot, :count]
+
+
+def _roomy(size: int) -> int:
+    """Return a size that is enough for the next page, too, if that is a little longer."""
+    return size + size // _WORD
 
 
 def is_fixed(cell: bytes, decimals: int) -> bool:

@@ -124,7 +124,8 @@ def read_table(
     start = text.start if start is None else start
     stop = text.stop if stop is None else stop
     raw = np.frombuffer(text.data, np.uint8)[:stop]
-    rows = _Rows(tuple(columns), delimiter, width, tuple(shifts) or (0,) * len(columns))
+    returns = text.data.find(b"\r", start, stop) >= 0
+    rows = _Rows(tuple(columns), delimiter, width, tuple(shifts) or (0,) * len(columns), returns)
     # glibc hands back what is freed on top of its heap, unless a larger block was freed once; to fetch it anew, page
     # after page, costs more than to calculate in it.
     np.empty(_KEPT_BYTES, np.uint8)
@@ -141,8 +142,10 @@ def read_table(
 class _Rows:
     """Gathers the rows of one page after the other."""
 
-    def __init__(self, columns: tuple[int, ...], delimiter: str, width: int | None, shifts: tuple[int, ...]) -> None:
-        self.columns, self.width, self.shifts = columns, width, shifts
+    def __init__(
+        self, columns: tuple[int, ...], delimiter: str, width: int | None, shifts: tuple[int, ...], returns: bool
+    ) -> None:
+        self.columns, self.width, self.shifts, self.returns = columns, width, shifts, returns
         self.mark = ord(delimiter or "\t")
         self.points = b"." if delimiter == "," else b".,"
         self.values = [Growing(np.float64) for _ in columns]
@@ -223,7 +226,7 @@ class _Rows:
                 usual[k] = read_single(page, begin, end, 0)[1]
             if not (0 <= usual[k] < EXPONENT and is_fixed(page.raw[begin:end].tobytes(), usual[k])):
                 return False
-        walk = Walk.of(page, first[:count])
+        walk = Walk.of(page, first[:count], self.returns)
         if walk is None or not self._walk(walk, usual, pages):
             self.halt, self.halts = self.halts, 2 * self.halts
             return False

@@ -59,11 +59,11 @@ class Walk(NamedTuple):
     start: I8
 
     @classmethod
-    def of(cls, page: Page, first: tuple[tuple[int, int], ...]) -> Walk | None:
-        """Find the lines; None where a CR stands alone."""
-        returns = int(np.count_nonzero(page.equal(RETURN)))
+    def of(cls, page: Page, first: tuple[tuple[int, int], ...], returns: bool) -> Walk | None:
+        """Find the lines, among which there may be ``returns``; None where a CR stands alone."""
+        count = int(np.count_nonzero(page.equal(RETURN))) if returns else 0
         ends = page.places(NEWLINE)
-        if returns and (returns != ends.size or (page.raw.take(ends - 1, mode="clip") != RETURN).any()):
+        if count and (count != ends.size or (page.raw.take(ends - 1, mode="clip") != RETURN).any()):
             return None
         return cls(page, first, starts_of(ends))
 
