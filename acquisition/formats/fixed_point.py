@@ -41,7 +41,7 @@ _LAST = np.array([_ALL ^ ((1 << 8 * (_WORD - n)) - 1) for n in range(_WORD + 1)]
 
 
 class Page:
-    """Some lines of a text, one byte a character. One page is filled again and again: its memory is used once.
+    """Some lines of a text, one byte a character. One page is used again and again, and so is its memory.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Page:
 
     def __init__(self, text: NDArray[np.uint8]) -> None:
         self._padded = np.zeros(0, np.uint8)
-        self._mask = np.zeros(0, bool)
+        self._mask = np.empty(0, bool)
         self._room = np.empty((2, 0), np.uint64)
         self.fill(text)
 
@@ -208,10 +208,10 @@ def read_fixed(
         return value, None
     negative = page.raw.take(begin, mode="clip") == _MINUS
     length = end - begin
-    if negative.any():
+    signed = bool(negative.any())
+    if signed:
         length -= negative
-        return value, read_signed(page, end, length, negative, (decimals, shift), points, value)
-    return value, read_signed(page, end, length, None, (decimals, shift), points, value)
+    return value, read_signed(page, end, length, negative if signed else None, (decimals, shift), points, value)
 
 
 def read_signed(

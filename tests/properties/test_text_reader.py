@@ -265,24 +265,25 @@ def test_cells_that_are_walked_to_are_read_as_plain_python_reads_rows(
 ) -> None:
     """Signs, lengths that change, odd cells and lines in the midst of short pages: every number and line as by rows."""
     lines, columns, delimiter = drawn
-    body = "\n".join(lines)
+    body = "\n".join([*lines, ""])
     body = body[: len(body) - cut]
+    text = Text.of(body.replace("\n", newline).encode())
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(table_module, "_PAGE_BYTES", (64, 160))
         read_both(rows_oracle, body, columns, delimiter, newline)
-        # Ragged rows: the last column asked for first is never walked to.
-        text = Text.of(body.replace("\n", newline).encode())
-        order = list(range(columns))
-        walked, searched = (read_table(text, each, delimiter) for each in (order, order[::-1]))
-    assert walked.bad.tobytes() == searched.bad.tobytes()
-    assert (walked.last_cell, walked.cut, walked.decimals) == (
-        searched.last_cell,
-        searched.cut,
-        searched.decimals[::-1],
-    )
-    for column in order:
-        assert walked.values[column].tobytes() == searched.values[-1 - column].tobytes()
-        assert walked.form[column].tobytes() == searched.form[-1 - column].tobytes()
+        # Ragged rows, and rows that are too long; cells of columns in another order are never walked to.
+        for asked, width in ((columns, None), (columns - 1, None), (columns - 1, columns - 1)):
+            order = list(range(asked))
+            if not order:
+                continue
+            walked = read_table(text, order, delimiter, width=width)
+            searched = read_table(text, [*order[::-1], 0], delimiter, width=width)
+            assert walked.bad.tobytes() == searched.bad.tobytes()
+            assert (walked.last_cell, walked.cut) == (searched.last_cell, searched.cut)
+            assert walked.decimals == searched.decimals[:asked][::-1]
+            for column in order:
+                assert walked.values[column].tobytes() == searched.values[asked - 1 - column].tobytes()
+                assert walked.form[column].tobytes() == searched.form[asked - 1 - column].tobytes()
 
 
 @pytest.mark.parametrize("end", [",\n", "\n", ",\r\n"])
