@@ -22,7 +22,7 @@ from acquisition.formats.fixed_point import Page, is_fixed, read_alike, read_sig
 from acquisition.formats.growing import Growing
 from acquisition.formats.lines import NEWLINE, RETURN, Alike, Lines, alike_lines, first_cells, next_page
 from acquisition.formats.text import Text
-from acquisition.formats.walk import Walk
+from acquisition.formats.walk import line_starts, walk
 
 __all__ = ["Table", "read_table"]
 
@@ -226,30 +226,30 @@ class _Rows:
                 usual[k] = read_single(page, begin, end, 0)[1]
             if not (0 <= usual[k] < EXPONENT and is_fixed(page.raw[begin:end].tobytes(), usual[k])):
                 return False
-        walk = Walk.of(page, first[:count], self.returns)
-        if walk is None or not self._walk(walk, usual, pages):
+        start = line_starts(page, self.returns)
+        if start is None or not self._walk(first[:count], start, usual, pages):
             self.halt, self.halts = self.halts, 2 * self.halts
             return False
         self.usual, self.halts = usual, 1
         return True
 
-    def _walk(self, walk: Walk, forms: list[int], pages: float) -> bool:
+    def _walk(self, first: Sequence[tuple[int, int]], start: I8, forms: list[int], pages: float) -> bool:
         """Read the cells that a walk finds, or nothing; tell whether all have the forms of their columns."""
-        page, count = self.page, walk.start.size
+        page, count = self.page, start.size
         expected = self._expected(count, pages)
-        for k, (cells, usual) in enumerate(zip(walk.columns(), forms, strict=True)):
+        for k, (cells, usual) in enumerate(zip(walk(page, first, start), forms, strict=True)):
             room = self.values[k].room(count, expected)
             if cells is None or read_signed(page, *cells, (usual, self.shifts[k]), self.points, room) is not None:
                 for column in self.values[: k + 1]:
                     column.drop(count)
                 return False
             if usual and not self.padded[k]:
-                self.padded[k] = bool((page.raw.take(cells.end - 1, mode="clip") == _ZERO).any())
+                self.padded[k] = bool((page.raw.take(cells[0] - 1, mode="clip") == _ZERO).any())
         for k, usual in enumerate(forms):
             self.form[k].repeat(usual, count, expected)
             self.counts[k, usual] += count
         self.bad.repeat(False, count, expected)
-        last = page.raw[int(walk.start[-1]) : -1].tobytes().removesuffix(b"\r").split(bytes((self.mark,)))
+        last = page.raw[int(start[-1]) : -1].tobytes().removesuffix(b"\r").split(bytes((self.mark,)))
         self._end(count, last[0], len(last))
         return True
 
