@@ -85,12 +85,16 @@ def _demand_sense(options: argparse.Namespace) -> None:
 
 @contextlib.contextmanager
 def _told_to_end() -> Iterator[None]:
-    """Take the end of a terminal or a service (SIGTERM, SIGHUP) for Ctrl-C, so that it closes the run as cleanly."""
+    """Take the end of a terminal or a service (SIGTERM, SIGHUP) for Ctrl-C, so that it closes the run as cleanly.
+
+    What was ignored before stays ignored: under ``nohup`` a recording outlives its terminal.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield  # signals are the main thread's
         return
     signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {number: signal.signal(number, signal.default_int_handler) for number in signals}
+    heard = [number for number in signals if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, signal.default_int_handler) for number in heard}
     try:
         yield
     finally:

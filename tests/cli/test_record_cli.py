@@ -271,13 +271,20 @@ def test_a_scene_without_a_spring_simulates_nothing(cli: Callable, tmp_path: Pat
     assert "constant_n_per_m" in done.complaint
 
 
-def start(scene: Path, out: Path) -> subprocess.Popen[str]:
+def start(scene: Path, out: Path, ignoring: tuple[signal.Signals, ...] = ()) -> subprocess.Popen[str]:
     """Start a recording that would not end by itself, and return when it has kept its first second."""
+
+    def set_signals() -> None:
+        """Whatever started the tests may ignore signals, and children inherit that."""
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_IGN if number in ignoring else signal.SIG_DFL)
+
     child = subprocess.Popen(
         [sys.executable, "-m", "springmass", "record", "--simulate", str(scene), "-o", str(out)],
         stderr=subprocess.PIPE,
         stdin=subprocess.DEVNULL,
         text=True,
+        preexec_fn=set_signals,
     )
     assert child.stderr is not None
     assert " s | " in child.stderr.readline()
@@ -295,6 +302,20 @@ def test_being_told_to_end_closes_the_run_cleanly(tmp_path: Path, scene: Path, n
     with open_run(tmp_path / "run.h5") as run:
         run.verify()
         assert len(run) >= 95
+
+
+def test_a_recording_outlives_its_terminal_where_it_was_told_to(tmp_path: Path, scene: Path) -> None:
+    """Under nohup a hang-up is ignored: the recording goes on, and ends when it is asked to."""
+    child = start(scene, tmp_path / "run.h5", ignoring=(signal.SIGHUP,))
+    child.send_signal(signal.SIGHUP)
+    assert child.stderr is not None
+    assert " s | " in child.stderr.readline()
+    assert " s | " in child.stderr.readline()
+    child.send_signal(signal.SIGTERM)
+    child.communicate(timeout=30)
+    assert child.returncode == 130
+    with open_run(tmp_path / "run.h5") as run:
+        assert len(run) >= 195
 
 
 def test_a_killed_recording_is_recovered_from_its_log(cli: Callable, tmp_path: Path, scene: Path) -> None:
