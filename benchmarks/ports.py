@@ -7,7 +7,9 @@ the reader's alone, and each sample tells how long it took from the wire until i
 Each design gives a port's bytes to a chain of its own, from which the samples are taken ten times a second. One is
 what `springmass record` does: one thread reads, then decodes (`springmass/reads.py`). Beside it stand two with a thread
 for each port that reads what is there and decodes it as it comes: pyserial's own `serial.threaded.ReaderThread`, and
-the leanest such thread that we could write, which leaves out most of what pyserial does around each read.
+the leanest such thread that we could write, which leaves out most of what pyserial does around each read. A last one
+is no design but a floor: one thread that waits, reads and decodes in the barest loop, with no log, no loss of a port
+and no request provided for.
 """
 
 from __future__ import annotations
@@ -223,9 +225,48 @@ class LeanThreads:
             port.close()
 
 
+class BareLoop:
+    """The least that one thread can do for many ports in Python, at the cadence of a recording."""
+
+    def __init__(self, paths: Sequence[str], chains: Sequence[SensorChain]) -> None:
+        self._ports = [serial.Serial(path, BAUD, timeout=0) for path in paths]
+        self._ready = select.epoll()
+        self._chains = {}
+        for port, chain in zip(self._ports, chains, strict=True):
+            self._ready.register(port.fileno(), select.EPOLLIN)
+            self._chains[port.fileno()] = chain
+        self._stop = threading.Event()
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        poll, read, chains = self._ready.poll, os.read, self._chains
+        while not self._stop.is_set():
+            found = [(chains[descriptor], read(descriptor, 4096)) for descriptor, _ in poll(0.25)]
+            now = time.monotonic_ns()
+            with self._lock:
+                for chain, data in found:
+                    chain.take(now, data)
+            time.sleep(CADENCE_NS * 1e-9)
+
+    def blocks(self) -> list[tuple[int, Block]]:
+        """Return the samples since the last call."""
+        with self._lock:
+            return [(i, chain.block()) for i, chain in enumerate(self._chains.values()) if len(chain)]
+
+    def stop(self) -> None:
+        """Stop the thread."""
+        self._stop.set()
+        self._thread.join()
+        self._ready.close()
+        for port in self._ports:
+            port.close()
+
+
 Design = Callable[[Sequence[str], Sequence[SensorChain]], Running]
 THREADS: dict[str, Design] = {"pyserial's ReaderThread": ReaderThreads, "lean threads": LeanThreads}
-DESIGNS: dict[str, Design] = {"one thread": OneThread, **THREADS}
+DESIGNS: dict[str, Design] = {"one thread": OneThread, "bare loop": BareLoop, **THREADS}
 
 
 def measure(design: Design, *, ports: int, rate_hz: float, seconds: float, decode: bool) -> Figures:
@@ -329,9 +370,11 @@ def compare(ports: int, rate_hz: float, seconds: float) -> int:
     ours = [figures("decoded, one thread", OneThread, 1, 100.0), figures("decoded, one thread", OneThread, 1, 1000.0)]
     for what, decode in (("decoded", True), ("read", False)):
         one = figures(f"{what}, one thread", OneThread, decode=decode)
+        floor = figures(f"{what}, bare loop", BareLoop, decode=decode)
         for name, design in THREADS.items():
             other = figures(f"{what}, {name}", design, decode=decode)
-            print(f"  one thread over {name}: {one.cpu_share / other.cpu_share:.2f} x", flush=True)
+            bare = floor.cpu_share / other.cpu_share
+            print(f"  over it: one thread {one.cpu_share / other.cpu_share:.2f} x, bare loop {bare:.2f} x", flush=True)
         ours.append(one)
     with tempfile.TemporaryDirectory() as folder:
         ours.append(figures("recorded and decoded", partial(OneThread, log=Path(folder) / "run.wire")))
