@@ -34,8 +34,8 @@ __all__ = ["DiskNearlyFull", "Recorder", "RecorderStatus", "check_disk"]
 QUEUE_BYTES = 16 << 20
 """Three quarters of an hour of one sensor at 100 Hz, four seconds of 200 ports in a flood at 115200 baud."""
 
-SLOW_NS = 5_000_000
-"""A write that takes longer waited for the disk."""
+SLOW_NS = 50_000_000
+"""A write that takes longer waited for the disk, and not for its turn on a busy machine."""
 PATIENCE_NS = 10_000_000_000
 """After a slow write the reading thread writes nothing for so long."""
 
