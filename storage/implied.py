@@ -20,8 +20,6 @@ __all__ = ["Implied", "rule_for", "values_of"]
 Rule = Mapping[str, float]
 """``{"value": x}``, or ``{"first": i, "rate_hz": f, "origin_s": t}`` for the times ``t + (i + row) / f``."""
 
-_BLOCK = 16384  # what fits into the cache is calculated in a fraction of the time
-
 
 class Implied:
     """The rules that a run's columns keep so far, while the run is written.
@@ -82,13 +80,9 @@ def values_of(rule: Rule, start: int, stop: int, dtype: np.dtype[Any]) -> NDArra
     """
     if "value" in rule:
         return np.full(stop - start, rule["value"], dtype)
-    grid = Grid(rule["rate_hz"], rule["origin_s"])
-    first = int(rule["first"])
-    values = np.empty(stop - start, dtype)
-    for row in range(start, stop, _BLOCK):
-        end = min(row + _BLOCK, stop)
-        values[row - start : end - start] = grid.time(np.arange(first + row, first + end))
-    return values
+    values = np.empty(stop - start, np.float64)
+    Grid(rule["rate_hz"], rule["origin_s"]).fill(int(rule["first"]) + start, values)
+    return values.astype(dtype, copy=False)
 
 
 def _same(one: NDArray[Any], other: NDArray[Any]) -> bool:
