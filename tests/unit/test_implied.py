@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.block import Block
+from acquisition.formats.nominal import Grid
 from acquisition.source import SourceInfo
 from storage.errors import RunDamaged
 from storage.implied import rule_for, values_of
@@ -91,3 +92,13 @@ def test_a_rule_gives_what_it_was_told_from(first: int, rate_hz: float, origin_s
     negative_zero = np.array([-0.0])
     rule = rule_for("time", negative_zero, rate_hz)
     assert rule is None or values_of(rule, 0, 1, t.dtype).tobytes() == negative_zero.tobytes()
+
+
+@pytest.mark.parametrize("size", [0, 1, 16384, 16385, 40_000])
+@pytest.mark.parametrize("grid", [Grid(100.0), Grid(59.94, 46.8596458), Grid(3.0, -1e-3)])
+@pytest.mark.parametrize("first", [-7, 0, 123_456_789])
+def test_times_filled_in_place_are_those_of_their_indices(grid: Grid, first: int, size: int) -> None:
+    """Bit for bit, within one piece and across several."""
+    out = np.full(size, np.nan)
+    grid.fill(first, out)
+    assert out.tobytes() == np.asarray(grid.time(np.arange(first, first + size))).tobytes()
