@@ -4,7 +4,8 @@
 line protocol to pseudo-terminals, with the moment of sending as the device's clock; so the processor time counted is
 the reader's alone, and each sample tells how long it took from the wire until it was parsed.
 
-Each design gives a port's bytes to a chain of its own, from which the samples are taken ten times a second. One is
+Each design gives a port's bytes to a chain of its own, from which the samples are taken ten times a second; or once a
+second, beside a wire log, as `springmass record` does it, which then decodes many readings at a time. One design is
 what `springmass record` does: one thread reads, then decodes (`springmass/reads.py`). Beside it stand two with a thread
 for each port that reads what is there and decodes it as it comes: pyserial's own `serial.threaded.ReaderThread`, and
 the leanest such thread that we could write, which leaves out most of what pyserial does around each read. A last one
@@ -29,7 +30,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import serial
@@ -39,7 +40,7 @@ from serial.threaded import ReaderThread
 
 from acquisition.block import Block
 from acquisition.chain import SensorChain
-from acquisition.clock import SystemClock
+from acquisition.clock import Clock, SystemClock
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from acquisition.serial_port import SerialPort
@@ -52,7 +53,7 @@ WRAP_US = 1 << 32
 BAUD = 115200
 SETTLE_S = 0.5
 PATIENCE_S = 10.0
-LOOK_S = 0.1
+LOOK_S, SELDOM_S = 0.1, 1.0
 CADENCES_MS = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
 
 
@@ -100,6 +101,13 @@ class CountingChain(TimedChain):
         return 0
 
 
+def recorder(log: Path, paths: Sequence[str], clock: Clock) -> Recorder:
+    """Return what a recording of these ports appends to."""
+    entries = tuple(SensorEntry(i, "line-protocol", path, BAUD) for i, path in enumerate(paths))
+    log.unlink(missing_ok=True)
+    return Recorder(log, LogHeader(sensors=entries, mono_ns=0, unix_ns=0), clock, own_clocks=True)
+
+
 class Running(Protocol):
     """A design at work."""
 
@@ -129,8 +137,7 @@ class OneThread:
         tee.heard_enough()
         self._recorder = None
         if log is not None:
-            entries = tuple(SensorEntry(i, "line-protocol", path, BAUD) for i, path in enumerate(paths))
-            self._recorder = Recorder(log, LogHeader(sensors=entries, mono_ns=0, unix_ns=0), clock)
+            self._recorder = recorder(log, paths, clock)
             tee.start(self._recorder, chains, 0)
         self._reader = PortReader(lines, tee, clock, decode=tee.decode, cadence_ns=cadence_ns)
         self._reader.start()
@@ -195,11 +202,12 @@ class LeanThreads:
     """A thread for each port that reads what is there or waits for a byte, and decodes it.
 
     The calls are those of pyserial's ``read(in_waiting or 1)``, but for ``poll`` in place of its ``select``, which
-    refuses descriptors from 1024.
+    refuses descriptors from 1024. With a log, each thread puts what it read into the recorder's queue first.
     """
 
-    def __init__(self, paths: Sequence[str], chains: Sequence[SensorChain]) -> None:
+    def __init__(self, paths: Sequence[str], chains: Sequence[SensorChain], *, log: Path | None = None) -> None:
         self._stop = threading.Event()
+        self._recorder = None if log is None else recorder(log, paths, SystemClock())
         self._ports = [serial.Serial(path, BAUD, timeout=0) for path in paths]
         self._locked = LockedChains(chains)
         self._threads = [threading.Thread(target=self._read, args=(i,), daemon=True) for i in range(len(paths))]
@@ -214,7 +222,10 @@ class LeanThreads:
         while not self._stop.is_set():
             size = port.in_waiting or 1
             if ready.poll(250):
-                self._locked.take(channel, os.read(port.fileno(), size))
+                data = os.read(port.fileno(), size)
+                if self._recorder is not None:
+                    self._recorder.put(channel, time.monotonic_ns(), data)
+                self._locked.take(channel, data)
 
     def stop(self) -> None:
         """Stop all threads."""
@@ -223,6 +234,8 @@ class LeanThreads:
             thread.join()
         for port in self._ports:
             port.close()
+        if self._recorder is not None:
+            self._recorder.close()
 
 
 class BareLoop:
@@ -269,7 +282,9 @@ THREADS: dict[str, Design] = {"pyserial's ReaderThread": ReaderThreads, "lean th
 DESIGNS: dict[str, Design] = {"one thread": OneThread, "bare loop": BareLoop, **THREADS}
 
 
-def measure(design: Design, *, ports: int, rate_hz: float, seconds: float, decode: bool) -> Figures:
+def measure(
+    design: Design, *, ports: int, rate_hz: float, seconds: float, decode: bool, look_s: float = LOOK_S
+) -> Figures:
     """Read so many ports for so long with one design."""
     command = [sys.executable, os.path.abspath(__file__), "--send"]
     command += ["--ports", str(ports), "--rate", str(rate_hz), "--seconds", str(seconds)]
@@ -294,7 +309,7 @@ def measure(design: Design, *, ports: int, rate_hz: float, seconds: float, decod
 
         ear = threading.Thread(target=hear)
         ear.start()
-        while not over.wait(LOOK_S):
+        while not over.wait(look_s):
             taken += sum(len(block) for _, block in running.blocks())
         took, used = time.monotonic() - began, time.process_time() - cpu
         ear.join()
@@ -362,8 +377,8 @@ def main() -> int:
 def compare(ports: int, rate_hz: float, seconds: float) -> int:
     """Print one port, every design on many, and the trade of the cadence; return 1 where this project lost samples."""
 
-    def figures(name: str, design: Design, count: int = ports, rate: float = rate_hz, decode: bool = True) -> Figures:
-        found = measure(design, ports=count, rate_hz=rate, seconds=seconds, decode=decode)
+    def figures(name: str, design: Design, count: int = ports, rate: float = rate_hz, **how: Any) -> Figures:
+        found = measure(design, ports=count, rate_hz=rate, seconds=seconds, **{"decode": True, **how})
         print(found.line(f"{count} x {rate:g} Hz {name}"), flush=True)
         return found
 
@@ -377,7 +392,12 @@ def compare(ports: int, rate_hz: float, seconds: float) -> int:
             print(f"  over it: one thread {one.cpu_share / other.cpu_share:.2f} x, bare loop {bare:.2f} x", flush=True)
         ours.append(one)
     with tempfile.TemporaryDirectory() as folder:
-        ours.append(figures("recorded and decoded", partial(OneThread, log=Path(folder) / "run.wire")))
+        log = Path(folder) / "run.wire"
+        ours.append(figures("recorded and decoded", partial(OneThread, log=log)))
+        one = figures("recorded, one thread", partial(OneThread, log=log), look_s=SELDOM_S)
+        other = figures("recorded, lean threads", partial(LeanThreads, log=log), look_s=SELDOM_S)
+        print(f"  one thread over lean threads: {one.cpu_share / other.cpu_share:.2f} x", flush=True)
+        ours.append(one)
     references = {name: figures(f"decoded, {name}", design) for name, design in THREADS.items()}
     for cadence_ms in CADENCES_MS:
         one = figures(f"decoded, cadence {cadence_ms:g} ms", partial(OneThread, cadence_ns=round(cadence_ms * 1e6)))

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from storage.wire_log import Kind, read_log
 
 PORTS = Path(__file__).with_name("ports.py")
 
@@ -37,3 +40,14 @@ def test_one_kilohertz_on_one_port(ports: ModuleType) -> None:
     """A port at 1 kHz delivers what was sent."""
     figures = ports.measure(ports.OneThread, ports=1, rate_hz=1000.0, seconds=0.3, decode=True)
     assert figures.received == 300
+
+
+@pytest.mark.parametrize("design", ["OneThread", "LeanThreads"])
+def test_every_sample_is_recorded(ports: ModuleType, design: str, tmp_path: Path) -> None:
+    """Beside a wire log the samples are the same, and the log holds every byte of them."""
+    log = tmp_path / "run.wire"
+    recorded = partial(getattr(ports, design), log=log)
+    figures = ports.measure(recorded, ports=4, rate_hz=100.0, seconds=0.3, decode=True, look_s=0.3)
+    assert figures.received == figures.expected == 120
+    data = b"".join(record.payload for record in read_log(log) if record.kind is Kind.DATA)
+    assert data.count(b"\n") == 120
