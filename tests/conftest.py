@@ -10,12 +10,15 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from numpy.typing import ArrayLike
 
 from pipeline.demodulate import Demodulated
 
-settings.register_profile("springmass", derandomize=True, deadline=None, max_examples=50)
+# A slow machine is no fault of the data: neither a deadline nor the check for slow generation holds here.
+settings.register_profile(
+    "springmass", derandomize=True, deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("springmass")
 
 

@@ -33,7 +33,7 @@ from acquisition.virtual_port import Faults, VirtualPort
 from acquisition.wired import Line, PortReader
 
 WAIT_S = 10.0
-QUIET_S = 0.25
+QUIET_S = 0.4
 NAMES = [family.name for family in families()]
 STREAMING = [family.name for family in families() if family.poll is None]
 POLLED = [family.name for family in families() if family.poll is not None]
