@@ -89,10 +89,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = build_parser().parse_args(arguments)
     from importlib import import_module
 
-    # A title or a name that the terminal's code lacks is shown escaped.
+    # A title or a name that the terminal's code lacks is shown escaped. Line by line, so that both streams come in the
+    # order they were written in where they go to one place.
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
+            stream.reconfigure(errors="backslashreplace", line_buffering=True)
     try:
         return int(import_module(f"springmass.commands.{options.command}").run(options))
     except KeyboardInterrupt:

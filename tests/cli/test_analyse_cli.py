@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -419,3 +420,21 @@ def test_the_module_runs_as_a_program(recording: Path, tmp_path: Path) -> None:
     assert np.isclose(result["estimates"]["period"]["value"], 0.7585, atol=5e-4)
     assert done.stderr.startswith("springmass: absent.txt: cannot be opened")
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_both_streams_come_in_their_order_in_one_file(recording: Path, tmp_path: Path) -> None:
+    """Into one log (`> log 2>&1`) the table comes before the line that names the report, buffered or not."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    command = [sys.executable, "-m", "springmass", "analyse", str(recording), "--out", "results"]
+    done = subprocess.run(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+        env=environment,
+    )
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("quantity")
+    assert lines[-1].startswith("report: ")
