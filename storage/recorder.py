@@ -261,8 +261,7 @@ class Recorder:
         if self._log.syncing or began_ns < self._hands_over_until_ns or not self._order.acquire(blocking=False):
             return False
         try:
-            if not self._stopped:
-                self._append_queued()
+            self._append_queued()
         finally:
             self._order.release()
         ended_ns = self._clock.now_ns()
@@ -287,6 +286,8 @@ class Recorder:
 
         What overflowed came after everything queued and before everything to come: its events stand in its place.
         """
+        if self._stopped:  # by the other thread, while this one waited for its turn
+            return False
         with self._lock:
             taken, self._queue, self._queued_bytes = self._queue, [], 0
             if self._overflows:
@@ -298,6 +299,7 @@ class Recorder:
                 self._log.extend(taken)
             except Exception as error:  # a defect, too, must stop the recording and not look like one
                 self._stop(self._one_line(error), taken[self._log.extended :])
+                return True
         with self._lock:
             self._appending = False
             self._done.notify_all()
@@ -318,6 +320,8 @@ class Recorder:
             self._queued_bytes = 0
             self._dropped_records += len(left)
             self._dropped_bytes += sum(len(payload) for *_, payload in left)
+            self._appending = False
+            self._done.notify_all()
         self._sync()
 
     def _sync_often(self) -> None:
