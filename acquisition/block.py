@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["F8", "I8", "U8", "Block", "Flag", "concatenate"]
+__all__ = ["B1", "F8", "I8", "U8", "Block", "Flag", "concatenate"]
 
+B1 = NDArray[np.bool_]
 F8 = NDArray[np.float64]
 I8 = NDArray[np.int64]
 U8 = NDArray[np.uint8]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from acquisition.block import F8
+from acquisition.block import F8, I8
 from acquisition.errors import CalibrationError
 
 __all__ = ["Calibration", "StillPoint", "against_ruler", "from_still"]
@@ -55,6 +55,14 @@ class Calibration:
         """Return the distance in m of an echo time, or of a stated distance where there is none; NaN for neither."""
         raw = 0.5e-6 * self.speed_of_sound_m_per_s * echo_us if math.isfinite(echo_us) else distance_m
         return self.scale * raw + self.offset_m
+
+    @staticmethod
+    def distances(calibrations: Sequence[Calibration], readings: I8, echo_us: F8, distance_m: F8) -> F8:
+        """Return what :meth:`distance` returns, of several sensors' readings one after the other, so many of each."""
+        numbers = np.array([(each.speed_of_sound_m_per_s, each.scale, each.offset_m) for each in calibrations])
+        speed, scale, offset_m = np.repeat(numbers, readings, axis=0).T
+        raw = np.where(np.isfinite(echo_us), 0.5e-6 * speed * echo_us, distance_m)
+        return np.asarray(scale * raw + offset_m)
 
     def restated(self, point: StillPoint, before: Calibration) -> StillPoint:
         """Return a rest position that was measured with ``before``, another scale and offset, as this one states it."""

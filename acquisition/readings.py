@@ -11,9 +11,12 @@ import numpy as np
 
 from acquisition.block import F8, I8, U8, Flag
 
-__all__ = ["COLUMNS", "NO_READINGS", "Reading", "Readings", "join"]
+__all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "Readings", "join"]
 
 NAN = math.nan
+
+Read = tuple[int, int, bytes]
+"""What was read of a port at a time: channel (the sensor's number within the run), host's stamp in ns, bytes."""
 
 
 class Reading(NamedTuple):

@@ -12,7 +12,6 @@ from acquisition.errors import PortError
 __all__ = ["PortFacts", "SerialPort", "list_ports"]
 
 READ_BYTES = 65536
-WAIT_S = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,21 +82,8 @@ class SerialPort:
         """Return the descriptor to wait on, -1 where the address has none (RFC 2217, Windows)."""
         return self._descriptor
 
-    def read(self, wait_s: float = WAIT_S) -> bytes:
-        """Return what has come; without a descriptor, wait so long for it."""
-        if self._descriptor < 0:
-            return self._read_waiting(wait_s)
-        try:
-            data = os.read(self._descriptor, READ_BYTES)
-        except BlockingIOError:
-            return b""
-        except OSError as error:
-            raise PortError(f"{self.name}: the port has gone ({error})") from error
-        if not data:
-            raise PortError(f"{self.name}: the port has gone (end of file)")
-        return data
-
-    def _read_waiting(self, wait_s: float) -> bytes:
+    def read(self, wait_s: float) -> bytes:
+        """Return what comes within that time, at once what is there: for an address without a descriptor."""
         import serial
 
         try:

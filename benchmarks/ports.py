@@ -27,7 +27,7 @@ import threading
 import time
 import tty
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -38,11 +38,13 @@ from serial.serialposix import PosixPollSerial
 from serial.threaded import Protocol as PortProtocol
 from serial.threaded import ReaderThread
 
-from acquisition.block import Block
-from acquisition.chain import SensorChain
+from acquisition.block import I8, Block, concatenate
+from acquisition.chain import Chains, SensorChain
 from acquisition.clock import Clock, SystemClock
+from acquisition.decoders.base import Family
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
+from acquisition.readings import Read
 from acquisition.serial_port import SerialPort
 from acquisition.wired import CADENCE_NS, Line, PortReader
 from springmass.reads import Tee
@@ -54,6 +56,8 @@ BAUD = 115200
 SETTLE_S = 0.5
 PATIENCE_S = 10.0
 LOOK_S, SELDOM_S = 0.1, 1.0
+Parsed = tuple[int, int]
+"""Host's stamp of the last read of a piece, and when that piece was parsed, ns."""
 CADENCES_MS = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
 
 
@@ -75,30 +79,57 @@ class Figures:
 
 
 class TimedChain(SensorChain):
-    """The real chain, that notes how late its samples are."""
+    """The real chain, that keeps its blocks: what they tell of delays is worked out when all is over."""
 
-    def __init__(self, rate_hz: float) -> None:
-        super().__init__(get_family("line-protocol"), rate_hz=rate_hz)
+    def __init__(self, family: Family, rate_hz: float) -> None:
+        super().__init__(family, rate_hz=rate_hz)
         self.received = 0
-        self.delays_us: list[int] = []
+        self.kept: list[Block] = []
 
-    def take(self, host_ns: int, data: bytes) -> int:
-        """Take the bytes of one read."""
-        count = super().take(host_ns, data)
-        if count:
-            now_us = time.monotonic_ns() // 1000
-            self.received += count
-            self.delays_us.append((now_us - self.last[-1].device_us) % WRAP_US)
-        return count
+    def _block(self, *columns: Any) -> Block:
+        block = super()._block(*columns)
+        self.received += len(block)
+        self.kept.append(block)
+        return block
+
+    def delays_us(self, parsed: Sequence[Parsed]) -> I8:
+        """Return how long it took from the moment of sending until a reading was parsed."""
+        blocks = concatenate(self.kept)
+        if not len(blocks):
+            return np.empty(0, np.int64)
+        first_us = (self.timebase._last_raw or 0) - self.timebase._ticks
+        sent_us = first_us + np.round(blocks.t * 1e6).astype(np.int64)
+        until_ns, parsed_ns = np.array(parsed).T
+        # Several pieces may hold reads of one wake-up; the last one is it then.
+        at = np.searchsorted(until_ns, blocks.host_ns, side="right")
+        at -= until_ns[at - 1] == blocks.host_ns
+        return np.asarray((parsed_ns[at] // 1000 - sent_us) % WRAP_US)
 
 
 class CountingChain(TimedChain):
     """Counts lines and decodes none."""
 
+    def __init__(self, family: Family, rate_hz: float) -> None:
+        super().__init__(replace(family, whole=None), rate_hz)
+
     def take(self, host_ns: int, data: bytes) -> int:  # noqa: ARG002
         """Take the bytes of one read."""
         self.received += data.count(b"\n")
         return 0
+
+
+class TimedChains(Chains):
+    """The real chains, that note when what was read of all ports at a time was parsed."""
+
+    def __init__(self, chains: Sequence[SensorChain]) -> None:
+        super().__init__(chains)
+        self.parsed: list[Parsed] = []
+
+    def take(self, reads: Sequence[Read]) -> None:
+        """Take reads."""
+        super().take(reads)
+        if reads:
+            self.parsed.append((reads[-1][1], time.monotonic_ns()))
 
 
 def recorder(log: Path, paths: Sequence[str], clock: Clock) -> Recorder:
@@ -113,6 +144,10 @@ class Running(Protocol):
 
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples since the last call."""
+        ...
+
+    def parsed(self, channel: int) -> Sequence[Parsed]:
+        """Return when what was read of a port was parsed."""
         ...
 
     def stop(self) -> None:
@@ -133,15 +168,21 @@ class OneThread:
     ) -> None:
         clock = SystemClock()
         lines = [Line(SerialPort(path, BAUD), i) for i, path in enumerate(paths)]
-        tee = Tee(chains, {})
+        timed = TimedChains(chains)
+        tee = Tee(timed, {})
         tee.heard_enough()
         self._recorder = None
         if log is not None:
             self._recorder = recorder(log, paths, clock)
-            tee.start(self._recorder, chains, 0)
+            tee.start(self._recorder, timed, 0)
         self._reader = PortReader(lines, tee, clock, decode=tee.decode, cadence_ns=cadence_ns)
         self._reader.start()
         self.blocks = tee.blocks
+        self._parsed = timed.parsed
+
+    def parsed(self, channel: int) -> Sequence[Parsed]:  # noqa: ARG002 - all were parsed together
+        """Return when what was read was parsed."""
+        return self._parsed
 
     def stop(self) -> None:
         """Stop reading."""
@@ -154,18 +195,25 @@ class LockedChains:
     """Chains that threads of their own feed, each behind a lock."""
 
     def __init__(self, chains: Sequence[SensorChain]) -> None:
-        self._chains = [(chain, threading.Lock()) for chain in chains]
+        self._chains: list[tuple[SensorChain, threading.Lock, list[Parsed]]]
+        self._chains = [(chain, threading.Lock(), []) for chain in chains]
 
     def take(self, channel: int, data: bytes) -> None:
         """Decode what one port sent."""
-        chain, lock = self._chains[channel]
+        chain, lock, parsed = self._chains[channel]
         with lock:
-            chain.take(time.monotonic_ns(), data)
+            read_ns = time.monotonic_ns()
+            chain.take(read_ns, data)
+            parsed.append((read_ns, time.monotonic_ns()))
+
+    def parsed(self, channel: int) -> Sequence[Parsed]:
+        """Return when what was read of a port was parsed."""
+        return self._chains[channel][2]
 
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples since the last call."""
         found = []
-        for channel, (chain, lock) in enumerate(self._chains):
+        for channel, (chain, lock, _) in enumerate(self._chains):
             with lock:
                 if len(chain):
                     found.append((channel, chain.block()))
@@ -190,7 +238,7 @@ class ReaderThreads:
         ]
         for thread in self._threads:
             thread.start()
-        self.blocks = locked.blocks
+        self.blocks, self.parsed = locked.blocks, locked.parsed
 
     def stop(self) -> None:
         """Stop all threads."""
@@ -213,7 +261,7 @@ class LeanThreads:
         self._threads = [threading.Thread(target=self._read, args=(i,), daemon=True) for i in range(len(paths))]
         for thread in self._threads:
             thread.start()
-        self.blocks = self._locked.blocks
+        self.blocks, self.parsed = self._locked.blocks, self._locked.parsed
 
     def _read(self, channel: int) -> None:
         port = self._ports[channel]
@@ -244,29 +292,35 @@ class BareLoop:
     def __init__(self, paths: Sequence[str], chains: Sequence[SensorChain]) -> None:
         self._ports = [serial.Serial(path, BAUD, timeout=0) for path in paths]
         self._ready = select.epoll()
-        self._chains = {}
-        for port, chain in zip(self._ports, chains, strict=True):
-            self._ready.register(port.fileno(), select.EPOLLIN)
-            self._chains[port.fileno()] = chain
+        self._channels = {port.fileno(): channel for channel, port in enumerate(self._ports)}
+        for descriptor in self._channels:
+            self._ready.register(descriptor, select.EPOLLIN)
+        self._chains = chains
+        self._parsed: list[Parsed] = []
         self._stop = threading.Event()
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
     def _read(self) -> None:
-        poll, read, chains = self._ready.poll, os.read, self._chains
+        poll, read, channels, chains = self._ready.poll, os.read, self._channels, self._chains
         while not self._stop.is_set():
-            found = [(chains[descriptor], read(descriptor, 4096)) for descriptor, _ in poll(0.25)]
+            found = [(chains[channels[descriptor]], read(descriptor, 4096)) for descriptor, _ in poll(0.25)]
             now = time.monotonic_ns()
             with self._lock:
                 for chain, data in found:
                     chain.take(now, data)
+            self._parsed.append((now, time.monotonic_ns()))
             time.sleep(CADENCE_NS * 1e-9)
 
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples since the last call."""
         with self._lock:
-            return [(i, chain.block()) for i, chain in enumerate(self._chains.values()) if len(chain)]
+            return [(i, chain.block()) for i, chain in enumerate(self._chains) if len(chain)]
+
+    def parsed(self, channel: int) -> Sequence[Parsed]:  # noqa: ARG002 - all were parsed together
+        """Return when what was read was parsed."""
+        return self._parsed
 
     def stop(self) -> None:
         """Stop the thread."""
@@ -292,7 +346,8 @@ def measure(
         assert sender.stdin is not None
         assert sender.stdout is not None
         paths = sender.stdout.readline().split()
-        chains = [(TimedChain if decode else CountingChain)(rate_hz) for _ in paths]
+        family = get_family("line-protocol")
+        chains = [(TimedChain if decode else CountingChain)(family, rate_hz) for _ in paths]
         running = design(paths, chains)
         taken = 0
         over = threading.Event()
@@ -316,15 +371,16 @@ def measure(
         deadline = time.monotonic() + PATIENCE_S
         while sum(chain.received for chain in chains) < expected and time.monotonic() < deadline:
             threading.Event().wait(0.05)
+            taken += sum(len(block) for _, block in running.blocks())
         running.stop()
         taken += sum(len(block) for _, block in running.blocks())
         sender.stdin.write("end\n")
     received = sum(chain.received for chain in chains)
     if decode and taken != received:
         raise AssertionError(f"{received} samples were parsed, and {taken} came in blocks")
-    delays = np.concatenate([np.array(chain.delays_us) for chain in chains]) / 1000 if decode else np.empty(0)
+    delays = np.concatenate([chain.delays_us(running.parsed(channel)) for channel, chain in enumerate(chains)])
     p50, p99 = np.percentile(delays, [50, 99]) if delays.size else (np.nan, np.nan)
-    return Figures(received, expected, used / took, float(p50), float(p99))
+    return Figures(received, expected, used / took, float(p50) / 1000, float(p99) / 1000)
 
 
 def send(ports: int, rate_hz: float, seconds: float) -> None:

@@ -18,8 +18,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from acquisition.block import Block
-from acquisition.chain import SensorChain
+from acquisition.chain import Chains
 from acquisition.decoders.base import Polled
+from acquisition.readings import Read
 from storage.recorder import Recorder
 
 __all__ = ["Tee"]
@@ -34,48 +35,45 @@ HELD_BYTES = 4 << 20
 """So many bytes may wait for the decoders; a flood that is more than they can do is recorded and not shown."""
 
 
-Read = tuple[int, int, bytes | None]
-"""Channel, host's stamp in ns, and bytes; None for the bytes where the port's stream was broken off."""
-
-
 class Tee:
     """Hands every read to the recorder, once there is one, and to the decoders.
 
     Parameters
     ----------
-    chains : sequence of SensorChain
-        By channel.
+    chains : Chains
     askers : mapping of int to Polled
         By channel: decoders fed at once, that say what a polled sensor is asked next.
     """
 
-    def __init__(self, chains: Sequence[SensorChain], askers: Mapping[int, Polled]) -> None:
-        self._chains = list(chains)
+    def __init__(self, chains: Chains, askers: Mapping[int, Polled]) -> None:
+        self._chains = chains
         self._askers = askers
         self._lock = threading.Lock()
         self._recorder: Recorder | None = None
         self._waiting: deque[Read] = deque()
         self._waiting_bytes = 0
-        self._kept: deque[tuple[int, int, bytes]] | None = None
-        self._heard: list[bytearray] | None = [bytearray() for _ in chains]
+        self._kept: deque[Read] | None = None
+        self._heard: list[bytearray] | None = [bytearray() for _ in chains.each]
         self._latest_ns = self._asked_ns = 0
         self._asked_often = True
         self.gone: dict[int, str] = {}
         self.skipped_bytes = 0
 
-    def data(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Take the bytes of one read; called on the reading thread."""
+    def reads(self, reads: Sequence[Read]) -> None:
+        """Take what one wake-up read; called on the reading thread."""
         with self._lock:
             if self._recorder is not None:
-                self._recorder.enqueue(channel, host_ns, data)
-            if channel in self._askers:
-                self._askers[channel].feed(host_ns, data)
-            read = (channel, host_ns, data)
-            self._waiting.append(read)
-            self._waiting_bytes += len(data)
-            self._latest_ns = host_ns
+                self._recorder.enqueue(reads)
+            if self._askers:
+                for channel, host_ns, data in reads:
+                    if channel in self._askers:
+                        self._askers[channel].feed(host_ns, data)
+            self._waiting += reads
+            for _, _, data in reads:
+                self._waiting_bytes += len(data)
+            self._latest_ns = reads[-1][1]
             if self._kept is not None:
-                self._kept.append(read)
+                self._kept += reads
             if self._waiting_bytes > HELD_BYTES:
                 self._skip()
 
@@ -86,7 +84,7 @@ class Tee:
                 self._recorder.event(channel, host_ns, kind, facts)
             if channel in self._askers:
                 self._askers[channel].flush()
-            self._waiting.append((channel, host_ns, None))
+            self._waiting.append((channel, host_ns, b""))
             if kind == "lost":
                 self.gone[channel] = str(facts.get("why", ""))
 
@@ -109,20 +107,23 @@ class Tee:
                 self._decode_piece()
             self._asked_often = self._latest_ns - self._asked_ns < SELDOM_NS
             self._asked_ns = self._latest_ns
-            return [(channel, chain.block()) for channel, chain in enumerate(self._chains) if len(chain)]
+            return self._chains.blocks()
 
     def _decode_piece(self) -> None:
-        waiting, chains, done = self._waiting, self._chains, 0
-        while waiting and done < ROUND_BYTES:
-            channel, host_ns, data = waiting.popleft()
-            if data is None:
-                chains[channel].lost()
-                continue
-            done += len(data)
-            chains[channel].take(host_ns, data)
-            if self._heard is not None:
+        if self._waiting_bytes <= ROUND_BYTES:
+            piece = list(self._waiting)
+            self._waiting.clear()
+        else:
+            piece, size = [], 0
+            while self._waiting and size < ROUND_BYTES:
+                piece.append(self._waiting.popleft())
+                size += len(piece[-1][2])
+        for _, _, data in piece:
+            self._waiting_bytes -= len(data)
+        if self._heard is not None:
+            for channel, _, data in piece:
                 self._heard[channel] += data[: HEARD_BYTES - len(self._heard[channel])]
-        self._waiting_bytes -= done
+        self._chains.take(piece)
 
     def heard(self, channel: int) -> bytes:
         """Return the first bytes that a sensor sent."""
@@ -145,18 +146,17 @@ class Tee:
             while self._kept and self._kept[0][1] < before_ns:
                 self._kept.popleft()
 
-    def start(self, recorder: Recorder, chains: Sequence[SensorChain], since_ns: int) -> None:
+    def start(self, recorder: Recorder, chains: Chains, since_ns: int) -> None:
         """Record from here on, and the kept reads since a moment, no read twice and none left out.
 
         What a polled sensor is asked, and what is decoded, begins anew, as the recorded bytes do.
         """
         with self._lock:
             kept = deque(read for read in self._kept or () if read[1] >= since_ns)
-            for channel, host_ns, data in kept:
-                recorder.data(channel, host_ns, data)
+            recorder.reads(kept)
             self._recorder = recorder
-            self._chains = list(chains)
-            self._waiting, self._waiting_bytes = deque[Read](kept), sum(len(data) for _, _, data in kept)
+            self._chains = chains
+            self._waiting, self._waiting_bytes = deque(kept), sum(len(data) for _, _, data in kept)
             self._kept = None
             for asker in self._askers.values():
                 asker.flush()
@@ -170,7 +170,6 @@ class Tee:
         """Let the oldest reads go undecoded, and no frame be put together across them."""
         while self._waiting_bytes > HELD_BYTES // 2:
             channel, _, data = self._waiting.popleft()
-            self._chains[channel].lost()
-            if data is not None:
-                self._waiting_bytes -= len(data)
-                self.skipped_bytes += len(data)
+            self._chains.each[channel].lost()
+            self._waiting_bytes -= len(data)
+            self.skipped_bytes += len(data)

@@ -20,6 +20,7 @@ import numpy as np
 
 from acquisition.block import Block
 from acquisition.calibration import StillPoint, against_ruler, from_still
+from acquisition.chain import Chains
 from acquisition.clock import Clock
 from acquisition.decoders.base import Polled
 from acquisition.wired import Line, PortReader
@@ -73,10 +74,10 @@ class Session:
             for i, sensor in enumerate(self.sensors)
             if sensor.family.poll is not None
         }
-        self._chains = [sensor.chain() for sensor in self.sensors]
+        self._chains = Chains([sensor.chain() for sensor in self.sensors])
         self._tee = Tee(self._chains, self._askers)
         self._reader: PortReader | None = None
-        self._shown = Shown(self._chains[0].timebase.rate_hz)
+        self._shown = Shown(self._chains.each[0].timebase.rate_hz)
 
     def listen(self) -> None:
         """Start reading, and return when every sensor has been heard.
@@ -93,7 +94,7 @@ class Session:
         self._reader.start()
         heard = [0] * len(self.sensors)
         # A slow sensor takes several of its own periods to be told from silence.
-        slowest = min(chain.timebase.rate_hz for chain in self._chains)
+        slowest = min(chain.timebase.rate_hz for chain in self._chains.each)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
         while not all(count >= 3 for count in heard):
             if self._clock.now_ns() > deadline:
@@ -121,7 +122,7 @@ class Session:
         before = self.sensors[0].calibration
         calibration = against_ruler(tuple(points), tuple(known_m), u_known_m, before)
         self.sensors[0] = replace(self.sensors[0], calibration=calibration)
-        self._chains[0].calibration = calibration
+        self._chains.each[0].calibration = calibration
         self.poll(0.0)  # what was decoded with the calibration before
         return calibration.restated(points[-1], before)
 
@@ -165,7 +166,7 @@ class Session:
             )
         since_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, progress)
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
-        self._chains = [sensor.chain() for sensor in self.sensors]
+        self._chains = Chains([sensor.chain() for sensor in self.sensors])
         self._shown.clear()
         own_clocks = all(sensor.family.has_device_time for sensor in self.sensors)
         recorder = Recorder(log, self._header(), self._clock, own_clocks=own_clocks)
@@ -264,7 +265,7 @@ class Session:
             seconds,
             shown.samples,
             shown.missing,
-            sum(len(chain.timebase.gaps) for chain in self._chains),
+            sum(len(chain.timebase.gaps) for chain in self._chains.each),
             shown.rate_hz(self._clock.now_ns()),
             partial(shown.motion, self._clock.now_ns()),
             None if recorder is None else recorder.status,

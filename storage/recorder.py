@@ -17,13 +17,14 @@ from __future__ import annotations
 import json
 import os
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from acquisition.clock import Clock
+from acquisition.readings import Read
 from storage.disk import DiskNearlyFull, check_disk
 from storage.errors import WriteFailed, one_line
 from storage.wire_layout import HEAD_BYTES, event_payload
@@ -169,16 +170,18 @@ class Recorder:
             queue = (len(self._queue), self._queued_bytes, self._dropped_records, self._dropped_bytes)
             return RecorderStatus(*log, *queue, str(self._error or ""), self._closed)
 
-    def put(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Take the bytes of one read of a port; never waits for the disk, never raises for its sake."""
-        self._offer(Kind.DATA, channel, host_ns, data)
+    def reads(self, reads: Sequence[Read]) -> None:
+        """Take what was read of ports; never waits for the disk, never raises for its sake."""
+        self.enqueue(reads)
         self.wake()
 
-    data = put  # as a sink calls it
+    def put(self, channel: int, host_ns: int, data: bytes) -> None:
+        """Take the bytes of one read of a port."""
+        self.reads(((channel, host_ns, data),))
 
-    def enqueue(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Take the bytes of one read as :meth:`put` does, to be appended at the next :meth:`append` at the latest."""
-        self._offer(Kind.DATA, channel, host_ns, data)
+    def enqueue(self, reads: Sequence[Read]) -> None:
+        """Take what was read as :meth:`reads` does, to be appended at the next :meth:`append` at the latest."""
+        self._offer(Kind.DATA, reads)
 
     def append(self) -> None:
         """Append what is queued: on this thread, with ``own_clocks`` and while the disk is quick, else on another."""
@@ -194,12 +197,12 @@ class Recorder:
     def mark(self, text: str, *, host_ns: int | None = None, channel: int = 0) -> None:
         """Take a mark."""
         now = self._clock.now_ns() if host_ns is None else host_ns
-        self._offer(Kind.MARK, channel, now, text.encode("utf-8", "replace"))
+        self._offer(Kind.MARK, ((channel, now, text.encode("utf-8", "replace")),))
         self.wake()
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Take "lost", "reopened", "timeout", "trigger", "calibration" or another event, with facts about it."""
-        self._offer(Kind.EVENT, channel, host_ns, event_payload(kind, facts))
+        self._offer(Kind.EVENT, ((channel, host_ns, event_payload(kind, facts)),))
         self.wake()
 
     def drain(self, *, sync: bool = False) -> RecorderStatus:
@@ -236,24 +239,26 @@ class Recorder:
         if self._error is not None:
             raise self._error
 
-    def _offer(self, kind: Kind, channel: int, mono_ns: int, payload: bytes) -> None:
-        if not 0 <= channel <= 255:
-            raise ValueError(f"a channel must lie in 0 to 255, got {channel}")
-        size = HEAD_BYTES + len(payload)
+    def _offer(self, kind: Kind, records: Sequence[Read]) -> None:
         with self._lock:
             open_ = self._error is None and not self._closing
-            # After an overflow nothing is taken before its event: records around a loss must not look like neighbours.
-            if open_ and not self._overflows and self._queued_bytes + size <= self._limit:
-                self._queue.append((kind, channel, mono_ns, payload))
-                self._queued_bytes += size
-                return
-            self._dropped_records += 1
-            self._dropped_bytes += len(payload)
-            if open_:
-                lost = self._overflows.setdefault(channel, _Overflow(mono_ns, mono_ns))
-                lost.last_ns = mono_ns
-                lost.records += 1
-                lost.bytes += len(payload)
+            for channel, mono_ns, payload in records:
+                if not 0 <= channel <= 255:
+                    raise ValueError(f"a channel must lie in 0 to 255, got {channel}")
+                size = HEAD_BYTES + len(payload)
+                # After an overflow nothing is taken before its event: records around a loss must not look like
+                # neighbours.
+                if open_ and not self._overflows and self._queued_bytes + size <= self._limit:
+                    self._queue.append((kind, channel, mono_ns, payload))
+                    self._queued_bytes += size
+                    continue
+                self._dropped_records += 1
+                self._dropped_bytes += len(payload)
+                if open_:
+                    lost = self._overflows.setdefault(channel, _Overflow(mono_ns, mono_ns))
+                    lost.last_ns = mono_ns
+                    lost.records += 1
+                    lost.bytes += len(payload)
 
     def _append_here(self) -> bool:
         """Append on the caller's thread; False where that is for the other one."""

@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 import re
 from binascii import crc_hqx
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import repeat
 from types import MappingProxyType
 
 from acquisition.decoders.base import Family
@@ -23,9 +24,11 @@ LONGEST = 96
 """Longest line without its line feed, bytes."""
 
 _WRAP = 1 << 32
+_new = tuple.__new__  # makes a Reading in a third of the time that Reading(...) takes
 _FIELDS = rb"R1,([0-9]{1,10}+),([0-9]{1,10}+),([0-9]{1,6}+\.[0-9]{2})?+,(-?[0-9]{1,5}+)?+,([A-Z])"
 _RECORD = re.compile(_FIELDS)
-_sound_line = re.compile(rb"\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?+\n").fullmatch  # what nearly every line is
+_LINE = re.compile(rb"\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?+\n")  # what nearly every line is
+_LINES = re.compile(b"(" + _LINE.pattern + b")")
 _ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable, neither $ nor * within
 
 
@@ -104,7 +107,7 @@ class LineProtocolDecoder:
 
 def _sound(host_ns: int, line: bytes) -> Reading | None:
     """Return the reading of a line, with its end, in which nothing is wrong or unusual."""
-    found = _sound_line(line)
+    found = _LINE.fullmatch(line)
     if found is None:
         return None
     body, sequence, device_us, echo, temperature, status, crc = found.groups()
@@ -113,6 +116,30 @@ def _sound(host_ns: int, line: bytes) -> Reading | None:
         if crc_hqx(body, 0xFFFF) == int(crc, 16)
         else None
     )
+
+
+def whole_lines(
+    decoders: Sequence[LineProtocolDecoder], host_ns: Sequence[int], data: Sequence[bytes]
+) -> list[Reading] | None:
+    """Decode reads of which each is one whole line: what :attr:`acquisition.decoders.base.Family.whole` asks for."""
+    if False in [decoder._lines.between for decoder in decoders]:
+        return None
+    found = _LINES.findall(b"".join(data))
+    if len(found) != len(data):
+        return None
+    line, body, sequence, device_us, echo, temperature, status, crc = zip(*found, strict=True)
+    if line != data or list(map(crc_hqx, body, repeat(0xFFFF))) != list(map(int, crc, repeat(16))):
+        return None
+    # By columns, what _reading does: many at a time that is two thirds of the work.
+    counts, clocks_us = list(map(int, sequence)), list(map(int, device_us))
+    if max(counts) >= _WRAP or max(clocks_us) >= _WRAP:
+        return None
+    echoes_us = [
+        (float(echo_us) if letter == b"E" and echo_us else 0.0) or NAN
+        for echo_us, letter in zip(echo, status, strict=True)
+    ]
+    celsius = [int(hundredths) / 100 if hundredths else NAN for hundredths in temperature]
+    return list(map(_new, repeat(Reading), zip(host_ns, counts, clocks_us, echoes_us, repeat(NAN), celsius)))
 
 
 def _parse(host_ns: int, line: bytes, start: int) -> Reading | str:
@@ -138,8 +165,7 @@ def _reading(
     # Only status E vouches for an echo; with any other letter nothing was measured. No echo takes no time.
     echo_us = float(echo) if status == b"E" and echo else 0.0
     celsius = int(temperature) / 100 if temperature else NAN
-    # Reading(...) in a third of its time.
-    return tuple.__new__(Reading, (host_ns, count, clock_us, echo_us or NAN, NAN, celsius))
+    return _new(Reading, (host_ns, count, clock_us, echo_us or NAN, NAN, celsius))
 
 
 class LineProtocolEncoder:
@@ -167,5 +193,6 @@ FAMILY = Family(
     decoder=LineProtocolDecoder,
     encoder=LineProtocolEncoder,
     has_device_time=True,
+    whole=whole_lines,
     source="docs/reference/line-protocol.md",
 )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import describe_bytes, probe
 from acquisition.errors import PortError
+from acquisition.readings import Read
 from acquisition.serial_port import SerialPort, list_ports
 from acquisition.wired import Line, PortReader
 from springmass.errors import OK
@@ -62,10 +63,11 @@ class _Heard:
         self.bytes = b""
         self.why = ""
 
-    def data(self, channel: int, host_ns: int, data: bytes) -> None:  # noqa: ARG002 - a sink
-        self.bytes += data
+    def reads(self, reads: Sequence[Read]) -> None:
+        for _, _, data in reads:
+            self.bytes += data
 
-    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:  # noqa: ARG002
+    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:  # noqa: ARG002 - a sink
         if kind == "lost":
             self.why = str(facts["why"])
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.chain import SensorChain
+from acquisition.chain import Chains, SensorChain
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
 from springmass.reads import Tee
@@ -34,13 +34,13 @@ def record(port: int, log: str, mode: str, appender: str) -> None:
     """Record a port until the process is killed; say after each read how far the log has come."""
     clock = SystemClock()
     recorder = Recorder(log, HEADER, clock, sync_every_s=0.003, own_clocks=appender == "reader")
-    chain = SensorChain(get_family("line-protocol"))
-    tee = Tee([chain], {})
-    tee.start(recorder, [chain], 0)
+    chains = Chains([SensorChain(get_family("line-protocol"))])
+    tee = Tee(chains, {})
+    tee.start(recorder, chains, 0)
     os.write(1, struct.pack("<II", 0, 0))
     while data := os.read(port, PACKET):
         # As the reading thread does: all that was read is put away, then decoded, and last the appending is asked for.
-        tee.data(0, clock.now_ns(), data)
+        tee.reads([(0, clock.now_ns(), data)])
         tee.decode()
         status = recorder.drain() if mode == "paced" else recorder.status
         os.write(1, struct.pack("<II", status.records, status.synced_records))

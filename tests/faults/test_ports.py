@@ -9,7 +9,7 @@ import math
 import os
 import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +26,7 @@ from acquisition.clock import SystemClock
 from acquisition.decoders.base import Poll
 from acquisition.decoders.registry import families, get_family
 from acquisition.errors import PortError
-from acquisition.readings import Readings, join
+from acquisition.readings import Read, Readings, join
 from acquisition.serial_port import PortFacts, SerialPort, list_ports
 from acquisition.virtual import Shot, VirtualRangefinder, VirtualSensor
 from acquisition.virtual_port import Faults, VirtualPort
@@ -67,11 +67,12 @@ class Keeper:
         self._came = threading.Event()
         self._told = {kind: threading.Event() for kind in ("lost", "reopened", "timeout")}
 
-    def data(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Decode the bytes of one read."""
-        assert channel == 3
-        self.blocks.append(self.chain.feed(host_ns, data))
-        self.readings.append(self.chain.last)
+    def reads(self, reads: Sequence[Read]) -> None:
+        """Decode what was read."""
+        for channel, host_ns, data in reads:
+            assert channel == 3
+            self.blocks.append(self.chain.feed(host_ns, data))
+            self.readings.append(self.chain.last)
         self._came.set()
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
@@ -370,9 +371,10 @@ def test_several_ports_are_read_by_one_thread() -> None:
     class Counter:
         """Counts frames by channel."""
 
-        def data(self, channel: int, host_ns: int, data: bytes) -> None:
+        def reads(self, reads: Sequence[Read]) -> None:
             """Count."""
-            counts[channel] += len(decoders[channel].feed(host_ns, data))
+            for channel, host_ns, data in reads:
+                counts[channel] += len(decoders[channel].feed(host_ns, data))
             if all(count == 60 for count in counts.values()):
                 whole.set()
 
@@ -552,7 +554,7 @@ def test_a_sink_that_refuses_ends_the_reading_and_is_heard_of() -> None:
         def __init__(self) -> None:
             self.asked = threading.Event()
 
-        def data(self, channel: int, host_ns: int, data: bytes) -> None:
+        def reads(self, reads: Sequence[Read]) -> None:
             """Refuse."""
             self.asked.set()
             raise RuntimeError("no room")

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from acquisition.block import Flag, concatenate
-from acquisition.chain import SensorChain
+from acquisition.chain import Chains, SensorChain
 from acquisition.decoders.registry import get_family
+from acquisition.readings import Read
 from springmass import reads
 from springmass.reads import Tee
 from storage.recorder import Recorder
@@ -24,19 +25,19 @@ class Log:
     """A recorder that remembers."""
 
     def __init__(self) -> None:
-        self.reads: list[tuple[int, int, bytes]] = []
+        self.taken: list[Read] = []
         self.events: list[str] = []
         self.awake = 0
 
-    def data(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Remember a read."""
-        self.reads.append((channel, host_ns, data))
+    def enqueue(self, reads: Sequence[Read]) -> None:
+        """Remember reads."""
+        self.taken += reads
 
-    enqueue = data
+    reads = enqueue
 
     def append(self) -> None:
         """Remember up to where it was to be appended."""
-        self.awake = len(self.reads)
+        self.awake = len(self.taken)
 
     def event(self, channel: int, host_ns: int, kind: str, facts: dict[str, Any]) -> None:
         """Remember an event."""
@@ -60,7 +61,7 @@ def frame(i: int) -> bytes:
 def started(tee: Tee, chains: Sequence[SensorChain], since_ns: int) -> Log:
     """Record from here on."""
     log = Log()
-    tee.start(cast(Recorder, log), chains, since_ns)
+    tee.start(cast(Recorder, log), Chains(chains), since_ns)
     return log
 
 
@@ -68,7 +69,7 @@ def test_what_is_recorded_decodes_to_what_was_shown() -> None:
     """Cut anywhere, with a break in between, the chain fed one read at a time gives the same bits as the tee."""
     data = b"".join(map(frame, range(40)))
     cuts = [0, *np.sort(np.random.default_rng(2).integers(1, len(data), 25)).tolist(), len(data)]
-    tee = Tee([chain()], {})
+    tee = Tee(Chains([chain()]), {})
     log = started(tee, [chain()], 0)
     other = chain()
     expected = []
@@ -76,7 +77,7 @@ def test_what_is_recorded_decodes_to_what_was_shown() -> None:
         if n == 12:
             tee.event(0, n * STEP_NS, "lost", {"why": "cable"})
             other.lost()
-        tee.data(0, n * STEP_NS, data[a:b])
+        tee.reads([(0, n * STEP_NS, data[a:b])])
         expected.append(other.feed(n * STEP_NS, data[a:b]))
     assert tee.blocks() == []
     assert tee.decode() is False
@@ -87,34 +88,34 @@ def test_what_is_recorded_decodes_to_what_was_shown() -> None:
     assert whole.host_ns is not None
     for name in ("t", "distance", "flags", "host_ns"):
         assert getattr(block, name).tobytes() == getattr(whole, name).tobytes()
-    assert b"".join(data for _, _, data in log.reads) == data
+    assert b"".join(data for _, _, data in log.taken) == data
     assert log.events == [f'0 {12 * STEP_NS} lost {{"why": "cable"}}']
     assert tee.gone == {0: "cable"}
 
 
 def test_the_recorder_is_woken_after_each_piece() -> None:
     """What was read waits for the appending no longer than one piece of decoding takes, in a flood too."""
-    tee = Tee([chain()], {})
+    tee = Tee(Chains([chain()]), {})
     log = started(tee, [chain()], 0)
     for i in range(1000):
-        tee.data(0, i * STEP_NS, frame(i))
+        tee.reads([(0, i * STEP_NS, frame(i))])
     assert log.awake == 0
     assert tee.decode()
     assert log.awake == 1000
-    tee.data(0, 1000 * STEP_NS, frame(1000))
+    tee.reads([(0, 1000 * STEP_NS, frame(1000))])
     tee.decode()
     assert log.awake == 1001
 
 
 def test_samples_asked_for_once_a_second_are_decoded_then() -> None:
     """Nothing is decoded in between but a whole piece; what is asked for is all that was read, and the same bits."""
-    tee, other = Tee([chain()], {}), chain()
+    tee, other = Tee(Chains([chain()]), {}), chain()
     expected, found, untouched = [], [], 0
     for i in range(1000):
-        tee.data(0, i * STEP_NS, frame(i))
-        before = len(tee._chains[0])
+        tee.reads([(0, i * STEP_NS, frame(i))])
+        before = len(tee._chains.each[0])
         assert not tee.decode()
-        untouched += len(tee._chains[0]) == before
+        untouched += len(tee._chains.each[0]) == before
         expected.append(other.feed(i * STEP_NS, frame(i)))
         if i % 100 == 99:
             found += [block for _, block in tee.blocks()]
@@ -127,36 +128,36 @@ def test_samples_asked_for_once_a_second_are_decoded_then() -> None:
 
 def test_samples_asked_for_often_are_decoded_as_they_come() -> None:
     """Ten times a second is often, also after a time in which nobody asked."""
-    tee = Tee([chain()], {})
+    tee = Tee(Chains([chain()]), {})
     for i in range(300):
-        tee.data(0, i * STEP_NS, frame(i))
+        tee.reads([(0, i * STEP_NS, frame(i))])
         tee.decode()
         if i == 100 or (i > 200 and i % 10 == 0):
             tee.blocks()
         elif i > 220:
-            assert len(tee._chains[0]) == i % 10
+            assert len(tee._chains.each[0]) == i % 10
 
 
 def test_a_flood_is_decoded_piece_by_piece_though_nobody_asks() -> None:
     """Less than a piece waits until somebody asks."""
-    tee = Tee([chain()], {})
-    tee.data(0, 0, frame(0))
+    tee = Tee(Chains([chain()]), {})
+    tee.reads([(0, 0, frame(0))])
     tee.blocks()
-    tee.data(0, 1000 * STEP_NS, frame(1))
+    tee.reads([(0, 1000 * STEP_NS, frame(1))])
     tee.blocks()
     for i in range(2, 1000):
-        tee.data(0, (1000 + i) * STEP_NS, frame(i))
+        tee.reads([(0, (1000 + i) * STEP_NS, frame(i))])
     while tee.decode():
         pass
-    assert 1000 - len(tee._chains[0]) < reads.ROUND_BYTES / len(frame(0)) + 1
+    assert 1000 - len(tee._chains.each[0]) < reads.ROUND_BYTES / len(frame(0)) + 1
     assert sum(len(block) for _, block in tee.blocks()) == 1000
 
 
 def test_decoding_stops_after_a_piece_and_goes_on_later() -> None:
     """A flood does not keep the reader from its ports."""
-    tee = Tee([chain()], {})
+    tee = Tee(Chains([chain()]), {})
     for i in range(1000):
-        tee.data(0, i * STEP_NS, frame(i))
+        tee.reads([(0, i * STEP_NS, frame(i))])
     rounds = 1
     while tee.decode():
         rounds += 1
@@ -167,14 +168,14 @@ def test_decoding_stops_after_a_piece_and_goes_on_later() -> None:
 def test_more_than_the_decoders_can_do_is_recorded_counted_and_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
     """The oldest reads are skipped, the log has all, and the first sample after them is flagged."""
     monkeypatch.setattr(reads, "HELD_BYTES", 4000)
-    tee = Tee([chain()], {})
+    tee = Tee(Chains([chain()]), {})
     log = started(tee, [chain()], 0)
     for i in range(200):
-        tee.data(0, i * STEP_NS, frame(i))
+        tee.reads([(0, i * STEP_NS, frame(i))])
     while tee.decode():
         pass
     ((_, block),) = tee.blocks()
-    assert len(log.reads) == 200
+    assert len(log.taken) == 200
     assert tee.skipped_bytes == sum(len(frame(i)) for i in range(200 - len(block)))
     assert 0 < len(block) < 200
     assert block.flags[0] == Flag.GAP_BEFORE
@@ -183,28 +184,28 @@ def test_more_than_the_decoders_can_do_is_recorded_counted_and_flagged(monkeypat
 
 def test_a_run_begins_with_the_reads_kept_from_before() -> None:
     """From the moment asked for on, each once, whether or not it was decoded before; breaks are no bytes."""
-    tee = Tee([chain()], {})
-    tee.data(0, 0, frame(0))
+    tee = Tee(Chains([chain()]), {})
+    tee.reads([(0, 0, frame(0))])
     tee.keep()
     for i in range(1, 20):
-        tee.data(0, i * STEP_NS, frame(i))
+        tee.reads([(0, i * STEP_NS, frame(i))])
         if i == 10:
             tee.decode()
     tee.forget(3 * STEP_NS)
     log = started(tee, [chain()], 5 * STEP_NS)
-    tee.data(0, 20 * STEP_NS, frame(20))
+    tee.reads([(0, 20 * STEP_NS, frame(20))])
     tee.decode()
     ((_, block),) = tee.blocks()
-    assert [host_ns // STEP_NS for _, host_ns, _ in log.reads] == list(range(5, 21))
+    assert [host_ns // STEP_NS for _, host_ns, _ in log.taken] == list(range(5, 21))
     np.testing.assert_allclose(block.t, np.arange(16) * 0.01, atol=1e-12)
     assert block.first == 0
 
 
 def test_the_first_bytes_are_kept_until_the_sensor_is_known() -> None:
     """So that silence or garbage can be described; not for ever."""
-    tee = Tee([chain()], {})
+    tee = Tee(Chains([chain()]), {})
     for _ in range(200):
-        tee.data(0, 0, b"x" * 100)
+        tee.reads([(0, 0, b"x" * 100)])
         tee.decode()
     assert tee.heard(0) == b"x" * reads.HEARD_BYTES
     tee.heard_enough()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,6 +12,7 @@ import pytest
 
 from acquisition.clock import VirtualClock
 from acquisition.errors import PortError
+from acquisition.readings import Read
 from acquisition.wired import CADENCE_NS, Line, PortReader
 
 WAIT_S = 10.0
@@ -29,9 +30,9 @@ class Pipe:
         """Return the end to wait on."""
         return self._read
 
-    def read(self, wait_s: float = 0.0) -> bytes:
-        """Return what is there."""
-        return os.read(self._read, 4096)
+    def read(self, wait_s: float) -> bytes:
+        """Refuse: what has a descriptor is read through it."""
+        raise AssertionError(wait_s)
 
     def write(self, data: bytes) -> None:
         """Refuse: nothing is asked here."""
@@ -58,9 +59,9 @@ class Order:
         self._pieces = pieces
         self._left = 0
 
-    def data(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Note a read."""
-        self.calls.append(f"read {channel}")
+    def reads(self, reads: Sequence[Read]) -> None:
+        """Note what was read."""
+        self.calls += [f"read {channel}" for channel, _, _ in reads]
         self._left = self._pieces
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
@@ -114,7 +115,7 @@ def test_only_several_busy_ports_are_looked_at_in_turns(ports: int) -> None:
 
 
 class Remote(Pipe):
-    """A transport at a network address, whose other side hung up and takes its time to answer again."""
+    """A transport at a network address, whose other side takes its time to answer again once it hung up."""
 
     name = "socket://bench:4000"
 
@@ -123,18 +124,18 @@ class Remote(Pipe):
         self.opening = threading.Event()
         self.answer = threading.Event()
 
-    def read(self, wait_s: float = 0.0) -> bytes:
-        """Be gone."""
-        raise PortError("socket://bench:4000: the port has gone")
-
     def reopen(self) -> None:
         """Wait for the other side."""
         self.opening.set()
         self.answer.wait(WAIT_S)
         raise PortError("socket://bench:4000: cannot be opened")
 
+    def hang_up(self) -> None:
+        """Be gone."""
+        os.close(self.end)
+
     def close(self) -> None:
-        """Keep the pipe, which the test closes."""
+        """Keep the end that is read, which the test closes."""
 
 
 class Lossy(Order):
@@ -144,9 +145,9 @@ class Lossy(Order):
         super().__init__()
         self.came = threading.Event()
 
-    def data(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Note a read."""
-        super().data(channel, host_ns, data)
+    def reads(self, reads: Sequence[Read]) -> None:
+        """Note what was read."""
+        super().reads(reads)
         self.came.set()
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
@@ -160,7 +161,7 @@ def test_a_network_port_that_is_slow_to_open_holds_up_no_other() -> None:
     clock = VirtualClock()
     reader = PortReader([Line(cable, 0), Line(remote, 1)], sink, clock)
     reader.start()
-    os.write(remote.end, b"x")
+    remote.hang_up()
     while not remote.opening.wait(0.01):
         clock.sleep_until_ns(clock.now_ns() + 500_000_000)
     os.write(cable.end, b"y")
@@ -169,4 +170,4 @@ def test_a_network_port_that_is_slow_to_open_holds_up_no_other() -> None:
     assert "read 0" in sink.calls
     remote.answer.set()
     reader.stop()
-    Pipe.close(remote)
+    os.close(remote.fileno())
