@@ -1,0 +1,189 @@
+"""Many sensors' reads decoded together, and their samples made together, are what each chain alone gives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.block import Block, Flag, concatenate
+from acquisition.calibration import Calibration
+from acquisition.chain import FEW, MANY, Chains, SensorChain
+from acquisition.decoders.line_protocol import LineProtocolEncoder, frame
+from acquisition.decoders.registry import get_family
+from acquisition.readings import Read
+
+SENSORS = 7
+STEP_US, STEP_NS = 10_000, 10_000_000
+WRAP_US = 1 << 32
+COLUMNS = ("t", "distance", "flags", "host_ns")
+ODD = (
+    b"",
+    b"# a comment\n",
+    b"$R1,1,2,3\n",
+    frame(b"R2,1,2"),
+    frame(b"R1,5,6,0.00,,E"),
+    frame(b"R1,99999999999,6,,,N")[:-1],
+    frame(b"R1,4294967296,6,,,N"),
+    b"x" * 120,
+)
+
+
+def line(sequence: int, device_us: int, *, target: bool = True, warm: bool = True) -> bytes:
+    """Return one line."""
+    return LineProtocolEncoder().encode(
+        sequence=sequence,
+        device_us=device_us,
+        echo_us=1500.0 + sequence % 9 if target else np.nan,
+        distance_m=0.25,
+        temperature_c=21.37 if warm else np.nan,
+    )
+
+
+def chains(family: str = "line-protocol") -> list[SensorChain]:
+    """Return chains that differ in their calibration."""
+    return [
+        SensorChain(get_family(family), rate_hz=100.0, calibration=Calibration(340.0 + i, 1.0 + 1e-3 * i, 1e-4 * i))
+        for i in range(SENSORS)
+    ]
+
+
+def alone(reads: Sequence[Read], each: Sequence[SensorChain]) -> list[Block]:
+    """Feed every read to its chain by itself."""
+    parts: list[list[Block]] = [[] for _ in each]
+    for channel, host_ns, data in reads:
+        if data:
+            parts[channel].append(each[channel].feed(host_ns, data))
+        else:
+            each[channel].lost()
+    return [concatenate(blocks) for blocks in parts]
+
+
+def assert_same(together: Chains, rounds: Sequence[Sequence[Read]], each: Sequence[SensorChain]) -> list[Block]:
+    """Feed rounds to both, compare all that comes of it bit by bit; return the samples."""
+    parts: list[list[Block]] = [[] for _ in each]
+    for reads in rounds:
+        together.take(reads)
+        for channel, block in together.blocks():
+            assert len(block)
+            parts[channel].append(block)
+    expected = alone([read for reads in rounds for read in reads], each)
+    found = [concatenate(blocks) for blocks in parts]
+    for got, want, chain, other in zip(found, expected, together.each, each, strict=True):
+        for name in COLUMNS:
+            if len(want):
+                assert getattr(got, name).tobytes() == getattr(want, name).tobytes(), name
+        assert len(got) == len(want)
+        assert chain.timebase.gaps == other.timebase.gaps
+        assert chain.timebase.restarts == other.timebase.restarts
+        assert chain.decoder.faults == other.decoder.faults
+        assert chain.decoder.pending == other.decoder.pending
+    return found
+
+
+@st.composite
+def recordings(draw: st.DrawFn) -> list[list[Read]]:
+    """Rounds of reads of sensors that skip, repeat, wrap, start again, miss targets, cut lines, send rubbish and go."""
+    clocks_us = [draw(st.sampled_from([0, 5, WRAP_US - 35_000])) for _ in range(SENSORS)]
+    sequence, host_ns = [0] * SENSORS, 0
+    rounds = []
+    for _ in range(draw(st.integers(1, 3))):
+        reads: list[Read] = []
+        for _ in range(draw(st.integers(1, 9))):
+            host_ns += STEP_NS
+            for i in range(SENSORS):
+                what = draw(
+                    st.sampled_from(["line"] * 24 + ["skip", "repeat", "restart", "mute", "cold", "cut", "odd"])
+                )
+                clocks_us[i] += 0 if what == "repeat" else STEP_US * (4 if what == "skip" else 1)
+                if what == "restart":
+                    clocks_us[i] = 0
+                sequence[i] += 1
+                text = line(sequence[i], clocks_us[i], target=what != "mute", warm=what != "cold")
+                if what == "odd":
+                    text = draw(st.sampled_from(ODD))
+                if what == "cut":
+                    at = draw(st.integers(1, len(text) - 1))
+                    reads.append((i, host_ns, text[:at]))
+                    text = text[at:]
+                reads.append((i, host_ns, text))
+        rounds.append(reads)
+    return rounds
+
+
+@given(recordings())
+def test_together_is_as_alone(rounds: list[list[Read]]) -> None:
+    """Samples, gaps, restarts and faults are the same bit by bit, whatever comes between sound lines."""
+    assert_same(Chains(chains()), rounds, chains())
+
+
+def test_sound_lines_are_decoded_together_and_make_samples_together() -> None:
+    """Of steady sensors no chain is asked by itself, but for their first samples and for few."""
+
+    class Alone(SensorChain):
+        """Counts what it is asked by itself."""
+
+        def __init__(self) -> None:
+            super().__init__(get_family("line-protocol"), rate_hz=100.0)
+            self.taken = self.blocked = 0
+
+        def take(self, host_ns: int, data: bytes) -> int:
+            """Count."""
+            self.taken += 1
+            return super().take(host_ns, data)
+
+        def block(self) -> Block:
+            """Count."""
+            self.blocked += 1
+            return super().block()
+
+    each = [Alone() for _ in range(MANY)]
+    together = Chains(each)
+    for k in range(5):
+        together.take([(i, k * STEP_NS, line(k, k * STEP_US)) for i in range(MANY)])
+        assert len(together.blocks()) == MANY
+    assert {(chain.taken, chain.blocked) for chain in each} == {(0, 1)}
+    together.take([(i, 5 * STEP_NS, line(5, 5 * STEP_US)) for i in range(FEW - 1)])
+    assert len(together.blocks()) == FEW - 1
+    assert [(chain.taken, chain.blocked) for chain in each[:FEW]] == [(1, 2)] * (FEW - 1) + [(0, 1)]
+
+
+def test_half_lines_of_two_ports_make_no_line() -> None:
+    """What one port's read begins and another's would end is no reading of either."""
+    text = line(1, STEP_US)
+    reads = [(0, 0, text[:9]), (1, 0, text[9:]), (2, 0, text + text), (3, 0, text), (4, 0, b"x" + text)]
+    found = assert_same(Chains(chains()), [reads, [(0, 1, text[9:])]], chains())
+    assert [len(block) for block in found] == [1, 0, 2, 1, 1, 0, 0]
+
+
+def test_a_port_that_went_away_flags_the_next_sample_made_together() -> None:
+    """Also where the next sample comes in a later block."""
+    rounds = [[(i, k * STEP_NS, line(k, k * STEP_US)) for k in range(MANY) for i in range(2)]]
+    rounds[0].insert(21, (1, 10 * STEP_NS, b""))
+    rounds[0].append((0, MANY * STEP_NS, b""))
+    rounds.append([(i, k * STEP_NS, line(k, k * STEP_US)) for k in range(MANY, 2 * MANY) for i in range(2)])
+    found = assert_same(Chains(chains()), rounds, chains())
+    gap = int(Flag.GAP_BEFORE)
+    assert [np.flatnonzero(block.flags == gap).tolist() for block in found[:2]] == [[MANY], [10]]
+
+
+def test_sensors_of_other_families_go_through_their_own_decoders() -> None:
+    """Lines of text beside the line protocol, neither disturbed by the other."""
+
+    other = get_family("maxbotix-hr")
+    encoder = other.encoder()
+
+    def mixed() -> list[SensorChain]:
+        return [SensorChain(family, rate_hz=100.0) for family in (get_family("line-protocol"), other) * 3]
+
+    def text(k: int) -> bytes:
+        """Return what the other family sends."""
+        return encoder.encode(
+            sequence=k, device_us=k * STEP_US, echo_us=2900.0, distance_m=0.5 + 1e-3 * k, temperature_c=21.0
+        )
+
+    rounds = [[(i, k * STEP_NS, text(k) if i % 2 else line(k, k * STEP_US)) for k in range(20) for i in range(6)]]
+    found = assert_same(Chains(mixed()), rounds, mixed())
+    assert [len(block) for block in found] == [20] * 6
