@@ -25,7 +25,7 @@ REOPEN_EVERY_NS = 500_000_000
 IDLE_WAIT_S = 0.5
 BLOCKING_WAIT_S = 0.25
 POLLED_WAIT_S = 0.01
-CADENCE_NS = 500_000
+CADENCE_NS = 900_000
 """Where several ports keep the reader busy it looks at them so often; alone, a port is read as soon as it speaks."""
 
 

@@ -8,9 +8,7 @@ Each design gives a port's bytes to a chain of its own, from which the samples a
 second, beside a wire log, as `springmass record` does it, which then decodes many readings at a time. One design is
 what `springmass record` does: one thread reads, then decodes (`springmass/reads.py`). Beside it stand two with a thread
 for each port that reads what is there and decodes it as it comes: pyserial's own `serial.threaded.ReaderThread`, and
-the leanest such thread that we could write, which leaves out most of what pyserial does around each read. A last one
-is no design but a floor: one thread that waits, reads and decodes in the barest loop, with no log, no loss of a port
-and no request provided for.
+the leanest such thread that we could write, which leaves out most of what pyserial does around each read.
 """
 
 from __future__ import annotations
@@ -58,7 +56,7 @@ PATIENCE_S = 10.0
 LOOK_S, SELDOM_S = 0.1, 1.0
 Parsed = tuple[int, int]
 """Host's stamp of the last read of a piece, and when that piece was parsed, ns."""
-CADENCES_MS = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
+CADENCES_MS = (0.0, 0.25, 0.5, 0.9, 2.0, 5.0)
 
 
 @dataclass(frozen=True)
@@ -286,54 +284,9 @@ class LeanThreads:
             self._recorder.close()
 
 
-class BareLoop:
-    """The least that one thread can do for many ports in Python, at the cadence of a recording."""
-
-    def __init__(self, paths: Sequence[str], chains: Sequence[SensorChain]) -> None:
-        self._ports = [serial.Serial(path, BAUD, timeout=0) for path in paths]
-        self._ready = select.epoll()
-        self._channels = {port.fileno(): channel for channel, port in enumerate(self._ports)}
-        for descriptor in self._channels:
-            self._ready.register(descriptor, select.EPOLLIN)
-        self._chains = chains
-        self._parsed: list[Parsed] = []
-        self._stop = threading.Event()
-        self._lock = threading.Lock()
-        self._thread = threading.Thread(target=self._read, daemon=True)
-        self._thread.start()
-
-    def _read(self) -> None:
-        poll, read, channels, chains = self._ready.poll, os.read, self._channels, self._chains
-        while not self._stop.is_set():
-            found = [(chains[channels[descriptor]], read(descriptor, 4096)) for descriptor, _ in poll(0.25)]
-            now = time.monotonic_ns()
-            with self._lock:
-                for chain, data in found:
-                    chain.take(now, data)
-            self._parsed.append((now, time.monotonic_ns()))
-            time.sleep(CADENCE_NS * 1e-9)
-
-    def blocks(self) -> list[tuple[int, Block]]:
-        """Return the samples since the last call."""
-        with self._lock:
-            return [(i, chain.block()) for i, chain in enumerate(self._chains) if len(chain)]
-
-    def parsed(self, channel: int) -> Sequence[Parsed]:  # noqa: ARG002 - all were parsed together
-        """Return when what was read was parsed."""
-        return self._parsed
-
-    def stop(self) -> None:
-        """Stop the thread."""
-        self._stop.set()
-        self._thread.join()
-        self._ready.close()
-        for port in self._ports:
-            port.close()
-
-
 Design = Callable[[Sequence[str], Sequence[SensorChain]], Running]
 THREADS: dict[str, Design] = {"pyserial's ReaderThread": ReaderThreads, "lean threads": LeanThreads}
-DESIGNS: dict[str, Design] = {"one thread": OneThread, "bare loop": BareLoop, **THREADS}
+DESIGNS: dict[str, Design] = {"one thread": OneThread, **THREADS}
 
 
 def measure(
@@ -441,11 +394,9 @@ def compare(ports: int, rate_hz: float, seconds: float) -> int:
     ours = [figures("decoded, one thread", OneThread, 1, 100.0), figures("decoded, one thread", OneThread, 1, 1000.0)]
     for what, decode in (("decoded", True), ("read", False)):
         one = figures(f"{what}, one thread", OneThread, decode=decode)
-        floor = figures(f"{what}, bare loop", BareLoop, decode=decode)
         for name, design in THREADS.items():
             other = figures(f"{what}, {name}", design, decode=decode)
-            bare = floor.cpu_share / other.cpu_share
-            print(f"  over it: one thread {one.cpu_share / other.cpu_share:.2f} x, bare loop {bare:.2f} x", flush=True)
+            print(f"  one thread over it: {one.cpu_share / other.cpu_share:.2f} x", flush=True)
         ours.append(one)
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "run.wire"

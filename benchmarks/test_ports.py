@@ -27,7 +27,7 @@ def ports() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize("design", ["one thread", "bare loop", "pyserial's ReaderThread", "lean threads"])
+@pytest.mark.parametrize("design", ["one thread", "pyserial's ReaderThread", "lean threads"])
 @pytest.mark.parametrize("decode", [True, False])
 def test_every_sample_is_received(ports: ModuleType, design: str, decode: bool) -> None:
     """Four ports at 100 Hz for 0.3 s deliver what was sent."""
