@@ -212,17 +212,15 @@ class PortReader:
             cadence_ns = self._cadence_ns if len(lines) > 1 else 0
             behind, woke_ns = False, 0
             while not self._stop.is_set():
-                wait_s = 0.0 if behind else self._wait_s([*polled, *lost]) if polled or lost else IDLE_WAIT_S
-                ready = selector.select(wait_s)
+                ready = selector.select(0.0 if behind else self._wait_s([*polled, *lost]))
                 before_ns, woke_ns = woke_ns, self._clock.now_ns()
                 for line in self._read(ready, woke_ns):
                     selector.unregister(line.transport.fileno())
                     line.transport.close()
                     lost.append(line)
-                if lost:
-                    for line in [line for line in lost if self._tries_again(line)]:
-                        selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
-                        lost.remove(line)
+                for line in [line for line in lost if self._tries_again(line)]:
+                    selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
+                    lost.remove(line)
                 for line in polled:
                     if line.poll is not None and line._lost_ns is None and not self._ask(line, line.poll):
                         selector.unregister(line.transport.fileno())

@@ -22,7 +22,10 @@ from acquisition.decoders.registry import families, get_family
 from acquisition.virtual import VirtualRangefinder, VirtualSensor
 from acquisition.virtual_port import VirtualPort
 from pipeline.analyse import Motion, analyse
+from pipeline.streaming import NotYet
 from springmass import load
+from springmass.commands.record import _Line
+from springmass.progress import Progress
 from storage.run import open_run
 
 SCENE = """
@@ -423,3 +426,21 @@ def test_several_distances_need_somebody_who_presses_enter(
     assert done.code == 2
     assert "begun with Enter" in done.err.splitlines()[-1]
     assert not (tmp_path / "run.wire").exists()
+
+
+def test_off_a_terminal_the_progress_line_comes_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
+    """After 1, 10, 40 and 70 seconds, and what moves is looked into for those lines alone."""
+    asked: list[float] = []
+
+    def progress(seconds: float) -> Progress:
+        def motion() -> NotYet:
+            asked.append(seconds)
+            return NotYet("no samples so far")
+
+        return Progress(seconds, 0, 0, 0, 0.0, motion, None, None, waiting=False)
+
+    line = _Line()
+    for second in range(1, 81):
+        line(progress(float(second)))
+    assert asked == [1.0, 10.0, 40.0, 70.0]
+    assert capsys.readouterr().err.count("no samples so far") == 4
