@@ -6,7 +6,6 @@ Live view, recording, recovery and replay from wire bytes all use this one chain
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import chain as chain_together
 from typing import Any
 
 import numpy as np
@@ -190,7 +189,7 @@ class Chains:
             return [(channel, chain.block()) for channel, chain in found]
         chains = [chain for _, chain in found]
         readings = np.array(counts)
-        held = chain_together.from_iterable([chain._held for chain in chains])
+        held = [reading for chain in chains for reading in chain._held]
         host_ns, _, device_us, echo_us, distance_m, _ = zip(*held, strict=True)
         stamps_ns = np.array(host_ns)
         t, steady = steady_times([chain.timebase for chain in chains], readings, stamps_ns, np.array(device_us))

@@ -9,7 +9,7 @@ from typing import Any
 
 from acquisition.errors import PortError
 
-__all__ = ["PortFacts", "SerialPort", "list_ports"]
+__all__ = ["READ_BYTES", "PortFacts", "SerialPort", "list_ports"]
 
 READ_BYTES = 65536
 

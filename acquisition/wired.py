@@ -17,10 +17,10 @@ from acquisition.clock import Clock
 from acquisition.decoders.base import Poll, Polled
 from acquisition.errors import PortError
 from acquisition.readings import Read
+from acquisition.serial_port import READ_BYTES
 
 __all__ = ["Line", "PortReader", "Sink", "Transport"]
 
-READ_BYTES = 65536
 REOPEN_EVERY_NS = 500_000_000
 IDLE_WAIT_S = 0.5
 BLOCKING_WAIT_S = 0.25

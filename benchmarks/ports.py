@@ -95,6 +95,7 @@ class TimedChain(SensorChain):
         blocks = concatenate(self.kept)
         if not len(blocks):
             return np.empty(0, np.int64)
+        # The device stamps each line with the moment of sending; its time axis begins with the first one.
         first_us = (self.timebase._last_raw or 0) - self.timebase._ticks
         sent_us = first_us + np.round(blocks.t * 1e6).astype(np.int64)
         until_ns, parsed_ns = np.array(parsed).T
