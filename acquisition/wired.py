@@ -212,15 +212,18 @@ class PortReader:
             cadence_ns = self._cadence_ns if len(lines) > 1 else 0
             behind, woke_ns = False, 0
             while not self._stop.is_set():
-                ready = selector.select(0.0 if behind else self._wait_s([*polled, *lost]))
+                # Without an end where nothing can be due: the pipe wakes it, and a timer costs a tenth of a wake-up.
+                wait_s = 0.0 if behind else self._wait_s([*polled, *lost]) if polled or lost else None
+                ready = selector.select(wait_s)
                 before_ns, woke_ns = woke_ns, self._clock.now_ns()
                 for line in self._read(ready, woke_ns):
                     selector.unregister(line.transport.fileno())
                     line.transport.close()
                     lost.append(line)
-                for line in [line for line in lost if self._tries_again(line)]:
-                    selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
-                    lost.remove(line)
+                if lost:
+                    for line in [line for line in lost if self._tries_again(line)]:
+                        selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
+                        lost.remove(line)
                 for line in polled:
                     if line.poll is not None and line._lost_ns is None and not self._ask(line, line.poll):
                         selector.unregister(line.transport.fileno())
@@ -249,8 +252,6 @@ class PortReader:
 
     def _wait_s(self, lines: list[Line]) -> float:
         """How long nothing can be due."""
-        if not lines:
-            return IDLE_WAIT_S
         now = self._clock.now_ns()
         wait = IDLE_WAIT_S
         for line in lines:
@@ -286,7 +287,7 @@ class PortReader:
             self._sink.reads(reads)
         for line, why in gone:
             self._gone(line, f"{line.transport.name}: the port has gone ({why})")
-        return [line for line, _ in gone]
+        return [line for line, _ in gone] if gone else []
 
     def _wait_for(self, line: Line, wait_s: float) -> bool:
         """Hand on what comes within that time; False where the port is gone."""

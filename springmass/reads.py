@@ -63,7 +63,7 @@ class Tee:
         """Take what one wake-up read; called on the reading thread."""
         with self._lock:
             if self._recorder is not None:
-                self._recorder.enqueue(reads)
+                self._recorder.take(reads)
             if self._askers:
                 for channel, host_ns, data in reads:
                     if channel in self._askers:
@@ -93,12 +93,12 @@ class Tee:
 
         Called on the reading thread whenever it has read, so no read waits for the appending longer than a piece takes.
         """
-        with self._lock:
-            if self._asked_often or self._waiting_bytes >= ROUND_BYTES:
+        if self._asked_often or self._waiting_bytes >= ROUND_BYTES:
+            with self._lock:
                 self._decode_piece()
-            if self._recorder is not None:
-                self._recorder.append()
-            return self._waiting_bytes >= ROUND_BYTES or (self._asked_often and bool(self._waiting))
+        if (recorder := self._recorder) is not None:
+            recorder.wake()
+        return self._waiting_bytes >= ROUND_BYTES or (self._asked_often and bool(self._waiting))
 
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples that came since the last call, by channel."""

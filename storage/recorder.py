@@ -4,12 +4,12 @@ Three threads share the work. The reading thread only puts records into a queue.
 them to the wire log at once, so that a killed process loses no more than the read in flight. A third calls fdatasync
 once a second: that may take as long as the disk likes, and neither of the others waits for it.
 
-The second thread is woken when the reading thread has nothing else to do (:meth:`Recorder.enqueue`,
-:meth:`Recorder.append`): woken earlier, the two would contend for the interpreter while ports wait.
+The second thread is woken when the reading thread has nothing else to do (:meth:`Recorder.take`,
+:meth:`Recorder.wake`): woken earlier, the two would contend for the interpreter while ports wait.
 
-Where it harms nobody that a write may wait for the disk, the reading thread appends by itself (``own_clocks``): waking
-another thread for it costs more than the appending. It does so only while no sync has the file, and hands over to the
-second thread for a while once a write took long.
+Where it harms nobody that a write may wait for the disk, the reading thread appends by itself and past the queue
+(``own_clocks``): that costs less than waking another thread. It does so only while nothing is queued and no sync has
+the file, and goes by the queue for a while once a write took long.
 """
 
 from __future__ import annotations
@@ -39,6 +39,8 @@ SLOW_NS = 50_000_000
 """A write that takes longer waited for the disk, and not for its turn on a busy machine."""
 PATIENCE_NS = 10_000_000_000
 """After a slow write the reading thread writes nothing for so long."""
+
+_DATA = Kind.DATA  # looked up once: each look-up of an enumeration's member costs more than the checksum of a reading
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +104,7 @@ class Recorder:
         Bound of the queue. What comes while it is full is counted, and told by an event in the log.
     own_clocks : bool
         Whether every sensor sends the time of its readings by a clock of its own. A late stamp of the host's does no
-        harm then, and :meth:`append` may write on the thread that calls it.
+        harm then, and :meth:`take` may write on the thread that calls it.
     open_file : callable
         Makes the log's file: the seam for tests.
 
@@ -172,27 +174,24 @@ class Recorder:
 
     def reads(self, reads: Sequence[Read]) -> None:
         """Take what was read of ports; never waits for the disk, never raises for its sake."""
-        self.enqueue(reads)
+        self.take(reads)
         self.wake()
 
     def put(self, channel: int, host_ns: int, data: bytes) -> None:
         """Take the bytes of one read of a port."""
         self.reads(((channel, host_ns, data),))
 
-    def enqueue(self, reads: Sequence[Read]) -> None:
-        """Take what was read as :meth:`reads` does, to be appended at the next :meth:`append` at the latest."""
-        self._offer(Kind.DATA, reads)
-
-    def append(self) -> None:
-        """Append what is queued: on this thread, with ``own_clocks`` and while the disk is quick, else on another."""
-        if not (self._own_clocks and self._append_here()):
-            self.wake()
+    def take(self, reads: Sequence[Read]) -> None:
+        """Take what was read as :meth:`reads` does; where it is queued, :meth:`wake` has it appended."""
+        if not (self._own_clocks and self._append_here(reads)):
+            self._offer(_DATA, reads)
 
     def wake(self) -> None:
         """Have what is queued appended by another thread; costs nothing where there is nothing."""
-        with self._lock:
-            if (self._queue or self._overflows or self._closing) and self._rest.locked():
-                self._rest.release()
+        if self._queue or self._overflows or self._closing:
+            with self._lock:
+                if self._rest.locked():
+                    self._rest.release()
 
     def mark(self, text: str, *, host_ns: int | None = None, channel: int = 0) -> None:
         """Take a mark."""
@@ -231,7 +230,8 @@ class Recorder:
         self._stop_sync.set()
         self._syncer.join()
         if self._error is None:
-            self._guarded(self._append_end)
+            with self._order:  # no read is on its way past the queue
+                self._guarded(self._append_end)
         self._sync()
         self._guarded(self._log.close)
         with self._lock:
@@ -260,13 +260,16 @@ class Recorder:
                     lost.records += 1
                     lost.bytes += len(payload)
 
-    def _append_here(self) -> bool:
-        """Append on the caller's thread; False where that is for the other one."""
+    def _append_here(self, reads: Sequence[Read]) -> bool:
+        """Append on the caller's thread; False where that must go by the queue."""
         began_ns = self._clock.now_ns()
-        if self._log.syncing or began_ns < self._hands_over_until_ns or not self._order.acquire(blocking=False):
+        if self._log.syncing or began_ns < self._hands_over_until_ns or not self._order.acquire(False):
             return False
         try:
-            self._append_queued()
+            # What was queued comes first; and a recording that has ended or stopped counts what still comes.
+            if self._queue or self._overflows or self._closing or self._error:
+                return False
+            self._extend([(_DATA, *read) for read in reads])
         finally:
             self._order.release()
         ended_ns = self._clock.now_ns()
@@ -299,16 +302,20 @@ class Recorder:
                 taken += [lost.event(channel) for channel, lost in self._overflows.items()]
                 self._overflows.clear()
             self._appending = bool(taken)
-        if taken:
-            try:
-                self._log.extend(taken)
-            except Exception as error:  # a defect, too, must stop the recording and not look like one
-                self._stop(self._one_line(error), taken[self._log.extended :])
-                return True
+        if not taken:
+            return False
+        self._extend(taken)
         with self._lock:
             self._appending = False
             self._done.notify_all()
-        return bool(taken)
+        return True
+
+    def _extend(self, items: list[Item]) -> None:
+        """Append; the caller holds ``_order``."""
+        try:
+            self._log.extend(items)
+        except Exception as error:  # a defect, too, must stop the recording and not look like one
+            self._stop(self._one_line(error), items[self._log.extended :])
 
     def _one_line(self, error: Exception) -> WriteFailed:
         if isinstance(error, WriteFailed):
@@ -325,7 +332,6 @@ class Recorder:
             self._queued_bytes = 0
             self._dropped_records += len(left)
             self._dropped_bytes += sum(len(payload) for *_, payload in left)
-            self._appending = False
             self._done.notify_all()
         self._sync()
 

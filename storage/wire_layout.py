@@ -36,7 +36,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, NamedTuple
 
 from acquisition.source import Kind as SourceKind
 from storage.header import json_text
@@ -188,8 +188,7 @@ class LogHeader:
         return cls(**content)
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
+class Record(NamedTuple):
     """One record; a mark, event or header that was split is joined again, data come part by part.
 
     Parameters
@@ -213,7 +212,7 @@ class Record:
     mono_ns: int
     kind: Kind
     channel: int
-    payload: bytes = field(repr=False)
+    payload: bytes
     lost_before: int = 0
 
     def text(self) -> str:
@@ -238,9 +237,7 @@ def event_payload(kind: str, facts: Mapping[str, Any]) -> bytes:
     return text.encode("ascii")
 
 
-def frame(
-    kind: Kind, payload: bytes, *, sequence: int, mono_ns: int, log: int, channel: int = 0, parts: int = 0
-) -> bytes:
+def frame(kind: Kind, payload: bytes, sequence: int, mono_ns: int, log: int, channel: int = 0, parts: int = 0) -> bytes:
     """Return one record with a payload of at most 65535 bytes.
 
     Examples
@@ -249,7 +246,7 @@ def frame(
     'f5a90500 07000000 01000000 00000000 02000000 02030000 034438e3 52303530 30'
     """
     head = _HEAD.pack(MAGIC, len(payload), sequence % _WRAP, mono_ns, log, kind, channel, parts)
-    return b"".join((head, _CRC.pack(zlib.crc32(payload, zlib.crc32(head))), payload))
+    return head + _CRC.pack(zlib.crc32(payload, zlib.crc32(head))) + payload
 
 
 def frames(kind: Kind, payload: bytes, *, sequence: int, mono_ns: int, log: int, channel: int = 0) -> Iterator[bytes]:

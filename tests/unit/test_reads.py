@@ -29,13 +29,13 @@ class Log:
         self.events: list[str] = []
         self.awake = 0
 
-    def enqueue(self, reads: Sequence[Read]) -> None:
+    def take(self, reads: Sequence[Read]) -> None:
         """Remember reads."""
         self.taken += reads
 
-    reads = enqueue
+    reads = take
 
-    def append(self) -> None:
+    def wake(self) -> None:
         """Remember up to where it was to be appended."""
         self.awake = len(self.taken)
 

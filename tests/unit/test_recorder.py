@@ -143,11 +143,11 @@ def test_what_is_enqueued_is_appended_when_the_log_is_woken() -> None:
     recording.drain()
     before = len(disk.data)
     for number in range(10):
-        recording.enqueue([(0, number, b"x")])
+        recording.take([(0, number, b"x")])
     assert (recording.status.queued_records, recording.status.records, len(disk.data)) == (10, 1, before)
     recording.wake()
     assert recording.drain().records == 11
-    recording.enqueue([(0, 10, b"last")])
+    recording.take([(0, 10, b"last")])
     recording.close()
     assert [record.payload for record in parse_log(bytes(disk.data)) if record.kind is Kind.DATA][-1] == b"last"
 
@@ -157,8 +157,8 @@ def test_what_needs_no_host_stamp_is_appended_by_the_thread_that_asks() -> None:
     disk = Disk()
     recording = recorder(disk, own_clocks=True)
     for number in range(10):
-        recording.enqueue([(0, number, b"x")])
-    recording.append()
+        recording.take([(0, number, b"x")])
+    recording.wake()
     assert (recording.status.queued_records, recording.status.records) == (0, 11)
     recording.close()
     assert disk.threads["write"] == {"MainThread"}
@@ -169,12 +169,12 @@ def test_the_thread_that_asks_does_not_wait_for_a_sync() -> None:
     disk = Disk()
     recording = recorder(disk, own_clocks=True, sync_every_s=1e-4)
     disk.syncs_pass.clear()
-    recording.enqueue([(0, 0, b"first")])
-    recording.append()
+    recording.take([(0, 0, b"first")])
+    recording.wake()
     assert disk.held.wait(WAIT_S)
     disk.writes_pass.clear()
-    recording.enqueue([(0, 1, b"second")])
-    recording.append()
+    recording.take([(0, 1, b"second")])
+    recording.wake()
     assert recording.status.queued_records + recording.status.records >= 2
     disk.writes_pass.set()
     assert recording.drain().records == 3
@@ -192,8 +192,8 @@ def test_after_a_slow_write_another_thread_appends_for_a_while() -> None:
         """Append one record that takes so long, and tell on which thread."""
         disk.threads["write"].clear()
         disk.takes = lambda: clock.sleep_until_ns(clock.now_ns() + round(seconds * 1e9))
-        recording.enqueue([(0, 0, b"x")])
-        recording.append()
+        recording.take([(0, 0, b"x")])
+        recording.wake()
         recording.drain()
         return disk.threads["write"]
 
@@ -209,10 +209,10 @@ def test_records_stand_in_their_order_whichever_thread_appends(tmp_path: Path) -
     """A mark wakes the other thread while the reading thread appends: the log keeps the queue's order."""
     recording = Recorder(tmp_path / "run.wire", HEADER, VirtualClock(), own_clocks=True, sync_every_s=1e-4)
     for number in range(3000):
-        recording.enqueue([(0, number, b"%d" % number)])
+        recording.take([(0, number, b"%d" % number)])
         if number % 3 == 0:
             recording.mark(str(number), host_ns=number)
-        recording.append()
+        recording.wake()
     recording.close()
     records = [r for r in read_log(tmp_path / "run.wire") if r.kind in (Kind.DATA, Kind.MARK)]
     assert [r.mono_ns for r in records] == sorted(r.mono_ns for r in records)
@@ -225,8 +225,8 @@ def test_a_full_disk_stops_the_appending_of_the_thread_that_asks() -> None:
     recording = recorder(disk, own_clocks=True)
     disk.room = len(disk.data) + 50
     for number in range(5):
-        recording.enqueue([(0, number, b"R%04d\r" % number)])
-        recording.append()
+        recording.take([(0, number, b"R%04d\r" % number)])
+        recording.wake()
     assert "No space left on device" in recording.status.error
     assert (recording.status.queued_records, recording.status.records + recording.status.dropped_records) == (0, 6)
     with pytest.raises(WriteFailed, match="could not be written further"):
