@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import numpy as np
 from acquisition.block import Block
 from acquisition.recording import Original, Trap
 from storage.errors import RunDamaged, RunExists, one_line
-from storage.wire_decode import Chain, Decoded, chain_of, decode_log
+from storage.wire_decode import Decoded, decode_log
 from storage.wire_layout import Kind, LogHeader, Record, SensorEntry
 from storage.wire_read import Damage, LogContents, NotALog, parse_log
 
@@ -110,7 +110,6 @@ def recover(
     header: LogHeader | None = None,
     speed_of_sound_m_per_s: float | None = None,
     provenance: Mapping[str, Any] | None = None,
-    chain_for: Callable[[SensorEntry], Chain] = chain_of,
 ) -> RecoverReport:
     """Build the run file of a log, or one for each sensor where several were recorded.
 
@@ -131,8 +130,6 @@ def recover(
         Applied to echo times in place of the one that the log notes, m/s.
     provenance : mapping, optional
         Goes into the run file besides what the log says: software, version, ...
-    chain_for : callable
-        Makes the chain of a sensor.
 
     Raises
     ------
@@ -149,7 +146,7 @@ def recover(
     paths = run_paths(log_path if out_path is None else Path(out_path), [sensor.channel for sensor in sensors])
     if not overwrite:
         _demand_free(paths)
-    decoded = decode_log(log.contents, sensors, chain_for)
+    decoded = decode_log(log.contents, sensors)
     runs = [_write(path, log, part, provenance or {}, overwrite) for path, part in zip(paths, decoded, strict=True)]
     removed = remove_log and _remove(log_path, len(log.original.data))
     return RecoverReport(log_path, tuple(runs), log.contents.damage, len(log.marks), len(log.events), removed)

@@ -1,34 +1,29 @@
-"""From the records of a wire log to samples, through the chain that showed them live."""
+"""From the records of a wire log to samples, through the chains that showed them live."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
 from typing import Any, Protocol
 
-import numpy as np
-
-from acquisition.block import F8, I8, Block, Flag, concatenate
+from acquisition.block import F8, I8, Block, concatenate
+from acquisition.readings import Read
 from acquisition.source import SourceInfo
 from storage.wire_layout import Kind, Record, SensorEntry
 
-__all__ = ["BREAKS", "Chain", "Decoded", "chain_of", "decode_log"]
+__all__ = ["BREAKS", "Chain", "Chains", "Decoded", "chains_of", "decode_log"]
 
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
 """Events after which the bytes of a channel do not continue those before."""
+READS = 32
+"""So many reads are decoded together: where one of them is no whole frame, few go one by one for it."""
+HELD_READS = 4096
+"""Of so many reads samples are made at a time: a long run would be a heap of small arrays, or of readings."""
 
 
 class Chain(Protocol):
-    """One sensor's way from bytes to samples; :class:`acquisition.chain.SensorChain` is the real one."""
-
-    def feed(self, host_ns: int, data: bytes) -> Block:
-        """Take the bytes of one read, return the samples they completed (perhaps none)."""
-        ...
-
-    def lost(self) -> None:
-        """Forget a half-received frame: what comes next does not continue it."""
-        ...
+    """One sensor's way from bytes to samples, as far as it is asked after the last byte."""
 
     def info(self, name: str, kind: str = "live") -> SourceInfo:
         """Return what is known of the source once its samples came."""
@@ -39,15 +34,40 @@ class Chain(Protocol):
         ...
 
 
-def chain_of(sensor: SensorEntry) -> Chain:
-    """Return the chain that the sensor's family names, with the calibration noted in the log."""
+class Chains(Protocol):
+    """The ways of several sensors; :class:`acquisition.chain.Chains` are the real ones."""
+
+    @property
+    def each(self) -> Sequence[Chain]:
+        """By number."""
+        ...
+
+    def take(self, reads: Sequence[Read]) -> None:
+        """Take reads in their order, by the sensor's number; one without bytes breaks off what came before it."""
+        ...
+
+    def blocks(self) -> Iterable[tuple[int, Block]]:
+        """Return the samples that came since the last call, by number."""
+        ...
+
+
+def chains_of(sensors: Sequence[SensorEntry]) -> Chains:
+    """Return the chains that the sensors' families name, with the calibrations noted in the log."""
+    from acquisition import chain
     from acquisition.calibration import Calibration
-    from acquisition.chain import SensorChain
     from acquisition.decoders.registry import get_family
 
-    calibration = Calibration.from_mapping(sensor.calibration) if sensor.calibration else None
-    family = get_family(sensor.family)
-    return SensorChain(family, options=sensor.options, rate_hz=sensor.rate_hz, calibration=calibration)
+    return chain.Chains(
+        [
+            chain.SensorChain(
+                get_family(sensor.family),
+                options=sensor.options,
+                rate_hz=sensor.rate_hz,
+                calibration=Calibration.from_mapping(sensor.calibration) if sensor.calibration else None,
+            )
+            for sensor in sensors
+        ]
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,61 +91,51 @@ class Decoded:
     reads: int
 
 
-@dataclass(slots=True)
-class _Gathered:
-    """Samples on their way: small blocks are joined by the thousand, or a long run would hold millions of them."""
-
-    small: list[Block] = field(default_factory=list)
-    large: list[Block] = field(default_factory=list)
-    reads: int = 0
-    broken: bool = False
-
-    def add(self, block: Block) -> None:
-        if not len(block):
-            return
-        if self.broken:
-            flags = block.flags.copy()
-            flags[0] |= np.uint8(Flag.GAP_BEFORE)
-            block = dataclasses.replace(block, flags=flags)
-            self.broken = False
-        self.small.append(block)
-        if len(self.small) == 4096:
-            self.large.append(concatenate(self.small))
-            self.small.clear()
-
-    def whole(self) -> Block:
-        return concatenate([*self.large, *self.small])
-
-
 def decode_log(
     log: Iterable[Record],
     sensors: Sequence[SensorEntry],
-    chain_for: Callable[[SensorEntry], Chain] = chain_of,
+    chains_for: Callable[[Sequence[SensorEntry]], Chains] = chains_of,
 ) -> tuple[Decoded, ...]:
     """Return every sensor's samples, in the order of ``sensors``; other channels are passed over.
 
     Where records are missing, or a port went away, no frame is put together across the gap, and the first sample
     after it is flagged.
     """
-    chains = {sensor.channel: chain_for(sensor) for sensor in sensors}
-    gathered = {channel: _Gathered() for channel in chains}
+    chains = chains_for(sensors)
+    counts = [0] * len(sensors)
+    gathered: list[list[Block]] = [[] for _ in sensors]
 
-    def break_off(channels: Iterable[int]) -> None:
-        for channel in channels:
-            chains[channel].lost()
-            gathered[channel].broken = True
+    def gather() -> None:
+        for number, block in chains.blocks():
+            gathered[number].append(block)
 
+    reads = _reads(log, {sensor.channel: number for number, sensor in enumerate(sensors)}, counts)
+    held = 0
+    while piece := list(islice(reads, READS)):
+        chains.take(piece)
+        held += len(piece)
+        if held >= HELD_READS:
+            gather()
+            held = 0
+    gather()
+    return tuple(
+        Decoded(sensor, chain, concatenate(blocks), count)
+        for sensor, chain, blocks, count in zip(sensors, chains.each, gathered, counts, strict=True)
+    )
+
+
+def _reads(log: Iterable[Record], numbers: Mapping[int, int], counts: list[int]) -> Iterator[Read]:
+    """Yield what was read of the sensors, by number, count it, and tell of every break by a read without bytes."""
     for record in log:
         if record.lost_before:
-            break_off(chains)
-        if record.channel not in chains:
+            for number in numbers.values():
+                yield number, record.mono_ns, b""
+        if record.channel not in numbers:
             continue
+        number = numbers[record.channel]
         if record.kind is Kind.EVENT and record.json().get("kind") in BREAKS:
-            break_off([record.channel])
+            yield number, record.mono_ns, b""
         if record.kind is Kind.DATA:
-            gathered[record.channel].reads += 1
-            gathered[record.channel].add(chains[record.channel].feed(record.mono_ns, record.payload))
-    return tuple(
-        Decoded(sensor, chains[sensor.channel], gathered[sensor.channel].whole(), gathered[sensor.channel].reads)
-        for sensor in sensors
-    )
+            counts[number] += 1
+            if record.payload:
+                yield number, record.mono_ns, record.payload

@@ -10,7 +10,7 @@ import io
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -22,6 +22,7 @@ __all__ = ["Damage", "LogContents", "NotALog", "Record", "parse_log", "read_log"
 KEPT_STRETCHES = 100
 _LONGEST = HEAD_BYTES + MAX_PAYLOAD
 _CHUNK = 1 << 20
+_DATA, _END = Kind.DATA, Kind.END  # looked up once, and not for each record
 
 
 class NotALog(StorageError):
@@ -247,11 +248,12 @@ class _Scan:
         self._records += 1
         self._lost += missing
         self._owed += missing
-        self._ended = kind is Kind.END
+        self._ended = kind is _END
         record = Record(offset, sequence, mono_ns, kind, channel, payload)
-        if kind is not Kind.DATA:
+        if kind is not _DATA:
             return self._joined(record, parts, missing)
-        self._drop_parts()
+        if self._parts:
+            self._drop_parts()
         return self._told(record)
 
     def _joined(self, record: Record, parts: int, missing: int) -> Record | None:
@@ -274,7 +276,7 @@ class _Scan:
         if not self._owed:
             return record
         owed, self._owed = self._owed, 0
-        return replace(record, lost_before=owed)
+        return record._replace(lost_before=owed)
 
     def _drop_parts(self) -> None:
         self._lost += len(self._parts)

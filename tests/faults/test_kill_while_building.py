@@ -11,55 +11,25 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.block import F8, I8, Block
-from acquisition.source import SourceInfo
 from storage.recover import recover
 from storage.run import open_run
 from storage.wire_log import Kind, LogHeader, SensorEntry, WireLogWriter
 
 TRIALS = max(10, int(os.environ.get("SPRINGMASS_KILLS", "12")) // 2)
-HEADER = LogHeader(sensors=(SensorEntry(0, "bytes"),), mono_ns=0, unix_ns=0, kind="simulated")
-
-
-class Bytes:
-    """A chain in which every byte is a sample."""
-
-    def __init__(self, sensor: SensorEntry) -> None:
-        self._next = 0
-
-    def feed(self, host_ns: int, data: bytes) -> Block:
-        """Return a sample a byte."""
-        n = len(data)
-        t = np.arange(self._next, self._next + n) / 100
-        distance = np.frombuffer(data, np.uint8) * 1e-3
-        block = Block(self._next, t, distance, np.zeros(n, np.uint8), np.full(n, host_ns))
-        self._next += n
-        return block
-
-    def lost(self) -> None:
-        """Nothing is half received."""
-
-    def info(self, name: str, kind: str = "live") -> SourceInfo:
-        """Return what is known."""
-        return SourceInfo("simulated", name, 100.0)
-
-    def report(self, t: F8, host_ns: I8) -> Mapping[str, Any]:
-        """Return nothing of note."""
-        return {}
+HEADER = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr"),), mono_ns=0, unix_ns=0, kind="simulated")
 
 
 def log_of(path: Path, reads: int) -> None:
     """Write a log."""
     log = WireLogWriter(path, HEADER)
     for number in range(reads):
-        log.append(Kind.DATA, bytes([number % 256]) * 5, mono_ns=number)
+        log.append(Kind.DATA, b"R%04d\r" % (1000 + number) * 5, mono_ns=number)
     log.append(Kind.END, b"{}", mono_ns=reads)
     log.close()
 
@@ -76,7 +46,7 @@ def build(log: str, out: str, stop_at: int) -> None:
             threading.Event().wait()
 
     sys.setprofile(count)
-    recover(log, out, overwrite=True, remove_log=True, chain_for=Bytes)
+    recover(log, out, overwrite=True, remove_log=True)
     sys.setprofile(None)
     print(calls)
 
@@ -100,7 +70,7 @@ def test_killed_while_the_run_file_is_built_old_or_new_stands(tmp_path: Path) ->
     old, new = tmp_path / "old.wire", tmp_path / "new.wire"
     log_of(old, 100)
     log_of(new, 160)
-    recover(old, tmp_path / "old.h5", chain_for=Bytes)
+    recover(old, tmp_path / "old.h5")
     before, bytes_of_log = (tmp_path / "old.h5").read_bytes(), new.read_bytes()
     out, log = tmp_path / "run.h5", tmp_path / "run.wire"
     log.write_bytes(bytes_of_log)
@@ -124,7 +94,7 @@ def test_killed_while_the_run_file_is_built_old_or_new_stands(tmp_path: Path) ->
         assert found in ((500, 800) if trial % 2 else (0, 800)), f"killed at call {stop_at} of {calls}"
         assert found == 800 or log.read_bytes() == bytes_of_log
         if log.exists():
-            assert recover(log, out, overwrite=True, chain_for=Bytes).runs[0].samples == 800
+            assert recover(log, out, overwrite=True).runs[0].samples == 800
         states.append(found == 800)
     assert {False, True} <= set(states), "the kills hit only one side"
     print(f"kill -9 while building: {TRIALS} trials, {states.count(False)} old, {states.count(True)} new")

@@ -6,7 +6,7 @@ was synced and does what it likes with every page after that.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from acquisition.block import F8, I8, Block
+from acquisition.readings import Read
 from acquisition.source import SourceInfo
 from storage.wire_decode import decode_log
 from storage.wire_log import Kind, LogHeader, SensorEntry, WireLogWriter, parse_log
@@ -48,30 +49,30 @@ class Disk:
 
 
 class Frames:
-    """A chain for ``R1234\\r``: no checksum, so that halves of two frames would make a value."""
+    """Chains of a sensor that sends ``R1234\\r``: no checksum, so that halves of two frames would make a value."""
 
     def __init__(self) -> None:
+        self.each = (self,)
         self._held = b""
+        self._blocks: list[tuple[int, Block]] = []
         self._next = 0
 
-    def feed(self, host_ns: int, data: bytes) -> Block:
-        """Return the frames completed."""
-        *lines, self._held = (self._held + data).split(b"\r")
-        values = [int(line[1:]) for line in lines if len(line) == 5 and line[:1] == b"R"]
-        n = len(values)
-        block = Block(
-            self._next,
-            np.arange(self._next, self._next + n) / 100,
-            np.array(values, np.float64),
-            np.zeros(n, np.uint8),
-            np.full(n, host_ns),
-        )
-        self._next += n
-        return block
+    def take(self, reads: Sequence[Read]) -> None:
+        """Make samples of the frames that each read completes."""
+        for number, host_ns, data in reads:
+            # After a break half a frame is forgotten; what is left of it on the other side has no R.
+            *lines, self._held = (self._held + data).split(b"\r") if data else [b""]
+            values = [int(line[1:]) for line in lines if len(line) == 5 and line[:1] == b"R"]
+            n = len(values)
+            t = np.arange(self._next, self._next + n) / 100
+            distance, flags = np.array(values, np.float64), np.zeros(n, np.uint8)
+            self._blocks.append((number, Block(self._next, t, distance, flags, np.full(n, host_ns))))
+            self._next += n
 
-    def lost(self) -> None:
-        """Forget half a frame; what is left of it on the other side has no R."""
-        self._held = b""
+    def blocks(self) -> list[tuple[int, Block]]:
+        """Return the samples since the last call."""
+        blocks, self._blocks = self._blocks, []
+        return blocks
 
     def info(self, name: str, kind: str = "live") -> SourceInfo:
         """Return what is known."""

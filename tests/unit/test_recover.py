@@ -19,7 +19,7 @@ from storage.errors import RunDamaged, RunExists
 from storage.recorder import Recorder
 from storage.recover import recover
 from storage.run import Run, open_run
-from storage.wire_decode import chain_of, decode_log
+from storage.wire_decode import chains_of, decode_log
 from storage.wire_log import Kind, LogHeader, NotALog, SensorEntry, WireLogWriter, read_log
 
 FAMILY = "line-protocol"
@@ -255,5 +255,5 @@ def test_bytes_of_an_unnamed_channel_stay_in_the_log(tmp_path: Path) -> None:
         for host_ns, data in wire(20):
             recorder.put(4, host_ns, data[::-1])
             recorder.put(3, host_ns, data)
-    (decoded,) = decode_log(read_log(tmp_path / "run.wire"), header.sensors, chain_of)
+    (decoded,) = decode_log(read_log(tmp_path / "run.wire"), header.sensors, chains_of)
     assert (len(decoded.samples), decoded.reads) == (20, 21)
