@@ -97,8 +97,10 @@ class _Log:
     original: Original
     contents: LogContents
     header: LogHeader
-    marks: tuple[Record, ...]
-    events: tuple[Record, ...]
+
+    def told(self, kind: Kind) -> list[Record]:
+        """Return marks or events."""
+        return [record for record in self.contents.told if record.kind is kind]
 
 
 def recover(
@@ -142,14 +144,19 @@ def recover(
     """
     log_path = Path(log_path)
     log = _read(log_path, header)
-    sensors = _calibrated(log, speed_of_sound_m_per_s)
+    other = {} if speed_of_sound_m_per_s is None else {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
+    sensors = _calibrated(log.header.sensors, {}, other)
     paths = run_paths(log_path if out_path is None else Path(out_path), [sensor.channel for sensor in sensors])
     if not overwrite:
         _demand_free(paths)
     decoded = decode_log(log.contents, sensors)
+    # What the log tells of is known when it was read; a calibration among it is rare, so only then it is read again.
+    if (calibrated := _calibrated(log.header.sensors, _calibrations(log), other)) != sensors:
+        decoded = decode_log(log.contents, calibrated)
     runs = [_write(path, log, part, provenance or {}, overwrite) for path, part in zip(paths, decoded, strict=True)]
     removed = remove_log and _remove(log_path, len(log.original.data))
-    return RecoverReport(log_path, tuple(runs), log.contents.damage, len(log.marks), len(log.events), removed)
+    marks, events = len(log.told(Kind.MARK)), len(log.told(Kind.EVENT))
+    return RecoverReport(log_path, tuple(runs), log.contents.damage, marks, events, removed)
 
 
 def _read(path: Path, stand_in: LogHeader | None) -> _Log:
@@ -165,22 +172,26 @@ def _read(path: Path, stand_in: LogHeader | None) -> _Log:
             raise NotALog(path, f"a wire log was demanded, got {len(data)} bytes without one record", "name another")
         demand = f"the log's header is lost in all its copies ({contents.damage.describe()})"
         raise NotALog(path, demand, "say which sensors were recorded")
-    told = [record for record in contents if record.kind in (Kind.MARK, Kind.EVENT)]
-    marks, events = (tuple(r for r in told if r.kind is kind) for kind in (Kind.MARK, Kind.EVENT))
-    return _Log(Original(path.name, data), contents, header, marks, events)
+    return _Log(Original(path.name, data), contents, header)
 
 
-def _calibrated(log: _Log, speed_of_sound_m_per_s: float | None) -> tuple[SensorEntry, ...]:
-    """Return the sensors, each with the last calibration that the log tells of, and another speed of sound in it."""
-    other = {} if speed_of_sound_m_per_s is None else {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
+def _calibrations(log: _Log) -> dict[int, Mapping[str, Any]]:
+    """Return the last calibration that the log tells of, by channel."""
     told = {}
-    for event in log.events:
+    for event in log.told(Kind.EVENT):
         content = event.json()
         if content.get("kind") == "calibration":
             told[event.channel] = content.get("facts", {})
+    return told
+
+
+def _calibrated(
+    sensors: Sequence[SensorEntry], told: Mapping[int, Mapping[str, Any]], other: Mapping[str, Any]
+) -> tuple[SensorEntry, ...]:
+    """Return the sensors, each with the calibration told of its channel, if any, and other numbers in it."""
     return tuple(
         dataclasses.replace(sensor, calibration={**told.get(sensor.channel, sensor.calibration), **other})
-        for sensor in log.header.sensors
+        for sensor in sensors
     )
 
 
@@ -246,8 +257,8 @@ def _provenance(log: _Log, decoded: Decoded) -> dict[str, Any]:
         "sensor": dataclasses.asdict(decoded.sensor),
         "reads": decoded.reads,
         "log": {"name": log.original.name, "sha256": log.original.sha256, **dataclasses.asdict(damage)},
-        "marks": [{**at(mark), "text": mark.text()} for mark in log.marks],
-        "events": [{**at(event), **event.json()} for event in log.events],
+        "marks": [{**at(mark), "text": mark.text()} for mark in log.told(Kind.MARK)],
+        "events": [{**at(event), **event.json()} for event in log.told(Kind.EVENT)],
     }
 
 

@@ -23,6 +23,7 @@ KEPT_STRETCHES = 100
 _LONGEST = HEAD_BYTES + MAX_PAYLOAD
 _CHUNK = 1 << 20
 _DATA, _END = Kind.DATA, Kind.END  # looked up once, and not for each record
+_TOLD = (Kind.MARK, Kind.EVENT)
 
 
 class NotALog(StorageError):
@@ -93,12 +94,17 @@ class LogContents:
         self.path = path
         self._opened = opened
         self._damage: Damage | None = None
+        self._told: tuple[Record, ...] = ()
 
     def __iter__(self) -> Iterator[Record]:
         scan = _Scan(self.path)
+        told = []
         with self._opened() as stream:
-            yield from scan.records(stream)
-        self._damage = scan.damage()
+            for record in scan.records(stream):
+                if record.kind in _TOLD:
+                    told.append(record)
+                yield record
+        self._damage, self._told = scan.damage(), tuple(told)
 
     @property
     def damage(self) -> Damage:
@@ -108,6 +114,12 @@ class LogContents:
                 pass
         assert self._damage is not None
         return self._damage
+
+    @property
+    def told(self) -> tuple[Record, ...]:
+        """Marks and events, as :attr:`damage` is known."""
+        _ = self.damage
+        return self._told
 
     @property
     def header(self) -> LogHeader | None:
