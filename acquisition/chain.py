@@ -5,7 +5,7 @@ Live view, recording, recovery and replay from wire bytes all use this one chain
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,9 +75,14 @@ class SensorChain:
         -----
         Times and distances are found, and arrays made, once for many readings: that takes a third of the time.
         """
-        self.last = readings = self.decoder.feed(host_ns, data)
+        readings = self.decode(host_ns, data)
         self._held += readings
         return len(readings)
+
+    def decode(self, host_ns: int, data: bytes) -> Readings:
+        """Take the bytes of one read, return the readings they completed, for which somebody else will ask samples."""
+        self.last = readings = self.decoder.feed(host_ns, data)
+        return readings
 
     def block(self) -> Block:
         """Return the samples of the readings held, with the next indices of the run, and hold none."""
@@ -105,10 +110,16 @@ class SensorChain:
         self._held.clear()
         return Block(first, t, distance, flags, host_ns)
 
-    def lost(self) -> None:
-        """The port went away: a frame cut in half by that is no frame, and the next sample is flagged."""
+    def lost(self, held: int = 0) -> None:
+        """The port went away: a frame cut in half by that is no frame, and the next sample is flagged.
+
+        Parameters
+        ----------
+        held : int
+            How many readings :meth:`decode` gave that are to become samples before.
+        """
         self.decoder.flush()
-        self._breaks.append(len(self._held))
+        self._breaks.append(held + len(self._held))
 
     def info(self, name: str, kind: str = "live") -> SourceInfo:
         """Return what is known of the source; the clock's kind once a reading came."""
@@ -154,14 +165,24 @@ class Chains:
     Attributes
     ----------
     each : tuple of SensorChain
+
+    Notes
+    -----
+    The readings of all sensors are held together, by columns, until their samples are asked for: many ports then cost
+    no list each that has to be filled and emptied.
     """
 
     def __init__(self, chains: Sequence[SensorChain]) -> None:
         self.each = tuple(chains)
         self._decoders = [chain.decoder for chain in chains]
-        self._hold = [chain._held.append for chain in chains]
         kinds = {chain.family.whole for chain in chains}
         self._whole = kinds.pop() if len(kinds) == 1 else None
+        self._channels: list[int] = []  # of the readings held
+        self._columns: tuple[list[Any], ...] = tuple([] for _ in Reading._fields)
+
+    def __len__(self) -> int:
+        """Return how many samples :meth:`blocks` would give."""
+        return len(self._channels)
 
     def take(self, reads: Sequence[Read]) -> None:
         """Take reads in their order, many at a time where each is a whole frame and the family can.
@@ -170,39 +191,58 @@ class Chains:
         """
         if self._whole is not None and len(reads) >= FEW:
             channels, stamps_ns, frames = zip(*reads, strict=True)
-            readings = self._whole([self._decoders[channel] for channel in channels], stamps_ns, frames)
-            if readings is not None:
-                for channel, reading in zip(channels, readings, strict=True):
-                    self._hold[channel](reading)
+            columns = self._whole([self._decoders[channel] for channel in channels], stamps_ns, frames)
+            if columns is not None:
+                self._hold(channels, columns)
                 return
         for channel, host_ns, data in reads:
-            if data:
-                self.each[channel].take(host_ns, data)
-            else:
-                self.each[channel].lost()
+            if not data:
+                self.lost(channel)
+            elif readings := self.each[channel].decode(host_ns, data):
+                self._hold([channel] * len(readings), zip(*readings, strict=True))
+
+    def lost(self, channel: int) -> None:
+        """A port went away: a frame cut in half by that is no frame, and the next sample is flagged."""
+        self.each[channel].lost(self._channels.count(channel))
+
+    def _hold(self, channels: Sequence[int], columns: Iterable[Iterable[Any]]) -> None:
+        self._channels += channels
+        for held, column in zip(self._columns, columns, strict=True):
+            held += column
 
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples held, by channel, of those sensors that have any."""
-        found = [(channel, chain) for channel, chain in enumerate(self.each) if chain._held]
-        counts = [len(chain._held) for _, chain in found]
-        if sum(counts) < MANY:
-            return [(channel, chain.block()) for channel, chain in found]
-        chains = [chain for _, chain in found]
-        readings = np.array(counts)
-        held = [reading for chain in chains for reading in chain._held]
-        host_ns, _, device_us, echo_us, distance_m, _ = zip(*held, strict=True)
-        stamps_ns = np.array(host_ns)
-        t, steady = steady_times([chain.timebase for chain in chains], readings, stamps_ns, np.array(device_us))
-        distance = Calibration.distances(
-            [chain.calibration for chain in chains], readings, np.array(echo_us), np.array(distance_m)
-        )
-        flags = np.where(np.isnan(distance), np.uint8(MISSING), np.uint8(0))
+        if not self._channels:
+            return []
+        channels = np.fromiter(self._channels, np.int64, len(self))
+        order = np.argsort(channels, kind="stable")
+        every = np.bincount(channels)
+        found = np.flatnonzero(every).tolist()
+        chains, counts = [self.each[channel] for channel in found], every[found]
+        together = self._together(order, chains, counts) if order.size >= MANY else [None] * len(found)
         blocks, end = [], 0
-        for (channel, chain), count, is_steady in zip(found, counts, steady.tolist(), strict=True):
+        for channel, chain, count, block in zip(found, chains, counts.tolist(), together, strict=True):
             start, end = end, end + count
-            if is_steady:
-                rows = slice(start, end)
-                blocks.append((channel, chain._block(t[rows], distance[rows], flags[rows], stamps_ns[rows])))
-            else:
-                blocks.append((channel, chain.block()))
+            if block is None:
+                chain._held += [Reading(*(held[i] for held in self._columns)) for i in order[start:end].tolist()]
+            blocks.append((channel, chain.block() if block is None else block))
+        for held in (self._channels, *self._columns):
+            held.clear()
+        return blocks
+
+    def _together(self, order: I8, chains: Sequence[SensorChain], counts: I8) -> list[Block | None]:
+        """Return the blocks of all sensors that are steady, None for the others."""
+        stamps, _, clocks, echoes, stated, _ = self._columns
+        host_ns, device_us = (np.fromiter(held, np.int64, order.size)[order] for held in (stamps, clocks))
+        echo_us, distance_m = (np.fromiter(held, np.float64, order.size)[order] for held in (echoes, stated))
+        t, steady = steady_times([chain.timebase for chain in chains], counts, host_ns, device_us)
+        distance = Calibration.distances([chain.calibration for chain in chains], counts, echo_us, distance_m)
+        flags = np.where(np.isnan(distance), np.uint8(MISSING), np.uint8(0))
+        blocks: list[Block | None] = []
+        end = 0
+        for chain, count, is_steady in zip(chains, counts.tolist(), steady.tolist(), strict=True):
+            start, end = end, end + count
+            rows = slice(start, end)
+            block = chain._block(t[rows], distance[rows], flags[rows], host_ns[rows]) if is_steady else None
+            blocks.append(block)
         return blocks

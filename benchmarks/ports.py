@@ -42,7 +42,7 @@ from acquisition.clock import Clock, SystemClock
 from acquisition.decoders.base import Family
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
-from acquisition.readings import Read
+from acquisition.readings import NO_READINGS, Read, Readings
 from acquisition.serial_port import SerialPort
 from acquisition.wired import CADENCE_NS, Line, PortReader
 from springmass.reads import Tee
@@ -111,10 +111,10 @@ class CountingChain(TimedChain):
     def __init__(self, family: Family, rate_hz: float) -> None:
         super().__init__(replace(family, whole=None), rate_hz)
 
-    def take(self, host_ns: int, data: bytes) -> int:  # noqa: ARG002
+    def decode(self, host_ns: int, data: bytes) -> Readings:  # noqa: ARG002
         """Take the bytes of one read."""
         self.received += data.count(b"\n")
-        return 0
+        return NO_READINGS
 
 
 class TimedChains(Chains):

@@ -69,8 +69,10 @@ class Tee:
                     if channel in self._askers:
                         self._askers[channel].feed(host_ns, data)
             self._waiting += reads
+            size = self._waiting_bytes
             for _, _, data in reads:
-                self._waiting_bytes += len(data)
+                size += len(data)
+            self._waiting_bytes = size
             self._latest_ns = reads[-1][1]
             if self._kept is not None:
                 self._kept += reads
@@ -113,13 +115,13 @@ class Tee:
         if self._waiting_bytes <= ROUND_BYTES:
             piece = list(self._waiting)
             self._waiting.clear()
+            self._waiting_bytes = 0
         else:
             piece, size = [], 0
             while self._waiting and size < ROUND_BYTES:
                 piece.append(self._waiting.popleft())
                 size += len(piece[-1][2])
-        for _, _, data in piece:
-            self._waiting_bytes -= len(data)
+            self._waiting_bytes -= size
         if self._heard is not None:
             for channel, _, data in piece:
                 self._heard[channel] += data[: HEARD_BYTES - len(self._heard[channel])]
@@ -170,6 +172,6 @@ class Tee:
         """Let the oldest reads go undecoded, and no frame be put together across them."""
         while self._waiting_bytes > HELD_BYTES // 2:
             channel, _, data = self._waiting.popleft()
-            self._chains.each[channel].lost()
+            self._chains.lost(channel)
             self._waiting_bytes -= len(data)
             self.skipped_bytes += len(data)

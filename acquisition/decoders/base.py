@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from acquisition.errors import SensorError
-from acquisition.readings import Reading, Readings
+from acquisition.readings import Columns, Readings
 
 __all__ = ["Decoder", "Encoder", "Family", "Poll", "Polled"]
 
@@ -111,8 +111,9 @@ class Family:
         Whether readings carry the device's clock or counter.
     whole : callable or None
         Decodes reads of several ports at once where that costs less: takes the decoders of the ports, the reads' host
-        stamps in ns and their bytes, one for each read, and returns the readings, one for each. None, unless every read
-        is one sound frame and every decoder stands between two: the decoders need not hear of such a frame.
+        stamps in ns and their bytes, one for each read, and returns the readings by columns, one for each read. None,
+        unless every read is one sound frame and every decoder stands between two: the decoders need not hear of such a
+        frame.
     self_framing : bool
         Whether a mark or checksum tells a frame from noise; without one, bytes alone never show the family.
     source : str
@@ -131,7 +132,7 @@ class Family:
     poll: Poll | None = None
     options: Mapping[str, str] = field(default_factory=dict)
     has_device_time: bool = False
-    whole: Callable[[Sequence[Any], Sequence[int], Sequence[bytes]], Sequence[Reading] | None] | None = None
+    whole: Callable[[Sequence[Any], Sequence[int], Sequence[bytes]], Columns | None] | None = None
     self_framing: bool = True
     source: str = ""
 

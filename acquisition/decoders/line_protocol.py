@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 from acquisition.decoders.base import Family
 from acquisition.decoders.lines import LineSplitter
-from acquisition.readings import NAN, NO_READINGS, Reading, Readings
+from acquisition.readings import NAN, NO_READINGS, Columns, Reading, Readings
 
 __all__ = ["FAMILY", "LineProtocolDecoder", "LineProtocolEncoder", "checksum", "frame"]
 
@@ -120,7 +120,7 @@ def _sound(host_ns: int, line: bytes) -> Reading | None:
 
 def whole_lines(
     decoders: Sequence[LineProtocolDecoder], host_ns: Sequence[int], data: Sequence[bytes]
-) -> list[Reading] | None:
+) -> Columns | None:
     """Decode reads of which each is one whole line: what :attr:`acquisition.decoders.base.Family.whole` asks for."""
     if False in [decoder._lines.between for decoder in decoders]:
         return None
@@ -139,7 +139,7 @@ def whole_lines(
         for echo_us, letter in zip(echo, status, strict=True)
     ]
     celsius = [int(hundredths) / 100 if hundredths else NAN for hundredths in temperature]
-    return list(map(_new, repeat(Reading), zip(host_ns, counts, clocks_us, echoes_us, repeat(NAN), celsius)))
+    return host_ns, counts, clocks_us, echoes_us, [NAN] * len(counts), celsius
 
 
 def _parse(host_ns: int, line: bytes, start: int) -> Reading | str:

@@ -13,7 +13,7 @@ from acquisition.calibration import Calibration
 from acquisition.chain import FEW, MANY, Chains, SensorChain
 from acquisition.decoders.line_protocol import LineProtocolEncoder, frame
 from acquisition.decoders.registry import get_family
-from acquisition.readings import Read
+from acquisition.readings import Read, Readings
 
 SENSORS = 7
 STEP_US, STEP_NS = 10_000, 10_000_000
@@ -129,10 +129,10 @@ def test_sound_lines_are_decoded_together_and_make_samples_together() -> None:
             super().__init__(get_family("line-protocol"), rate_hz=100.0)
             self.taken = self.blocked = 0
 
-        def take(self, host_ns: int, data: bytes) -> int:
+        def decode(self, host_ns: int, data: bytes) -> Readings:
             """Count."""
             self.taken += 1
-            return super().take(host_ns, data)
+            return super().decode(host_ns, data)
 
         def block(self) -> Block:
             """Count."""

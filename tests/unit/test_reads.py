@@ -113,9 +113,9 @@ def test_samples_asked_for_once_a_second_are_decoded_then() -> None:
     expected, found, untouched = [], [], 0
     for i in range(1000):
         tee.reads([(0, i * STEP_NS, frame(i))])
-        before = len(tee._chains.each[0])
+        before = len(tee._chains)
         assert not tee.decode()
-        untouched += len(tee._chains.each[0]) == before
+        untouched += len(tee._chains) == before
         expected.append(other.feed(i * STEP_NS, frame(i)))
         if i % 100 == 99:
             found += [block for _, block in tee.blocks()]
@@ -135,7 +135,7 @@ def test_samples_asked_for_often_are_decoded_as_they_come() -> None:
         if i == 100 or (i > 200 and i % 10 == 0):
             tee.blocks()
         elif i > 220:
-            assert len(tee._chains.each[0]) == i % 10
+            assert len(tee._chains) == i % 10
 
 
 def test_a_flood_is_decoded_piece_by_piece_though_nobody_asks() -> None:
@@ -149,7 +149,7 @@ def test_a_flood_is_decoded_piece_by_piece_though_nobody_asks() -> None:
         tee.reads([(0, (1000 + i) * STEP_NS, frame(i))])
     while tee.decode():
         pass
-    assert 1000 - len(tee._chains.each[0]) < reads.ROUND_BYTES / len(frame(0)) + 1
+    assert 1000 - len(tee._chains) < reads.ROUND_BYTES / len(frame(0)) + 1
     assert sum(len(block) for _, block in tee.blocks()) == 1000
 
 
