@@ -7,7 +7,6 @@ reported with its time and opened again when it comes back; the run goes on.
 from __future__ import annotations
 
 import os
-import selectors
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ from acquisition.clock import Clock
 from acquisition.decoders.base import Poll, Polled
 from acquisition.errors import PortError
 from acquisition.readings import Read
+from acquisition.ready import Ready
 from acquisition.serial_port import READ_BYTES
 
 __all__ = ["Line", "PortReader", "Sink", "Transport"]
@@ -202,10 +202,10 @@ class PortReader:
             self._failure = error
 
     def _select_loop(self, lines: list[Line]) -> None:
-        with selectors.DefaultSelector() as selector:
-            selector.register(self._wake_read, selectors.EVENT_READ, None)
+        with Ready[Line | None]() as waiting:
+            waiting.add(self._wake_read, None)
             for line in lines:
-                selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
+                waiting.add(line.transport.fileno(), line)
             # The many lines that only send need no look at each wake-up.
             polled = [line for line in lines if line.poll is not None]
             lost: list[Line] = []
@@ -214,19 +214,19 @@ class PortReader:
             while not self._stop.is_set():
                 # Without an end where nothing can be due: the pipe wakes it, and a timer costs a tenth of a wake-up.
                 wait_s = 0.0 if behind else self._wait_s([*polled, *lost]) if polled or lost else None
-                ready = selector.select(wait_s)
+                ready = waiting.wait(wait_s)
                 before_ns, woke_ns = woke_ns, self._clock.now_ns()
                 for line in self._read(ready, woke_ns):
-                    selector.unregister(line.transport.fileno())
+                    waiting.remove(line.transport.fileno())
                     line.transport.close()
                     lost.append(line)
                 if lost:
                     for line in [line for line in lost if self._tries_again(line)]:
-                        selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
+                        waiting.add(line.transport.fileno(), line)
                         lost.remove(line)
                 for line in polled:
                     if line.poll is not None and line._lost_ns is None and not self._ask(line, line.poll):
-                        selector.unregister(line.transport.fileno())
+                        waiting.remove(line.transport.fileno())
                         line.transport.close()
                         lost.append(line)
                 behind = self._decode is not None and self._decode()  # last: it may wake another thread
@@ -261,17 +261,17 @@ class PortReader:
                 wait = min(wait, (line._ask_ns - now) * 1e-9)
         return max(wait, 0.0)
 
-    def _read(self, ready: Iterable[tuple[selectors.SelectorKey, int]], now_ns: int) -> list[Line]:
+    def _read(self, ready: Iterable[tuple[int, Line | None]], now_ns: int) -> list[Line]:
         """Read the ports that have something and hand it on; return those that are gone."""
         reads: list[Read] = []
         gone: list[tuple[Line, str]] = []
         read = os.read
-        for key, _ in ready:
-            if (line := key.data) is None:
+        for descriptor, line in ready:
+            if line is None:
                 continue
             try:
                 # Not a call of the transport's: at 200 ports a call for each read is a fifth of what reading costs.
-                data = read(key.fd, READ_BYTES)
+                data = read(descriptor, READ_BYTES)
             except BlockingIOError:
                 continue
             except OSError as error:
