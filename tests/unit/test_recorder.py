@@ -153,15 +153,38 @@ def test_what_is_enqueued_is_appended_when_the_log_is_woken() -> None:
 
 
 def test_what_needs_no_host_stamp_is_appended_by_the_thread_that_asks() -> None:
-    """Where sensors have clocks of their own the records are in the log when the call returns, in one write."""
+    """Where sensors have clocks of their own all records of a call are in the log when it returns, in one write."""
     disk = Disk()
     recording = recorder(disk, own_clocks=True)
-    for number in range(10):
-        recording.take([(0, number, b"x")])
-    recording.wake()
-    assert (recording.status.queued_records, recording.status.records) == (0, 11)
+    writes = 0
+
+    def count() -> None:
+        nonlocal writes
+        writes += 1
+
+    disk.takes = count
+    recording.take([(0, number, b"x") for number in range(10)])
+    assert (recording.status.queued_records, recording.status.records, writes) == (0, 11, 1)
     recording.close()
     assert disk.threads["write"] == {"MainThread"}
+
+
+def test_what_is_queued_comes_before_what_could_be_appended_at_once() -> None:
+    """A mark that waits for another thread stands before a read that came after it."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=True)
+    disk.writes_pass.clear()
+    recording.mark("let go")
+    assert disk.held.wait(WAIT_S)
+    recording.mark("held")
+    recording.take([(0, 1, b"x")])
+    assert recording.status.queued_records == 2
+    disk.writes_pass.set()
+    recording.wake()
+    recording.drain()
+    recording.close()
+    kinds = [record.kind for record in parse_log(bytes(disk.data))]
+    assert kinds == [Kind.HEADER, Kind.MARK, Kind.MARK, Kind.DATA, Kind.END]
 
 
 def test_the_thread_that_asks_does_not_wait_for_a_sync() -> None:
@@ -300,10 +323,11 @@ def test_an_overflow_is_told_where_it_happened() -> None:
     assert records[16].json()["dropped_records"] == 88
 
 
-def test_a_full_disk_stops_the_recording_and_says_so() -> None:
+@pytest.mark.parametrize("own_clocks", [False, True])
+def test_a_full_disk_stops_the_recording_and_says_so(own_clocks: bool) -> None:
     """The status shows the error at once, putting goes on harmlessly, closing raises it, and the log is whole."""
     disk = Disk()
-    recording = recorder(disk)
+    recording = recorder(disk, own_clocks=own_clocks)
     disk.room = len(disk.data) + 1000
     for number in range(200):
         recording.put(0, number, b"R%04d\r" % number)
@@ -335,10 +359,11 @@ def test_what_a_full_disk_took_is_synced_at_once() -> None:
         recording.close()
 
 
-def test_a_failed_sync_stops_the_recording() -> None:
+@pytest.mark.parametrize("own_clocks", [False, True])
+def test_a_failed_sync_stops_the_recording(own_clocks: bool) -> None:
     """Records that may never reach the disk must not look safe."""
     disk = Disk()
-    recording = recorder(disk)
+    recording = recorder(disk, own_clocks=own_clocks)
     recording.put(0, 0, b"x")
     assert recording.drain(sync=True).synced_records == 2
     disk.sync_trouble = OSError(errno.EIO, "Input/output error")
@@ -351,9 +376,10 @@ def test_a_failed_sync_stops_the_recording() -> None:
     assert recording.status.synced_records == 2
 
 
-def test_a_defect_does_not_pass_for_a_recording() -> None:
+@pytest.mark.parametrize("own_clocks", [False, True])
+def test_a_defect_does_not_pass_for_a_recording(own_clocks: bool) -> None:
     """A record that cannot be laid out stops the recording with a line, not a thread without a word."""
-    recording = recorder(Disk())
+    recording = recorder(Disk(), own_clocks=own_clocks)
     recording.put(0, 1 << 70, b"x")
     with pytest.raises(WriteFailed, match="a record could not be appended"):
         recording.close()
@@ -365,10 +391,11 @@ def test_a_channel_is_a_byte() -> None:
         recording.put(256, 0, b"x")
 
 
-def test_putting_after_the_end_is_counted() -> None:
+@pytest.mark.parametrize("own_clocks", [False, True])
+def test_putting_after_the_end_is_counted(own_clocks: bool) -> None:
     """A reading thread that outlives the recording harms nothing and is not forgotten."""
     disk = Disk()
-    recording = recorder(disk)
+    recording = recorder(disk, own_clocks=own_clocks)
     recording.close()
     recording.put(0, 0, b"late")
     assert (recording.status.dropped_records, recording.status.dropped_bytes) == (1, 4)
