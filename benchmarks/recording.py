@@ -1,8 +1,8 @@
 """What a recording costs and keeps: `python benchmarks/recording.py`.
 
 A simulated sensor speaks from a process of its own; `springmass record` reads it twice, for a short and a long run. The
-difference of the two is the recording alone, without its start and without the run file built at its end. Both are done
-with the progress line going nowhere, and with it on a terminal.
+difference of the two is the recording with what its readings cost in the run file built at its end, without the start.
+Both are done with the progress line going nowhere, and with it on a terminal.
 """
 
 from __future__ import annotations
