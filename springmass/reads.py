@@ -1,9 +1,9 @@
 """Reads on their way from the port: to the recorder as they are, then through the decoders.
 
-Both happen on the reading thread, and in this order: first every port that has something is read and all bytes are put
-into the recorder's queue, then what came is decoded, a bounded piece at a time, and last the thread that appends the
-queue to the log is woken. Woken before, it would contend with the decoding for the interpreter. A second thread for the
-decoding would be woken by each read, and would hold the interpreter while the ports wait.
+Both happen on the reading thread, and in this order: first every port that has something is read and all bytes are
+given to the recorder, then what came is decoded, a bounded piece at a time, and last the thread that appends what the
+recorder has queued is woken. Woken before, it would contend with the decoding for the interpreter. A second thread for
+the decoding would be woken by each read, and would hold the interpreter while the ports wait.
 
 Whoever asks for samples several times a second finds them decoded when they have come. For one that asks less often
 they are decoded when it asks, or when a piece of them waits: decoding a hundred readings at once takes a tenth of what
@@ -170,8 +170,11 @@ class Tee:
 
     def _skip(self) -> None:
         """Let the oldest reads go undecoded, and no frame be put together across them."""
+        channels = set()
         while self._waiting_bytes > HELD_BYTES // 2:
             channel, _, data = self._waiting.popleft()
-            self._chains.lost(channel)
+            channels.add(channel)
             self._waiting_bytes -= len(data)
             self.skipped_bytes += len(data)
+        for channel in channels:
+            self._chains.lost(channel)
