@@ -219,18 +219,21 @@ class Chains:
         every = np.bincount(channels)
         found = np.flatnonzero(every).tolist()
         chains, counts = [self.each[channel] for channel in found], every[found]
-        together = self._together(order, chains, counts) if order.size >= MANY else [None] * len(found)
-        blocks, end = [], 0
-        for channel, chain, count, block in zip(found, chains, counts.tolist(), together, strict=True):
-            start, end = end, end + count
+        ends = np.cumsum(counts).tolist()
+        cuts = list(map(slice, [0, *ends], ends))
+        together = self._together(order, chains, counts, cuts) if order.size >= MANY else [None] * len(found)
+        blocks = []
+        for channel, chain, cut, block in zip(found, chains, cuts, together, strict=True):
             if block is None:
-                chain._held += [Reading(*(held[i] for held in self._columns)) for i in order[start:end].tolist()]
+                chain._held += [Reading(*(held[i] for held in self._columns)) for i in order[cut].tolist()]
             blocks.append((channel, chain.block() if block is None else block))
         for held in (self._channels, *self._columns):
             held.clear()
         return blocks
 
-    def _together(self, order: I8, chains: Sequence[SensorChain], counts: I8) -> list[Block | None]:
+    def _together(
+        self, order: I8, chains: Sequence[SensorChain], counts: I8, cuts: Sequence[slice]
+    ) -> list[Block | None]:
         """Return the blocks of all sensors that are steady, None for the others."""
         stamps, _, clocks, echoes, stated, _ = self._columns
         host_ns, device_us = (np.fromiter(held, np.int64, order.size)[order] for held in (stamps, clocks))
@@ -238,11 +241,7 @@ class Chains:
         t, steady = steady_times([chain.timebase for chain in chains], counts, host_ns, device_us)
         distance = Calibration.distances([chain.calibration for chain in chains], counts, echo_us, distance_m)
         flags = np.where(np.isnan(distance), np.uint8(MISSING), np.uint8(0))
-        blocks: list[Block | None] = []
-        end = 0
-        for chain, count, is_steady in zip(chains, counts.tolist(), steady.tolist(), strict=True):
-            start, end = end, end + count
-            rows = slice(start, end)
-            block = chain._block(t[rows], distance[rows], flags[rows], host_ns[rows]) if is_steady else None
-            blocks.append(block)
-        return blocks
+        return [
+            chain._block(t[cut], distance[cut], flags[cut], host_ns[cut]) if is_steady else None
+            for chain, cut, is_steady in zip(chains, cuts, steady.tolist(), strict=True)
+        ]

@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition.block import F8, I8, U8, Flag
 
-__all__ = ["COLUMNS", "NO_READINGS", "Columns", "Read", "Reading", "Readings", "join"]
+__all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "ReadingColumns", "Readings", "join"]
 
 NAN = math.nan
 
@@ -49,7 +49,7 @@ class Reading(NamedTuple):
     temperature_c: float = NAN
 
 
-Columns = tuple[Sequence[int], Sequence[int], Sequence[int], Sequence[float], Sequence[float], Sequence[float]]
+ReadingColumns = tuple[Sequence[int], Sequence[int], Sequence[int], Sequence[float], Sequence[float], Sequence[float]]
 """Many readings by columns, in the order of the fields of :class:`Reading`."""
 
 COLUMNS = (*Reading._fields, "flags")

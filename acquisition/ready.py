@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import select
 import selectors
-from types import TracebackType
-from typing import Generic, Self, TypeVar
+from typing import Generic, TypeVar
 
 __all__ = ["Ready"]
 
@@ -30,15 +29,8 @@ class Ready(Generic[T]):
         if hasattr(select, "epoll") and isinstance(self._selector, selectors.EpollSelector):
             self._epoll = select.epoll.fromfd(os.dup(self._selector.fileno()))
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Wait no more; the descriptors waited on stay open."""
         self._selector.close()
         if self._epoll is not None:
             self._epoll.close()

@@ -6,6 +6,7 @@ reported with its time and opened again when it comes back; the run goes on.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -202,7 +203,7 @@ class PortReader:
             self._failure = error
 
     def _select_loop(self, lines: list[Line]) -> None:
-        with Ready[Line | None]() as waiting:
+        with contextlib.closing(Ready[Line | None]()) as waiting:
             waiting.add(self._wake_read, None)
             for line in lines:
                 waiting.add(line.transport.fileno(), line)

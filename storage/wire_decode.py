@@ -133,9 +133,9 @@ def _reads(log: Iterable[Record], numbers: Mapping[int, int], counts: list[int])
         if record.channel not in numbers:
             continue
         number = numbers[record.channel]
-        if record.kind is Kind.EVENT and record.json().get("kind") in BREAKS:
-            yield number, record.mono_ns, b""
         if record.kind is Kind.DATA:
             counts[number] += 1
             if record.payload:
                 yield number, record.mono_ns, record.payload
+        elif record.kind is Kind.EVENT and record.json().get("kind") in BREAKS:
+            yield number, record.mono_ns, b""

@@ -93,8 +93,7 @@ class LogContents:
     def __init__(self, path: Path, opened: Callable[[], BinaryIO]) -> None:
         self.path = path
         self._opened = opened
-        self._damage: Damage | None = None
-        self._told: tuple[Record, ...] = ()
+        self._found: tuple[Damage, tuple[Record, ...]] | None = None
 
     def __iter__(self) -> Iterator[Record]:
         scan = _Scan(self.path)
@@ -104,22 +103,25 @@ class LogContents:
                 if record.kind in _TOLD:
                     told.append(record)
                 yield record
-        self._damage, self._told = scan.damage(), tuple(told)
+        self._found = scan.damage(), tuple(told)
+
+    def _known(self) -> tuple[Damage, tuple[Record, ...]]:
+        """Return what the last iteration that came to the end found; read the log where there was none."""
+        if self._found is None:
+            for _ in self:
+                pass
+        assert self._found is not None
+        return self._found
 
     @property
     def damage(self) -> Damage:
         """What is missing, of the last iteration that came to the end; reads the log where there was none."""
-        if self._damage is None:
-            for _ in self:
-                pass
-        assert self._damage is not None
-        return self._damage
+        return self._known()[0]
 
     @property
     def told(self) -> tuple[Record, ...]:
-        """Marks and events, as :attr:`damage` is known."""
-        _ = self.damage
-        return self._told
+        """Marks and events, of the same iteration."""
+        return self._known()[1]
 
     @property
     def header(self) -> LogHeader | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from acquisition.errors import SensorError
-from acquisition.readings import Columns, Readings
+from acquisition.readings import ReadingColumns, Readings
 
 __all__ = ["Decoder", "Encoder", "Family", "Poll", "Polled"]
 
@@ -132,7 +132,7 @@ class Family:
     poll: Poll | None = None
     options: Mapping[str, str] = field(default_factory=dict)
     has_device_time: bool = False
-    whole: Callable[[Sequence[Any], Sequence[int], Sequence[bytes]], Columns | None] | None = None
+    whole: Callable[[Sequence[Any], Sequence[int], Sequence[bytes]], ReadingColumns | None] | None = None
     self_framing: bool = True
     source: str = ""
 

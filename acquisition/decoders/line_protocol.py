@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 from acquisition.decoders.base import Family
 from acquisition.decoders.lines import LineSplitter
-from acquisition.readings import NAN, NO_READINGS, Columns, Reading, Readings
+from acquisition.readings import NAN, NO_READINGS, Reading, ReadingColumns, Readings
 
 __all__ = ["FAMILY", "LineProtocolDecoder", "LineProtocolEncoder", "checksum", "frame"]
 
@@ -120,7 +120,7 @@ def _sound(host_ns: int, line: bytes) -> Reading | None:
 
 def whole_lines(
     decoders: Sequence[LineProtocolDecoder], host_ns: Sequence[int], data: Sequence[bytes]
-) -> Columns | None:
+) -> ReadingColumns | None:
     """Decode reads of which each is one whole line: what :attr:`acquisition.decoders.base.Family.whole` asks for."""
     if False in [decoder._lines.between for decoder in decoders]:
         return None
