@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from acquisition.block import Block, Flag, concatenate
 from acquisition.errors import AcquisitionError, FormatError, NeedsAnswer, SourceError, UnknownFormat
-from acquisition.recording import Original, Recording, Trap
-from acquisition.registry import formats, open_recording, sniff
+from acquisition.recordings.identify import formats, open_recording, sniff
+from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.source import Source, SourceInfo
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from pathlib import Path
 
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
-from springmass.recording import Progress, Sensor, Session
-from storage.wire_read import read_log
+from springmass.session.session import Progress, Sensor, Session
+from storage.wire_log.scanning import read_log
 
 RATE_HZ = 100
 STEP_NS = 100_000_000

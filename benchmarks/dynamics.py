@@ -14,8 +14,8 @@ from scipy.signal import lfilter
 from pipeline.dynamics import Equation, Problem, get_integrator
 from pipeline.dynamics.choose import AUTO, choose, cost_ns
 from pipeline.dynamics.flow import flow
-from pipeline.dynamics.solve_ivp import LSODA, SolveIvp
-from pipeline.dynamics.taylor import TAYLOR
+from pipeline.dynamics.integrators.solve_ivp import LSODA, SolveIvp
+from pipeline.dynamics.integrators.taylor import TAYLOR
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 

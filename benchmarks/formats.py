@@ -22,11 +22,17 @@ import numpy as np
 REPO_ROOT = Path(__file__).resolve().parents[1]
 COLD_ROWS, LONG_ROWS, LVM_ROWS = 12_000, 10_000_000, 51_200
 
-OPEN = "from acquisition.registry import open_recording as f; import acquisition.formats.motion_sensor"
-LOAD = "from springmass.loading import load as f; import storage.run, acquisition.formats.motion_sensor"
+OPEN = (
+    "from acquisition.recordings.identify import open_recording as f; "
+    "import acquisition.recordings.families.motion_sensor"
+)
+LOAD = (
+    "from springmass.runs.loading import load as f; "
+    "import storage.run_file.reading, acquisition.recordings.families.motion_sensor"
+)
 PANDAS = "import pandas; f = lambda p: pandas.read_csv(p, sep='\\t', skiprows=1, engine='c')"
-LVM = "import acquisition.formats.motion_sensor, acquisition.formats.lvm; "
-LVM += "from acquisition.registry import open_recording; "
+LVM = "import acquisition.recordings.families.motion_sensor, acquisition.recordings.families.lvm; "
+LVM += "from acquisition.recordings.identify import open_recording; "
 LVM += "f = lambda p: open_recording(p, channel='Acceleration_0', unit='m')"
 LVM_READ = "from lvm_read import read; f = lambda p: read(p, read_from_pickle=False, dump_file=False)"
 
@@ -117,8 +123,8 @@ def cold(setup: str, path: Path) -> Callable[[], float]:
 
 def ratios(folder: Path, cold_rows: int, long_rows: int, lvm_rows: int) -> Iterator[Ratio]:
     """Yield every ratio, over files written into a folder."""
-    from springmass.loading import load
-    from storage.write import write_run
+    from springmass.runs.loading import load
+    from storage.run_file.writing import write_run
 
     short = write_motion_sensor(folder / "short.txt", cold_rows)
     long = write_motion_sensor(folder / "long.txt", long_rows)

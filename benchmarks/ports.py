@@ -6,7 +6,8 @@ the reader's alone, and each sample tells how long it took from the wire until i
 
 Each design gives a port's bytes to a chain of its own, from which the samples are taken ten times a second; or once a
 second, beside a wire log, as `springmass record` does it, which then decodes many readings at a time. One design is
-what `springmass record` does: one thread reads, then decodes (`springmass/reads.py`). Beside it stand two with a thread
+what `springmass record` does: one thread reads, then decodes (`springmass/session/reads.py`). Beside it stand two
+with a thread
 for each port that reads what is there and decodes it as it comes: pyserial's own `serial.threaded.ReaderThread`, and
 the leanest such thread that we could write, which leaves out most of what pyserial does around each read.
 """
@@ -37,17 +38,17 @@ from serial.threaded import Protocol as PortProtocol
 from serial.threaded import ReaderThread
 
 from acquisition.block import I8, Block, concatenate
-from acquisition.chain import Chains, SensorChain
 from acquisition.clock import Clock, SystemClock
 from acquisition.decoders.base import Family
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
+from acquisition.live.decoding import Chains, SensorChain
+from acquisition.live.reader import CADENCE_NS, Line, PortReader
+from acquisition.live.serial_port import SerialPort
 from acquisition.readings import NO_READINGS, Read, Readings
-from acquisition.serial_port import SerialPort
-from acquisition.wired import CADENCE_NS, Line, PortReader
-from springmass.reads import Tee
+from springmass.session.reads import Tee
 from storage.recorder import Recorder
-from storage.wire_layout import LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, SensorEntry
 
 WRAP_US = 1 << 32
 BAUD = 115200

@@ -17,10 +17,10 @@ import numpy as np
 
 from pipeline.accuracy import params_for
 from pipeline.analyse import analyse
-from pipeline.scene import Scene
+from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from springmass import load, sample_data
-from springmass.loading import read_scene
+from springmass.runs.loading import read_scene
 
 HERE = Path(__file__).resolve().parent
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.registry import open_recording
+from acquisition.recordings.identify import open_recording
 
 FORMATS = Path(__file__).with_name("formats.py")
 

@@ -10,7 +10,7 @@ from types import ModuleType
 
 import pytest
 
-from storage.wire_log import Kind, read_log
+from storage.wire_log.appending import Kind, read_log
 
 PORTS = Path(__file__).with_name("ports.py")
 

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.analyse import analyse
 from springmass import load, sample_data
-from springmass.loading import read_scene
+from springmass.runs.loading import read_scene
 
 RATIOS = Path(__file__).with_name("ratios.py")
 

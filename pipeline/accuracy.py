@@ -1,15 +1,29 @@
-"""Accuracy: the tiers between which a user trades time for error, and the options that each stands for."""
+"""Accuracy: the tiers between which a user trades time for error, each a set of options of the one path."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pipeline.analyse import Params
-from pipeline.damping import Params as DampingParams
+from pipeline.damping.select import Params as DampingParams
 from pipeline.errors import AnalysisError
-from pipeline.quick_models import FAST_LAWS
+from pipeline.motion.waveform_fit import Params as WaveformParams
+from pipeline.oscillation.disturbances import Params as DisturbancesParams
 
-__all__ = ["TIERS", "params_for"]
+__all__ = ["PRESETS", "TIERS", "params_for"]
 
-TIERS = ("fast", "standard", "best")
+FAST_LAWS = ("none", "linear", "quadratic", "linear+quadratic")
+STANDARD = Params()
+PRESETS = {
+    "fast": replace(
+        STANDARD,
+        damping=DampingParams(laws=FAST_LAWS, otherwise=DampingParams().laws),
+        beside=DisturbancesParams(modes=False),
+    ),
+    "standard": STANDARD,
+    "best": replace(STANDARD, full=WaveformParams()),
+}
+TIERS = tuple(PRESETS)
 
 
 def params_for(accuracy: str) -> Params:
@@ -26,11 +40,9 @@ def params_for(accuracy: str) -> Params:
 
     Examples
     --------
-    >>> params_for("best").accuracy
-    'best'
+    >>> params_for("fast").damping.laws
+    ('none', 'linear', 'quadratic', 'linear+quadratic')
     """
-    if accuracy not in TIERS:
+    if accuracy not in PRESETS:
         raise AnalysisError(f"accuracy must be one of {', '.join(TIERS)}, got {accuracy!r}")
-    if accuracy == "fast":
-        return Params(accuracy=accuracy, damping=DampingParams(laws=FAST_LAWS))
-    return Params(accuracy=accuracy)
+    return PRESETS[accuracy]

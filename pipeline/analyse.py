@@ -7,40 +7,38 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline import beside as besides
-from pipeline import condition as conditioning
-from pipeline import cycles as cycling
-from pipeline import damping as dampings
-from pipeline import demodulate as demodulation
-from pipeline import derive as derivation
-from pipeline import fullfit as fullfits
-from pipeline import motion_fit as solutions
-from pipeline import phase as phases
-from pipeline import relaxation as relaxations
-from pipeline.beside import Beside
-from pipeline.condition import Conditioned
-from pipeline.cycles import Cycles, NoOscillation
-from pipeline.damping import Damping
-from pipeline.demodulate import Demodulated, demodulate
-from pipeline.derive import Derived, derive
-from pipeline.effects import Effect, tabulate
+from pipeline.bench.instrument import Instrument
+from pipeline.bench.scene import Scene
+from pipeline.damping import select as dampings
+from pipeline.damping.select import Damping, fit_damping
 from pipeline.errors import AnalysisError
-from pipeline.estimate import Estimate
-from pipeline.fullfit import FullFit, fit_record
-from pipeline.instrument import Instrument
-from pipeline.judge import Finding, by_severity, count_quality, judge, judge_samples, judge_still
-from pipeline.judge_scene import judge_scene
-from pipeline.motion_fit import MotionFit, MotionMisfit, fit_motion, moving_part
-from pipeline.phase import PhaseFit
-from pipeline.quick import demodulate_quickly
-from pipeline.regression import correlation_length
-from pipeline.relaxation import Relaxation, find_relaxation, spring_constant
-from pipeline.rest import Rest
-from pipeline.scene import Scene
-from pipeline.smoother import Smoothed, smooth
-from pipeline.tiers import models_of, tier_of
+from pipeline.motion import equation_fit as solutions
+from pipeline.motion import phase as phases
+from pipeline.motion import waveform_fit as fullfits
+from pipeline.motion.equation_fit import MotionFit, MotionMisfit, fit_motion, moving_part
+from pipeline.motion.overdamped import relaxation as relaxations
+from pipeline.motion.overdamped.relaxation import Relaxation, find_relaxation, spring_constant
+from pipeline.motion.phase import PhaseFit, fit_phase
+from pipeline.motion.rest import Rest, fit_rest
+from pipeline.motion.smoother import Smoothed, smooth
+from pipeline.motion.waveform import Waveform, reconstruct
+from pipeline.motion.waveform_fit import FullFit, fit_record
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.regression import correlation_length
+from pipeline.oscillation import condition as conditioning
+from pipeline.oscillation import cycles as cycling
+from pipeline.oscillation import demodulate as demodulation
+from pipeline.oscillation import disturbances as besides
+from pipeline.oscillation.condition import Conditioned, condition
+from pipeline.oscillation.cycles import Cycles, NoOscillation, find_cycles
+from pipeline.oscillation.demodulate import Demodulated, demodulate
+from pipeline.oscillation.disturbances import Beside, set_apart
+from pipeline.results import derive as derivation
+from pipeline.results.derive import Derived, derive
+from pipeline.results.effects import Effect, tabulate
+from pipeline.results.findings import Finding, by_severity, count_quality, judge, judge_samples, judge_still
+from pipeline.results.scene_findings import judge_scene
 from pipeline.track import U8, Track
-from pipeline.waveform import Waveform
 
 __all__ = ["Analysis", "Motion", "Params", "analyse"]
 
@@ -51,13 +49,12 @@ class Params:
 
     Parameters
     ----------
-    accuracy : {"fast", "standard", "best"}
-        The tier; :func:`pipeline.accuracy.params_for` gives the options that belong to it.
-    condition, cycles, demodulate, beside, damping, phase, derive, full, relaxation, motion
+    condition, cycles, demodulate, beside, damping, phase, derive, relaxation, motion
         Of the stages of those names.
+    full : pipeline.motion.waveform_fit.Params, optional
+        Of the fit of the whole waveform; None leaves it out.
     """
 
-    accuracy: str = "standard"
     condition: conditioning.Params = field(default_factory=conditioning.Params)
     cycles: cycling.Params = field(default_factory=cycling.Params)
     demodulate: demodulation.Params = field(default_factory=demodulation.Params)
@@ -65,7 +62,7 @@ class Params:
     damping: dampings.Params = field(default_factory=dampings.Params)
     phase: phases.Params = field(default_factory=phases.Params)
     derive: derivation.Params = field(default_factory=derivation.Params)
-    full: fullfits.Params = field(default_factory=fullfits.Params)
+    full: fullfits.Params | None = None
     relaxation: relaxations.Params = field(default_factory=relaxations.Params)
     motion: solutions.Params = field(default_factory=solutions.Params)
 
@@ -97,7 +94,8 @@ class Analysis:
     conditioned : Conditioned
     motion : Motion or NoOscillation
         The latter says why there is nothing to fit; ``estimates`` then holds offset and noise alone. Where damping
-        ends the motion within a few cycles it is a :class:`pipeline.relaxation.Relaxation` and brings its rates.
+        ends the motion within a few cycles it is a :class:`pipeline.motion.overdamped.relaxation.Relaxation` and
+        brings its rates.
     effects : tuple of Effect
     findings : tuple of Finding
         Gravest first.
@@ -176,25 +174,22 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     scene, params = scene or Scene(), params or Params()
     if track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
-    tier = tier_of(params.accuracy)
-    conditioned = tier.condition(track, params.condition)
-    cycles = tier.find_cycles(conditioned, params.cycles)
+    conditioned = condition(track, params.condition)
+    cycles = find_cycles(conditioned, params.cycles)
     stopped = False
     share = 0.75 if isinstance(cycles, NoOscillation) else 0.25
     if (moving := moving_part(conditioned, share)) is not None:
-        trimmed = tier.find_cycles(moving, params.cycles)
+        trimmed = find_cycles(moving, params.cycles)
         stopped = not isinstance(trimmed, NoOscillation)
         cycles = trimmed if stopped else cycles
     if isinstance(cycles, NoOscillation):
         return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or cycles)
-    quick = demodulate_quickly(conditioned, cycles)
-    demodulated = demodulate(conditioned, cycles, params.demodulate) if quick is None else quick.demodulated
+    demodulated = demodulate(conditioned, cycles, params.demodulate)
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
         return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or why)
-    demodulated, beside = tier.set_apart(conditioned, cycles, demodulated, params.beside, params.demodulate)
-    models = models_of(tier, quick)
+    demodulated, beside = set_apart(conditioned, cycles, demodulated, params.beside, params.demodulate)
     start = float(track.t[np.argmax(conditioned.used)])
-    damping = models.fit_damping(demodulated, start, params.damping)
+    damping = fit_damping(demodulated, start, params.damping)
     solved = fit_motion(conditioned, demodulated, damping, params.motion, params.damping, stopped=stopped)
     strong = damping.best.rate_at_start() > params.relaxation.least_damping * demodulated.angular_frequency
     linear = not isinstance(solved, MotionFit) or solved.damping.selected == "linear"
@@ -205,11 +200,11 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         damping, phase, rest = solved.damping, solved.phase(demodulated), solved.rest(demodulated)
         waveform = solved.waveform
     else:
-        phase = models.fit_phase(demodulated, damping, params.phase)
-        rest = models.fit_rest(demodulated)
-        waveform = models.reconstruct(quick, beside.conditioned.track, demodulated, phase, rest)
+        phase = fit_phase(demodulated, damping, params.phase)
+        rest = fit_rest(demodulated)
+        waveform = reconstruct(beside.conditioned.track, demodulated, phase, rest)
     full = None
-    if tier.fits_waveform and not isinstance(solved, MotionFit):
+    if params.full is not None and not isinstance(solved, MotionFit):
         # The record without modes and with their columns: as good as the whole record with them, for the columns span
         # what was taken out. Values and intervals agree to rounding, and put_back serves both tiers.
         extra = beside.columns(track.t)

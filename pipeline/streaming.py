@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.analyse import Motion, Params, analyse
 from pipeline.errors import AnalysisError
-from pipeline.estimate import Estimate
+from pipeline.numerics.estimate import Estimate
 from pipeline.track import F8, U8, Track
 
 __all__ = ["LiveMotion", "MotionAccumulator", "NotYet"]

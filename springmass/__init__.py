@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from acquisition.replay import Replay
     from pipeline.analyse import Analysis, analyse
-    from pipeline.classic import classic
-    from pipeline.compare import SpringRun, compare_springs
-    from pipeline.estimate import Estimate
-    from pipeline.scene import Scene
+    from pipeline.bench.scene import Scene
+    from pipeline.numerics.estimate import Estimate
+    from pipeline.results.classic import classic
+    from pipeline.results.compare import SpringRun, compare_springs
     from pipeline.track import Track
-    from springmass.loading import Loaded, load, read_scene, sample_data
-    from storage.run import open_run
-    from storage.write import write_run
+    from springmass.runs.loading import Loaded, load, read_scene, sample_data
+    from storage.run_file.reading import open_run
+    from storage.run_file.writing import write_run
 
 __version__ = "0.1.0"
 
@@ -51,20 +51,20 @@ __all__ = [
 # Name to module: loaded on first use, so that `springmass --help` waits for none of them.
 _WHERE = {
     "Analysis": "pipeline.analyse",
-    "Estimate": "pipeline.estimate",
-    "Loaded": "springmass.loading",
+    "Estimate": "pipeline.numerics.estimate",
+    "Loaded": "springmass.runs.loading",
     "Replay": "acquisition.replay",
-    "Scene": "pipeline.scene",
-    "SpringRun": "pipeline.compare",
+    "Scene": "pipeline.bench.scene",
+    "SpringRun": "pipeline.results.compare",
     "Track": "pipeline.track",
     "analyse": "pipeline.analyse",
-    "classic": "pipeline.classic",
-    "compare_springs": "pipeline.compare",
-    "load": "springmass.loading",
-    "open_run": "storage.run",
-    "read_scene": "springmass.loading",
-    "sample_data": "springmass.loading",
-    "write_run": "storage.write",
+    "classic": "pipeline.results.classic",
+    "compare_springs": "pipeline.results.compare",
+    "load": "springmass.runs.loading",
+    "open_run": "storage.run_file.reading",
+    "read_scene": "springmass.runs.loading",
+    "sample_data": "springmass.runs.loading",
+    "write_run": "storage.run_file.writing",
 }
 
 

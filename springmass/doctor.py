@@ -96,7 +96,7 @@ def _libraries() -> Iterator[Check]:
 
 def _bundled() -> Check:
     from springmass.errors import ProgramError
-    from springmass.loading import sample_data
+    from springmass.runs.loading import sample_data
 
     try:
         return Check("bundled recordings", True, str(sample_data()))
@@ -111,8 +111,8 @@ def _round_trip() -> Check:
     from acquisition.block import Block
     from acquisition.source import SourceInfo
     from storage.errors import StorageError
-    from storage.run import open_run
-    from storage.write import write_run
+    from storage.run_file.reading import open_run
+    from storage.run_file.writing import write_run
 
     block = Block(0, np.arange(8) / 100.0, np.linspace(0.2, 0.3, 8), np.zeros(8, np.uint8))
     try:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from pipeline.analyse import Analysis, Motion
 
 if TYPE_CHECKING:
-    from pipeline.classic import Classic
-    from pipeline.compare import Comparison
+    from pipeline.results.classic import Classic
+    from pipeline.results.compare import Comparison
 
 __all__ = ["classic_text", "comparison_text", "findings_text", "wrapped"]
 

@@ -27,8 +27,8 @@ from acquisition.clock import Clock
 from acquisition.readings import Read
 from storage.disk import DiskNearlyFull, check_disk
 from storage.errors import WriteFailed, one_line
-from storage.wire_layout import HEAD_BYTES, event_payload
-from storage.wire_log import Item, Kind, LogFile, LogHeader, WireLogWriter, open_log_file
+from storage.wire_log.appending import Item, Kind, LogFile, LogHeader, WireLogWriter, open_log_file
+from storage.wire_log.records import HEAD_BYTES, event_payload
 
 __all__ = ["DiskNearlyFull", "Recorder", "RecorderStatus", "check_disk"]
 
@@ -89,7 +89,7 @@ class _Overflow:
 
 
 class Recorder:
-    """Records to a new wire log. It is a :class:`acquisition.wired.Sink`.
+    """Records to a new wire log. It is a :class:`acquisition.live.reader.Sink`.
 
     Parameters
     ----------

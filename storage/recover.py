@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import Block
-from acquisition.recording import Original, Trap
+from acquisition.recordings.recording import Original, Trap
 from storage.errors import RunDamaged, RunExists, one_line
-from storage.wire_decode import Decoded, decode_log
-from storage.wire_layout import Kind, LogHeader, Record, SensorEntry
-from storage.wire_read import Damage, LogContents, NotALog, parse_log
+from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry
+from storage.wire_log.scanning import Damage, LogContents, NotALog, parse_log
+from storage.wire_log.wire_samples import Decoded, decode_log
 
 __all__ = ["RecoverReport", "RecoveredRun", "recover", "run_paths"]
 
@@ -213,8 +213,8 @@ def _demand_free(paths: Sequence[Path]) -> None:
 
 def _write(path: Path, log: _Log, decoded: Decoded, provenance: Mapping[str, Any], overwrite: bool) -> RecoveredRun:
     # h5py takes longer to import than a short log to read.
-    from storage.run import open_run
-    from storage.write import write_run
+    from storage.run_file.reading import open_run
+    from storage.run_file.writing import write_run
 
     samples, header = decoded.samples, log.header
     told = dict(decoded.chain.report(samples.t, _host_ns(samples)))

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from numpy.typing import ArrayLike
 
-from pipeline.demodulate import Demodulated
+from pipeline.oscillation.demodulate import Demodulated
 
 # A slow machine is no fault of the data: neither a deadline nor the check for slow generation holds here.
 settings.register_profile(

@@ -15,7 +15,7 @@ import numpy as np
 from trials import QUANTITIES, Case, Outcome, bounds, evaluate, record, synthetic
 
 from pipeline.accuracy import TIERS
-from pipeline.classic import classic
+from pipeline.results.classic import classic
 
 __all__ = ["CHECKS", "Bench", "Line"]
 

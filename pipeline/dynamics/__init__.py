@@ -11,16 +11,16 @@ Examples
 
 from __future__ import annotations
 
-from pipeline.dynamics.averaged import AVERAGED
 from pipeline.dynamics.equation import Equation, Problem, effective_mass_kg
-from pipeline.dynamics.euler import FORWARD_EULER, SYMPLECTIC_EULER
-from pipeline.dynamics.exact import EXACT
 from pipeline.dynamics.integrator import Integrator, Trajectory
-from pipeline.dynamics.runge_kutta import RK4
-from pipeline.dynamics.solve_ivp import DOP853, LSODA
-from pipeline.dynamics.strang import STRANG
-from pipeline.dynamics.taylor import TAYLOR
-from pipeline.dynamics.verlet import VERLET, YOSHIDA4
+from pipeline.dynamics.integrators.averaged import AVERAGED
+from pipeline.dynamics.integrators.euler import FORWARD_EULER, SYMPLECTIC_EULER
+from pipeline.dynamics.integrators.exact import EXACT
+from pipeline.dynamics.integrators.runge_kutta import RK4
+from pipeline.dynamics.integrators.solve_ivp import DOP853, LSODA
+from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.dynamics.integrators.taylor import TAYLOR
+from pipeline.dynamics.integrators.verlet import VERLET, YOSHIDA4
 from pipeline.errors import DynamicsError
 
 __all__ = [

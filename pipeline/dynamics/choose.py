@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from pipeline.dynamics.averaged import AVERAGED, stopping_time
 from pipeline.dynamics.equation import Equation, Problem
-from pipeline.dynamics.exact import EXACT, rounding_error
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
+from pipeline.dynamics.integrators.averaged import AVERAGED, stopping_time
+from pipeline.dynamics.integrators.exact import EXACT, rounding_error
+from pipeline.dynamics.integrators.runge_kutta import RK4
+from pipeline.dynamics.integrators.solve_ivp import SolveIvp
+from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
 from pipeline.dynamics.pilot import fine_step, in_own_units, predicted_by_pilot
-from pipeline.dynamics.runge_kutta import RK4
-from pipeline.dynamics.solve_ivp import SolveIvp
-from pipeline.dynamics.strang import STRANG
-from pipeline.dynamics.taylor import TAYLOR, Taylor
 from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
 

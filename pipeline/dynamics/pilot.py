@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.dynamics.equation import Equation, Problem
-from pipeline.dynamics.strang import STRANG
+from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.dynamics.averaged import amplitude
 from pipeline.dynamics.equation import Problem
-from pipeline.dynamics.exact import rounding_error
 from pipeline.dynamics.flow import flows
+from pipeline.dynamics.integrators.averaged import amplitude
+from pipeline.dynamics.integrators.exact import rounding_error
 from pipeline.dynamics.pilot import predicted_by_pilot
 from pipeline.dynamics.stability import step_matrix
 from pipeline.track import F8
 
 if TYPE_CHECKING:
-    from pipeline.dynamics.one_step import OneStep
+    from pipeline.dynamics.integrators.one_step import OneStep
 
 __all__ = ["predicted_by_average"]
 

@@ -16,7 +16,7 @@ from pipeline.dynamics.equation import Equation
 from pipeline.track import F8
 
 if TYPE_CHECKING:
-    from pipeline.dynamics.one_step import OneStep
+    from pipeline.dynamics.integrators.one_step import OneStep
 
 __all__ = ["growth_per_step", "limit_by_search", "step_matrix"]
 
@@ -38,7 +38,7 @@ def step_matrix(method: OneStep, x: float | F8, ratio: float) -> F8:
 
     Examples
     --------
-    >>> from pipeline.dynamics.euler import FORWARD_EULER
+    >>> from pipeline.dynamics.integrators.euler import FORWARD_EULER
     >>> step_matrix(FORWARD_EULER, 0.5, 0.0)
     array([[ 1. ,  0.5],
            [-0.5,  1. ]])
@@ -53,7 +53,7 @@ def growth_per_step(method: OneStep, x: float, ratio: float) -> float:
 
     Examples
     --------
-    >>> from pipeline.dynamics.euler import FORWARD_EULER
+    >>> from pipeline.dynamics.integrators.euler import FORWARD_EULER
     >>> growth_per_step(FORWARD_EULER, 0.75, 0.0)
     1.25
     """
@@ -76,7 +76,7 @@ def limit_by_search(method: OneStep, ratio: float) -> float:
 
     Examples
     --------
-    >>> from pipeline.dynamics.runge_kutta import RK4
+    >>> from pipeline.dynamics.integrators.runge_kutta import RK4
     >>> round(limit_by_search(RK4, 0.0), 4)
     2.8284
     """

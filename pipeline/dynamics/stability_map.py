@@ -21,7 +21,7 @@ def limits(integrator: Integrator, ratios: F8) -> F8:
 
     Examples
     --------
-    >>> from pipeline.dynamics.euler import SYMPLECTIC_EULER
+    >>> from pipeline.dynamics.integrators.euler import SYMPLECTIC_EULER
     >>> limits(SYMPLECTIC_EULER, np.array([0.0, 1.0])).round(3)
     array([2.   , 0.828])
     """

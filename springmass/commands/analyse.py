@@ -11,11 +11,11 @@ from typing import Any
 from acquisition.errors import AcquisitionError
 from pipeline.analyse import Motion
 from pipeline.errors import PipelineError
-from pipeline.relaxation import Relaxation
-from springmass.analysing import Analysed, analyse_loaded, distinct_names, make_folder
+from pipeline.motion.overdamped.relaxation import Relaxation
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain
-from springmass.loading import load, read_scene
+from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder
+from springmass.runs.loading import load, read_scene
 from storage.errors import StorageError
 
 __all__ = ["run"]

@@ -8,13 +8,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from pipeline.scene import Scene
+from pipeline.bench.scene import Scene
 from springmass import __version__
-from springmass.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc
 from springmass.commands import completions
-from springmass.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain
-from springmass.loading import Loaded, load, read_scene
+from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc
+from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
+from springmass.runs.loading import Loaded, load, read_scene
 
 __all__ = ["run"]
 

@@ -8,15 +8,15 @@ from collections.abc import Sequence
 from pathlib import Path, PurePath
 from typing import Any
 
-from acquisition.formats.writers import WRITERS
-from acquisition.recording import Original
+from acquisition.recordings.recording import Original
+from acquisition.recordings.writers import WRITERS
 from springmass import __version__
-from springmass.analysing import now_utc
 from springmass.commands import completions
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError
-from springmass.loading import Loaded, load, read_scene
+from springmass.runs.analysing import now_utc
+from springmass.runs.loading import Loaded, load, read_scene
 from storage.atomic import write_whole
-from storage.write import write_run
+from storage.run_file.writing import write_run
 
 __all__ = ["run", "write_loaded"]
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
-from springmass.analysing import Analysed, analyse_loaded, make_folder
 from springmass.commands.convert import write_loaded
-from springmass.comparing import compare_analysed
 from springmass.errors import OK
-from springmass.loading import load, read_scene, sample_data
 from springmass.printing import findings_text
 from springmass.report.tables import text_table
 from springmass.report.write import ReportRun, write_report
+from springmass.runs.analysing import Analysed, analyse_loaded, make_folder
+from springmass.runs.comparing import compare_analysed
+from springmass.runs.loading import load, read_scene, sample_data
 
 __all__ = ["run"]
 

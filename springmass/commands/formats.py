@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import NeedsAnswer
-from acquisition.inspection import Inspection, Survey
-from acquisition.recording import Trap
-from acquisition.registry import formats, inspect
+from acquisition.recordings.identify import formats, inspect
+from acquisition.recordings.inspection import Inspection, Survey
+from acquisition.recordings.recording import Trap
 from springmass.commands import completions
 from springmass.errors import OK
-from springmass.loading import Loaded, kind_of, load
+from springmass.runs.loading import Loaded, kind_of, load
 
 __all__ = ["run"]
 

@@ -10,9 +10,9 @@ from typing import Any
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import describe_bytes, probe
 from acquisition.errors import PortError
+from acquisition.live.reader import Line, PortReader
+from acquisition.live.serial_port import SerialPort, list_ports
 from acquisition.readings import Read
-from acquisition.serial_port import SerialPort, list_ports
-from acquisition.wired import Line, PortReader
 from springmass.errors import OK
 
 __all__ = ["run"]

@@ -15,20 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.calibration import SPEED_OF_SOUND_M_PER_S, Calibration, StillPoint
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
 from acquisition.errors import CalibrationError
-from acquisition.serial_port import SerialPort
-from pipeline.air import speed_of_sound
-from pipeline.estimate import format_value
-from pipeline.scene import Scene
+from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration, StillPoint
+from acquisition.live.serial_port import SerialPort
+from pipeline.bench.air import speed_of_sound
+from pipeline.bench.scene import Scene
+from pipeline.numerics.estimate import format_value
 from pipeline.streaming import LiveMotion
 from springmass import __version__
-from springmass.analysing import now_utc
 from springmass.errors import OK, USAGE, ProgramError
-from springmass.loading import read_scene
-from springmass.recording import BYTES_PER_READ, Progress, Sensor, Session, Trigger, demand_new
+from springmass.runs.analysing import now_utc
+from springmass.runs.loading import read_scene
+from springmass.session.session import BYTES_PER_READ, Progress, Sensor, Session, Trigger, demand_new
 from storage.disk import check_disk
 from storage.recover import recover
 
@@ -248,9 +248,9 @@ def _simulated(
 ) -> Iterator[Sensor]:
     if os.name == "nt":
         raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port", USAGE)
-    from acquisition.virtual import VirtualRangefinder, VirtualSensor
-    from acquisition.virtual_port import VirtualPort
-    from springmass.bench import bench_position
+    from acquisition.simulated.pseudo_terminal import VirtualPort
+    from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
+    from springmass.session.simulated_bench import bench_position
 
     family = get_family(options.sensor[0] if options.sensor else "line-protocol")
     position = bench_position(read_scene(options.simulate), where=str(options.simulate))

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 from springmass import __version__
-from springmass.analysing import now_utc
 from springmass.errors import OK
+from springmass.runs.analysing import now_utc
 from storage.recover import recover
 
 __all__ = ["run"]

@@ -15,7 +15,7 @@ from acquisition.replay import Replay
 from springmass.commands import completions
 from springmass.commands.convert import write_loaded
 from springmass.errors import OK, USAGE, ProgramError
-from springmass.loading import load
+from springmass.runs.loading import load
 
 __all__ = ["run"]
 

@@ -13,16 +13,15 @@ import numpy as np
 
 from acquisition.block import Block
 from acquisition.source import SourceInfo
+from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem, effective_mass_kg
 from pipeline.dynamics.choose import Choice
 from pipeline.errors import DynamicsError
-from pipeline.scene import Scene
 from springmass import __version__
-from springmass.analysing import make_folder, now_utc
-from springmass.bench import REST_M
 from springmass.errors import OK, USAGE, ProgramError
-from springmass.loading import load, read_scene
-from springmass.simulation import (
+from springmass.runs.analysing import make_folder, now_utc
+from springmass.runs.loading import load, read_scene
+from springmass.runs.simulation import (
     Against,
     Simulation,
     compare_with,
@@ -33,6 +32,7 @@ from springmass.simulation import (
     simulate,
     summary,
 )
+from springmass.session.simulated_bench import REST_M
 
 __all__ = ["run"]
 
@@ -118,7 +118,7 @@ def _write_run(
     path: Path, simulation: Simulation, scene: Scene, options: argparse.Namespace, told: dict[str, Any]
 ) -> None:
     """Write the trajectory as a run of kind ``simulated``: a sensor without noise, as far away as the bob needs."""
-    from storage.write import write_run
+    from storage.run_file.writing import write_run
 
     trajectory = simulation.trajectory
     rest = max(REST_M, 2.0 * float(np.max(np.abs(trajectory.y))))

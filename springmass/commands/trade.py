@@ -9,9 +9,9 @@ import time
 from collections.abc import Callable
 
 from springmass import __version__
-from springmass.analysing import make_folder
 from springmass.commands import completions
 from springmass.errors import OK, USAGE, ProgramError
+from springmass.runs.analysing import make_folder
 
 __all__ = ["run"]
 
@@ -98,7 +98,7 @@ def _integrators(options: argparse.Namespace) -> int:
 
 
 def _own(options: argparse.Namespace) -> int:
-    from springmass.loading import load
+    from springmass.runs.loading import load
     from springmass.trade.measure import own_record
     from springmass.trade.methods import methods
     from springmass.trade.tables import own_json, own_text

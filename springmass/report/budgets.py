@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipeline.analyse import Analysis
-from pipeline.budget import Budget, Contribution
-from pipeline.cycles import NoOscillation
+from pipeline.oscillation.cycles import NoOscillation
+from pipeline.results.budget import Budget, Contribution
 from springmass.report.tables import QUANTITIES
 
 __all__ = ["INPUTS", "BudgetRow", "budget_csv", "budget_text", "budgets_of"]
@@ -35,7 +35,7 @@ INPUTS = {
     "calibrated_scale": "calibration of the scale",
     "sensor_zero": "calibration of the zero",
 }
-"""Every input of :mod:`pipeline.derive` in words."""
+"""Every input of :mod:`pipeline.results.derive` in words."""
 SAME = ("frequency", "angular_frequency")  # one number with the period
 LEAST_SHARE = 1e-3  # of the variance; what is less does not reach a printed digit of u
 

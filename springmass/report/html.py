@@ -8,11 +8,11 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from pipeline.analyse import Analysis, Motion
-from pipeline.classic import Classic
-from pipeline.compare import Comparison
-from pipeline.cycles import NoOscillation
-from pipeline.estimate import Estimate
-from pipeline.joint_damping import JointDamping
+from pipeline.damping.joint import JointDamping
+from pipeline.numerics.estimate import Estimate
+from pipeline.oscillation.cycles import NoOscillation
+from pipeline.results.classic import Classic
+from pipeline.results.compare import Comparison
 from springmass.report.budgets import INPUTS, budgets_of
 from springmass.report.inline import inline_svg
 from springmass.report.tables import law_status, page_unit, pretty, pretty_number, table_rows
@@ -33,7 +33,7 @@ _QUALITY = {
     "non_monotonic_time": "running backward in time",
     "malformed_rows": "malformed rows",
 }
-# What is wrong with each number of the report's own method; pipeline.classic derives it.
+# What is wrong with each number of the report's own method; pipeline.results.classic derives it.
 _BIASES = {
     "period": "two sampled maxima decide where a thousand samples could",
     "frequency": "as the period",

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from pipeline.analyse import Analysis
-from pipeline.estimate import Estimate, format_value
+from pipeline.numerics.estimate import Estimate, format_value
 from springmass.report.budgets import INPUTS, budgets_of
 from springmass.report.tables import table_rows
 

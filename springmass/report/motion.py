@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.analyse import Analysis
-from pipeline.cycles import NoOscillation
 from pipeline.errors import AnalysisError
-from pipeline.smoother import Smoothed
+from pipeline.motion.smoother import Smoothed
+from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import UNUSABLE
 
 __all__ = ["COLUMNS", "motion_csv", "row_step", "smoothed_or_why"]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from springmass.simulation import Against, Simulation
+    from springmass.runs.simulation import Against, Simulation
 
 __all__ = ["EULERS", "SIMULATION_FIGURES", "against_figure", "draw_simulation", "stability_figure"]
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipeline.analyse import Analysis
-from pipeline.cycles import NoOscillation
-from pipeline.damping import Damping
-from pipeline.estimate import Estimate, format_value
+from pipeline.damping.select import Damping
+from pipeline.numerics.estimate import Estimate, format_value
+from pipeline.oscillation.cycles import NoOscillation
 
 __all__ = [
     "QUANTITIES",
@@ -160,7 +160,7 @@ def results_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
 
 
 def pretty(estimate: Estimate | None) -> str:
-    """Return an estimate for the page: the digits of :func:`pipeline.estimate.format_value`, typeset.
+    """Return an estimate for the page: the digits of :func:`pipeline.numerics.estimate.format_value`, typeset.
 
     Examples
     --------

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.analyse import Analysis, Motion
-from pipeline.cycles import NoOscillation
-from pipeline.estimate import Estimate
-from pipeline.relaxation import Relaxation
+from pipeline.motion.overdamped.relaxation import Relaxation
+from pipeline.numerics.estimate import Estimate
+from pipeline.oscillation.cycles import NoOscillation
 from springmass.report.figures.phase import turn_step
 from springmass.report.figures.position import ZOOM_PERIODS, has_error_bars, is_long
 from springmass.report.motion import row_step

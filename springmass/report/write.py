@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from pipeline.compare import Comparison
-from pipeline.joint_damping import JointDamping
+from pipeline.damping.joint import JointDamping
+from pipeline.results.compare import Comparison
 from springmass.report.budgets import budget_csv
 from springmass.report.figures import MAKERS, comparison_figure, draw, render
 from springmass.report.html import ComparedRuns, ReportRun, render_html

@@ -14,8 +14,8 @@ import numpy as np
 
 from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem
 from pipeline.dynamics.choose import choose
-from pipeline.dynamics.solve_ivp import SolveIvp
-from pipeline.dynamics.taylor import TAYLOR, Taylor
+from pipeline.dynamics.integrators.solve_ivp import SolveIvp
+from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
 from pipeline.errors import DynamicsError
 from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, panels, style
 from springmass.trade.front import Point

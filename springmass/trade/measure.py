@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.accuracy import TIERS
 from pipeline.errors import AnalysisError
-from pipeline.estimate import Estimate
+from pipeline.numerics.estimate import Estimate
 from pipeline.track import Track
 from springmass.trade.front import EQUAL, Point
 from springmass.trade.methods import Method

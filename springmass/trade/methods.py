@@ -16,9 +16,9 @@ import numpy as np
 
 from pipeline.accuracy import TIERS, params_for
 from pipeline.analyse import Motion, analyse
-from pipeline.classic import classic
 from pipeline.errors import AnalysisError
-from pipeline.estimate import Estimate
+from pipeline.numerics.estimate import Estimate
+from pipeline.results.classic import classic
 from pipeline.track import F8, Track
 
 __all__ = ["UNITS", "Method", "Unavailable", "methods"]

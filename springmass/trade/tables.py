@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pipeline.estimate import Estimate
+from pipeline.numerics.estimate import Estimate
 from springmass.trade.measure import Trade
 from springmass.trade.methods import UNITS, Method, Unavailable
 

@@ -16,8 +16,8 @@ import pytest
 
 import springmass
 from pipeline.accuracy import params_for
-from pipeline.classic import classic
-from pipeline.judge import Finding
+from pipeline.results.classic import classic
+from pipeline.results.findings import Finding
 
 Cli = Callable[..., Any]
 
@@ -228,7 +228,7 @@ def test_strict_passes_what_only_warns(cli: Cli, write: Callable[..., Path], row
 def test_strict_rejects_an_error(cli: Cli, recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A finding that forbids the use of a number gives exit code 5, but only where strictness was asked for."""
     error = Finding("law_rejected", "error", "every damping law tried is rejected")
-    monkeypatch.setattr("springmass.results.all_findings", lambda *_: (error,))
+    monkeypatch.setattr("springmass.runs.json_results.all_findings", lambda *_: (error,))
     done = cli("analyse", "--json", "--strict", recording)
     assert (done.code, len(done.results)) == (5, 1)
     assert done.complaint.endswith("run.txt: rejected under --strict: law_rejected")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from springmass.cli import main
-from springmass.loading import sample_data
+from springmass.runs.loading import sample_data
 
 DATA = sample_data()
 BARE, DISC = (str(DATA / f"{name}_simulated_position.txt") for name in ("undamped", "damped"))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import springmass
-from acquisition.recording import Original
+from acquisition.recordings.recording import Original
 
 Cli = Callable[..., Any]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import springmass
 from acquisition.clock import VirtualClock
-from acquisition.registry import formats
+from acquisition.recordings.identify import formats
 from storage.recorder import Recorder
-from storage.wire_layout import LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, SensorEntry
 
 Cli = Callable[..., Any]
 

@@ -19,14 +19,14 @@ import pytest
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import families, get_family
-from acquisition.virtual import VirtualRangefinder, VirtualSensor
-from acquisition.virtual_port import VirtualPort
+from acquisition.simulated.pseudo_terminal import VirtualPort
+from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from pipeline.analyse import Motion, analyse
 from pipeline.streaming import NotYet
 from springmass import load
 from springmass.commands.record import _Line
-from springmass.progress import Progress
-from storage.run import open_run
+from springmass.session.progress import Progress
+from storage.run_file.reading import open_run
 
 SCENE = """
 [bob]
@@ -128,7 +128,7 @@ def test_an_absent_port_is_named_with_those_that_are_there(cli: Callable, tmp_pa
 def test_a_busy_port_is_called_busy(cli: Callable, tmp_path: Path) -> None:
     """A port that another program holds: one line, exit code 4."""
     with speaking("line-protocol") as sensor:
-        from acquisition.serial_port import SerialPort
+        from acquisition.live.serial_port import SerialPort
 
         holder = SerialPort(sensor.path, 115200)
         done = cli("record", "--port", sensor.path, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")

@@ -12,8 +12,8 @@ import pytest
 from acquisition.block import Block
 from acquisition.source import SourceInfo
 from springmass import analyse, load
-from springmass.loading import read_scene
-from storage.write import write_run
+from springmass.runs.loading import read_scene
+from storage.run_file.writing import write_run
 
 LINEAR = """
 [bob]

@@ -12,10 +12,10 @@ import pytest
 
 from acquisition.block import Flag, concatenate
 from acquisition.errors import FormatError
-from acquisition.formats.base import HEAD_BYTES, Format
-from acquisition.formats.example import FORMAT as EXAMPLE
-from acquisition.recording import Recording
-from acquisition.registry import formats, get_format
+from acquisition.recordings.base import HEAD_BYTES, Format
+from acquisition.recordings.families.template import FORMAT as EXAMPLE
+from acquisition.recordings.identify import formats, get_format
+from acquisition.recordings.recording import Recording
 
 RATE_HZ = 100.0
 T = np.arange(300) / RATE_HZ

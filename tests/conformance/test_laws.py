@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline import damping
-from pipeline.demodulate import Demodulated
-from pipeline.laws import LAWS, Law, drag
-from pipeline.laws.drag import Drag, amplitudes, fading, jacobians_of
+from pipeline.damping import select as damping
+from pipeline.damping.laws import LAWS, Law, drag
+from pipeline.damping.laws.drag import Drag, amplitudes, fading, jacobians_of
+from pipeline.oscillation.demodulate import Demodulated
 
 # Rows of coefficients; a law takes those that its parameters name.
 BENCHES = (

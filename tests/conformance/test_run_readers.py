@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from acquisition.block import Block, Flag
-from acquisition.recording import Original, Trap
+from acquisition.recordings.recording import Original, Trap
 from acquisition.source import SourceInfo
-from storage.layout import CHUNK
-from storage.run import open_run
-from storage.write import write_run
+from storage.run_file.layout import CHUNK
+from storage.run_file.reading import open_run
+from storage.run_file.writing import write_run
 
 xr = pytest.importorskip("xarray")
 

@@ -11,8 +11,8 @@ import pytest
 from acquisition.block import Block, Flag, concatenate
 from acquisition.clock import Clock, VirtualClock
 from acquisition.replay import Replay
+from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor, VirtualSource
 from acquisition.source import Source, SourceInfo
-from acquisition.virtual import VirtualRangefinder, VirtualSensor, VirtualSource
 
 SECONDS = 120
 RATE_HZ = 100.0

@@ -12,15 +12,15 @@ from typing import Any
 
 import pytest
 
-from acquisition.registry import formats
-from pipeline.laws import LAWS
-from pipeline.scene import Scene
+from acquisition.recordings.identify import formats
+from pipeline.bench.scene import Scene
+from pipeline.damping.laws import LAWS
 from springmass import analyse, load, sample_data
-from springmass.analysing import analyse_loaded
 from springmass.cli import COMMANDS, build_parser, main
-from springmass.loading import read_scene
-from springmass.results import all_findings
-from storage.layout import COLUMNS
+from springmass.runs.analysing import analyse_loaded
+from springmass.runs.json_results import all_findings
+from springmass.runs.loading import read_scene
+from storage.run_file.layout import COLUMNS
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

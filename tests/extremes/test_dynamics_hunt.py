@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem, get_integrator, solve_ivp, taylor
-from pipeline.dynamics.averaged import amplitude, stopping_time
+from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem, get_integrator
 from pipeline.dynamics.choose import choose, cost_ns, fit_step, least_tolerance
+from pipeline.dynamics.integrators import solve_ivp, taylor
+from pipeline.dynamics.integrators.averaged import amplitude, stopping_time
 from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
 

@@ -10,8 +10,8 @@ import pytest
 
 from pipeline.accuracy import TIERS, params_for
 from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError, SceneError, TrackError
-from pipeline.scene import Scene
 from pipeline.track import Track
 
 F8 = np.ndarray

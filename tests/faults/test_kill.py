@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.chain import Chains, SensorChain
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
-from springmass.reads import Tee
+from acquisition.live.decoding import Chains, SensorChain
+from springmass.session.reads import Tee
 from storage.recorder import Recorder
-from storage.wire_log import Kind, LogHeader, SensorEntry, read_log
+from storage.wire_log.appending import Kind, LogHeader, SensorEntry, read_log
 
 KILLS = int(os.environ.get("SPRINGMASS_KILLS", "12"))
 PACKET = 64

@@ -16,10 +16,10 @@ from serial.rfc2217 import PortManager
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
-from acquisition.virtual import VirtualRangefinder, VirtualSensor
-from acquisition.virtual_port import VirtualPort
+from acquisition.simulated.pseudo_terminal import VirtualPort
+from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from springmass.cli import main
-from storage.run import open_run
+from storage.run_file.reading import open_run
 
 # pyserial 3.5 starts its reading thread in the old way.
 pytestmark = pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\) is deprecated:DeprecationWarning")

@@ -19,18 +19,19 @@ import numpy as np
 import pytest
 import serial
 
-from acquisition import serial_port, wired
 from acquisition.block import Block, Flag, concatenate
-from acquisition.chain import SensorChain
 from acquisition.clock import SystemClock
 from acquisition.decoders.base import Poll
 from acquisition.decoders.registry import families, get_family
 from acquisition.errors import PortError
+from acquisition.live import reader as wired
+from acquisition.live import serial_port
+from acquisition.live.decoding import SensorChain
+from acquisition.live.reader import Line, PortReader
+from acquisition.live.serial_port import PortFacts, SerialPort, list_ports
 from acquisition.readings import Read, Readings, join
-from acquisition.serial_port import PortFacts, SerialPort, list_ports
-from acquisition.virtual import Shot, VirtualRangefinder, VirtualSensor
-from acquisition.virtual_port import Faults, VirtualPort
-from acquisition.wired import Line, PortReader
+from acquisition.simulated.pseudo_terminal import Faults, VirtualPort
+from acquisition.simulated.rangefinder import Shot, VirtualRangefinder, VirtualSensor
 
 WAIT_S = 10.0
 QUIET_S = 0.4

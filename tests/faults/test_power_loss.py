@@ -16,8 +16,8 @@ import pytest
 from acquisition.block import F8, I8, Block
 from acquisition.readings import Read
 from acquisition.source import SourceInfo
-from storage.wire_decode import decode_log
-from storage.wire_log import Kind, LogHeader, SensorEntry, WireLogWriter, parse_log
+from storage.wire_log.appending import Kind, LogHeader, SensorEntry, WireLogWriter, parse_log
+from storage.wire_log.wire_samples import decode_log
 
 PAGE = 4096
 SENSOR = SensorEntry(0, "maxbotix", "COM3", 57600)

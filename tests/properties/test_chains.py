@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.block import Block, Flag, concatenate
-from acquisition.calibration import Calibration
-from acquisition.chain import FEW, MANY, Chains, SensorChain
 from acquisition.decoders.line_protocol import LineProtocolEncoder, frame
 from acquisition.decoders.registry import get_family
+from acquisition.live.calibration import Calibration
+from acquisition.live.decoding import FEW, MANY, Chains, SensorChain
 from acquisition.readings import Read, Readings
 
 SENSORS = 7

@@ -24,9 +24,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition.errors import FormatError
-from acquisition.formats.text import decode, parse_number
-from acquisition.recording import Recording
-from acquisition.registry import formats, get_format
+from acquisition.recordings.identify import formats, get_format
+from acquisition.recordings.recording import Recording
+from acquisition.recordings.tables.text import decode, parse_number
 
 CONFORMANCE = Path(__file__).parents[1] / "conformance" / "test_formats.py"
 NAMES = sorted(each.name for each in formats())
@@ -333,8 +333,8 @@ def test_a_coverage_guided_hunt_finds_nothing(hunt: ModuleType, tmp_path: Path) 
     """Some thousand inputs, grown from sound files towards code not yet reached; bounded in number and seconds."""
     few = np.arange(6) / 100.0
     seeds = {f"{i}": bytes([i]) + case.build(few, np.round(0.2 + few, 5)) for i, case in enumerate(CASES)}
-    imports = "import acquisition.registry as r; r.formats(); import acquisition.formats.columns"
-    watched = "acquisition.formats"
+    imports = "import acquisition.recordings.identify as r; r.formats(); import acquisition.recordings.tables.sheet"
+    watched = "acquisition.recordings.families"
     options = ["-timeout=20", "-rss_limit_mb=2048"]
     bounds = {"runs": COVERAGE_RUNS, "seconds": 12, "longest": 1200}
     assert hunt.hunt(__file__, watched, imports, seeds, tmp_path, options=options, **bounds) >= 10

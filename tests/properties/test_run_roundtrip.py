@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from acquisition.block import Block, concatenate
-from acquisition.recording import Original, Trap
+from acquisition.recordings.recording import Original, Trap
 from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunDamaged
-from storage.run import Run, open_run
-from storage.write import write_run
+from storage.run_file.reading import Run, open_run
+from storage.run_file.writing import write_run
 
 # Any bit pattern is a float64: NaN payloads, negative zero and subnormal numbers among them.
 patterns = st.integers(0, 2**64 - 1)

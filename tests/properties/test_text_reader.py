@@ -14,14 +14,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition.errors import FormatError
-from acquisition.formats import cells
-from acquisition.formats import table as table_module
-from acquisition.formats.fixed_point import Page
-from acquisition.formats.lines import Lines
-from acquisition.formats.motion_sensor import FORMAT
-from acquisition.formats.table import Table, read_table
-from acquisition.formats.text import Text, decode, parse_number, split_cells, unify
-from acquisition.recording import Recording
+from acquisition.recordings.families.motion_sensor import FORMAT
+from acquisition.recordings.recording import Recording
+from acquisition.recordings.tables import cells, table_module
+from acquisition.recordings.tables.fixed_point import Page
+from acquisition.recordings.tables.line_pages import Lines
+from acquisition.recordings.tables.table import Table, read_table
+from acquisition.recordings.tables.text import Text, decode, parse_number, split_cells, unify
 
 PLAIN_CELL = st.decimals(-9999, 9999, places=3, allow_nan=False).map(lambda d: f"{d:.3f}")
 ODD_CELL = st.sampled_from(

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from storage.wire_layout import Kind, LogHeader, Record, SensorEntry, frame, frames
-from storage.wire_read import LogContents, parse_log
+from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry, frame, frames
+from storage.wire_log.scanning import LogContents, parse_log
 
 LOG = 0x5EED
 PAGE = 4096

@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.block import Flag, concatenate
 from acquisition.errors import NeedsAnswer
-from acquisition.registry import formats, inspect, open_recording, sniff
+from acquisition.recordings.identify import formats, inspect, open_recording, sniff
 
 PANDHI = "AyushPandhi__Pandhi_Ayush_PHY224"
 MATTIA = "Mattia04__Smorzamento/Oscillazioni pretensionata_cd_5e7masse.csv"

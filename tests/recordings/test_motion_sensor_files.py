@@ -9,9 +9,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from acquisition.formats.table import read_table
-from acquisition.formats.text import Text
-from acquisition.registry import open_recording, sniff
+from acquisition.recordings.identify import open_recording, sniff
+from acquisition.recordings.tables.table import read_table
+from acquisition.recordings.tables.text import Text
 
 PANDHI = "AyushPandhi__Pandhi_Ayush_PHY224"
 

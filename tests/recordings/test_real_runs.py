@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import Analysis, Motion, analyse
-from pipeline.compare import Comparison, SpringRun, compare_springs
-from pipeline.mixed import find_mixed
-from pipeline.scene import Scene
+from pipeline.bench.scene import Scene
+from pipeline.damping.mixture import find_mixed
+from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.track import Track
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"

@@ -20,13 +20,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from nist_models import MODELS, DataSet, digits, read
 
-from pipeline.least_squares import Params, minimise
+from pipeline.numerics.least_squares import Params, minimise
 
 Fitter = Callable[[DataSet, np.ndarray], tuple[np.ndarray, bool]]
 
 
 def ours(data: DataSet, start: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Fit with pipeline.least_squares at the precision of reference values."""
+    """Fit with pipeline.numerics.least_squares at the precision of reference values."""
     fit = minimise(data.residuals, start, params=Params(precision=1e-8))
     return fit.values, fit.converged
 
@@ -50,7 +50,7 @@ def lmfits(data: DataSet, start: np.ndarray) -> tuple[np.ndarray, bool]:
 
 
 FITTERS: dict[str, Fitter] = {
-    "pipeline.least_squares": ours,
+    "pipeline.numerics.least_squares": ours,
     "scipy trf, 3-point, x_scale=jac": scipys(method="trf", jac="3-point", x_scale="jac", max_nfev=2000),
     "the same, tolerances 1e-15": scipys(
         method="trf", jac="3-point", x_scale="jac", max_nfev=2000, xtol=1e-15, ftol=1e-15, gtol=1e-15

@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.least_squares import Fit, Params, minimise
+from pipeline.numerics.least_squares import Fit, Params, minimise
 
 ENOUGH = 6.0  # digits
 

@@ -15,8 +15,8 @@ import pytest
 
 from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem
 from pipeline.dynamics.choose import Choice, choose, cost_ns
-from pipeline.dynamics.solve_ivp import SolveIvp
-from pipeline.dynamics.taylor import TAYLOR, Taylor
+from pipeline.dynamics.integrators.solve_ivp import SolveIvp
+from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 

@@ -10,11 +10,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.condition import condition
-from pipeline.cycles import Cycles, find_cycles
-from pipeline.damping import Damping, fit_damping
-from pipeline.demodulate import demodulate
-from pipeline.mixed import find_mixed
+from pipeline.damping.mixture import find_mixed
+from pipeline.damping.select import Damping, fit_damping
+from pipeline.oscillation.condition import condition
+from pipeline.oscillation.cycles import Cycles, find_cycles
+from pipeline.oscillation.demodulate import demodulate
 from pipeline.track import Track
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "30"))

@@ -12,8 +12,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from pipeline.analyse import Analysis
-from pipeline.cycles import NoOscillation
-from pipeline.smoother import Smoothed
+from pipeline.motion.smoother import Smoothed
+from pipeline.oscillation.cycles import NoOscillation
 from springmass.report.figures.amplitude import amplitude_figure
 from springmass.report.figures.canvas import render
 from springmass.report.figures.comparison import comparison_figure

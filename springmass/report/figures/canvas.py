@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Motion
-from pipeline.cycles import NoOscillation
+from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import F8
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.compare import Comparison
+from pipeline.results.compare import Comparison
 from springmass.report.figures.canvas import BLUE, BOTTOM, RIGHT, SKY, VERMILLION, WIDTH, style
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.analyse import Analysis
-from pipeline.curves import Curve
+from pipeline.results.curves import Curve
 from pipeline.track import F8
 from springmass.report.figures.canvas import BLUE, SKY, legend_above, moving, panels, share, style
 

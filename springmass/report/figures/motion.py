@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.analyse import Analysis, Motion
-from pipeline.smoother import Smoothed
+from pipeline.motion.smoother import Smoothed
 from pipeline.track import F8
 from springmass.report.figures.canvas import (
     BLUE,

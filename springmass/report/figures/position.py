@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipeline.analyse import Analysis, Motion
-from pipeline.cycles import NoOscillation
-from pipeline.relaxation import Relaxation
+from pipeline.motion.overdamped.relaxation import Relaxation
+from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import F8, UNUSABLE, Quality
 from springmass.report.figures.canvas import (
     BLUE,

@@ -1,0 +1,351 @@
+"""Reading ports: one I/O thread for all of them, and nothing between the wire and whoever keeps the bytes.
+
+Every byte is handed on as it came, with the host clock's stamp of the wake-up that read it. A port that goes away is
+reported with its time and opened again when it comes back; the run goes on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from acquisition.clock import Clock
+from acquisition.decoders.base import Poll, Polled
+from acquisition.errors import PortError
+from acquisition.live.ready import Ready
+from acquisition.live.serial_port import READ_BYTES
+from acquisition.readings import Read
+
+__all__ = ["Line", "PortReader", "Sink", "Transport"]
+
+REOPEN_EVERY_NS = 500_000_000
+IDLE_WAIT_S = 0.5
+BLOCKING_WAIT_S = 0.25
+POLLED_WAIT_S = 0.01
+CADENCE_NS = 900_000
+"""Where several ports keep the reader busy it looks at them so often; alone, a port is read as soon as it speaks."""
+
+
+class Transport(Protocol):
+    """Bytes from somewhere: a serial port, a socket, a test's own."""
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        ...
+
+    def fileno(self) -> int:
+        """Return a descriptor to wait on and to read without blocking, or -1 where there is none."""
+        ...
+
+    def read(self, wait_s: float) -> bytes:
+        """Return what is there, or what comes within that time; asked of a transport without a descriptor only.
+
+        Raises
+        ------
+        PortError
+            If the port is gone.
+        """
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send a request.
+
+        Raises
+        ------
+        PortError
+            If the port is gone.
+        """
+        ...
+
+    def discard_input(self) -> None:
+        """Forget what came and was not read."""
+        ...
+
+    def reopen(self) -> None:
+        """Open again after the port was lost.
+
+        Raises
+        ------
+        PortError
+            If it is still gone.
+        """
+        ...
+
+    def close(self) -> None:
+        """Close; again does no harm."""
+        ...
+
+
+class Sink(Protocol):
+    """Who keeps the bytes; called on the I/O thread, so it must not block."""
+
+    def reads(self, reads: Sequence[Read]) -> None:
+        """Take what one wake-up read, of each port its bytes."""
+        ...
+
+    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
+        """Take "lost", "reopened" (with gap_s) or "timeout"."""
+        ...
+
+
+@dataclass(slots=True)
+class Line:
+    """One port and how its sensor is spoken to.
+
+    Parameters
+    ----------
+    transport : Transport
+    channel : int
+        Number of the sensor within the run.
+    poll : Poll or None
+    decoder : Polled or None
+        A polled sensor's decoder, where the sink feeds it within ``data`` and flushes it at "timeout": then it says
+        what to ask next, and a reply that came short counts as timed out before the next request.
+    """
+
+    transport: Transport
+    channel: int = 0
+    poll: Poll | None = None
+    decoder: Polled | None = None
+    _lost_ns: int | None = field(default=None, init=False)
+    _retry_ns: int = field(default=0, init=False)
+    _ask_ns: int = field(default=0, init=False)
+    _answer_by_ns: int | None = field(default=None, init=False)
+
+
+class PortReader:
+    """Reads every line on one thread with ``selectors``; a line that may block it gets a thread of its own.
+
+    That is one without a descriptor (Windows, RFC 2217), and one at a network address, which may take seconds to open
+    again after a loss.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+        Open.
+    sink : Sink
+    clock : Clock
+        The system's: real ports know no other.
+    decode : callable, optional
+        Called on the reading thread when every port that had something was read, its bytes were handed on and what was
+        due to be asked was asked: time for work that may wait until then. It does a bounded piece and returns whether
+        more is to be done at once.
+    cadence_ns : int
+        Least time between two looks at several busy ports, ns; 0 reads each as soon as it speaks.
+
+    Notes
+    -----
+    A wake-up costs more than the read that it is for. Where several ports speak so fast that one wake-up follows
+    another, the reader therefore rests until the cadence is over and then reads all that came meanwhile.
+    benchmarks/ports.py measures what that costs in delay and saves in processor time.
+    """
+
+    def __init__(
+        self,
+        lines: Sequence[Line],
+        sink: Sink,
+        clock: Clock,
+        *,
+        decode: Callable[[], bool] | None = None,
+        cadence_ns: int = CADENCE_NS,
+    ) -> None:
+        self._lines = list(lines)
+        self._sink = sink
+        self._clock = clock
+        self._decode = decode
+        self._cadence_ns = cadence_ns
+        self._stop = threading.Event()
+        self._threads: list[threading.Thread] = []
+        self._failure: BaseException | None = None
+        self._wake_read, self._wake_write = os.pipe()
+        os.set_blocking(self._wake_read, False)
+
+    def start(self) -> None:
+        """Begin to read."""
+        shared = [line for line in self._lines if not _may_block(line)]
+        loops = [(self._select_loop, shared)] if shared else []
+        for line in filter(_may_block, self._lines):
+            loops.append((self._select_loop if line.transport.fileno() >= 0 else self._blocking_loop, [line]))
+        for target, lines in loops:
+            thread = threading.Thread(target=self._guarded, args=(target, lines), name="springmass-io", daemon=True)
+            self._threads.append(thread)
+            thread.start()
+
+    def stop(self) -> None:
+        """End reading and close the ports; raises what ended a thread, if anything did. Again does no harm."""
+        if self._stop.is_set():
+            return
+        self._stop.set()
+        os.write(self._wake_write, b"x")
+        for thread in self._threads:
+            thread.join()
+        for line in self._lines:
+            line.transport.close()
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+        if self._failure is not None:
+            raise self._failure
+
+    @property
+    def failure(self) -> BaseException | None:
+        """What ended a reading thread, if anything did: a defect, or a sink that refused."""
+        return self._failure
+
+    def _guarded(self, loop: Any, lines: list[Line]) -> None:
+        try:
+            loop(lines)
+        except BaseException as error:  # handed to stop(), which raises it on the caller's thread
+            self._failure = error
+
+    def _select_loop(self, lines: list[Line]) -> None:
+        with contextlib.closing(Ready[Line | None]()) as waiting:
+            waiting.add(self._wake_read, None)
+            for line in lines:
+                waiting.add(line.transport.fileno(), line)
+            # The many lines that only send need no look at each wake-up.
+            polled = [line for line in lines if line.poll is not None]
+            lost: list[Line] = []
+            cadence_ns = self._cadence_ns if len(lines) > 1 else 0
+            behind, woke_ns = False, 0
+            while not self._stop.is_set():
+                # Without an end where nothing can be due: the pipe wakes it, and a timer costs a tenth of a wake-up.
+                wait_s = 0.0 if behind else self._wait_s([*polled, *lost]) if polled or lost else None
+                ready = waiting.wait(wait_s)
+                before_ns, woke_ns = woke_ns, self._clock.now_ns()
+                for line in self._read(ready, woke_ns):
+                    waiting.remove(line.transport.fileno())
+                    line.transport.close()
+                    lost.append(line)
+                if lost:
+                    for line in [line for line in lost if self._tries_again(line)]:
+                        waiting.add(line.transport.fileno(), line)
+                        lost.remove(line)
+                for line in polled:
+                    if line.poll is not None and line._lost_ns is None and not self._ask(line, line.poll):
+                        waiting.remove(line.transport.fileno())
+                        line.transport.close()
+                        lost.append(line)
+                behind = self._decode is not None and self._decode()  # last: it may wake another thread
+                if not behind and woke_ns - before_ns < 2 * cadence_ns:
+                    self._clock.sleep_until_ns(woke_ns + cadence_ns)
+
+    def _blocking_loop(self, lines: list[Line]) -> None:
+        (line,) = lines
+        while not self._stop.is_set():
+            if line._lost_ns is not None:
+                if not self._tries_again(line):
+                    self._stop.wait(IDLE_WAIT_S)
+                continue
+            if line.poll is not None and not self._ask(line, line.poll):
+                line.transport.close()
+                continue
+            # A reply is not waited for so long that the next request comes late.
+            wait_s = BLOCKING_WAIT_S if line.poll is None else POLLED_WAIT_S
+            if not self._wait_for(line, wait_s):
+                line.transport.close()
+            if self._decode is not None:
+                self._decode()
+
+    def _wait_s(self, lines: list[Line]) -> float:
+        """How long nothing can be due."""
+        now = self._clock.now_ns()
+        wait = IDLE_WAIT_S
+        for line in lines:
+            if line._lost_ns is not None:
+                wait = min(wait, (line._retry_ns - now) * 1e-9)
+            elif line.poll is not None:
+                wait = min(wait, (line._ask_ns - now) * 1e-9)
+        return max(wait, 0.0)
+
+    def _read(self, ready: Iterable[tuple[int, Line | None]], now_ns: int) -> list[Line]:
+        """Read the ports that have something and hand it on; return those that are gone."""
+        reads: list[Read] = []
+        gone: list[tuple[Line, str]] = []
+        read = os.read
+        for descriptor, line in ready:
+            if line is None:
+                continue
+            try:
+                # Not a call of the transport's: at 200 ports a call for each read is a fifth of what reading costs.
+                data = read(descriptor, READ_BYTES)
+            except BlockingIOError:
+                continue
+            except OSError as error:
+                gone.append((line, str(error)))
+                continue
+            if data:
+                reads.append((line.channel, now_ns, data))
+            else:
+                gone.append((line, "end of file"))
+            if line.poll is not None:
+                line._answer_by_ns = None
+        if reads:
+            self._sink.reads(reads)
+        for line, why in gone:
+            self._gone(line, f"{line.transport.name}: the port has gone ({why})")
+        return [line for line, _ in gone] if gone else []
+
+    def _wait_for(self, line: Line, wait_s: float) -> bool:
+        """Hand on what comes within that time; False where the port is gone."""
+        try:
+            data = line.transport.read(wait_s)
+        except PortError as error:
+            self._gone(line, str(error))
+            return False
+        if data:
+            line._answer_by_ns = None
+            self._sink.reads([(line.channel, self._clock.now_ns(), data)])
+        return True
+
+    def _ask(self, line: Line, poll: Poll) -> bool:
+        """Send the request when it is due, drop a late answer's remains first; False where the port is gone."""
+        now = self._clock.now_ns()
+        if now < line._ask_ns:
+            return True
+        try:
+            short = line.decoder is not None and line._answer_by_ns is None and line.decoder.pending > 0
+            if short or (line._answer_by_ns is not None and now >= line._answer_by_ns):
+                # Without header and checksum the rest of a late reply would be read as the next one.
+                line.transport.discard_input()
+                self._sink.event(line.channel, now, "timeout", {"after_s": poll.timeout_s})
+                line._answer_by_ns = None
+            if line._answer_by_ns is None:
+                line.transport.write(poll.request if line.decoder is None else line.decoder.request)
+                line._answer_by_ns = now + int(poll.timeout_s * 1e9)
+        except PortError as error:
+            self._gone(line, str(error))
+            return False
+        step = int(poll.interval_s * 1e9)
+        # An absolute schedule: a late wake-up does not push the ones after it.
+        line._ask_ns = max(line._ask_ns + step, now) if line._ask_ns else now + step
+        return True
+
+    def _gone(self, line: Line, why: str) -> None:
+        line._lost_ns = self._clock.now_ns()
+        line._retry_ns = line._lost_ns + REOPEN_EVERY_NS
+        line._answer_by_ns = None
+        self._sink.event(line.channel, line._lost_ns, "lost", {"port": line.transport.name, "why": why})
+
+    def _tries_again(self, line: Line) -> bool:
+        now = self._clock.now_ns()
+        if line._lost_ns is None or now < line._retry_ns:
+            return False
+        try:
+            line.transport.reopen()
+        except PortError:
+            line._retry_ns = now + REOPEN_EVERY_NS
+            return False
+        gap_s = (now - line._lost_ns) * 1e-9
+        line._lost_ns = None
+        line._ask_ns = 0
+        self._sink.event(line.channel, now, "reopened", {"port": line.transport.name, "gap_s": gap_s})
+        return True
+
+
+def _may_block(line: Line) -> bool:
+    return line.transport.fileno() < 0 or "://" in line.transport.name

@@ -1,0 +1,84 @@
+"""PASCO Capstone: columns under headings like ``"Position (m) Run #1"``, semicolons with decimal commas, or commas.
+
+What no careful reader may take at face value:
+
+- Runs stand side by side and end at different rows; derived columns (velocity, acceleration) are empty at the edges.
+- The decimal mark is told cell by cell: ``-8,90E-4`` stands beside ``0.12``, and a small number has an exponent.
+- The column of times may be missing: then the rate must be given.
+- Localised exports have words of their own for time and run, or headings without any unit
+  (``time;position;velocity;acceleration``).
+"""
+
+from __future__ import annotations
+
+import re
+
+from acquisition.errors import FormatError
+from acquisition.recordings.tables.contents import (
+    Channel,
+    Contents,
+    Heading,
+    Sheet,
+    channels_of,
+    is_time,
+    name_and_unit,
+    split_heading,
+)
+from acquisition.recordings.tables.sheet import ColumnFormat
+from acquisition.recordings.tables.text import Line, decode, is_text, text_of, unify
+
+__all__ = ["FORMAT"]
+
+_OF_RUN = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+)")
+_QUANTITIES = frozenset(
+    (
+        *("position", "velocity", "acceleration"),
+        *("posizione", "velocità", "velocita", "accelerazione"),
+        *("ort", "weg", "geschwindigkeit", "beschleunigung"),
+        *("vitesse", "accélération"),
+        *("posición", "velocidad", "aceleración"),
+        *("位置", "速度", "加速度"),
+    )
+)
+
+
+def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
+    """Return the headings of a line and what separates them; none where it is no line of this family."""
+    cells, mark = split_heading(line)
+    found = [_OF_RUN.fullmatch(cell) for cell in cells]
+    if cells and all(each is not None or not cell for each, cell in zip(found, cells, strict=True)) and any(found):
+        named = [name_and_unit(each["quantity"]) if each else ("", "") for each in found]
+        runs = [each["run"] if each else "" for each in found]
+        return tuple(Heading(name, unit, run) for (name, unit), run in zip(named, runs, strict=True)), mark
+    words = [cell.lower() for cell in cells]
+    if len(cells) > 1 and is_time(words[0]) and all(word in _QUANTITIES for word in words[1:]):
+        return tuple(Heading(cell, "") for cell in cells), mark
+    return (), mark
+
+
+def _evidence(head: bytes) -> str:
+    if not is_text(head):
+        return ""
+    line = unify(decode(head)).partition("\n")[0]
+    headings, mark = _headings(line)
+    if not headings:
+        return ""
+    if any(each.run for each in headings):
+        return f'headings in line 1 end in a run, "{next(each.run for each in headings if each.run)}"'
+    return f'line 1 is the headings "{mark.join(each.name for each in headings)}"'
+
+
+def _contents(path: str, data: bytes) -> Contents:
+    text = text_of(path, data)
+    first: Line | None = next(text.lines(), None)
+    headings, mark = _headings(first.text) if first else ((), "")
+    channels: tuple[Channel, ...] = ()
+    if first is not None and headings:
+        sheet = Sheet(text, first.next, text.stop, first.number + 1, mark)
+        channels = tuple(each for each in channels_of(sheet, headings) if each.name and headings[each.column].name)
+    if not channels:
+        raise FormatError(path, 'expected headings like "Position (m) Run #1"', "export the run again", line=1)
+    return Contents(channels, zeros=text.zeros)
+
+
+FORMAT = ColumnFormat("capstone", "PASCO Capstone CSV: runs side by side, any decimal mark", _evidence, _contents)

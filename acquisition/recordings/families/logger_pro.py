@@ -1,0 +1,44 @@
+"""Logger Pro CSV: headings like ``Latest: Position (m)`` or ``Run 1: Position (m)``, runs side by side."""
+
+from __future__ import annotations
+
+import re
+
+from acquisition.recordings.tables.contents import (
+    Contents,
+    Heading,
+    is_time,
+    name_and_unit,
+    split_heading,
+    under_first_line,
+)
+from acquisition.recordings.tables.sheet import ColumnFormat
+from acquisition.recordings.tables.text import decode, is_text, unify
+
+__all__ = ["FORMAT"]
+
+_OF_RUN = re.compile(r"(?P<run>[^:]+): (?P<quantity>.+)")
+
+
+def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
+    cells, mark = split_heading(line)
+    found = [match for cell in cells if (match := _OF_RUN.fullmatch(cell))]
+    if len(found) < 2 or len(found) != len(cells):
+        return (), mark
+    headings = tuple(Heading(*name_and_unit(each["quantity"]), each["run"].strip()) for each in found)
+    known = any(is_time(each.name) for each in headings) or all(each.unit for each in headings)
+    return (headings, mark) if known else ((), mark)
+
+
+def _evidence(head: bytes) -> str:
+    if not is_text(head):
+        return ""
+    headings, _ = _headings(unify(decode(head)).partition("\n")[0])
+    return f'headings in line 1 begin with a run, "{headings[0].run}: "' if headings else ""
+
+
+def _contents(path: str, data: bytes) -> Contents:
+    return under_first_line(path, data, _headings, '"Latest: Position (m)"')
+
+
+FORMAT = ColumnFormat("logger-pro", "Logger Pro CSV: runs side by side", _evidence, _contents)

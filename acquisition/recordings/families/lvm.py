@@ -1,0 +1,215 @@
+"""LVM: LabVIEW Measurement files.
+
+A file header, ended by ``***End_of_Header***``, says what separates cells and how times are kept. Then come segments:
+a header of their own, ended by another ``***End_of_Header***``, a line with the names of the channels, and rows. What
+no careful reader may take at face value:
+
+- The separator is the character behind the word ``Separator``. ``Decimal_Separator`` may be absent; the mark is told
+  cell by cell.
+- ``X_Columns`` No: the first cell of a row is empty and t = X0 + i Delta_X. One: the first column holds t. Multi: a
+  column of times stands before each channel.
+- Headers go stale: more or fewer rows than ``Samples``, another step than ``Delta_X``. Where the column of times
+  agrees with the formula within its own rounding the formula is the better of the two; else the column is believed.
+- Channels of one segment may be of different length; a comment column may follow.
+- A date of 1903 or 1904 is LabVIEW's zero, no start.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import takewhile
+
+from acquisition.errors import FormatError
+from acquisition.recordings.tables.contents import Channel, Contents, Formula, Sheet, name_and_unit, numbered_apart
+from acquisition.recordings.tables.sheet import ColumnFormat
+from acquisition.recordings.tables.text import Line, Text, decode, is_text, parse_number, text_of
+
+__all__ = ["FORMAT"]
+
+_MAGIC = "LabVIEW Measurement"
+_END = "***End_of_Header***"
+_SEPARATOR = "Separator"
+_MOST_HEADER_LINES = 500
+_MOST_SEGMENTS = 10_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Header:
+    """Keys with the cells behind them, and the line that follows."""
+
+    cells: Mapping[str, list[str]]
+    first: Line
+    next_start: int
+    next_line: int
+
+    def first_of(self, key: str) -> str:
+        """Return the first cell of a key."""
+        return next((cell for cell in self.cells.get(key, ()) if cell), "")
+
+    def of_column(self, key: str, column: int) -> str:
+        """Return the cell of a key that stands above a column of the rows."""
+        cells = self.cells.get(key, [])
+        return cells[column - 1] if 0 < column <= len(cells) else ""
+
+
+def _evidence(head: bytes) -> str:
+    if is_text(head) and decode(head).lstrip().startswith(_MAGIC):
+        return f'line 1 begins with "{_MAGIC}"'
+    return ""
+
+
+def _contents(path: str, data: bytes) -> Contents:
+    text = text_of(path, data)
+    mark = _separator(path, text)
+    top = _header(path, text, text.start, 1, mark)
+    channels: list[Channel] = []
+    segments = list(_segments(path, text, top, mark))
+    for number, (segment, stop) in enumerate(segments, 1):
+        run = f"Segment {number}" if len(segments) > 1 else ""
+        channels.extend(_channels(text, top, segment, stop, mark, run))
+    if not channels:
+        raise FormatError(path, "expected channels below the header, got none", "export the run again")
+    return Contents(tuple(channels), title=_title(top, segments[0][0]), zeros=text.zeros)
+
+
+def _separator(path: str, text: Text) -> str:
+    """Return the character behind the tag; where the tag is missing, the one behind the first line's words."""
+    first = next(text.lines(), None)
+    if first is None or not first.text.lstrip().startswith(_MAGIC):
+        demand = f'expected "{_MAGIC}" in the first line'
+        raise FormatError(path, demand, "check that this is an LVM file", line=1)
+    for line in text.lines():
+        tag = line.text.lstrip()
+        mark = tag.removeprefix(_SEPARATOR)[:1]
+        if tag.startswith(_SEPARATOR) and mark and not (mark.isalnum() or mark == "_"):
+            return mark
+        if line.text.startswith(_END) or line.number > _MOST_HEADER_LINES:
+            break
+    return first.text.lstrip()[len(_MAGIC) :][:1] or "\t"
+
+
+def _header(path: str, text: Text, start: int, number: int, mark: str) -> _Header:
+    """Read the lines from a place to the next end of a header."""
+    cells: dict[str, list[str]] = {}
+    first = None
+    for count, line in enumerate(text.lines(start, number)):
+        first = first or line
+        key, *values = [cell.strip() for cell in line.text.split(mark)]
+        if key == _END:
+            return _Header(cells, first, line.next, line.number + 1)
+        if key:
+            cells.setdefault(key, values)
+        if count == _MOST_HEADER_LINES:
+            break
+    demand = f"expected {_END} within {_MOST_HEADER_LINES} lines, got none"
+    raise FormatError(path, demand, "check that the export ended", line=number)
+
+
+def _segments(path: str, text: Text, top: _Header, mark: str) -> Iterator[tuple[_Header, int]]:
+    """Yield each segment's header and the byte where its rows end."""
+    start, number = top.next_start, top.next_line
+    for _ in range(_MOST_SEGMENTS):
+        header = _header(path, text, start, number, mark)
+        # A search for one character is a tenth of the time, and rows hold none.
+        star = text.data.find(_END[:1].encode(), header.next_start, text.stop)
+        end = star if star < 0 else text.data.find(_END.encode(), star, text.stop)
+        if end < 0:
+            yield header, text.stop
+            return
+        start = _begin_of_header(text, header.next_start, end)
+        number = header.next_line + _line_ends(text.data, header.next_start, start)
+        yield header, start
+    raise FormatError(path, f"expected at most {_MOST_SEGMENTS} segments", "split the file")
+
+
+def _begin_of_header(text: Text, low: int, end: int) -> int:
+    """Walk back from the end of a header over lines that begin with a word."""
+    at = text.data.rfind(b"\n", low, end) + 1 or low
+    while at > low:
+        previous = max(text.data.rfind(b"\n", low, at - 1) + 1, low)
+        line = text.data[previous:at].strip()
+        if (line and not re.match(rb"[A-Za-z*]", line)) or previous == at:
+            break
+        at = previous
+    return at
+
+
+def _line_ends(data: bytes, start: int, stop: int) -> int:
+    return data.count(b"\n", start, stop) or data.count(b"\r", start, stop)
+
+
+def _channels(text: Text, top: _Header, segment: _Header, stop: int, mark: str, run: str) -> Iterator[Channel]:
+    """Yield the channels that a segment's line of names tells of."""
+    names = next(iter(text.lines(segment.next_start, segment.next_line)), None)
+    if names is None or names.start >= stop:
+        return
+    cells = [cell.strip() for cell in names.text.split(mark)]
+    while cells and not cells[-1]:
+        cells.pop()
+    if cells and cells[-1] == "Comment":
+        cells.pop()
+    mode = (top.first_of("X_Columns") or "One").lower()
+    columns = range(1, len(cells), 2) if mode == "multi" else range(1, len(cells))
+    sheet = Sheet(text, names.next, stop, names.number + 1, mark)
+    labels = [_name_and_unit(cells[column], segment.of_column("Y_Unit_Label", column), column) for column in columns]
+    apart = numbered_apart([name for name, _ in labels])
+    for name, (_, unit), column in zip(apart, labels, columns, strict=True):
+        dimension = segment.of_column("X_Dimension", column) or segment.first_of("X_Dimension") or "Time"
+        time = None if mode == "no" else column - 1 if mode == "multi" else 0
+        yield Channel(
+            name=name,
+            unit=unit,
+            source=sheet,
+            run=run,
+            column=column,
+            time=time if dimension == "Time" else None,
+            time_unit="s",
+            formula=_formula(segment, column) if dimension == "Time" else None,
+            start_time=_start_time(segment, column),
+            ragged=True,
+        )
+
+
+def _name_and_unit(label: str, unit: str, column: int) -> tuple[str, str]:
+    """Take a unit out of a channel's name where the header has none, or the same."""
+    name, inside = name_and_unit(label)
+    if inside and unit in ("", inside):
+        return name, inside
+    return label or f"Column {column}", unit
+
+
+def _formula(segment: _Header, column: int) -> Formula | None:
+    start, step, samples = (
+        parse_number(segment.of_column(key, column) or segment.first_of(key)) for key in ("X0", "Delta_X", "Samples")
+    )
+    if step is None:
+        return None
+    count = None if samples is None or not 0 <= samples < 2**53 else int(samples)
+    return Formula(0.0 if start is None else start, step, count)
+
+
+def _start_time(segment: _Header, column: int) -> str:
+    date, time = (segment.of_column(key, column) or segment.first_of(key) for key in ("Date", "Time"))
+    if not _is_digits(date, "/", [4, 2, 2]) or int(date[:4]) <= 1904:
+        return ""
+    start, clock = date.replace("/", "-"), time[:8]
+    if not _is_digits(clock, ":", [2, 2, 2]):
+        return start
+    fraction = "".join(takewhile(str.isdecimal, time[9:15])) if time[8:9] in (".", ",") else ""
+    return f"{start}T{clock}.{fraction}" if fraction else f"{start}T{clock}"
+
+
+def _is_digits(text: str, mark: str, sizes: list[int]) -> bool:
+    """Tell whether a text is so many digits between marks; a pattern would be compiled for the one line it is for."""
+    return [len(part) for part in text.split(mark)] == sizes and text.replace(mark, "").isdecimal()
+
+
+def _title(top: _Header, segment: _Header) -> str:
+    return segment.first_of("Notes") or top.first_of("Description")
+
+
+FORMAT = ColumnFormat(
+    "lvm", "LVM: LabVIEW Measurement text, any separator, every kind of X_Columns", _evidence, _contents
+)

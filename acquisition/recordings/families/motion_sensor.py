@@ -1,0 +1,222 @@
+"""MotionSensor.vi: the text files of a LabVIEW front panel for an ultrasonic rangefinder.
+
+A file holds position (``Time (s)``, ``Distance (cm)``, ``Dist Error (cm)``) or velocity (``Time (s)``,
+``Velocity (cm/s)``), tab separated, three decimals, usually without line end after the last row. Title and
+column line may have been edited or deleted: :mod:`acquisition.recordings.families.motion_sensor_layout` tells what is
+there. What no careful reader may take at face value:
+
+- Times are row numbers over a nominal rate, rounded to a millisecond.
+- The error column is a constant, tens of times the noise.
+- Velocity is the backward difference of the unrounded position over one sample.
+- Position and velocity files may differ in length and window: they are joined by time, never by row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from acquisition.block import I8, Block, Flag
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.families.motion_sensor_column import Column, read_column
+from acquisition.recordings.families.motion_sensor_layout import evidence
+from acquisition.recordings.recording import Original, Recording, Trap
+from acquisition.recordings.sampling.nominal import time_flags
+from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
+from acquisition.recordings.tables.text import decode, is_text, unify
+from acquisition.source import SourceInfo
+
+if TYPE_CHECKING:
+    from acquisition.recordings.inspection import Survey
+
+__all__ = ["FORMAT", "MotionSensor"]
+
+
+class MotionSensor:
+    """The MotionSensor.vi family."""
+
+    name = "motion-sensor"
+    title = "MotionSensor.vi text: position, velocity, or one of each"
+
+    def evidence(self, head: bytes) -> str:
+        """Tell from the title, the column line, or the shape of rows without either."""
+        return evidence(unify(decode(head))) if is_text(head) else ""
+
+    def recognises(self, head: bytes) -> bool:
+        """Tell whether there is evidence for this family."""
+        return bool(self.evidence(head))
+
+    def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
+        """Tell what the one channel of a file is; nothing, where the user must say what the numbers are."""
+        from acquisition.recordings.inspection import Survey
+
+        try:
+            column = read_column(path, data, None, None, None)
+        except NeedsAnswer:
+            return ()
+        layout = column.layout
+        unit = layout.unit + ("/s" if layout.quantity == "velocity" else "")
+        return (Survey("", layout.quantity, unit, column.t.size, column.timing.rate_hz, column.traps),)
+
+    def read(
+        self,
+        path: str,
+        data: bytes,
+        *,
+        channel: str | None = None,
+        rate_hz: float | None = None,
+        unit: str | None = None,
+        run: str | None = None,
+    ) -> Recording:
+        """Read one file, of position or of velocity alone; see :class:`acquisition.recordings.base.Format`.
+
+        Examples
+        --------
+        >>> rows = b"Time (s)\\tDistance (cm)\\n0.430\\t16.500\\n0.440\\t16.509\\n0.450\\t16.565"
+        >>> recording = FORMAT.read("run.txt", rows)
+        >>> recording.info.rate_hz, recording.samples.distance.tolist()
+        (100.0, [0.165, 0.16509, 0.16565])
+        """
+        if run is not None:
+            raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds one run', "leave --run out")
+        column = read_column(path, data, channel, rate_hz, unit)
+        return _position_alone(column) if column.layout.quantity == "distance" else _velocity_alone(column)
+
+    def read_pair(
+        self, position: tuple[str, bytes], velocity: tuple[str, bytes], *, rate_hz: float | None = None
+    ) -> Recording:
+        """Join a position and a velocity file by time; which is which, their content says.
+
+        Raises
+        ------
+        FormatError
+            If they are not one of each, differ in rate, or have no time in common.
+        """
+        a, b = (read_column(path, data, None, rate_hz, None) for path, data in (position, velocity))
+        if a.layout.quantity == b.layout.quantity:
+            demand = f"expected a position and a velocity file, got {a.layout.quantity} in both ({a.name} too)"
+            raise FormatError(b.path, demand, "name the other file of the pair")
+        return _join(a, b) if a.layout.quantity == "distance" else _join(b, a)
+
+
+FORMAT = MotionSensor()
+
+
+def _recording(column: Column, samples: Block, quantum_m: float, traps: Iterable[Trap]) -> Recording:
+    info = SourceInfo(
+        kind="simulated" if column.simulated else "replay",
+        name=column.name,
+        rate_hz=column.timing.rate_hz,
+        quantum_m=quantum_m,
+        clock="device" if column.timing.grid is None else "nominal",
+        stated_error_m=column.stated_error_m,
+    )
+    return Recording(
+        format=MotionSensor.name,
+        path=column.path,
+        info=info,
+        channel=column.layout.quantity,
+        samples=samples,
+        traps=(*column.traps, *traps),
+        malformed_rows=column.malformed,
+        originals=(Original(column.name, column.data),),
+        title=column.layout.title,
+    )
+
+
+def _position_alone(column: Column) -> Recording:
+    return _recording(column, Block(0, column.t, column.value, column.flags), column.quantum, ())
+
+
+def _velocity_alone(column: Column) -> Recording:
+    """Sum velocity up to position; its zero is the first sample, for the file does not hold its offset."""
+    from acquisition.recordings.sampling.velocity import find_quantum, integrate
+
+    rate_hz, tick = column.timing.rate_hz, column.tick()
+    flags = column.flags.copy()
+    regular = np.flatnonzero((flags & IRREGULAR) == 0)
+    index = np.rint(column.t[regular] * rate_hz).astype(np.int64)
+    path = integrate(column.value[regular], index, rate_hz, tick, column.resolution / 2)
+    distance = np.full(column.t.size, np.nan)
+    distance[regular] = path.position
+    flags[regular[path.bridged]] |= Flag.GAP_BEFORE.value
+    flags[np.isnan(distance)] |= Flag.MISSING.value
+    quantum_m = find_quantum(column.value, tick) / rate_hz if tick else column.resolution / rate_hz
+    summed = "position is summed up from velocity: its offset is unknown and the first sample stands at 0 m"
+    traps = [Trap("offset_unknown", summed, column.t.size)]
+    if holes := int(np.count_nonzero(path.bridged)):
+        first = float(column.t[regular[path.bridged]][0])
+        message = (
+            f"{holes} holes in the velocity, the first before t = {first:g} s: the offset after each is "
+            "unknown and bridged with interpolated velocity"
+        )
+        traps.append(Trap("offset_unknown_after_gap", message, holes))
+    return _recording(column, Block(0, column.t, distance, flags, None, column.value), quantum_m, traps)
+
+
+def _join(position: Column, velocity: Column) -> Recording:
+    from acquisition.recordings.sampling.velocity import find_quantum, outer_join
+
+    rate_hz = position.timing.rate_hz
+    if abs(velocity.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
+        demand = f"expected {rate_hz:g} Hz as in {position.name}, got {velocity.timing.rate_hz:g} Hz"
+        raise FormatError(velocity.path, demand, "name the velocity file of the same run")
+    resolution = min(position.timing.resolution_s, velocity.timing.resolution_s)
+    keys = [np.rint(column.t / resolution).astype(np.int64) for column in (position, velocity)]
+    from_p, from_v = outer_join(keys[0], keys[1], (position.flags & IRREGULAR) == 0)
+    in_p, in_v = from_p >= 0, from_v >= 0
+    if not (in_p & in_v).any():
+        demand = f"expected times in common with {position.name}, got none"
+        raise FormatError(velocity.path, demand, "name the velocity file of the same run")
+    t = np.where(in_p, position.t[from_p], velocity.t[from_v])
+    distance = np.where(in_p, position.value[from_p], np.nan)
+    speed = np.where(in_v, velocity.value[from_v], np.nan)
+    flags = time_flags(t, 1.0 / rate_hz)
+    flags |= np.where(in_p, position.flags[from_p], velocity.flags[from_v]) & UNREAD_FLAGS
+    flags[~in_p] |= Flag.MISSING.value
+    tick = velocity.tick()
+    joined = _recording(
+        position,
+        Block(0, t, distance, flags, None, speed),
+        find_quantum(velocity.value, tick) / rate_hz if tick else position.quantum,
+        (*_velocity_traps(velocity), *_join_traps(position, velocity, from_p, from_v)),
+    )
+    return Recording(
+        joined.format,
+        joined.path,
+        joined.info,
+        joined.channel,
+        joined.samples,
+        joined.traps,
+        position.malformed + velocity.malformed,
+        (*joined.originals, Original(velocity.name, velocity.data)),
+        joined.title,
+    )
+
+
+def _velocity_traps(velocity: Column) -> Iterable[Trap]:
+    """Name the velocity file in what was seen there, but say nothing twice of what both files share."""
+    for trap in velocity.traps:
+        if trap.code not in ("nominal_clock", "rate_assumed"):
+            yield Trap(trap.code, f"in {velocity.name}: {trap.message}", trap.count, trap.line)
+
+
+def _join_traps(position: Column, velocity: Column, from_p: I8, from_v: I8) -> Iterable[Trap]:
+    alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
+    if alone_v:
+        message = f"{alone_v} times stand in the velocity file only: no distance there"
+        yield Trap("missing_samples", message, alone_v)
+    if alone_p:
+        yield Trap("velocity_missing", f"{alone_p} times stand in the position file only: no velocity there", alone_p)
+    # Neighbours in the position file whose later one has a velocity: it must be their difference.
+    both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
+    x, rate_hz = position.value, position.timing.rate_hz
+    apart = np.abs((x[from_p[both]] - x[from_p[both - 1]]) * rate_hz - velocity.value[from_v[both]])
+    apart = apart[np.isfinite(apart)]
+    allowed = position.resolution * rate_hz + velocity.resolution
+    wrong = int(np.count_nonzero(apart > 1.01 * allowed))
+    if wrong > 0.5 * apart.size:
+        message = f"{wrong} of {apart.size} velocities are no differences of the positions: is it the same run?"
+        yield Trap("pair_mismatch", message, wrong)

@@ -1,0 +1,228 @@
+"""What stands where in a MotionSensor.vi file: title, column line, first row, quantity and unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.tables.text import Text, guess_delimiter, parse_number, split_cells
+
+__all__ = ["Layout", "Quantity", "ask_columns", "evidence", "find_layout"]
+
+Quantity = Literal["distance", "velocity"]
+
+PER_METRE = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
+
+_TITLE, _TIME = "motion sensor data file", "time (s)"
+_DISTANCE = {f"distance ({unit})": unit for unit in PER_METRE}
+_ERROR = {f"{name} error ({unit})": unit for unit in PER_METRE for name in ("dist", "distance")}
+_VELOCITY = {f"velocity ({unit}/s)": unit for unit in PER_METRE}
+_HEAD = 16384
+_HEADER_LINES = 20
+_ROWS_OF_SHAPE = 100
+_REMEDY = 'put the column line "Time (s)<TAB>Distance (cm)" or "Time (s)<TAB>Velocity (cm/s)" above the rows'
+
+
+class Layout(NamedTuple):
+    """Where a file's rows start and what they mean.
+
+    Parameters
+    ----------
+    quantity : {"distance", "velocity"}
+    columns : int
+        Cells of a row: time, the quantity, and the error if there are three.
+    per_si : float
+        Printed units in a metre.
+    unit : str
+        "cm", say.
+    title : str
+    first_line : int
+        One-based line where the rows start.
+    body : int
+        Byte where they start.
+    delimiter : str
+    assumed : str
+        What was concluded from the shape of the rows, because no column line says it; else empty.
+    """
+
+    quantity: Quantity
+    columns: int
+    per_si: float
+    unit: str
+    title: str = ""
+    first_line: int = 1
+    body: int = 0
+    delimiter: str = "\t"
+    assumed: str = ""
+
+
+def evidence(text: str) -> str:
+    """Say why the start of a text, lines ended by LF, is a MotionSensor.vi file; empty where it is not."""
+    lines = _head_lines(text)
+    for number, line in enumerate(lines[:_HEADER_LINES], 1):
+        if _is_title(line):
+            return f'line {number} is the title "{line.strip()}"'
+    if found := _column_line(lines):
+        return f"line {found[0] + 1} is the column line of {found[1].quantity} in {found[1].unit}"
+    start = _first_row(lines[:2])
+    shape = _shape(lines[start:]) if start >= 0 else None
+    return f"the rows have the shape of {shape.assumed}" if shape else ""
+
+
+def find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> Layout:
+    """Tell where the rows start and what they mean.
+
+    Raises
+    ------
+    NeedsAnswer
+        If there is no column line and the rows do not show what they are.
+    FormatError
+        If there are no rows, or ``channel`` or ``unit`` contradict the file.
+    """
+    head = text.head(_HEADER_LINES + _ROWS_OF_SHAPE)
+    lines = [line.text for line in head]
+    asked = _asked_quantity(path, channel)
+    found = _column_line(lines)
+    if found:
+        at, layout = found
+        if unit is not None and _plain(unit) != layout.unit:
+            demand = f'unit "{unit}" was asked for, but the column line says {layout.unit}'
+            raise FormatError(path, demand, "leave the unit out", line=at + 1)
+        start, title = at + 1, " / ".join(line.strip() for line in lines[:at] if line.strip())
+    else:
+        start = _first_row(lines)
+        titled = any(_is_title(line) for line in lines[:_HEADER_LINES])
+        if start < 0:
+            raise _no_rows(path, lines, "rows of two or three numbers")
+        layout = _by_shape(path, lines[start:], titled, asked, start + 1)
+        layout = _with_unit(path, layout, unit)
+        title, start = _title_and_start(lines, start)
+    if asked and asked != layout.quantity:
+        demand = f'channel "{channel}" was asked for, but the file holds {layout.quantity}'
+        raise FormatError(path, demand, "leave the channel out or name the other file")
+    rows = [line for line in lines[start:] if line.strip()]
+    if not rows:
+        raise _no_rows(path, lines, "rows of numbers below the column line")
+    delimiter = next((guess_delimiter(row) for row in rows if _is_row(row)), guess_delimiter(rows[0]))
+    body = head[start].start
+    return layout._replace(title=title, first_line=start + 1, body=body, delimiter=delimiter)
+
+
+def ask_columns(path: str, got: str, line: int | None = None) -> NeedsAnswer:
+    """Return the error that asks for a column line."""
+    return NeedsAnswer(path, f"no column line says what the numbers are, got {got}", _REMEDY, line=line)
+
+
+def _no_rows(path: str, lines: Sequence[str], demand: str) -> FormatError:
+    last = len(lines)
+    return FormatError(path, f"expected {demand}, got none", "check that the export ended", line=max(last, 1))
+
+
+def _head_lines(text: str) -> list[str]:
+    return text[:_HEAD].split("\n")
+
+
+def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
+    """Find the column line above the first row."""
+    if not any(_TIME in line.lower() for line in lines[:_HEADER_LINES]):
+        return None
+    for at, line in enumerate(lines[:_HEADER_LINES]):
+        if _is_row(line):
+            return None
+        cells = [cell.strip().lower() for cell in split_cells(line, guess_delimiter(line) or "\t")]
+        if 2 <= len(cells) <= 3 and cells[0] == _TIME:
+            if (unit := _VELOCITY.get(cells[1])) and len(cells) == 2:
+                return at, _layout("velocity", 2, unit)
+            if (unit := _DISTANCE.get(cells[1])) and (len(cells) == 2 or _ERROR.get(cells[2]) == unit):
+                return at, _layout("distance", len(cells), unit)
+    return None
+
+
+def _layout(quantity: Quantity, columns: int, unit: str, assumed: str = "") -> Layout:
+    return Layout(quantity, columns, PER_METRE[unit], unit, assumed=assumed)
+
+
+def _is_title(line: str) -> bool:
+    return line.lstrip().lower().startswith(_TITLE)
+
+
+def _numbers(line: str) -> list[float | None]:
+    return [parse_number(cell) for cell in split_cells(line, guess_delimiter(line))]
+
+
+def _is_row(line: str) -> bool:
+    numbers = _numbers(line)
+    return len(numbers) >= 2 and None not in numbers
+
+
+def _first_row(lines: Sequence[str]) -> int:
+    return next((at for at, line in enumerate(lines[:_HEADER_LINES]) if _is_row(line)), -1)
+
+
+def _title_and_start(lines: Sequence[str], row: int) -> tuple[str, int]:
+    """Take the first line above the rows for a title, unless it begins like a row that got damaged."""
+    if row == 0 or (not _is_title(lines[0]) and _begins_with_number(lines[0])):
+        return "", 0
+    return lines[0].strip(), 1
+
+
+def _begins_with_number(line: str) -> bool:
+    cells = split_cells(line, guess_delimiter(line))
+    return bool(cells) and parse_number(cells[0]) is not None
+
+
+def _shape(lines: Sequence[str]) -> Layout | None:
+    """Tell from rows alone: a constant third column is the error, a NaN ahead is a first velocity."""
+    every = [_numbers(line) for line in lines[:_ROWS_OF_SHAPE] if line.strip()]
+    rows = [[x for x in row if x is not None] for row in every if None not in row]
+    three, two = ([row for row in rows if len(row) == n] for n in (3, 2))
+    if len(three) >= 3 and len(three) > len(two):
+        third = [row[2] for row in three]
+        usual = max(set(third), key=third.count)
+        if usual > 0 and third.count(usual) >= 0.95 * len(third) and _times_run(three):
+            return _layout("distance", 3, "cm", "distance and its error, for the third column is constant")
+    elif (
+        len(two) >= 3 and rows[0] == two[0] and math.isnan(two[0][1]) and not math.isnan(two[1][1]) and _times_run(two)
+    ):
+        return _layout("velocity", 2, "cm", "velocity, for the first value is NaN")
+    return None
+
+
+def _times_run(rows: Sequence[Sequence[float]]) -> bool:
+    forward = sum(a[0] < b[0] for a, b in pairwise(rows))
+    return rows[0][0] >= 0 and forward >= 0.5 * (len(rows) - 1)
+
+
+def _by_shape(path: str, rows: Sequence[str], titled: bool, asked: str, line: int) -> Layout:
+    if layout := _shape(rows):
+        return layout
+    columns = len(_numbers(rows[0]))
+    if columns == 2 and asked == "distance":
+        return _layout("distance", 2, "cm", "distance, as asked for")
+    if columns == 2 and asked == "velocity":
+        return _layout("velocity", 2, "cm", "velocity, as asked for")
+    raise ask_columns(path, f"{columns} columns" + (" under the title" if titled else ""), line)
+
+
+def _with_unit(path: str, layout: Layout, unit: str | None) -> Layout:
+    if unit is None:
+        return layout
+    if _plain(unit) not in PER_METRE:
+        raise FormatError(path, f'unit must be one of m, cm, mm, got "{unit}"', "name one of these")
+    return layout._replace(unit=_plain(unit), per_si=PER_METRE[_plain(unit)])
+
+
+def _plain(unit: str) -> str:
+    return unit.strip().removesuffix("/s")
+
+
+def _asked_quantity(path: str, channel: str | None) -> str:
+    names = {None: "", "distance": "distance", "position": "distance", "velocity": "velocity"}
+    if channel is not None:
+        channel = channel.lower()
+    if channel not in names:
+        raise FormatError(path, f'channel must be distance or velocity, got "{channel}"', "name one of these")
+    return names[channel]

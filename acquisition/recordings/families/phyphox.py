@@ -1,0 +1,120 @@
+"""phyphox: exports as CSV with quoted headings, and saved states as XML.
+
+Times are measured by the phone and jitter (steps of 9.964 to 9.972 ms); each sensor may have a column of times of its
+own. In the XML every buffer stands with its numbers in the ``init`` attribute of its container, and ``<export>`` says
+what each is.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from acquisition.block import F8
+from acquisition.errors import FormatError
+from acquisition.recordings.tables.contents import (
+    Arrays,
+    Channel,
+    Contents,
+    Heading,
+    is_time,
+    name_and_unit,
+    split_heading,
+    under_first_line,
+)
+from acquisition.recordings.tables.sheet import ColumnFormat
+from acquisition.recordings.tables.text import decode, is_text, parse_number, text_of, unify
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+__all__ = ["FORMAT"]
+
+_QUOTED = re.compile(r'\s*(?:"[^"]*"[,;\t]?)+\s*')
+_ROOT = re.compile(
+    r"\s*(?:<\?xml[^>]*>\s*)?(?:<!--.*?-->\s*)*(?:<!DOCTYPE[^>\[]*(?:\[.*?\])?\s*>\s*)?<phyphox[\s>]", re.DOTALL
+)
+
+
+def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
+    """Return quoted headings of which the first is a time with its unit; none where the line has others."""
+    if not _QUOTED.fullmatch(line):
+        return (), ""
+    cells, mark = split_heading(line)
+    headings = tuple(Heading(*name_and_unit(cell)) for cell in cells)
+    if len(headings) < 2 or not is_time(headings[0].name) or not headings[0].unit:
+        return (), mark
+    return headings, mark
+
+
+def _evidence(head: bytes) -> str:
+    if not is_text(head):
+        return ""
+    text = unify(decode(head))
+    if _ROOT.match(text):
+        return "it is XML with the root <phyphox>"
+    headings, _ = _headings(text.partition("\n")[0])
+    return f'line 1 is quoted headings that begin with "{headings[0].name} ({headings[0].unit})"' if headings else ""
+
+
+def _contents(path: str, data: bytes) -> Contents:
+    text = text_of(path, data)
+    if _ROOT.match(decode(text.data[text.start : text.start + 8192])):
+        return _of_xml(path, text.data[text.start : text.stop])
+    return under_first_line(path, data, _headings, '"Time (s)","Distance (m)", in quotes')
+
+
+def _of_xml(path: str, data: bytes) -> Contents:
+    from xml.etree import ElementTree
+
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise FormatError(path, "expected plain XML, got a document type", "save the experiment in phyphox again")
+    try:
+        root = ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise FormatError(path, f"expected XML, got {error}", "save the experiment in phyphox again") from error
+    buffers = dict(_buffers(root))
+    channels = tuple(_channels(root, buffers))
+    if not channels:
+        demand = "expected buffers with numbers and an export that names them, got none"
+        raise FormatError(path, demand, "save the state after recording, or export the data as CSV")
+    title = next((each.text.strip() for each in root.iter("title") if each.text), "")
+    return Contents(channels, title=title)
+
+
+def _buffers(root: Element) -> Iterator[tuple[str, F8]]:
+    for each in root.iter("container"):
+        numbers = [parse_number(cell.strip()) for cell in each.get("init", "").split(",") if cell.strip()]
+        if numbers and each.text:
+            yield each.text.strip(), np.array([np.nan if x is None else x for x in numbers])
+
+
+def _channels(root: Element, buffers: Mapping[str, F8]) -> Iterator[Channel]:
+    """Yield the channels of every set of the export, each with the times of its set."""
+    sets = list(root.iter("set"))
+    for each in sets:
+        run = each.get("name", "") if len(sets) > 1 else ""
+        time: F8 | None = None
+        for data in each.iter("data"):
+            name, unit = name_and_unit(data.get("name", ""))
+            values = buffers.get((data.text or "").strip())
+            if values is None:
+                continue
+            if is_time(name):
+                time = values
+                continue
+            if time is not None and time.size != values.size:
+                size = max(time.size, values.size)
+                yield Channel(name, unit, Arrays(_longer(time, size), _longer(values, size)), run)
+            else:
+                yield Channel(name, unit, Arrays(time, values), run)
+
+
+def _longer(values: F8, size: int) -> F8:
+    return np.concatenate((values, np.full(size - values.size, np.nan)))
+
+
+FORMAT = ColumnFormat("phyphox", "phyphox export as CSV, or saved state as XML", _evidence, _contents)

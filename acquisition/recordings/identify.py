@@ -1,0 +1,183 @@
+"""Which formats of recordings there are, and which one a file is of.
+
+The table holds names only: a format's module is imported when it is asked. A package elsewhere adds one with
+an entry point in the group ``springmass.formats`` that names an object like
+:class:`acquisition.recordings.base.Format`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from importlib import import_module
+from typing import TYPE_CHECKING, cast
+
+from acquisition.errors import AcquisitionError, UnknownFormat
+from acquisition.recordings.base import HEAD_BYTES, Format, PairFormat, SurveyFormat, read_bytes, read_head
+from acquisition.recordings.recording import Recording
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+    from acquisition.recordings.inspection import Inspection
+
+__all__ = ["formats", "get_format", "inspect", "open_recording", "sniff"]
+
+GROUP = "springmass.formats"
+
+_TABLE: dict[str, tuple[str, str]] = {
+    "motion-sensor": ("acquisition.recordings.families.motion_sensor", "FORMAT"),
+    "lvm": ("acquisition.recordings.families.lvm", "FORMAT"),
+    "tdms": ("acquisition.recordings.families.tdms", "FORMAT"),
+    "capstone": ("acquisition.recordings.families.capstone", "FORMAT"),
+    "datastudio": ("acquisition.recordings.families.datastudio", "FORMAT"),
+    "vernier": ("acquisition.recordings.families.vernier", "FORMAT"),
+    "logger-pro": ("acquisition.recordings.families.logger_pro", "FORMAT"),
+    "phyphox": ("acquisition.recordings.families.phyphox", "FORMAT"),
+    "tracker": ("acquisition.recordings.families.tracker", "FORMAT"),
+    "csv": ("acquisition.recordings.families.csv_units", "FORMAT"),
+    "bare": ("acquisition.recordings.families.bare", "FORMAT"),
+}
+
+
+def formats() -> tuple[Format, ...]:
+    """Return every format, those of this package first.
+
+    Examples
+    --------
+    >>> formats()[0].name
+    'motion-sensor'
+    """
+    return tuple(_every())
+
+
+def get_format(name: str) -> Format:
+    """Return the format of that name.
+
+    Raises
+    ------
+    UnknownFormat
+        If there is none.
+    """
+    if name in _TABLE:
+        return _built_in(name)
+    entries = _entry_points()
+    if name in entries:
+        return _load(entries[name])
+    known = ", ".join([*_TABLE, *entries])
+    raise UnknownFormat(f'format "{name}"', f"must be one of {known}", "name one of these or leave it out")
+
+
+def sniff(path: str | os.PathLike[str]) -> str:
+    """Tell the name of a file's format from its first bytes.
+
+    Raises
+    ------
+    FormatError
+        If it cannot be opened, or no format recognises it.
+    """
+    return _recognise(os.fspath(path), read_head(path)).name
+
+
+def open_recording(
+    path: str | os.PathLike[str],
+    *,
+    format: str | None = None,
+    channel: str | None = None,
+    rate_hz: float | None = None,
+    unit: str | None = None,
+    run: str | None = None,
+    velocity_path: str | os.PathLike[str] | None = None,
+) -> Recording:
+    """Read an old recording.
+
+    Parameters
+    ----------
+    path : path
+    format : str, optional
+        Name of the format; told by content if left out.
+    channel, rate_hz, unit, run : optional
+        What the file leaves out or leaves open; see :meth:`acquisition.recordings.base.Format.read`.
+    velocity_path : path, optional
+        The velocity file that belongs to a position file, joined to it by time.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    FormatError
+        With one line for the user, whatever is wrong with the file.
+    """
+    name = os.fspath(path)
+    reader = get_format(format) if format else _recognise(name, read_head(path))
+    data = read_bytes(path)
+    of_run = {} if run is None else {"run": run}
+    if velocity_path is None:
+        return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **of_run)
+    if not hasattr(reader, "read_pair"):
+        demand = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
+        raise UnknownFormat(name, demand, "leave the velocity file out")
+    velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
+    return cast("PairFormat", reader).read_pair((name, data), velocity, rate_hz=rate_hz)
+
+
+def inspect(path: str | os.PathLike[str]) -> Inspection:
+    """Tell what a file is and what it holds, with nothing chosen and nothing given.
+
+    Raises
+    ------
+    FormatError
+        If it cannot be opened, no format recognises it, or its content cannot be read.
+    """
+    from acquisition.recordings.inspection import Inspection  # of no use to a recording that is read
+
+    name = os.fspath(path)
+    head = read_head(path)
+    reader = _recognise(name, head)
+    why = getattr(reader, "evidence", lambda _: "")(head)
+    surveys = reader.survey(name, read_bytes(path)) if isinstance(reader, SurveyFormat) else ()
+    return Inspection(reader.name, reader.title, why, surveys)
+
+
+def _recognise(path: str, head: bytes) -> Format:
+    names = []
+    for candidate in _every():
+        if candidate.recognises(head[:HEAD_BYTES]):
+            return candidate
+        names.append(candidate.name)
+    from acquisition.recordings.foreign import refuse
+
+    raise refuse(path, head, tuple(names))
+
+
+def _every() -> Iterator[Format]:
+    """Yield one format after the other; entry points are looked for only if the table is used up."""
+    for name in _TABLE:
+        yield _built_in(name)
+    for name, entry in _entry_points().items():
+        if name not in _TABLE:
+            yield _load(entry)
+
+
+def _built_in(name: str) -> Format:
+    module, attribute = _TABLE[name]
+    return cast(Format, getattr(import_module(module), attribute))
+
+
+def _entry_points() -> dict[str, EntryPoint]:
+    from importlib.metadata import entry_points  # costs more than all the rest of this module
+
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def _load(entry: EntryPoint) -> Format:
+    try:
+        return cast(Format, entry.load())
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise AcquisitionError(
+            f'format "{entry.name}" ({entry.value}): cannot be loaded ({type(error).__name__}: {reason}); '
+            "repair or remove the package that brings it"
+        ) from error

@@ -1,0 +1,197 @@
+"""From printed times, a header's formula or a given rate to the times of samples, and what is to be said of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.block import F8, I8
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.recording import Trap
+from acquisition.recordings.sampling.nominal import Grid, find_rate
+
+__all__ = ["Timing", "check_rate", "clock_traps", "time_by_column", "time_by_formula", "time_by_rate"]
+
+_SHARE_OF_JITTER = 0.2
+_RATE = "give the rate with --rate-hz"
+
+
+class Timing(NamedTuple):
+    """Rate and grid of a file's times.
+
+    Parameters
+    ----------
+    rate_hz : float
+    grid : Grid or None
+        None where the times fit no grid and stand as printed.
+    resolution_s : float
+        Last printed digit, s.
+    certain : bool
+        Whether the times, or a header, settle the rate.
+    given : bool
+        Whether the user gave the rate and the file does not confirm it.
+    steps_s : (float, float) or None
+        The usual range of steps between times that fit no grid but jitter little about one step.
+    by_row : bool
+        Whether row numbers tell the times better than what is printed.
+    """
+
+    rate_hz: float
+    grid: Grid | None
+    resolution_s: float
+    certain: bool
+    given: bool = False
+    steps_s: tuple[float, float] | None = None
+    by_row: bool = False
+
+
+def check_rate(path: str, rate_hz: float | None) -> None:
+    """Demand that a rate, if given, is a positive number."""
+    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
+        raise NeedsAnswer(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
+
+
+def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
+    """Infer the rate from a column of times, s, of sound rows.
+
+    Raises
+    ------
+    NeedsAnswer
+        If fewer than two different times are there and no rate was given.
+    FormatError
+        If the rate given contradicts the times.
+    """
+    rate = find_rate(printed, resolution, rate_hz=rate_hz)
+    if rate is None:
+        if rate_hz is None:
+            demand = f"expected times to tell the rate, got {printed.size} rows at one time"
+            raise NeedsAnswer(path, demand, "record longer, or give rate_hz (--rate-hz)")
+        origin = float(printed[0]) if printed.size else 0.0
+        return Timing(rate_hz, Grid(rate_hz, origin), resolution, certain=False, given=True)
+    if rate_hz is not None:
+        steps = _jitter(printed) if rate.grid is None else None
+        allowed = rate_hz * (1.5 * rate.relative_u + 1e-6 + (0.01 if steps else 0.0))
+        if abs(rate.rate_hz - rate_hz) > allowed:
+            demand = f"rate_hz {rate_hz:g} was given, but the times say {rate.rate_hz:.6g} Hz"
+            raise FormatError(path, demand, "leave the rate out or correct it")
+        return Timing(rate_hz, rate.grid, resolution, certain=True, given=True, steps_s=steps)
+    steps = _jitter(printed) if rate.grid is None else None
+    return Timing(rate.rate_hz, rate.grid, resolution, rate.certain, steps_s=steps)
+
+
+def _jitter(printed: F8) -> tuple[float, float] | None:
+    """Return the usual range of steps, where all but a few lie close to one step."""
+    steps = np.diff(printed)
+    steps = steps[steps > 0]
+    if steps.size < 2:
+        return None
+    low, middle, high = (float(x) for x in np.percentile(steps, (5, 50, 95)))
+    return (low, high) if high - low <= _SHARE_OF_JITTER * middle else None
+
+
+def time_by_formula(
+    path: str,
+    start_s: float,
+    step_s: float,
+    printed: F8 | None,
+    tolerance: F8 | None,
+    numbers: Iterable[tuple[slice, I8]],
+    rate_hz: float | None,
+) -> Timing | None:
+    """Take a header's times ``start_s + i step_s``, if the column of times agrees within its rounding.
+
+    Parameters
+    ----------
+    printed, tolerance : (n,) float64, s, or None
+        Times of the rows, NaN where unread, and half the last digit of each; None: no column.
+    numbers : iterable of (slice, int64 array)
+        The i of some rows after the other.
+
+    Returns
+    -------
+    Timing or None
+        None where header and column disagree.
+    """
+    if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
+        return None
+    if printed is not None and tolerance is not None:
+        for rows, number in numbers:
+            expected = start_s + step_s * number
+            apart = printed[rows] - expected
+            np.abs(apart, out=apart)
+            if apart.max() <= tolerance[rows].min() * 1.0001:  # the usual case; never true of a NaN
+                continue
+            slack = 1e-9 * np.maximum(np.abs(expected), step_s)
+            if (apart > tolerance[rows] * 1.0001 + slack).any():  # never true of a NaN either
+                return None
+    rate = 1.0 / step_s
+    rounded = float(f"{rate:.9g}")
+    rate = rounded if math.isclose(rounded, rate, rel_tol=1e-12) else rate
+    if rate_hz is not None and abs(rate - rate_hz) > 1e-6 * rate:
+        demand = f"rate_hz {rate_hz:g} was given, but the header says {rate:.6g} Hz"
+        raise FormatError(path, demand, "leave the rate out or correct it")
+    return Timing(rate, Grid(rate, start_s), 0.0, certain=True, by_row=True)
+
+
+def time_by_rate(path: str, rate_hz: float | None, why: str) -> Timing:
+    """Take the rate that the user gives, for nothing in the file tells times."""
+    if rate_hz is None:
+        raise NeedsAnswer(path, f"expected times, got none: {why}", _RATE)
+    return Timing(rate_hz, Grid(rate_hz), 0.0, certain=True, given=True, by_row=True)
+
+
+def clock_traps(timing: Timing) -> Iterator[Trap]:
+    """Say what the times are."""
+    if timing.grid is not None:
+        message = f"times are row numbers over a nominal {timing.rate_hz:g} Hz, not measured times"
+        yield Trap("nominal_clock", message)
+    if timing.given:
+        yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz was given by the user")
+    elif timing.steps_s is not None:
+        low, high = (1e3 * step for step in timing.steps_s)
+        message = (
+            f"times are measured and jitter: steps of {low:.4g} to {high:.4g} ms, on average {timing.rate_hz:.6g} Hz"
+        )
+        yield Trap("jittered_time", message)
+    elif not timing.certain:
+        why = (
+            "too few rows settle it"
+            if timing.grid is not None
+            else "the times fit no regular grid and stand as printed"
+        )
+        yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the likeliest: {why}")
+
+
+def row_times(timing: Timing, numbers: Iterable[tuple[slice, I8]], out: F8) -> F8:
+    """Put the times of rows, by their numbers on a nominal clock, into an array, s; return it."""
+    if timing.grid is None:
+        raise ValueError("only a grid has times of rows")
+    for rows, number in numbers:
+        out[rows] = timing.grid.time(number)
+    return out
+
+
+def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int) -> F8:
+    """Return half the last printed digit of each time, s; of those with exponents at least that.
+
+    Parameters
+    ----------
+    printed : (n,) float64, s
+    form : (n,) int8
+        See :class:`acquisition.recordings.tables.table.Table`.
+    shift : int
+        Power of ten from the printed unit to seconds.
+    exponent : int
+        What is added to the decimals in a form with an exponent.
+    """
+    usual = int(form[0]) if form.size else 0
+    if 0 <= usual < exponent and (form == usual).all():
+        return np.broadcast_to(np.float64(0.5 * 10.0 ** (shift - usual)), form.size)
+    decimals = np.where(form >= exponent, form - exponent, np.maximum(form, 0))
+    half = 0.5 * 10.0 ** (shift - decimals)
+    scaled = 0.5 * 10.0 ** -decimals.astype(float) * np.abs(printed)
+    return np.where(form >= exponent, scaled, half)

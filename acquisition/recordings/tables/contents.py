@@ -1,0 +1,330 @@
+"""What a file holds, before any of it is taken as distance: runs, channels, units, and where their numbers stand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from acquisition.block import F8
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.recording import Trap
+from acquisition.recordings.tables.text import Text, text_of
+from acquisition.recordings.units import length_power, unit_words
+from acquisition.source import ClockKind
+
+__all__ = [
+    "Arrays",
+    "Channel",
+    "Contents",
+    "Formula",
+    "Heading",
+    "Sheet",
+    "channels_of",
+    "choose",
+    "is_time",
+    "name_and_unit",
+    "numbered_apart",
+    "split_heading",
+    "under_first_line",
+]
+
+_TIME_WORDS = frozenset(
+    (
+        *("time", "t", "elapsed", "zeit", "tempo", "temps", "tiempo", "tijd", "tid", "czas", "čas", "aika", "idő"),
+        *("zaman", "время", "时间", "時間", "시간"),
+    )
+)
+_HEADING = re.compile(r"(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheet:
+    """Rows below one header.
+
+    Parameters
+    ----------
+    text : Text
+    start, stop : int
+        Bytes where the rows begin and end.
+    first_line : int
+        One-based line of the first row.
+    delimiter : str
+    """
+
+    text: Text
+    start: int
+    stop: int
+    first_line: int
+    delimiter: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arrays:
+    """Numbers that a file holds in binary, or that were read already: times (s) or None, and values."""
+
+    t: F8 | None
+    values: F8
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """Times ``start_s + i * step_s`` as a header states them, and how many samples it declares, if it does."""
+
+    start_s: float
+    step_s: float
+    samples: int | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """One channel of one run.
+
+    Parameters
+    ----------
+    name : str
+        As the file calls it, without unit.
+    unit : str
+        As the file prints it; empty where it does not.
+    run : str
+        Empty where the file holds one run without a name.
+    source : Sheet or Arrays
+    column : int
+        Of the sheet.
+    time : int or None
+        Column of its times; None where there is none.
+    time_unit : str
+        As the file prints it; empty where it does not.
+    formula : Formula or None
+    clock : {"nominal", "device", "host"}
+        What times that fit no regular grid are.
+    start_time : str
+        ISO 8601, as the file states it; empty where it does not.
+    ragged : bool
+        Whether it may end before its times do, which then belong to others.
+    """
+
+    name: str
+    unit: str
+    source: Sheet | Arrays
+    run: str = ""
+    column: int = 0
+    time: int | None = None
+    time_unit: str = ""
+    formula: Formula | None = None
+    clock: ClockKind = "device"
+    start_time: str = ""
+    ragged: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name and unit, as a user may write it."""
+        return f"{self.name} ({self.unit})" if self.unit else self.name
+
+    @property
+    def is_length(self) -> bool:
+        """Whether its unit is a length."""
+        return length_power(self.unit) is not None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contents:
+    """Everything that a file holds.
+
+    Parameters
+    ----------
+    channels : tuple of Channel
+        At least one; times are no channels.
+    title : str
+    traps : tuple of Trap
+        What was seen in the file as a whole.
+    zeros : int
+        Zero bytes at the end, left out.
+    """
+
+    channels: tuple[Channel, ...]
+    title: str = ""
+    traps: tuple[Trap, ...] = ()
+    zeros: int = field(default=0)
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs, in the file's order."""
+        return tuple(dict.fromkeys(channel.run for channel in self.channels))
+
+
+def name_and_unit(heading: str) -> tuple[str, str]:
+    """Take a heading apart.
+
+    Examples
+    --------
+    >>> name_and_unit('"Position (mm)"'), name_and_unit("Time ( s )"), name_and_unit("velocity")
+    (('Position', 'mm'), ('Time', 's'), ('velocity', ''))
+    """
+    plain = heading.strip().strip('"').strip()
+    found = _HEADING.fullmatch(plain)
+    return (found["name"].strip(), found["unit"].strip()) if found and found["name"] else (plain, "")
+
+
+def is_time(name: str) -> bool:
+    """Tell whether a column's name says time, in one of a dozen languages.
+
+    Examples
+    --------
+    >>> is_time("Zeit"), is_time("Position"), is_time("X_Value")
+    (True, False, False)
+    """
+    return name.strip().lower() in _TIME_WORDS
+
+
+def choose(path: str, contents: Contents, channel: str | None, run: str | None) -> Channel:
+    """Return the channel to take as distance.
+
+    Raises
+    ------
+    NeedsAnswer
+        If there are several and none, or none of that name, was asked for; the line lists them.
+    """
+    of_run = _run(path, contents, run)
+    if channel is not None:
+        wanted = _plain(channel)
+        exact = [each for each in of_run if wanted in (_plain(each.label), _plain(each.name))]
+        if len(exact) == 1:
+            return exact[0]
+        names = _names(of_run)
+        if exact:
+            raise NeedsAnswer(path, f'channel "{channel}" is the name of {len(exact)} channels of {names}', _CHANNEL)
+        demand = f'channel "{channel}" was asked for, the file holds {names}'
+        raise NeedsAnswer(path, demand, "name one of these with --channel, or leave it out")
+    lengths = [each for each in of_run if each.is_length]
+    if len(lengths) == 1:
+        return lengths[0]
+    if len(of_run) == 1:
+        return of_run[0]
+    raise NeedsAnswer(path, f"more than one channel may be the distance: {_names(lengths or of_run)}", _CHANNEL)
+
+
+_CHANNEL = "name the one to take with --channel"
+
+
+def _run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
+    runs = contents.runs
+    listed = ", ".join(f'"{name}"' for name in runs)
+    if run is None:
+        if len(runs) > 1:
+            raise NeedsAnswer(path, f"the file holds {len(runs)} runs: {listed}", "name the one to take with --run")
+        return contents.channels
+    if runs == ("",):
+        raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds one run without a name', "leave --run out")
+    named = [name for name in runs if _plain(name) == _plain(run)]
+    # "2" is enough for "Run #2".
+    named = named or [name for name in runs if re.fullmatch(rf"\D*#?\s*0*{re.escape(run.strip())}", name)]
+    if len(named) != 1:
+        raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds {listed}', "name one of these with --run")
+    return [each for each in contents.channels if each.run == named[0]]
+
+
+def _names(channels: Sequence[Channel]) -> str:
+    return ", ".join(f'"{each.label}"' for each in channels)
+
+
+def _plain(name: str) -> str:
+    found = _HEADING.fullmatch(name.strip())
+    if found and found["name"]:
+        name = f"{found['name']} ({unit_words(found['unit'])})"
+    return " ".join(name.lower().split())
+
+
+def numbered_apart(names: Sequence[str]) -> list[str]:
+    """Return names of which none occurs twice: the second of a name gets a number.
+
+    Examples
+    --------
+    >>> numbered_apart(["a", "b", "a"])
+    ['a', 'b', 'a [2]']
+    """
+    seen: dict[str, int] = {}
+    apart = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        apart.append(name if seen[name] == 1 else f"{name} [{seen[name]}]")
+    return apart
+
+
+def split_heading(line: str) -> tuple[list[str], str]:
+    """Split a line of headings, quoted or not; return its cells and what separates them.
+
+    Examples
+    --------
+    >>> split_heading('"Time (s)","Length, total (m)"')
+    (['Time (s)', 'Length, total (m)'], ',')
+    """
+    bare = re.sub(r'"[^"]*"', "", line)
+    mark = next((mark for mark in "\t;," if mark in bare), "\t")
+    cells = [each.strip() for each in re.split(rf'{mark}(?=(?:[^"]*"[^"]*")*[^"]*$)', line)]
+    while cells and not cells[-1]:
+        cells.pop()
+    return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells], mark
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """What stands above a column."""
+
+    name: str
+    unit: str
+    run: str = ""
+
+
+def under_first_line(
+    path: str, data: bytes, headings_of: Callable[[str], tuple[tuple[Heading, ...], str]], example: str
+) -> Contents:
+    """Return the channels of a text whose first line is headings, and all below it rows.
+
+    Parameters
+    ----------
+    path : str
+        For messages.
+    data : bytes
+    headings_of : callable
+        From the first line to its headings, none where it is of another family, and what separates cells.
+    example : str
+        Headings as the family writes them.
+
+    Raises
+    ------
+    FormatError
+        If the first line holds no such headings.
+    """
+    text = text_of(path, data)
+    first = next(text.lines(), None)
+    headings, mark = headings_of(first.text) if first else ((), "")
+    channels = () if first is None else channels_of(Sheet(text, first.next, text.stop, 2, mark), headings)
+    if not channels:
+        raise FormatError(path, f"expected headings like {example}", "export the run again", line=1)
+    return Contents(channels, zeros=text.zeros)
+
+
+def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind = "device") -> tuple[Channel, ...]:
+    """Return the channels of a sheet: each has the times to its left, or the first of its run.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    headings : sequence of Heading
+        One for each column.
+    clock : {"nominal", "device", "host"}
+        What times on no regular grid are.
+    """
+    times = [column for column, each in enumerate(headings) if is_time(each.name)]
+    found = []
+    values = [column for column in range(len(headings)) if column not in times]
+    for run in dict.fromkeys(headings[column].run for column in values):
+        own = [column for column in values if headings[column].run == run]
+        of_run = [column for column in times if headings[column].run == run]
+        names = numbered_apart([headings[column].name or f"column {column + 1}" for column in own])
+        for column, name in zip(own, names, strict=True):
+            time = max((each for each in of_run if each < column), default=of_run[0] if of_run else None)
+            time_unit = "" if time is None else headings[time].unit
+            found.append(Channel(name, headings[column].unit, sheet, run, column, time, time_unit, clock=clock))
+    return tuple(found)

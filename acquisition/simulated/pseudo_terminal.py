@@ -1,0 +1,248 @@
+"""The simulated rangefinder on a pseudo-terminal: the real serial code reads it as it reads a sensor.
+
+POSIX only. A pseudo-terminal ignores the baud rate, so the device paces itself against the clock.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import pty
+import tempfile
+import threading
+import tty
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.clock import Clock
+from acquisition.decoders.base import Family
+from acquisition.simulated.rangefinder import Shot, VirtualRangefinder
+
+__all__ = ["Faults", "VirtualPort"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Faults:
+    """What goes wrong on the line; seeded chance, or at set seconds of the run.
+
+    Parameters
+    ----------
+    noise_rate, drop_rate, flip_rate : float
+        Probability per frame of bytes inserted, a byte dropped, a bit flipped (which breaks a checksum).
+    stall : tuple of float
+        (at, for) seconds: silence, and then everything at once.
+    unplug : tuple of float
+        (at, for) seconds: the port goes and comes back; what was measured meanwhile is lost.
+    flood : tuple of float
+        (at, bytes): that many random bytes at once.
+    wrong_baud : bool
+        Every byte is garbled, as a port at another speed reads it.
+    """
+
+    noise_rate: float = 0.0
+    drop_rate: float = 0.0
+    flip_rate: float = 0.0
+    stall: tuple[float, float] | None = None
+    unplug: tuple[float, float] | None = None
+    flood: tuple[float, int] | None = None
+    wrong_baud: bool = False
+
+
+class VirtualPort:
+    """A simulated sensor behind a port's path.
+
+    Parameters
+    ----------
+    family : Family
+        In whose wire form it speaks; a polled family answers requests, the others send by themselves.
+    rangefinder : VirtualRangefinder
+    clock : Clock
+    seconds : float
+        It falls silent after this.
+    faults : Faults, optional
+    rng : numpy.random.Generator, optional
+        For the faults.
+    options : mapping, optional
+        Of the family's encoder.
+    """
+
+    def __init__(
+        self,
+        family: Family,
+        rangefinder: VirtualRangefinder,
+        clock: Clock,
+        *,
+        seconds: float,
+        faults: Faults | None = None,
+        rng: np.random.Generator | None = None,
+        options: dict[str, object] | None = None,
+    ) -> None:
+        self._family = family
+        self._rangefinder = rangefinder
+        self._clock = clock
+        self._seconds = seconds
+        self._faults = faults or Faults()
+        self._rng = rng or np.random.default_rng(0)
+        self._encoder = family.encoder(**(options or {}))
+        self._folder = tempfile.TemporaryDirectory(prefix="springmass-")
+        self.path = str(Path(self._folder.name) / "port")
+        self.sent = 0
+        self.unsent = 0
+        self._master = -1
+        self._slave = -1
+        self._stop = threading.Event()
+        self.done = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="springmass-sensor", daemon=True)
+        self._plug()
+
+    def __enter__(self) -> VirtualPort:
+        return self
+
+    def start(self) -> None:
+        """Begin to measure and send."""
+        self._thread.start()
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Fall silent and take the port away."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._pull()
+        self._folder.cleanup()
+
+    def _plug(self) -> None:
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        place = Path(self.path)
+        place.unlink(missing_ok=True)
+        place.symlink_to(os.ttyname(self._slave))
+
+    def _pull(self) -> None:
+        Path(self.path).unlink(missing_ok=True)
+        for descriptor in (self._slave, self._master):
+            if descriptor >= 0:
+                os.close(descriptor)
+        self._slave = self._master = -1
+
+    def _run(self) -> None:
+        start_ns = self._clock.now_ns()
+        frames = self._answers(start_ns) if self._family.poll is not None else self._stream(start_ns)
+        try:
+            self._speak(frames)
+        finally:
+            self.done.set()
+
+    def _speak(self, frames: Iterator[tuple[Shot, bytes]]) -> None:
+        held: list[bytes] = []
+        flooded = False
+        for shot, frame in frames:
+            if not self._plugged(shot.true_s):
+                self.unsent += 1
+                continue
+            if self._faults.flood is not None and not flooded and shot.true_s >= self._faults.flood[0]:
+                flooded = True
+                self._send(self._rng.bytes(int(self._faults.flood[1])))
+            spoiled = self._spoiled(frame)
+            if self._within(self._faults.stall, shot.true_s):
+                held.append(spoiled)
+                continue
+            self._send(b"".join([*held, spoiled]))
+            self.sent += len(held) + 1
+            held.clear()
+        self._send(b"".join(held))
+        self.sent += len(held)
+
+    def _plugged(self, t: float) -> bool:
+        """Pull or plug as the faults say for this second of the run; True where the cable is in."""
+        out = self._within(self._faults.unplug, t)
+        if out and self._master >= 0:
+            self._pull()
+        elif not out and self._master < 0:
+            self._plug()
+        return not out
+
+    def _stream(self, start_ns: int) -> Iterator[tuple[Shot, bytes]]:
+        for shot in self._rangefinder.shots():
+            if shot.true_s >= self._seconds or self._stop.is_set():
+                return
+            self._clock.sleep_until_ns(start_ns + round(shot.true_s * 1e9))
+            yield shot, self._frame(shot)
+
+    def _answers(self, start_ns: int) -> Iterator[tuple[Shot, bytes]]:
+        """One shot for each request that comes, taken at the moment it comes."""
+        assert self._family.poll is not None
+        waiting = b""
+        sequence = 0
+        while not self._stop.is_set():
+            now_s = (self._clock.now_ns() - start_ns) * 1e-9
+            if now_s >= self._seconds:
+                return
+            waiting = waiting + self._received() if self._plugged(now_s) else b""
+            if not waiting:
+                self._clock.sleep_until_ns(self._clock.now_ns() + 500_000)
+                continue
+            request, waiting = waiting[: len(self._family.poll.request)], waiting[len(self._family.poll.request) :]
+            sequence = int(now_s * self._rangefinder.sensor.rate_hz)
+            shot = self._rangefinder.shot(sequence)
+            yield shot, self._answer(request, shot)
+
+    def _received(self) -> bytes:
+        if self._master < 0:
+            return b""
+        try:
+            return os.read(self._master, 4096)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            if error.errno == errno.EIO:  # nobody has the other end open
+                return b""
+            raise
+
+    def _answer(self, request: bytes, shot: Shot) -> bytes:
+        # A request for the temperature gets that, where the encoder knows such requests.
+        reply = getattr(self._encoder, "reply", None)
+        if reply is None:
+            return self._frame(shot)
+        return bytes(reply(request, distance_m=shot.distance_m, temperature_c=shot.temperature_c))
+
+    def _frame(self, shot: Shot) -> bytes:
+        return self._encoder.encode(
+            sequence=shot.sequence,
+            device_us=shot.device_us,
+            echo_us=shot.echo_us,
+            distance_m=shot.distance_m,
+            temperature_c=shot.temperature_c,
+        )
+
+    def _spoiled(self, frame: bytes) -> bytes:
+        faults, rng = self._faults, self._rng
+        data = bytearray(frame)
+        if faults.noise_rate and rng.random() < faults.noise_rate:
+            data = bytearray(rng.bytes(int(rng.integers(1, 8)))) + data
+        if faults.drop_rate and rng.random() < faults.drop_rate and data:
+            del data[int(rng.integers(len(data)))]
+        if faults.flip_rate and rng.random() < faults.flip_rate and data:
+            data[int(rng.integers(len(data)))] ^= 1 << int(rng.integers(8))
+        if faults.wrong_baud:
+            data = bytearray(rng.bytes(max(len(data) // 2, 1)))
+        return bytes(data)
+
+    def _send(self, data: bytes) -> None:
+        """Write all of it; a reader that does not read makes a real sensor's bytes overrun, and these wait."""
+        left = memoryview(data)
+        while left and not self._stop.is_set():
+            try:
+                left = left[os.write(self._master, left) :]
+            except BlockingIOError:
+                self._clock.sleep_until_ns(self._clock.now_ns() + 1_000_000)
+
+    @staticmethod
+    def _within(span: tuple[float, float] | None, t: float) -> bool:
+        return span is not None and span[0] <= t < span[0] + span[1]

@@ -1,0 +1,144 @@
+"""One damping law on one record: its parameters, and what follows from them with their uncertainty."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.damping.laws import Drag, Law
+from pipeline.damping.laws.drag import POWERS
+from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.track import F8
+
+__all__ = ["LawFit", "Rejection", "mean_squared_rate", "rates_of"]
+
+Rejection = Literal["", "misfit", "negative", "not converged"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LawFit:
+    """One law on one record.
+
+    Parameters
+    ----------
+    law : Law
+    joint : Joint
+        Parameters, the amplitude at the first sample used in front.
+    reduced_chi2 : float
+        Against noise and excess scatter.
+    dof : float
+        Degrees of freedom after correlation between points.
+    bic : float
+        Bayesian information criterion, up to a constant that all laws share, of the law at its best without a
+        coefficient below zero.
+    converged : bool
+    rejection : {"", "misfit", "negative", "not converged"}
+        Why the law is rejected, if it is: chi-square is improbable, a coefficient is negative beyond three standard
+        uncertainties, or the fit did not converge.
+    tried : str
+        What was tried where the fit did not converge.
+    widening : float
+        Factor on the covariance, of what a law that chi-square rejects leaves over what was expected.
+    """
+
+    law: Law
+    joint: Joint
+    reduced_chi2: float
+    dof: float
+    bic: float
+    converged: bool
+    rejection: Rejection
+    tried: str = ""
+    widening: float = 1.0
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the record contradicts the law."""
+        return self.rejection != ""
+
+    @property
+    def name(self) -> str:
+        """The law's name."""
+        return self.law.name
+
+    def amplitude(self, t: F8) -> F8:
+        """Return (n,) float64, m, at times since the first sample used, s."""
+        return self.law.amplitude(t, self.joint.values)
+
+    def u_amplitude(self, t: F8) -> F8:
+        """Return the standard uncertainty of :meth:`amplitude`, (n,) float64, m."""
+        jacobian = self.law.jacobian(t, self.joint.values)
+        variance = np.einsum("ni,ij,nj->n", jacobian, self.joint.covariance, jacobian)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+    def rates(self, amplitude: F8) -> tuple[F8, F8]:
+        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
+        return rates_of(self.law, amplitude, self.joint.values, self.joint.covariance)
+
+    def rate_at_start(self) -> float:
+        """Return the logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
+        return _relative_rate(self.law, self.joint.values)
+
+    def slopes_of_rate(self) -> F8:
+        """Return the derivatives (p,) of :meth:`rate_at_start` by the parameters.
+
+        In closed form for laws of drag; else central differences over a thousandth of each parameter's uncertainty, so
+        that their error is far below it.
+        """
+        theta = self.joint.values
+        if isinstance(self.law, Drag) and theta[0] > 0.0:
+            start, terms = _terms(self.law, theta)
+            by_start = sum(c * power * size for c, power, size in terms) / start
+            return np.array([by_start, *(size for _, _, size in terms)])
+        slopes = np.empty(theta.size)
+        variances = self.joint.covariance.diagonal().tolist()
+        for k, (value, variance) in enumerate(zip(theta.tolist(), variances, strict=True)):
+            step = max(1e-3 * math.sqrt(max(variance, 0.0)), 1e-7 * max(abs(value), 1e-9))
+            above, below = theta.copy(), theta.copy()
+            above[k] += step
+            below[k] -= step
+            slopes[k] = (_relative_rate(self.law, above) - _relative_rate(self.law, below)) / (2.0 * step)
+        return slopes
+
+    def damping_rate(self) -> Estimate:
+        """Return :meth:`rate_at_start` with its uncertainty."""
+        slopes = self.slopes_of_rate()
+        variance = float(slopes @ self.joint.covariance @ slopes)
+        return Estimate(self.rate_at_start(), math.sqrt(max(variance, 0.0)), "1/s")
+
+
+def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
+    """Return a law's -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
+    steps = 1e-6 * np.maximum(np.abs(theta[1:]), 1e-9)
+    gradient = np.zeros((theta.size, amplitude.size))
+    for k, step in enumerate(steps.tolist(), start=1):
+        shift = np.zeros(theta.size)
+        shift[k] = step
+        gradient[k] = (law.rate(amplitude, theta + shift) - law.rate(amplitude, theta - shift)) / (2.0 * step)
+    variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
+    return law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _relative_rate(law: Law, theta: F8) -> float:
+    """-dA/dt over A at the first amplitude, 1/s."""
+    if isinstance(law, Drag) and theta[0] > 0.0:
+        return float(sum(c * size for c, _, size in _terms(law, theta)[1]))
+    return float(law.rate(theta[:1], theta)[0] / theta[0])
+
+
+def _terms(law: Drag, theta: F8) -> tuple[float, list[tuple[float, int, float]]]:
+    """The first amplitude A, and each coefficient of -dA/dt over A with its power of A and that power's value."""
+    start, *coefficients = theta.tolist()
+    values = {-1: 1.0 / start, 0: 1.0, 1: start}
+    powers = (POWERS[name] - 1 for name in law.parameters[1:])
+    return start, [(c, power, values[power]) for c, power in zip(coefficients, powers, strict=True)]
+
+
+def mean_squared_rate(fit: LawFit, amplitude: F8) -> float:
+    """Return the mean of :math:`(\\dot A/A)^2` at a law's amplitudes (n,) m, weighted by :math:`A^2`, 1/s^2."""
+    power = float(amplitude @ amplitude)
+    rate = fit.law.rate(amplitude, fit.joint.values)
+    return float(rate @ rate) / power if power > 0.0 else 0.0

@@ -1,0 +1,276 @@
+"""Joint damping: does one law, with one set of coefficients, hold across several runs?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.damping.fitted_law import rates_of
+from pipeline.damping.law_fit import covariance_or_infinite
+from pipeline.damping.laws import LAWS, Law
+from pipeline.damping.select import NEGATIVE, Damping, Params, choose
+from pipeline.errors import AnalysisError
+from pipeline.numerics import least_squares
+from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.regression import chi2_quantile
+from pipeline.oscillation.demodulate import Demodulated
+from pipeline.track import F8
+
+__all__ = ["JointDamping", "JointFit", "fit_joint"]
+
+Rejection = Literal["", "misfit", "differ", "negative", "not converged"]
+
+PRECISION = 0.01  # of the standard uncertainties, at which a fit stops
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointFit:
+    """One law with shared coefficients on all runs.
+
+    Parameters
+    ----------
+    law : Law
+    coefficients : Joint
+        What the runs share; empty for the law "none".
+    amplitudes : tuple of Estimate
+        At the first sample used of each run, m.
+    chi2, dof : float
+        After correlation between points, of all runs together.
+    bic : float
+        Bayesian information criterion, up to a constant that all laws share.
+    excess_chi2, excess_dof : float
+        What sharing the coefficients costs against fitting every run by itself, and how many coefficients it saves.
+    rejection : {"", "misfit", "differ", "negative", "not converged"}
+        Why the law does not hold across the runs, if so: chi-square is improbable; each run follows the law but their
+        coefficients differ; a coefficient is negative beyond three standard uncertainties; no convergence.
+    """
+
+    law: Law
+    coefficients: Joint
+    amplitudes: tuple[Estimate, ...]
+    chi2: float
+    dof: float
+    bic: float
+    excess_chi2: float
+    excess_dof: float
+    rejection: Rejection
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the runs contradict one such law."""
+        return self.rejection != ""
+
+    @property
+    def reduced_chi2(self) -> float:
+        """Chi-square by degrees of freedom."""
+        return self.chi2 / self.dof if self.dof > 0 else math.nan
+
+    def rates(self, amplitude: F8) -> tuple[F8, F8]:
+        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
+        # A rate depends on the coefficients alone: any first amplitude will do.
+        theta = np.concatenate([[1.0], self.coefficients.values])
+        covariance = np.zeros((theta.size, theta.size))
+        covariance[1:, 1:] = self.coefficients.covariance
+        return rates_of(self.law, amplitude, theta, covariance)
+
+    def span(self, times: Sequence[F8]) -> F8:
+        """Return the greatest and the least amplitude over all runs' times since their first samples, m."""
+        ends = [
+            self.law.amplitude(np.array([0.0, float(t[-1])]), np.concatenate([[a.value], self.coefficients.values]))
+            for t, a in zip(times, self.amplitudes, strict=True)
+        ]
+        return np.array([np.max(ends), np.min(ends)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointDamping:
+    """What several runs say together about damping.
+
+    Parameters
+    ----------
+    runs : tuple of str
+        Names.
+    fits : mapping of str to JointFit
+    selected : str
+        As in :class:`pipeline.damping.select.Damping`.
+    admissible : tuple of str
+        Laws that hold across all runs, best first; empty where none does.
+    message : str
+        One sentence.
+    """
+
+    runs: tuple[str, ...]
+    fits: Mapping[str, JointFit]
+    selected: str
+    admissible: tuple[str, ...]
+    message: str
+
+    @property
+    def best(self) -> JointFit:
+        """The selected law's fit."""
+        return self.fits[self.selected]
+
+    @property
+    def one_law(self) -> bool:
+        """Whether one law with one set of coefficients holds across all runs."""
+        return bool(self.admissible)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Points:
+    """The amplitudes of all runs, one after the other; ``parts`` are their places."""
+
+    t: tuple[F8, ...]
+    y: F8
+    u: F8
+    parts: tuple[slice, ...]
+
+
+def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params | None = None) -> JointDamping:
+    """Fit each damping law with coefficients that all runs share and an amplitude of its own for each run.
+
+    Parameters
+    ----------
+    runs : sequence of (name, Demodulated, Damping)
+        Two at least, of one bob and disc: the coefficients go as one over the mass.
+    params : Params, optional
+        Of :func:`pipeline.damping.select.fit_damping`; laws that lack a fit in any run are left out.
+
+    Returns
+    -------
+    JointDamping
+
+    Raises
+    ------
+    AnalysisError
+        If fewer than two runs are given, or no law was fitted to every run.
+
+    Notes
+    -----
+    The points and their uncertainties, excess scatter included, are those that each run's own fits used; each run's
+    chi-square is divided by its correlation length. The sum of the runs' own chi-squares under a law, subtracted from
+    that of the joint fit, tests whether the coefficients are the same: under that hypothesis the difference is
+    chi-square distributed with (runs - 1) times the number of coefficients.
+    """
+    params = params or Params()
+    if len(runs) < 2:
+        raise AnalysisError(f"a joint fit needs two runs at least, got {len(runs)}")
+    shared = [name for name in params.laws if all(name in damping.fits for _, _, damping in runs)]
+    if not shared:
+        raise AnalysisError("no damping law was fitted to every run; a joint fit has nothing to join")
+    points = _points(runs)
+    fits = {name: _fit(LAWS[name], runs, points, params) for name in shared}
+    fits = {name: fit for name, fit in fits.items() if math.isfinite(fit.chi2)}
+    if not fits:
+        raise AnalysisError("no damping law could be fitted to the runs together; fit them one by one")
+    ends = points.t
+    selected, admissible = choose(fits, params, lambda name: fits[name].span(ends))
+    names = tuple(name for name, _, _ in runs)
+    return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
+
+
+def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:
+    times, values, errors, parts = [], [], [], []
+    at = 0
+    for _, demodulated, damping in runs:
+        spread = damping.scatter
+        kept = spread.kept
+        times.append((demodulated.t - damping.t0)[kept])
+        values.append(demodulated.amplitude[kept])
+        # Points that count as one share their information.
+        errors.append(spread.u[kept] * math.sqrt(spread.correlation))
+        parts.append(slice(at, at + int(np.count_nonzero(kept))))
+        at = parts[-1].stop
+    return _Points(tuple(times), np.concatenate(values), np.concatenate(errors), tuple(parts))
+
+
+def _curve(law: Law, points: _Points, theta: F8) -> F8:
+    """Amplitudes of all runs, (n,); parameters are the runs' amplitudes, then the coefficients."""
+    count = len(points.t)
+    return np.concatenate([law.amplitude(t, np.append(theta[run], theta[count:])) for run, t in enumerate(points.t)])
+
+
+def _slopes(law: Law, points: _Points, theta: F8) -> F8:
+    """Their derivatives, (n, p)."""
+    count = len(points.t)
+    slopes = np.zeros((points.y.size, theta.size))
+    for run, (t, part) in enumerate(zip(points.t, points.parts, strict=True)):
+        by = law.jacobian(t, np.append(theta[run], theta[count:]))
+        slopes[part, run], slopes[part, count:] = by[:, 0], by[:, 1:]
+    return slopes
+
+
+def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Points, params: Params) -> JointFit:
+    count, shared = len(runs), len(law.parameters) - 1
+    own = [damping.fits[law.name] for _, _, damping in runs]
+    length = float(np.sqrt(np.mean(points.y**2))) or 1.0
+    theta = _scaled(law, _start([fit.joint for fit in own]), length, count)
+    y, u = points.y / length, points.u / length
+    end = least_squares.minimise(
+        lambda at: (_curve(law, points, at) - y) / u,
+        theta,
+        lambda at: _slopes(law, points, at) / u[:, None],
+        least_squares.Params(precision=PRECISION),
+    )
+    values = _scaled(law, end.values, 1.0 / length, count)
+    with np.errstate(all="ignore"):
+        covariance = covariance_or_infinite((_slopes(law, points, values) / points.u[:, None]).T)
+    chi2 = end.cost
+    size = sum(float(t.size) / damping.scatter.correlation for t, (_, _, damping) in zip(points.t, runs, strict=True))
+    dof = max(size - values.size, 0.0)
+    separate = sum(
+        _chi2(fit.reduced_chi2, t.size - len(law.parameters)) / damping.scatter.correlation
+        for fit, t, (_, _, damping) in zip(own, points.t, runs, strict=True)
+    )
+    excess, saved = max(chi2 - separate, 0.0), float((count - 1) * shared)
+    deviation = np.sqrt(np.diag(covariance))
+    rejection: Rejection = ""
+    if dof >= 1.0 and chi2 > chi2_quantile(1.0 - params.rejection, dof):
+        rejection = "misfit"
+    elif saved and excess > chi2_quantile(1.0 - params.rejection, saved):
+        rejection = "differ"
+    elif np.any(values < -NEGATIVE * deviation):
+        rejection = "negative"
+    elif not end.converged:
+        rejection = "not converged"
+    amplitudes = tuple(
+        Estimate(float(a), float(u), "m") for a, u in zip(values[:count], deviation[:count], strict=True)
+    )
+    joint = Joint(law.parameters[1:], values[count:], covariance[count:, count:], law.units[1:])
+    bic = chi2 + values.size * math.log(max(size, 2.0))
+    return JointFit(law, joint, amplitudes, chi2, dof, bic, excess, saved, rejection)
+
+
+def _start(joints: Sequence[Joint]) -> F8:
+    """The runs' own amplitudes, and their coefficients' mean with weights by variance."""
+    amplitudes = [joint.values[0] for joint in joints]
+    coefficients = np.array([joint.values[1:] for joint in joints])
+    weights = 1.0 / np.maximum([np.diag(joint.covariance)[1:] for joint in joints], 1e-300)
+    return np.concatenate([amplitudes, (coefficients * weights).sum(axis=0) / weights.sum(axis=0)])
+
+
+def _scaled(law: Law, theta: F8, length_m: float, count: int) -> F8:
+    """All parameters with lengths divided by ``length_m``."""
+    coefficients = law.rescaled(np.concatenate([[1.0], theta[count:]]), length_m)[1:]
+    return np.concatenate([theta[:count] / length_m, coefficients])
+
+
+def _chi2(reduced: float, free: int) -> float:
+    """Chi-square of a run's own fit; nothing where it passes through its points."""
+    return reduced * free if free > 0 else 0.0
+
+
+def _message(names: tuple[str, ...], fits: Mapping[str, JointFit], selected: str, admissible: tuple[str, ...]) -> str:
+    together, best = ", ".join(names), fits[selected]
+    if admissible:
+        values = ", ".join(f"{name} = {value}" for name, value in best.coefficients.estimates().items()) or "none"
+        rest = f"; {', '.join(admissible[1:])} would do as well" if len(admissible) > 1 else ""
+        return f"One damping law holds across {together}: {best.law.words} ({values}){rest}."
+    alike = [fit.law.words for fit in fits.values() if fit.rejection == "differ"]
+    if alike:
+        return f"No common coefficients: {together} each follow {alike[0]}, with coefficients of their own."
+    return f"No one damping law holds across {together}; the least bad is {best.law.words}."

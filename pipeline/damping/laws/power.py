@@ -1,0 +1,120 @@
+"""A free power of the amplitude: the honest alternative where the drag coefficient varies with amplitude."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.damping.laws.drag import DRAGS, guesses
+from pipeline.track import F8
+
+__all__ = ["Power"]
+
+(_MIXED,) = (law for law in DRAGS if law.name == "linear+quadratic")
+
+
+class Power:
+    """Drag that goes as a power of the amplitude: :math:`dA/dt = -c A^n`.
+
+    Notes
+    -----
+    With :math:`m = 1 - n`, the starting rate :math:`k = c A_0^{-m}` and :math:`x = k t`,
+    :math:`A = A_0 (1 - m x)^{1/m}`, which goes over into :math:`A_0 e^{-x}`. n = 0 is friction, which stops the motion,
+    1 linear and 2 quadratic drag; vortices shed by an edge give 5/3.
+    """
+
+    name = "power"
+    words = "a free power of the amplitude"
+    parameters: tuple[str, ...] = ("A0", "c", "n")
+    units: tuple[str, ...] = ("m", "m^(1-n)/s", "")
+    cases: tuple[str, ...] = ("none", "linear", "quadratic", "friction")
+
+    def amplitude(self, t: F8, theta: F8) -> F8:
+        """Return the closed form; 0 after the motion has stopped, infinite beyond a growing one's pole."""
+        return _solution(np.asarray(t, np.float64), theta).amplitude
+
+    def jacobian(self, t: F8, theta: F8) -> F8:
+        """Return the derivatives by A0, c and n."""
+        return self.both(t, theta)[1]
+
+    def both(self, t: F8, theta: F8) -> tuple[F8, F8]:
+        """Return amplitude and jacobian, which share most of their work."""
+        at = np.asarray(t, np.float64)
+        start, c, n = theta.tolist()
+        found = _solution(at, theta)
+        amplitude, x = found.amplitude, found.x
+        jacobian = np.empty((at.size, 3))
+        with np.errstate(all="ignore"):
+            # d ln A / dx = -1/(1 - m x); x depends on A0, c and n through c t A0^(n-1).
+            fall = -amplitude / found.rest
+            jacobian[:, 0] = (amplitude - (1.0 - n) * fall * x) / start
+            jacobian[:, 1] = fall * at * np.float64(start) ** (n - 1.0)
+            jacobian[:, 2] = (fall * np.log(np.float64(start)) + amplitude * x * _logarithm_slope(found)) * x
+        if found.rest.min() <= 0.0:
+            jacobian[found.rest <= 0.0] = 0.0 if n < 1.0 and c > 0 else np.inf
+        return amplitude, jacobian
+
+    def rate(self, amplitude: F8, theta: F8) -> F8:
+        """Return c A^n; nothing where there is no amplitude left."""
+        left = amplitude > 0.0
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(np.where(left, theta[1] * np.where(left, amplitude, 1.0) ** theta[2], 0.0))
+
+    def guess(self, t: F8, amplitude: F8) -> F8:
+        """Return the power that linear and quadratic drag together have in the middle of the points."""
+        level = max(float(amplitude.mean()), 1e-3 * float(amplitude.max()), 1e-300)
+        start, _, gamma, beta = guesses(t, amplitude, (_MIXED,))[0].tolist()
+        rate = gamma + beta * level
+        if not rate > 0.0:
+            return np.array([start, 0.0, 1.0])
+        n = min(max((gamma + 2.0 * beta * level) / rate, 0.0), 3.0)
+        return np.array([start, rate * level ** (1.0 - n), n])
+
+    def rescaled(self, theta: F8, length_m: float) -> F8:
+        """Return theta with lengths divided by ``length_m``: c carries their power 1 - n."""
+        start, c, n = theta.tolist()
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.array([start / length_m, c * np.float64(length_m) ** (n - 1.0), n])
+
+
+class _Solution(NamedTuple):
+    """A, x = k t, z = m x, 1 - z (zero at the end of the motion or at a pole) and ln(1 - z)."""
+
+    amplitude: F8
+    x: F8
+    z: F8
+    rest: F8
+    logarithm: F8
+
+
+def _solution(t: F8, theta: F8) -> _Solution:
+    start, c, n = theta.tolist()
+    with np.errstate(all="ignore"):
+        # Not a number where A0 is not positive, through which a fit may step.
+        x = (c * np.float64(start) ** (n - 1.0)) * t if start > 0.0 else np.full(t.size, np.nan)
+        z = (1.0 - n) * x
+        rest = 1.0 - z
+        # Not a number beyond the end, which is put right below.
+        logarithm = np.log1p(-z)
+        exponent = logarithm / (1.0 - n) if abs(1.0 - n) > 1e-300 else -x
+        near = np.abs(z) < 1e-8
+        if near.any():
+            exponent = np.where(near, -x * (1.0 + 0.5 * z), exponent)
+        amplitude = start * np.exp(exponent)
+    over = rest <= 0.0
+    if over.any():
+        amplitude[over] = 0.0 if n < 1.0 and c > 0 else np.inf
+    return _Solution(amplitude, x, z, rest, logarithm)
+
+
+def _logarithm_slope(found: _Solution) -> F8:
+    """Derivative of -ln(1 - z)/z, a series where it would cancel."""
+    z = found.z
+    with np.errstate(all="ignore"):
+        closed = (found.logarithm + z / found.rest) / (z * z)
+    small = np.abs(z) < 1e-2
+    if small.any():
+        part = z[small]
+        closed[small] = 0.5 + part * (2 / 3 + part * (3 / 4 + part * (4 / 5 + part * (5 / 6 + part * (6 / 7)))))
+    return closed

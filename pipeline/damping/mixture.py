@@ -1,0 +1,95 @@
+"""Mixed drag: whether a record demands two kinds of drag or friction at once, though no law may fit it to the noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pipeline.damping.laws import Drag
+from pipeline.damping.select import NEGATIVE, Damping, LawFit
+
+__all__ = ["MixedDrag", "Params", "find_mixed"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`find_mixed`.
+
+    Parameters
+    ----------
+    evidence : float
+        By how much the BIC of each law of one term must exceed that of the mixture; 10 is "very strong" [1]_.
+    rival : float
+        The same for each other mixture, none of its terms negative, unless it only adds a term; 6 is "strong".
+
+    References
+    ----------
+    .. [1] R. E. Kass, A. E. Raftery, "Bayes factors", J. Am. Stat. Assoc. 90 (1995) 773,
+       doi:10.1080/01621459.1995.10476572.
+    """
+
+    evidence: float = 10.0
+    rival: float = 6.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MixedDrag:
+    """Terms of :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)` that a record demands together.
+
+    Parameters
+    ----------
+    fit : LawFit
+        Of the law of these terms; its uncertainties hold its misfit, if it has any.
+    against : mapping of str to float
+        By how much the BIC of each law of one term is higher.
+    """
+
+    fit: LawFit
+    against: Mapping[str, float]
+
+
+def find_mixed(damping: Damping, params: Params | None = None) -> MixedDrag | None:
+    """Return the mixture that the amplitudes demand, None where one term may do or it is not clear which two.
+
+    Parameters
+    ----------
+    damping : Damping
+    params : Params, optional
+
+    Notes
+    -----
+    All coefficients must exceed zero by three standard uncertainties. Chi-square may reject the mixture, as it does
+    where the coefficients themselves change with the amplitude: then what it leaves takes the noise's place, in the
+    uncertainties and in every BIC (:attr:`pipeline.damping.select.LawFit.widening`). So a mixture that fits badly
+    needs laws
+    of one term that fit worse by far.
+    """
+    params = params or Params()
+    sums = [fit for fit in damping.fits.values() if isinstance(fit.law, Drag) and fit.dof > 0]
+    alone = [fit for fit in sums if len(fit.law.parameters) == 2]
+    mixtures = [fit for fit in sums if len(fit.law.parameters) > 2 and _positive(fit)]
+    if not mixtures or not alone:
+        return None
+    best = min(mixtures, key=lambda fit: fit.bic)
+    against = {fit.name: _excess(fit, best) for fit in alone}
+    rivals = [fit for fit in mixtures if not set(best.law.parameters) <= set(fit.law.parameters)]
+    if min(against.values()) <= params.evidence or any(_excess(fit, best) <= params.rival for fit in rivals):
+        return None
+    return MixedDrag(best, against)
+
+
+def _positive(fit: LawFit) -> bool:
+    terms = [fit.joint[name] for name in fit.law.parameters[1:]]
+    return fit.converged and all(term.value > NEGATIVE * term.u for term in terms)
+
+
+def _chi2(fit: LawFit) -> float:
+    """Chi-square on as many points as are independent."""
+    return fit.reduced_chi2 * fit.dof
+
+
+def _excess(fit: LawFit, best: LawFit) -> float:
+    """By how much the BIC of a law is higher, noise being what the best one leaves."""
+    fewer = len(best.law.parameters) - len(fit.law.parameters)
+    return (_chi2(fit) - _chi2(best)) / best.widening - fewer * math.log(max(best.dof, 2.0))

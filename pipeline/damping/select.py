@@ -1,0 +1,370 @@
+"""Damping: fit every law to the amplitudes, reject those the record contradicts, name those it admits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from pipeline.damping.fitted_law import LawFit, Rejection, mean_squared_rate
+from pipeline.damping.law_fit import Fitted, fit_laws
+from pipeline.damping.laws import LAWS, Law
+from pipeline.errors import AnalysisError
+from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
+from pipeline.oscillation.condition import MAD_TO_SIGMA
+from pipeline.oscillation.demodulate import Demodulated
+from pipeline.track import F8
+
+__all__ = ["Damping", "LawFit", "Params", "fit_damping"]
+
+TINY = 1e-100  # stands for zero where something is divided by an uncertainty
+BARE_MENTION = 2.0  # difference of BIC below which evidence is none
+ALIKE = 0.1  # share of the damping that two laws may differ by and still say the same
+SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # of the first amplitude, to which at most and at least it is compared
+NEGATIVE = 3.0  # standard uncertainties below zero at which a coefficient speaks against its law
+LOOSEST_POWER = 3.0  # standard uncertainty of a power that still says anything: known ones lie between 0 and 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`fit_damping`.
+
+    Parameters
+    ----------
+    rejection : float
+        Probability at which chi-square rejects a law that is true.
+    evidence : float
+        A law whose BIC exceeds the best by more than this is not admissible; 6 is "strong" [1]_.
+    laws : tuple of str
+        Names of the laws to try, from :data:`pipeline.damping.laws.LAWS`.
+    otherwise : tuple of str
+        Names of the laws to try where the record rejects all of ``laws``: where few are tried to save time, a wrong
+        one must not be stated.
+
+    References
+    ----------
+    .. [1] R. E. Kass, A. E. Raftery, "Bayes factors", J. Am. Stat. Assoc. 90 (1995) 773,
+       doi:10.1080/01621459.1995.10476572.
+    """
+
+    rejection: float = 1e-3
+    evidence: float = 6.0
+    laws: tuple[str, ...] = tuple(LAWS)
+    otherwise: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Damping:
+    """What the amplitudes say about damping.
+
+    Parameters
+    ----------
+    t0 : float
+        Time of the first sample used, s; laws count from here.
+    fits : mapping of str to LawFit
+        Every law tried that could be fitted.
+    selected : str
+        The admissible law of lowest BIC; of all laws where every one is rejected. Where BIC differs by less than 2
+        ("not worth more than a bare mention") the law with fewer parameters, then the one listed first.
+    admissible : tuple of str
+        Laws the record does not contradict and whose evidence is within reach of the best, best first; without those
+        that repeat a simpler one (:func:`choose`).
+    scatter : Scatter
+        Of the amplitudes about a smooth curve.
+    unfitted : mapping of str to str
+        Why a law asked for has no fit.
+    """
+
+    t0: float
+    fits: Mapping[str, LawFit]
+    selected: str
+    admissible: tuple[str, ...]
+    scatter: Scatter
+    unfitted: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def best(self) -> LawFit:
+        """The selected law's fit."""
+        return self.fits[self.selected]
+
+    @property
+    def considered(self) -> Mapping[str, LawFit]:
+        """The fits that an average over laws may draw on: the selected one and the admissible ones."""
+        return {name: self.fits[name] for name in dict.fromkeys((self.selected, *self.admissible))}
+
+    @property
+    def settled(self) -> bool:
+        """Whether the selected law is the only admissible one, so that its coefficients mean something."""
+        return self.admissible == (self.selected,)
+
+    def squared_rate(self, t: F8) -> float:
+        """Return the mean of :math:`(\\dot A/A)^2` over times t (n,), s, weighted by :math:`A^2`, 1/s^2.
+
+        Added to the square of the angular frequency it gives that of the undamped oscillation: exactly for linear
+        drag, to second order in the damping for the others.
+        """
+        return mean_squared_rate(self.best, self.best.amplitude(t - self.t0))
+
+    def averaged(self, values: Mapping[str, Estimate]) -> Estimate:
+        """Return the selected law's value of a quantity, its uncertainty widened by what admissible laws differ.
+
+        Parameters
+        ----------
+        values : mapping of law name to Estimate
+            Of the laws :attr:`considered` at least.
+
+        Notes
+        -----
+        :math:`u^2 = u_s^2 + \\sum_i w_i (x_i - x_s)^2` with weights :math:`w_i \\propto e^{-\\Delta\\mathrm{BIC}_i/2}`.
+        """
+        chosen = values[self.selected]
+        names = self.admissible or (self.selected,)
+        weights = np.exp([-0.5 * (self.fits[name].bic - self.best.bic) for name in names])
+        spread = np.array([(values[name].value - chosen.value) ** 2 for name in names])
+        variance = chosen.u**2 + float(np.sum(weights * spread) / np.sum(weights))
+        return Estimate(chosen.value, math.sqrt(variance), chosen.unit)
+
+
+def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = None) -> Damping:
+    """Fit the damping laws to the windows' amplitudes.
+
+    Parameters
+    ----------
+    demodulated : Demodulated
+    t0 : float
+        Time of the first sample used, s.
+    params : Params, optional
+
+    Returns
+    -------
+    Damping
+
+    Raises
+    ------
+    AnalysisError
+        If no law can be fitted at all.
+
+    Notes
+    -----
+    Real amplitudes scatter more than their noise says (beats with a sideways mode, clusters of false echoes).
+    The excess is measured against a smooth curve that no law restricts, so that a wrong law cannot hide its misfit
+    in it; where friction stops the motion at a corner that no smooth curve follows, a law that leaves less than
+    half of it takes the curve's place. Points that are correlated count as fewer: chi-square, BIC and degrees of
+    freedom are divided and the covariance is multiplied by the correlation length. The covariance of a law that
+    chi-square rejects is by its own residuals: times its reduced chi-square, and with their correlation length.
+
+    Coefficients of drag are not negative, yet their estimates may be by chance, and unbounded estimates are unbiased
+    with intervals that hold. So fits are unbounded; a law with a coefficient below zero by more than three standard
+    uncertainties is rejected; and the BIC is that of the law's best without negative coefficients, which lies in one
+    of its special cases.
+    """
+    params = params or Params()
+    t, amplitude = demodulated.t - t0, demodulated.amplitude
+    noise = np.sqrt(demodulated.covariance[:, 0, 0])
+    if t.size < 3:
+        # One or two points show no law: what the amplitude lost since the start is then its uncertainty.
+        noise = np.hypot(noise, amplitude * demodulated.decay * t)
+    # Perfect data still carry rounding: without a floor chi-square would divide by nothing.
+    noise = np.maximum(noise, 1e-12 * float(np.max(amplitude)) + TINY)
+    spread = scatter(t, amplitude, noise)
+    unfitted: dict[str, str] = {}
+    laws = _affordable(params.laws, int(np.count_nonzero(spread.kept)), unfitted)
+    fits = _fit_all(laws, t, amplitude, spread, params, unfitted)
+    if fits and (closer := _corner(fits, t, amplitude, noise, spread)) is not None:
+        spread = closer
+        fits = _fit_all(laws, t, amplitude, spread, params, unfitted)
+    if not fits:
+        raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
+    selected, admissible = choose(fits, params, lambda name: fits[name].amplitude(np.array([0.0, float(t[-1])])))
+    if not admissible and params.otherwise:
+        return fit_damping(demodulated, t0, replace(params, laws=params.otherwise, otherwise=()))
+    return Damping(t0, fits, selected, admissible, spread, unfitted)
+
+
+def _affordable(names: Sequence[str], points: int, unfitted: dict[str, str]) -> list[Law]:
+    laws = []
+    for name in names:
+        needed = len(LAWS[name].parameters)
+        if points >= needed:
+            laws.append(LAWS[name])
+        else:
+            unfitted[name] = f"{needed} parameters need as many windows, and there are {points}"
+    return laws
+
+
+def _fit_all(
+    laws: Sequence[Law], t: F8, amplitude: F8, spread: Scatter, params: Params, unfitted: dict[str, str]
+) -> dict[str, LawFit]:
+    """Fit the laws; those whose numbers ran out of range, which no law with a chance does, are listed as unfitted."""
+    if not laws:
+        return {}
+    t, y, u = t[spread.kept], amplitude[spread.kept], spread.u[spread.kept]
+    found = {law.name: fit for law, fit in zip(laws, fit_laws(laws, t, y, u), strict=True)}
+    sound = {}
+    for law in laws:
+        if (why := _astray(law, found[law.name], t, y)) is None:
+            sound[law.name] = found[law.name]
+            unfitted.pop(law.name, None)
+        else:
+            unfitted[law.name] = why
+    least = least_chi2(sound)
+    weighed = {}
+    for name, fit in sound.items():
+        weighed[name] = weigh(LAWS[name], fit, least[name], y.size, spread.correlation, params)
+        if weighed[name].rejection == "misfit":
+            weighed[name] = _widened(weighed[name], (y - weighed[name].amplitude(t)) / u, spread.correlation)
+    return weighed
+
+
+def _widened(fit: LawFit, residual: F8, correlation: float) -> LawFit:
+    """Return a law that does not fit with uncertainties by its own residuals: their size and how they hang together."""
+    # A law that runs away between its fit's points and these has no residuals to go by.
+    own = correlation_length(residual) if np.isfinite(residual).all() else correlation
+    widening = fit.reduced_chi2 * max(own / correlation, 1.0)
+    return replace(fit, joint=replace(fit.joint, covariance=widening * fit.joint.covariance), widening=widening)
+
+
+def _astray(law: Law, fit: Fitted, t: F8, y: F8) -> str | None:
+    """Why a fit's numbers are of no use."""
+    top = float(np.max(y))
+    if not 1e-3 * top <= fit.theta[0] <= 1e3 * top or not math.isfinite(fit.chi2):
+        return "its numbers ran out of range"
+    if not np.isfinite(fit.covariance).all():
+        return "the windows do not determine its parameters"
+    if law.units[-1] == "" and fit.covariance[-1, -1] > LOOSEST_POWER**2:
+        return "the windows do not determine its power"
+    if fit.theta.min() >= 0.0:
+        return None
+    with np.errstate(all="ignore"):
+        growth = -law.rate(y, fit.theta) * (t[-1] - t[0])
+    # A growth that outruns the record by e^20 is a fit gone astray.
+    return "its numbers ran out of range" if np.any(growth > 20.0 * top) else None
+
+
+def least_chi2(fits: Mapping[str, Fitted]) -> dict[str, float]:
+    """Each law's chi-square at its best without negative coefficients, which is a special case's or its own."""
+    least: dict[str, float] = {}
+    for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
+        fit = fits[name]
+        least[name] = fit.chi2
+        if fit.theta.min() < 0.0:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                below = np.minimum(fit.theta, 0.0) ** 2 / np.diag(fit.covariance)
+            cases = [least[case] for case in LAWS[name].cases if case in least]
+            # Without its special cases at hand: what the worst coefficient costs to be zero.
+            least[name] = min(cases) if cases else fit.chi2 + float(np.max(below))
+    return least
+
+
+def weigh(law: Law, fit: Fitted, least_chi2: float, points: int, correlation: float, params: Params) -> LawFit:
+    count = len(law.parameters)
+    covariance = correlation * fit.covariance
+    free = points - count
+    dof = max(free / correlation, 1.0) if free > 0 else 0.0
+    reduced = fit.chi2 / free if free > 0 else math.nan
+    bic = least_chi2 / correlation + count * math.log(max(points / correlation, 2.0))
+    rejection: Rejection = ""
+    if dof > 0 and reduced * dof > chi2_quantile(1.0 - params.rejection, dof):
+        rejection = "misfit"
+    elif np.any(fit.theta < -NEGATIVE * np.sqrt(np.diag(covariance))):
+        rejection = "negative"
+    elif not fit.converged:
+        rejection = "not converged"
+    joint = Joint(law.parameters, fit.theta, covariance, law.units)
+    return LawFit(law, joint, reduced, dof, bic, fit.converged, rejection, fit.tried)
+
+
+def _corner(fits: Mapping[str, LawFit], t: F8, amplitude: F8, noise: F8, spread: Scatter) -> Scatter | None:
+    """The scatter about a law that follows the points much closer than the smooth curve does, if there is one."""
+    fit = min(fits.values(), key=lambda fit: fit.reduced_chi2)
+    if spread.excess == 0.0 or not fit.reduced_chi2 < 0.25:
+        return None
+    residual = amplitude - fit.amplitude(t)
+    typical = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
+    excess = math.sqrt(max(typical**2 - float(np.median(noise)) ** 2, 0.0))
+    excess = excess if typical > 1.3 * float(np.median(noise)) else 0.0
+    u = np.hypot(noise, excess)
+    kept = np.abs(residual) <= 5.0 * u
+    if np.count_nonzero(kept) < 0.8 * kept.size:
+        return None
+    return Scatter(u, excess, kept, correlation_length(residual[kept] / u[kept]))
+
+
+class Weighed(Protocol):
+    """A fit that takes part in the choice among laws: of one run, or of several together."""
+
+    @property
+    def law(self) -> Law:
+        """Which law."""
+        ...
+
+    @property
+    def bic(self) -> float:
+        """Bayesian information criterion."""
+        ...
+
+    @property
+    def rejection(self) -> str:
+        """Why the law is rejected, empty where it is not."""
+        ...
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the points contradict the law."""
+        ...
+
+    @property
+    def reduced_chi2(self) -> float:
+        """Chi-square by degrees of freedom."""
+        ...
+
+    def rates(self, amplitude: F8) -> tuple[F8, F8]:
+        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
+        ...
+
+
+def choose(fits: Mapping[str, Weighed], params: Params, span: Callable[[str], F8]) -> tuple[str, tuple[str, ...]]:
+    """Return the selected law and the admissible ones, best first; of rejected laws the one that fits best.
+
+    Parameters
+    ----------
+    fits : mapping of str to fit
+    params : Params
+    span : callable
+        Gives the greatest and the least amplitude, m, that a law shows over the points.
+
+    Notes
+    -----
+    A law that holds the selected one as a special case is no other answer where its further coefficient gains it
+    nothing (its BIC is higher by more than 2) and where the damping it tells is, with twice its uncertainty, within a
+    tenth of the simpler law's at both ends of the span, which is taken to a third of the greatest amplitude where the
+    record ends before. It is left out. Where the record cannot exclude a tenth, it stays.
+    """
+    allowed = [name for name in fits if not fits[name].rejected]
+    count = {name: len(fit.law.parameters) for name, fit in fits.items()}
+    if not allowed:
+        # A law of damping that does not fit is better than one that fits by driving the motion, if any damps.
+        damping = [name for name, fit in fits.items() if fit.rejection != "negative" and count[name] > 1]
+        least = min(fits.values(), key=lambda fit: fit.bic).bic
+        tolerable = [name for name in damping if fits[name].bic == least]
+        return (tolerable or [min(fits, key=lambda name: (fits[name].reduced_chi2, count[name]))])[0], ()
+    least = min(fits[name].bic for name in allowed)
+    ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
+    selected = min(ties, key=lambda name: (count[name], list(fits).index(name)))
+    best = fits[selected]
+    order = sorted(allowed, key=lambda name: (name != selected, fits[name].bic))
+    reach = [name for name in order if fits[name].bic - least <= params.evidence]
+    idle = {n for n in reach if selected in fits[n].law.cases and fits[n].bic - best.bic > BARE_MENTION}
+    if idle:
+        most, least_m = span(selected)
+        amplitudes = most * np.array([1.0, min(max(least_m / most, SMALLEST_SHARE), LARGEST_SHARE)])
+        alone, _ = best.rates(amplitudes)
+        for name in sorted(idle):
+            rate, u = fits[name].rates(amplitudes)
+            if not np.all(np.abs(rate - alone) + 2.0 * u <= ALIKE * alone):
+                idle.remove(name)
+    return selected, tuple(name for name in reach if name not in idle)

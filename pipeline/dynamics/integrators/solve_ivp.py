@@ -1,0 +1,164 @@
+"""scipy's solve_ivp behind the interface of the other integrators, to compare against."""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import math
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipeline.dynamics.equation import Equation, Problem
+from pipeline.dynamics.integrator import Trajectory, integrate, worst_error
+from pipeline.dynamics.integrators.exact import rounding_error
+from pipeline.errors import DynamicsError
+from pipeline.track import F8
+
+__all__ = ["DOP853", "LSODA", "SolveIvp"]
+
+MOST_CALLS = 1_000_000  # of the right side: many seconds
+LEAST_RTOL = 3e-14  # scipy raises anything less to a hundred roundings
+
+
+@dataclass(frozen=True, slots=True)
+class SolveIvp:
+    """One method of solve_ivp.
+
+    Parameters
+    ----------
+    name : str
+    words : str
+    method : str
+        As solve_ivp calls it.
+    grows : float
+        Error after a radian over the local tolerance ``rtol``, as measured on the reference cases.
+    tolerance : float
+        Error over the amplitude at the end of the run that is aimed at.
+    """
+
+    name: str
+    words: str
+    method: str
+    grows: float
+    tolerance: float = 1e-6
+    order: int = 0
+
+    def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - every integrator has the same signature
+        """Return why not, where scipy is not installed: nothing else here needs it."""
+        if importlib.util.find_spec("scipy") is None:
+            return "scipy is not installed; install it (pip install scipy), or take strang, taylor or auto"
+        return ""
+
+    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
+        """Solve a problem, an ensemble member by member; see :class:`Integrator`."""
+        return integrate(self, problem, step_s, steps, every, self._march)
+
+    def stable_step(self, problem: Problem) -> float:  # noqa: ARG002
+        """Return inf: it chooses its own step."""
+        return math.inf
+
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return what the local tolerance grows to."""
+
+        def of(one: Problem) -> float:
+            radians = 1.0 + one.equation.angular_frequency_per_s * seconds
+            return float(rounding_error(one, seconds) + self.grows * radians * self.rtol(one, seconds))
+
+        return worst_error(problem, step_s, seconds, of)
+
+    def rtol(self, problem: Problem, seconds: float) -> float:
+        """Return the local tolerance that leads to the one at the end."""
+        radians = 1.0 + float(np.max(problem.equation.angular_frequency_per_s)) * seconds
+        return float(min(max(self.tolerance / (self.grows * radians), LEAST_RTOL), 1e-2))
+
+    def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
+        rtol = self.rtol(problem, float(t[-1]))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of a failure that solve_ivp reports as well
+            try:
+                solved = [self._solve(one, t, rtol) for one in problem.members()]
+            except (ValueError, np.linalg.LinAlgError) as error:  # scipy's, where its numbers end
+                raise DynamicsError(f"{self.name} gave up: {error}; take strang, taylor or auto") from error
+        if not problem.is_ensemble:
+            return solved[0][0], solved[0][1]
+        return np.stack([y for y, _ in solved], axis=1), np.stack([v for _, v in solved], axis=1)
+
+    def _solve(self, problem: Problem, t: F8, rtol: float) -> F8:
+        """Return displacement and velocity (2, n); with friction from turning point to turning point."""
+        from scipy.integrate import solve_ivp
+
+        eq, calls = problem.equation, itertools.count()
+        start = np.array([problem.displacement_m, problem.velocity_m_per_s])
+        size = max(problem.amplitude_m(), np.finfo(np.float64).tiny)
+        options: dict[str, Any] = {
+            "method": self.method,
+            "rtol": rtol,
+            "atol": rtol * np.array([size, size * eq.angular_frequency_per_s]),
+        }
+        if not eq.friction_m_per_s2:
+            done = solve_ivp(self._right_side(eq, 0, calls), (0.0, float(t[-1])), start, t_eval=t, **options)
+            return np.asarray(self._whole(done).y)
+        states = np.empty((2, t.size))
+        row, now = 0, 0.0
+        while row < t.size:
+            way = eq.direction(*start)
+            if way == 0:
+                states[:, row:] = start[:, None]
+                break
+            done = self._whole(
+                solve_ivp(
+                    self._right_side(eq, way, calls),
+                    (now, float(t[-1])),
+                    start,
+                    events=_turning(way),
+                    dense_output=True,
+                    **options,
+                )
+            )
+            turned = done.status == 1
+            end = float(done.t_events[0][0]) if turned else float(t[-1])
+            last = int(np.searchsorted(t, end, side="right"))
+            if last > row:
+                states[:, row:last] = done.sol(t[row:last])
+            row, now = last, end
+            start = np.array([done.sol(end)[0], 0.0])
+            if not turned:
+                break
+        return states
+
+    def _right_side(
+        self, eq: Equation, way: int, calls: itertools.count[int]
+    ) -> Callable[[float, F8], tuple[float, float]]:
+        stiffness, viscous, drag = eq.angular_frequency_per_s**2, 2.0 * eq.gamma_per_s, eq.drag_per_m
+        friction, cubic = way * eq.friction_m_per_s2, eq.cubic_per_m2_s2
+
+        def right_side(t: float, state: F8) -> tuple[float, float]:
+            if next(calls) > MOST_CALLS:
+                raise DynamicsError(f"{self.name} gave up at t = {t:g} s: too stiff or too long; take strang or auto")
+            y, v = float(state[0]), float(state[1])
+            return v, -(stiffness + cubic * y * y) * y - (viscous + drag * abs(v)) * v - friction
+
+        return right_side
+
+    def _whole(self, done: Any) -> Any:
+        if done.status < 0:
+            raise DynamicsError(f"{self.name} gave up: {done.message}; take strang, taylor or auto")
+        return done
+
+
+def _turning(way: int) -> Callable[[float, F8], float]:
+    def turning(t: float, state: F8) -> float:  # noqa: ARG001
+        return float(state[1])
+
+    turning.terminal = True  # type: ignore[attr-defined]
+    turning.direction = -way  # type: ignore[attr-defined]
+    return turning
+
+
+LSODA = SolveIvp("lsoda", "scipy's solve_ivp, LSODA", "LSODA", 0.9)
+DOP853 = SolveIvp("dop853", "scipy's solve_ivp, DOP853", "DOP853", 10.0)

@@ -1,0 +1,212 @@
+"""Taylor series of any order with turning points located: the reference among the integrators.
+
+Between turning points the equation has no kink, and its solution's Taylor coefficients follow from each other. The
+step is as long as the last coefficients allow; where the velocity passes zero the series ends, the signs of drag and
+friction change, and a bob that the spring pulls with less than friction holds stays where it is.
+
+References
+----------
+.. [1] A. Jorba, M. Zou, Exp. Math. 14 (2005) 99, doi:10.1080/10586458.2005.10128904.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from operator import mul
+
+import numpy as np
+
+from pipeline.dynamics.equation import Equation, Problem
+from pipeline.dynamics.integrator import Trajectory, integrate, worst_error
+from pipeline.dynamics.integrators.exact import rounding_error
+from pipeline.errors import DynamicsError
+from pipeline.track import F8
+
+__all__ = ["TAYLOR", "Taylor"]
+
+LONGEST = 1.6  # radians a step; turning points lie twice as far apart
+MOST_STEPS = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Taylor:
+    """Adaptive Taylor series.
+
+    Parameters
+    ----------
+    tolerance : float
+        Error over the amplitude at the end of the run; the step passed to :meth:`run` is only the spacing of what is
+        kept.
+    """
+
+    tolerance: float = 1e-13
+    name: str = "taylor"
+    words: str = "adaptive Taylor series with turning points located"
+    order: int = 0
+
+    def refusal(self, problem: Problem) -> str:
+        """Return why not, where viscous drag is so stiff that the series would take a step for nothing."""
+        eq = problem.equation
+        if np.any(eq.gamma_per_s > 1e4 * eq.angular_frequency_per_s):
+            return "viscous drag this stiff needs a step far below the motion's own time; take strang, exact or auto"
+        return ""
+
+    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
+        """Solve a problem, an ensemble member by member; see :class:`Integrator`."""
+        return integrate(self, problem, step_s, steps, every, self._march)
+
+    def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - every integrator has the same signature
+        """Return inf: it chooses its own step."""
+        return math.inf
+
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return the tolerance, or the rounding where that is more; inf for more steps than it takes."""
+
+        def of(one: Problem) -> float:
+            one, _ = one.scaled()
+            eq = one.equation
+            # Where drag outweighs the spring its own time is what a step has.
+            stiff = math.sqrt(1.0 + eq.drag_per_m * one.amplitude_m())
+            if (_fastest(one) * stiff + eq.gamma_per_s) * seconds > LONGEST * MOST_STEPS:
+                return math.inf
+            return max(self.tolerance, rounding_error(one, seconds))
+
+        return worst_error(problem, step_s, seconds, of)
+
+    def order_of(self, problem: Problem, seconds: float) -> int:
+        """Return the number of terms of its series."""
+        return _order(_local(problem, seconds, self.tolerance))
+
+    def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        count = steps // every + 1
+        solved = [_solve(one, step_s * every, count, self.tolerance) for one in problem.members()]
+        if not problem.is_ensemble:
+            return solved[0][:, 0], solved[0][:, 1]
+        states = np.stack(solved, axis=1)
+        return states[..., 0], states[..., 1]
+
+
+TAYLOR = Taylor()
+
+
+def _fastest(problem: Problem) -> float:
+    """The frequency of a spring as hard as it gets, 1/s."""
+    eq = problem.equation
+    start = problem.amplitude_m()
+    return math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * start * start)
+
+
+def _local(problem: Problem, seconds: float, tolerance: float) -> float:
+    """What a step may err so that all of them keep the tolerance."""
+    return max(tolerance / (1.0 + _fastest(problem) * seconds), 1e-18)
+
+
+def _order(local: float) -> int:
+    return next(p for p in range(6, 60) if LONGEST**p / math.factorial(p) < local)
+
+
+def _solve(problem: Problem, apart: float, count: int, tolerance: float) -> F8:
+    """Return the states (count, 2) at multiples of a time apart."""
+    eq = problem.equation
+    states = np.empty((count, 2))
+    y, v = problem.displacement_m, problem.velocity_m_per_s
+    states[0] = y, v
+    fast, local = _fastest(problem), _local(problem, apart * count, tolerance)
+    order = _order(local)
+    kinked = eq.drag_per_m > 0 or eq.friction_m_per_s2 > 0
+    too_long = DynamicsError(
+        f"taylor needs more than {MOST_STEPS} steps for {apart * (count - 1):g} s; take a shorter run, strang or auto"
+    )
+    if fast * apart * (count - 1) > LONGEST * MOST_STEPS and not eq.has_friction:
+        raise too_long
+    row, since = 0, 0.0  # the last state kept, and the time since: a sum of short times rounds little
+    for _ in range(MOST_STEPS):
+        way = eq.direction(y, v) if kinked else 1
+        if way == 0:
+            states[row + 1 :] = y, 0.0
+            return states
+        unit = min(1.0 / fast, 0.5 / eq.gamma_per_s if eq.gamma_per_s else math.inf)
+        if eq.drag_per_m:
+            # The drag's own time shrinks with speed; where friction is strong it is the speed within the step.
+            unit = min(unit, 1.0 / (eq.drag_per_m * (abs(v) + abs(y) * fast)) if abs(v) + abs(y) else unit)
+        ys, vs = _series(eq, way, y, v, unit, order)
+        size = max(abs(y), abs(v) / fast, abs(ys[2]))
+        h = min(_step(ys, vs, size, local, unit * fast), LONGEST / (unit * fast))
+        end = _polynomial(vs, h)
+        turned = kinked and end * way <= 0.0
+        if turned:
+            h = _root(vs, h, way)
+        row, since = _keep(states, row, since, apart, h * unit, (ys, vs), unit)
+        y, v = _polynomial(ys, h), 0.0 if turned else _polynomial(vs, h)
+        if row == count - 1:
+            return states
+    raise too_long
+
+
+def _series(eq: Equation, way: int, y: float, v: float, unit: float, order: int) -> tuple[list[float], list[float]]:
+    """Return the coefficients of displacement and velocity in powers of t / unit."""
+    stiffness, viscous = eq.angular_frequency_per_s**2, 2.0 * eq.gamma_per_s
+    drag, cubic = way * eq.drag_per_m, eq.cubic_per_m2_s2
+    ys, vs, squares = [y], [v], [y * y]
+    force = way * eq.friction_m_per_s2
+    for k in range(order):
+        change = -stiffness * ys[k] - viscous * vs[k] - force
+        force = 0.0
+        if drag:
+            change -= drag * sum(map(mul, vs, reversed(vs)))
+        if cubic:
+            change -= cubic * sum(map(mul, squares, reversed(ys)))
+        ys.append(unit * vs[k] / (k + 1))
+        vs.append(unit * change / (k + 1))
+        if cubic:
+            squares.append(sum(map(mul, ys, reversed(ys))))
+    return ys, vs
+
+
+def _step(ys: list[float], vs: list[float], size: float, local: float, radians: float) -> float:
+    """Return the step, in units, at which the last terms fall to the local tolerance."""
+    longest = math.inf
+    for back in (1, 2):
+        # Displacement and velocity over the same size: velocity per radian of the unit.
+        last = max(abs(ys[-back]), abs(vs[-back]) * radians)
+        if last > 0.0:
+            longest = min(longest, (local * size / last) ** (1.0 / (len(ys) - back)))
+    return longest
+
+
+def _polynomial(coefficients: list[float], x: float) -> float:
+    value = 0.0
+    for c in reversed(coefficients):
+        value = value * x + c
+    return value
+
+
+def _root(vs: list[float], h: float, way: int) -> float:
+    """Return where in (0, h] the velocity leaves its sign."""
+    slopes = [k * c for k, c in enumerate(vs)][1:]
+    low, high = 0.0, h
+    x = h
+    for _ in range(60):
+        value = _polynomial(vs, x)
+        low, high = (x, high) if value * way > 0.0 else (low, x)
+        slope = _polynomial(slopes, x)
+        better = x - value / slope if slope else low
+        if not low < better < high:
+            better = 0.5 * (low + high)
+        if abs(better - x) <= 1e-16 * h:
+            return better
+        x = better
+    return x
+
+
+def _keep(
+    states: F8, row: int, since: float, apart: float, h: float, series: tuple[list[float], list[float]], unit: float
+) -> tuple[int, float]:
+    """Fill in the states that the step passes; return the last one's row and the time since."""
+    passed = min(math.floor((since + h) / apart), len(states) - 1 - row)
+    if passed:
+        times = (apart * np.arange(1, passed + 1) - since) / unit
+        powers = np.vander(times, len(series[0]), increasing=True)
+        states[row + 1 : row + 1 + passed] = powers @ np.array(series).T
+    return row + passed, since + h - passed * apart

@@ -1,0 +1,136 @@
+"""The free motion of a bob by its equation, at any times and for any of the laws of drag: what a fit compares."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipeline.dynamics import Equation, Problem, Trajectory
+from pipeline.dynamics.equation import Real
+from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.track import F8
+
+__all__ = ["COEFFICIENTS", "STATE", "FreeMotion"]
+
+STATE = ("rest", "displacement", "velocity", "angular_frequency")
+COEFFICIENTS = ("mu", "gamma", "beta")
+STEP = 0.08  # of the oscillation's angle: splitting and interpolation then err by less than 1e-4 of the amplitude
+REACH = 3.0  # factor by which a frequency may leave that of the start
+DIFFERENCE = 1e-6  # of each coefficient's scale, by which it is moved for a derivative
+LENGTHS = (1, 1, 1, 0, 1, 0, -1)  # powers of a length in each parameter
+KEPT = 8  # trajectories
+
+
+class FreeMotion:
+    """Displacements from the sensor against time, of parameters (o, y0, v0, omega0, mu, gamma, beta).
+
+    Parameters
+    ----------
+    t : (n,) float64, s
+        Since the instant at which displacement y0 and velocity v0 are taken.
+    omega : float
+        About the angular frequency, rad/s: it sets the integrator's step.
+    amplitude_m : float
+        About the first amplitude, m, for the size of differences.
+    step : float
+        Of the integrator, rad.
+
+    Notes
+    -----
+    Coefficients below zero, through which an unbounded fit must pass, have no equation of motion. There the motion is
+    continued from zero by its odd part, :math:`x(-c) = 2x(0) - x(c)`, which is smooth to first order: all that a
+    coefficient of a few standard uncertainties feels.
+    """
+
+    def __init__(self, t: F8, omega: float, amplitude_m: float, step: float = STEP) -> None:
+        self.t, self._omega = t, omega
+        self._spacing = step / omega
+        self._steps = max(2, math.ceil(float(np.max(t)) / self._spacing))
+        self._kept: dict[bytes, Trajectory] = {}
+        rate = 0.01 * omega
+        self.scale: F8 = np.array(
+            [amplitude_m, amplitude_m, amplitude_m * omega, omega, rate * amplitude_m, rate, rate / amplitude_m]
+        )
+
+    def position(self, theta: F8) -> F8:
+        """Return the distances (n,), m; NaN where the parameters are none of this motion."""
+        if not (np.all(np.isfinite(theta)) and self._omega / REACH < theta[3] < REACH * self._omega):
+            return np.full(self.t.size, np.nan)
+        found: F8 = theta[0] + self.trajectory(theta).at(self.t)
+        if np.any(theta[4:] < 0.0):
+            at_zero = np.concatenate([theta[:4], np.maximum(theta[4:], 0.0)])
+            found = 2.0 * (theta[0] + self.trajectory(at_zero).at(self.t)) - found
+        return found
+
+    def derivatives(self, theta: F8, slots: list[int]) -> F8:
+        """Return the derivatives (n, p) of the distances by some of the parameters.
+
+        All coefficients that are not zero must be among them.
+
+        Notes
+        -----
+        Only coefficients are moved to see what the motion does. The motion goes on alike from any of its states, in
+        any unit of length, and in any unit of time, which gives the rest:
+
+        .. math::
+            (\\dot y_0\\,\\partial_{y_0} + \\ddot y_0\\,\\partial_{v_0})\\,y &= \\dot y \\\\
+            (y_0\\,\\partial_{y_0} + v_0\\,\\partial_{v_0}
+            + \\mu\\,\\partial_\\mu - \\beta\\,\\partial_\\beta)\\,y &= y \\\\
+            (\\omega_0\\,\\partial_{\\omega_0} + v_0\\,\\partial_{v_0}
+            + \\mu\\,\\partial_\\mu + \\gamma\\,\\partial_\\gamma + \\beta\\,\\partial_\\beta)\\,y &= t\\,\\dot y
+        """
+        below = [slot for slot in range(len(STATE), theta.size) if theta[slot] < 0.0]
+        found = self._slopes(np.concatenate([theta[: len(STATE)], np.abs(theta[len(STATE) :])]), slots)
+        if below:
+            at_zero = self._slopes(np.concatenate([theta[: len(STATE)], np.maximum(theta[len(STATE) :], 0.0)]), slots)
+            # By what is below zero the continued motion has the slope of its odd counterpart.
+            found = np.where(np.isin(slots, below), found, 2.0 * at_zero - found)
+        return found
+
+    def _slopes(self, theta: F8, slots: list[int]) -> F8:
+        """Derivatives (n, p) where no coefficient is below zero."""
+        path = self.trajectory(theta)
+        y, speed = path.at(self.t), self._velocity(path)
+        columns: dict[int, F8] = {}
+        sized, timed = y.copy(), self.t * speed
+        for slot in (slot for slot in slots if slot >= len(STATE)):
+            moved = theta.copy()
+            moved[slot] += DIFFERENCE * self.scale[slot]
+            columns[slot] = (self.trajectory(moved).at(self.t) - y) / (moved[slot] - theta[slot])
+            sized -= LENGTHS[slot] * theta[slot] * columns[slot]
+            timed -= theta[slot] * columns[slot]
+        _, y0, v0, omega = theta[: len(STATE)].tolist()
+        a0 = self._acceleration(path.problem.equation, y0, v0)
+        determinant = y0 * a0 - v0 * v0
+        columns[0] = np.ones(self.t.size)
+        columns[1] = (a0 * sized - v0 * speed) / determinant
+        columns[2] = (y0 * speed - v0 * sized) / determinant
+        columns[3] = (timed - v0 * columns[2]) / omega
+        return np.stack([columns[slot] for slot in slots], axis=1)
+
+    def velocity(self, theta: F8) -> F8:
+        """Return the velocities (n,), m/s."""
+        return self._velocity(self.trajectory(theta))
+
+    def _velocity(self, path: Trajectory) -> F8:
+        pull = self._acceleration(path.problem.equation, path.y, path.v)
+        # A bob without velocity is taken to be held; one that only turns there is seen between two other states.
+        return Trajectory(path.problem, path.spacing_s, path.v, np.where(path.v == 0.0, 0.0, pull)).at(self.t)
+
+    @staticmethod
+    def _acceleration(equation: Equation, y: Real, v: Real) -> Real:
+        drag = (2.0 * equation.gamma_per_s + equation.drag_per_m * np.abs(v)) * v
+        return -equation.spring(y) - drag - equation.friction_m_per_s2 * np.sign(v)
+
+    def trajectory(self, theta: F8) -> Trajectory:
+        """Return the solution about rest; of coefficients below zero their amounts count."""
+        key = theta[1:].tobytes()
+        if key not in self._kept:
+            _, y, v, omega, mu, gamma, beta = (float(x) for x in theta)
+            equation = Equation.from_laws(omega, gamma_per_s=abs(gamma), beta_per_m_s=abs(beta), mu_m_per_s=abs(mu))
+            # A fit asks for residuals and then for derivatives at one point: the last few are kept.
+            while len(self._kept) >= KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[key] = STRANG.run(Problem(equation, y, v), self._spacing, self._steps)
+        return self._kept[key]

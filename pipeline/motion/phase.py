@@ -1,0 +1,259 @@
+"""Phase: the oscillation's frequency, and whether it depends on amplitude."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.damping.select import Damping, LawFit
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, solve_weighted
+from pipeline.oscillation.demodulate import Demodulated
+from pipeline.track import F8
+
+EXPONENTS = (2.0, 1.0, 0.5)  # a spring that is not linear; carried air that grows with the stroke, as vortices do
+
+__all__ = ["Params", "PhaseFit", "amplitude_integral", "backbone_unit", "fit_phase", "words_on_exponent", "wrapped"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`fit_phase`.
+
+    Parameters
+    ----------
+    evidence : float
+        The frequency counts as amplitude-dependent where that lowers the BIC by more than this; 10 is "very strong".
+    another_exponent : float
+        Another power of the amplitude than the square is taken where it lowers chi-square by more than this.
+    rejection : float
+        Probability at which chi-square finds residuals too large though they are noise.
+    """
+
+    evidence: float = 10.0
+    another_exponent: float = 10.0
+    rejection: float = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhaseFit:
+    """Total phase against time.
+
+    Parameters
+    ----------
+    t0 : float
+        Time of the first sample used, s.
+    angular_frequency : Estimate
+        Mean over the record: slope of a straight line through the phases, rad/s.
+    phase : Estimate
+        At ``t0``, wrapped into (-pi, pi], rad.
+    backbone : Estimate or None
+        :math:`\\kappa` of :math:`\\omega(A) = \\omega_0 + \\kappa A^p`, rad/(s m^p), where the record shows it.
+    reduced_chi2 : float
+        Of the model kept, against the noise of the windows' phases and their excess scatter.
+    correlation : float
+        Windows that count as one in the residuals of the straight line.
+    residual : (w,) float64, rad
+        Phases less the straight line.
+    coefficients : (2 or 3,) float64
+        Of 1, t - middle and the backbone's column.
+    middle : float
+        Weighted middle of the record, s.
+    damping : Damping
+        Whose amplitude the backbone integrates.
+    exponent : float
+        p: 2, the first correction of any smooth spring, unless 1 or 0.5 describes the phase far better.
+    """
+
+    t0: float
+    angular_frequency: Estimate
+    phase: Estimate
+    backbone: Estimate | None
+    reduced_chi2: float
+    correlation: float
+    residual: F8
+    coefficients: F8
+    middle: float
+    damping: Damping
+    exponent: float = 2.0
+
+    def total(self, t: F8) -> F8:
+        """Return the model's total phase at times t (n,), rad."""
+        level, slope, *bend = self.coefficients.tolist()
+        total = level + slope * (t - self.middle)
+        if bend:
+            total += bend[0] * _integral_at(t, self.middle, self.damping, self.exponent)
+        return np.asarray(total)
+
+    def rate(self, t: F8) -> F8:
+        """Return the model's angular frequency at times t (n,), rad/s."""
+        omega = np.full(t.size, self.coefficients[1])
+        if self.coefficients.size == 3:
+            omega += self.coefficients[2] * np.abs(self.damping.best.amplitude(t - self.t0)) ** self.exponent
+        return omega
+
+
+def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None = None) -> PhaseFit:
+    """Fit a constant frequency to the windows' phases and test it against one that depends on amplitude.
+
+    Parameters
+    ----------
+    demodulated : Demodulated
+    damping : Damping
+    params : Params, optional
+
+    Returns
+    -------
+    PhaseFit
+
+    Notes
+    -----
+    The frequency reported is the record's mean whether or not it varies. Where residuals of the straight line are
+    not white its uncertainty grows by the root of chi-square and of the correlation length, so that a bend of the
+    phase is covered by the interval and not hidden.
+
+    An ideal spring has one frequency. A spring that is not linear shifts it by the square of the amplitude; the air
+    that a disc carries grows with the stroke like its drag coefficient, and on real discs shifts it by about the root.
+    Where the square is shown, the powers 1 and 0.5 are tried in its place: as many parameters, so chi-square decides.
+    """
+    params = params or Params()
+    t, phase = demodulated.t, demodulated.phase
+    noise = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
+    if t.size < 2:
+        return _single(demodulated, damping, float(noise[0]))
+    turning = phase - demodulated.angular_frequency * (t - t[0])
+    spread = scatter(t, turning, noise)
+    kept = spread.kept
+    u = spread.u[kept]
+    middle = float(np.average(t[kept], weights=1.0 / u**2))
+    straight = solve_weighted(_design(t[kept], middle, damping, None), phase[kept], u)
+    bent, exponent = None, EXPONENTS[0]
+    if t[kept].size >= 8 and damping.selected != "none":
+        trial = solve_weighted(_design(t[kept], middle, damping, exponent), phase[kept], u)
+        gain = (straight.chi2 - trial.chi2) / spread.correlation - math.log(t[kept].size / spread.correlation)
+        if gain > params.evidence:
+            bent = trial
+            for other in EXPONENTS[1:]:
+                trial = solve_weighted(_design(t[kept], middle, damping, other), phase[kept], u)
+                least = params.another_exponent if exponent == EXPONENTS[0] else 0.0
+                if (bent.chi2 - trial.chi2) / spread.correlation > least:
+                    bent, exponent = trial, other
+    widened, length = _widening(straight, u, spread, params)
+    covariance = straight.covariance * widened
+    model = bent or straight
+    start = np.array([1.0, damping.t0 - middle])
+    at_start = float(
+        (_design(np.array([damping.t0]), middle, damping, None if bent is None else exponent) @ model.values)[0]
+    )
+    residual = phase - _design(t, middle, damping, None) @ straight.values
+    free = max(t[kept].size - model.values.size, 1)
+    return PhaseFit(
+        damping.t0,
+        Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),
+        Estimate(wrapped(at_start), math.sqrt(float(start @ covariance @ start)), "rad"),
+        None if bent is None else _backbone(bent, spread, free, exponent),
+        model.chi2 / free,
+        length,
+        residual,
+        model.values,
+        middle,
+        damping,
+        exponent,
+    )
+
+
+def _design(t: F8, middle: float, damping: Damping, exponent: float | None) -> F8:
+    columns = [np.ones(t.size), t - middle]
+    if exponent is not None:
+        columns.append(_integral_at(t, middle, damping, exponent))
+    return np.stack(columns, axis=1)
+
+
+def _integral_at(t: F8, middle: float, damping: Damping, exponent: float) -> F8:
+    end = max(2.0 * middle - damping.t0, float(np.max(t)), damping.t0 + 1e-9)
+    first = min(damping.t0, float(np.min(t)))
+    grid, area = amplitude_integral(damping.best, damping.t0, middle, first, end, exponent)
+    return np.asarray(np.interp(t - middle, grid, area))
+
+
+def amplitude_integral(
+    fit: LawFit, t0: float, middle: float, first: float, last: float, exponent: float
+) -> tuple[F8, F8]:
+    """Return times from ``middle`` (513,), s, and the integral of A^p from there, m^p s, by Simpson's rule.
+
+    Parameters
+    ----------
+    fit : LawFit
+        Gives the amplitude, counted from ``t0``.
+    t0, middle, first, last : float, s
+        The table runs from ``first`` to ``last``.
+    exponent : float
+        p.
+    """
+    grid = np.linspace(first - middle, last - middle, 513)
+    half = 0.5 * (grid[1:] + grid[:-1])
+    since = middle - t0
+    power = np.abs(fit.amplitude(grid + since)) ** exponent
+    inner = np.abs(fit.amplitude(half + since)) ** exponent
+    pieces = (grid[1] - grid[0]) / 6.0 * (power[:-1] + 4.0 * inner + power[1:])
+    integral = np.concatenate([[0.0], np.cumsum(pieces)])
+    return grid, np.asarray(integral - np.interp(0.0, grid, integral))
+
+
+def _widening(line: Line, u: F8, spread: Scatter, params: Params) -> tuple[float, float]:
+    """Factor on the straight line's covariance, and the correlation length behind it."""
+    free = line.residual.size - 2
+    if free < 1:
+        return 1.0, 1.0
+    length = max(correlation_length(line.residual / u), spread.correlation)
+    too_large = line.chi2 > chi2_quantile(1.0 - params.rejection, free)
+    return length * (line.chi2 / free if too_large else 1.0), length
+
+
+def backbone_unit(exponent: float) -> str:
+    """Return the unit of the backbone's coefficient.
+
+    Examples
+    --------
+    >>> backbone_unit(2.0), backbone_unit(1.0), backbone_unit(0.5)
+    ('rad/(s m^2)', 'rad/(s m)', 'rad/(s m^0.5)')
+    """
+    return "rad/(s m)" if exponent == 1.0 else f"rad/(s m^{exponent:g})"
+
+
+def words_on_exponent(exponent: float) -> str:
+    """Return what the frequency shifts with."""
+    return {2.0: "the square of the amplitude", 1.0: "the amplitude", 0.5: "the root of the amplitude"}[exponent]
+
+
+def _backbone(bent: Line, spread: Scatter, free: int, exponent: float) -> Estimate:
+    widened = spread.correlation * max(1.0, bent.chi2 / free)
+    return Estimate(float(bent.values[2]), math.sqrt(bent.covariance[2, 2] * widened), backbone_unit(exponent))
+
+
+def _single(demodulated: Demodulated, damping: Damping, noise: float) -> PhaseFit:
+    """One window: its frequency is the spectrum's, known to a share of the record's own line width."""
+    t, omega = float(demodulated.t[0]), demodulated.angular_frequency
+    phase = float(demodulated.phase[0]) + omega * (damping.t0 - t)
+    reach = max(2.0 * (t - damping.t0), 1e-9)
+    u_omega = math.pi / reach
+    return PhaseFit(
+        damping.t0,
+        Estimate(omega, u_omega, "rad/s"),
+        Estimate(wrapped(phase), math.hypot(noise, 0.5 * math.pi), "rad"),
+        None,
+        math.nan,
+        1.0,
+        np.zeros(1),
+        np.array([float(demodulated.phase[0]), omega]),
+        t,
+        damping,
+    )
+
+
+def wrapped(angle: float) -> float:
+    """Return an angle within (-pi, pi], rad."""
+    turned = math.remainder(angle, 2.0 * math.pi)
+    return math.pi if turned == -math.pi else turned

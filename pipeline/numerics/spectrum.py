@@ -1,0 +1,317 @@
+"""Lines: single frequencies in what a smooth model of an oscillation leaves, found at a stated false-alarm rate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.numerics.median import median
+from pipeline.track import F8
+
+__all__ = [
+    "Band",
+    "Blocks",
+    "Peak",
+    "evidence_for",
+    "false_alarm",
+    "smooth_density",
+    "spectral_density",
+    "strongest",
+    "worth_a_look",
+]
+
+AR_ORDER = 4  # highest order of the autoregression that describes the residual's correlation
+OVERSAMPLING = 4  # of the spectrum; the dearest loss between two of its points is 5 % of a line's power
+CONTINUUM = 2.5  # independent trials per natural bin, because the frequency is sought between bins too
+NEAR, FAR = 2, 7  # natural bins beside a line that show how much power there is without it
+VARYING = 3  # degree of the polynomial that a line's amplitude and phase may follow while its noise is looked at
+FREEDOM = 6.0  # of that power, in complex amplitudes: twelve bins, which the taper makes half as many
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blocks:
+    """Means of consecutive samples on an even grid: all that lines of a few times the main frequency need.
+
+    Parameters
+    ----------
+    t : (b,) float64, s
+        Mean times of the samples used, less ``origin``; the middle of the block where none was.
+    y : (b,) float64, m
+        Mean values; 0 where none was used.
+    weight : (b,) float64
+        Root of the number of samples used.
+    step : float, s
+    samples : float
+        Per full block.
+    origin : float, s
+    """
+
+    t: F8
+    y: F8
+    weight: F8
+    step: float
+    samples: float
+    origin: float
+
+    def unweighted(self, rows: F8) -> F8:
+        """Divide rows (b,) that were multiplied by the weights by them; 0 where a block holds no sample."""
+        return np.divide(rows, self.weight, out=np.zeros_like(rows), where=self.weight > 0)
+
+    @classmethod
+    def of(cls, t: F8, y: F8, step: float, rate_hz: float) -> Blocks:
+        """Average values y (n,) at times t (n,) over blocks of ``step`` seconds, a whole number of samples each."""
+        samples = max(1, round(step * rate_hz))
+        step = samples / rate_hz
+        origin = float(t[0]) - 0.5 / rate_hz
+        index = np.floor((t - origin) / step).astype(np.int64)
+        size = int(index.max()) + 1
+        count = np.bincount(index, minlength=size).astype(np.float64)
+        middle = (np.arange(size) + 0.5) * step
+        safe = np.maximum(count, 1.0)
+        away = np.bincount(index, weights=t - origin - middle[index], minlength=size) / safe
+        mean = np.bincount(index, weights=y, minlength=size) / safe
+        return cls(middle + away, mean, np.sqrt(count), step, float(samples), origin)
+
+    @property
+    def seconds(self) -> float:
+        """Length of the record, s."""
+        return self.t.size * self.step
+
+    def attenuation(self, frequency_hz: float) -> float:
+        """By how much averaging over a block lessens a line."""
+        x = math.pi * frequency_hz * self.step / self.samples
+        return math.sin(self.samples * x) / (self.samples * math.sin(x)) if x > 0 else 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """Where a line is sought.
+
+    Parameters
+    ----------
+    low_hz, high_hz : float
+    holes : tuple of (float, float)
+        Frequency and half-width, Hz, of what the model holds already.
+    """
+
+    low_hz: float
+    high_hz: float
+    holes: tuple[tuple[float, float], ...]
+
+    def inside(self, frequency_hz: F8) -> NDArray[np.bool_]:
+        """Return which frequencies (k,) belong to the band."""
+        mask = (frequency_hz >= self.low_hz) & (frequency_hz <= self.high_hz)
+        for centre, half in self.holes:
+            mask &= np.abs(frequency_hz - centre) > half
+        return np.asarray(mask)
+
+
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """The strongest line of a residual.
+
+    Parameters
+    ----------
+    frequency_hz : float
+    density : float, m^2
+        Variance of one full block's noise at that frequency.
+    evidence : float
+        Half the fall of chi-square that the line brings: exponentially distributed where there is none.
+    false_alarm : float
+        Probability that noise shows as strong a line anywhere in the band.
+    """
+
+    frequency_hz: float
+    density: float
+    evidence: float
+    false_alarm: float
+
+
+def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
+    """Return frequencies (k,), Hz, and power (k,), m^2: the expectation for white noise is its variance per block."""
+    taper = np.hanning(y.size + 2)[1:-1]
+    there = blocks.weight / math.sqrt(blocks.samples)
+    size = 1 << (OVERSAMPLING * y.size - 1).bit_length()
+    tapered = taper * there
+    lines = np.fft.rfft(tapered * there * y, size)
+    power = (lines.real**2 + lines.imag**2) / float(tapered @ tapered)
+    frequency = np.asarray(np.fft.rfftfreq(size, blocks.step), np.float64)
+    return frequency, np.asarray(power, np.float64)
+
+
+def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance: float) -> bool:
+    """Return whether any line could come out significant; one look at the spectrum spares most records the search.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        Their means are the residual.
+    band : Band
+    fixed_hz : tuple of float
+        Frequencies that are tested by themselves, Hz.
+    chance : float
+        False-alarm probability at which lines are accepted, here and there.
+
+    Notes
+    -----
+    Half the evidence that acceptance takes is let through, over the median density of the band.
+    """
+    frequency, power = spectrum(blocks, blocks.y)
+    inside = band.inside(frequency)
+    if np.count_nonzero(inside) < 8:
+        return False
+    usual = median(power[inside]) / math.log(2.0)
+    trials = _trials(inside, float(frequency[1]), blocks)
+    fixed = np.min(np.abs(frequency[:, None] - np.array(fixed_hz)), axis=1) <= 1.0 / blocks.seconds
+    # The taper costs a third of a line's power.
+    least, least_fixed = (0.5 * evidence_for(chance, n) / 1.5 * usual for n in (trials, float(len(fixed_hz))))
+    return bool(np.any(power[inside] > least) or np.any(power[fixed] > least_fixed))
+
+
+def _trials(inside: NDArray[np.bool_], spacing_hz: float, blocks: Blocks) -> float:
+    return max(CONTINUUM * float(np.count_nonzero(inside)) * spacing_hz * blocks.seconds, 1.0)
+
+
+def strongest(blocks: Blocks, residual: F8, basis: F8, band: Band) -> Peak | None:
+    """Find the strongest line and say how likely noise alone shows one like it.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    residual : (b,) float64, m
+        What the model leaves in each block.
+    basis : (b, p) float64
+        Orthonormal columns of the model, rows multiplied by the weights: what a line shares with them does not count.
+    band : Band
+
+    Returns
+    -------
+    Peak or None
+        None where the band is empty.
+
+    Notes
+    -----
+    Candidates come from the spectrum over that of a first-order autoregression. The line's evidence is half the
+    fall of chi-square that its cosine and sine bring beyond the model, over the noise's density at its frequency: the
+    larger of an autoregression's and of what the neighbouring frequencies hold, both with the line taken out. A line of
+    noise is then exponentially distributed but for the density's own error, which the heavier tail of
+    :math:`(1 + z/\\nu)^{-\\nu}` stands for [1]_.
+
+    References
+    ----------
+    .. [1] D. J. Thomson, "Spectrum estimation and harmonic analysis", Proc. IEEE 70 (1982) 1055,
+       doi:10.1109/PROC.1982.12433.
+    """
+    frequency, power = spectrum(blocks, residual)
+    inside = band.inside(frequency)
+    if np.count_nonzero(inside) < 4:
+        return None
+    coefficients, variance = _autoregression(residual, 1)
+    shaped = np.where(inside, power / _density(coefficients, variance, frequency * blocks.step), 0.0)
+    peak = int(np.argmax(shaped))
+    f = float(frequency[peak])
+    pair = np.stack([np.cos(2.0 * math.pi * f * blocks.t), np.sin(2.0 * math.pi * f * blocks.t)], axis=1)
+    # The line itself first; then what it may vary by, which must not pass for noise beside it.
+    powers = np.polynomial.legendre.legvander(2.0 * blocks.t / blocks.seconds - 1.0, VARYING)
+    columns = (powers[:, :, None] * pair[:, None, :]).reshape(blocks.t.size, -1)
+    weighted = columns * blocks.weight[:, None]
+    beyond = weighted - basis @ (basis.T @ weighted)
+    q, r = np.linalg.qr(beyond / np.linalg.norm(weighted, axis=0))
+    if np.min(np.abs(np.diagonal(r)[:2])) < 0.2:  # the model holds it already
+        return None
+    share = q.T @ (residual * blocks.weight)
+    left = residual - blocks.unweighted(q @ share)
+    density = spectral_density(blocks, left, f, band)
+    # Rows are weighted by samples, the density is one full block's.
+    evidence = 0.5 * float(share[:2] @ share[:2]) / (density * blocks.samples)
+    return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
+
+
+def false_alarm(evidence: float, trials: float) -> float:
+    """Return the probability that one of ``trials`` lines of noise reaches this evidence.
+
+    Parameters
+    ----------
+    evidence : float
+        Half the fall of chi-square, over a density known from some ten neighbouring frequencies only.
+    trials : float
+
+    Examples
+    --------
+    >>> false_alarm(0.0, 10.0)
+    1.0
+    >>> round(false_alarm(30.0, 100.0), 6)
+    0.002141
+    """
+    single = math.exp(-FREEDOM * math.log1p(evidence / FREEDOM))
+    return float(-math.expm1(trials * math.log1p(-single))) if single < 1.0 else 1.0
+
+
+def evidence_for(chance: float, trials: float) -> float:
+    """Return the evidence at which :func:`false_alarm` is ``chance``.
+
+    Examples
+    --------
+    >>> round(false_alarm(evidence_for(0.005, 100.0), 100.0), 6)
+    0.005
+    """
+    single = -math.expm1(math.log1p(-chance) / trials)
+    return float(FREEDOM * math.expm1(-math.log(single) / FREEDOM))
+
+
+def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band) -> float:
+    """Variance of one block's noise at a frequency, m^2: an autoregression's or its neighbours', the larger.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    y : (b,) float64, m
+        The residual without the line.
+    frequency_hz : float
+    band : Band
+        Neighbours outside it say nothing.
+    """
+    smooth = smooth_density(y, frequency_hz * blocks.step)
+    frequency, power = spectrum(blocks, y)
+    away = np.abs(frequency - frequency_hz) * blocks.seconds
+    near = (away >= NEAR) & (away <= FAR) & band.inside(frequency)
+    local = float(np.mean(power[near])) if np.count_nonzero(near) >= 4 * OVERSAMPLING else 0.0
+    return max(smooth, local, 1e-300)
+
+
+def smooth_density(y: F8, turns: float) -> float:
+    """Return the spectral density of an autoregression fitted to y (n,), at a frequency in turns per step.
+
+    Its mean over all frequencies is the variance, so that white noise has its variance everywhere.
+    """
+    coefficients, variance = _autoregression(y, AR_ORDER)
+    return float(_density(coefficients, variance, np.array([turns]))[0])
+
+
+def _autoregression(y: F8, highest: int) -> tuple[F8, float]:
+    """Coefficients (p,) and innovation variance of the order that the BIC prefers, by Levinson's recursion."""
+    n = y.size
+    covariances = np.array([float(y[lag:] @ y[: n - lag]) / n for lag in range(min(highest, n - 1) + 1)])
+    coefficients: F8 = np.empty(0)
+    variance = max(float(covariances[0]), 1e-300)
+    best = (math.log(variance), coefficients, variance)
+    for order in range(1, covariances.size):
+        reflection = (covariances[order] - coefficients @ covariances[order - 1 : 0 : -1]) / variance
+        coefficients = np.concatenate([coefficients - reflection * coefficients[::-1], [reflection]])
+        variance = max(variance * (1.0 - float(reflection) ** 2), 1e-300)
+        criterion = math.log(variance) + order * math.log(n) / n
+        if criterion < best[0]:
+            best = (criterion, coefficients, variance)
+    return best[1], best[2]
+
+
+def _density(coefficients: F8, variance: float, turns: F8) -> F8:
+    """Spectral density at frequencies in turns per block: its mean over all of them is the variance."""
+    if not coefficients.size:
+        return np.full(turns.size, variance)
+    lags = np.arange(1, coefficients.size + 1)
+    response = 1.0 - np.exp(-2j * math.pi * turns[:, None] * lags) @ coefficients
+    return np.asarray(variance / np.abs(response) ** 2)

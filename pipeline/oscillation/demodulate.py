@@ -1,0 +1,353 @@
+"""Demodulate: amplitude, phase, rest position and noise against time, window by window, with covariance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import AnalysisError
+from pipeline.oscillation.condition import MAD_TO_SIGMA, Conditioned
+from pipeline.oscillation.cycles import Cycles
+from pipeline.oscillation.tuning import Tuning, retune, unwrap
+from pipeline.oscillation.windows import Solution, Windows, ranked, solve
+from pipeline.track import F8, U8, Quality
+
+__all__ = ["Demodulated", "Params", "demodulate", "polar"]
+
+WEAK = 7.0  # standard uncertainties of an amplitude under which its phase is known to 0.14 rad and less well
+THIRD_TO_SIGMA = 0.3853204664075677  # 0.3-quantile of |x| for a standard normal x
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`demodulate`.
+
+    Parameters
+    ----------
+    clip_sigmas : float
+        Residuals beyond this many standard deviations are false echoes and leave the fit.
+    rounds : int
+        Reweighted fits of windows that hold false echoes, before the final ones.
+    """
+
+    clip_sigmas: float = 4.0
+    rounds: int = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Demodulated:
+    """The oscillation in windows of whole periods: what every later stage works on.
+
+    In window j the motion is :math:`o_j + A_j e^{-g\\tau}\\cos(\\omega\\tau + \\varphi_j)`, with :math:`\\tau`
+    counted from the window's centre.
+
+    Parameters
+    ----------
+    t : (w,) float64, s
+        Centres of the windows.
+    amplitude, phase, offset : (w,) float64, m, rad, m
+        The phase is unwrapped, as the total phase of the oscillation at the centre.
+    noise : (w,) float64, m
+        Standard deviation of the samples about the fit, each window by itself.
+    covariance : (w, 3, 3) float64
+        Of (amplitude, phase, offset); windows share no sample, so they are independent of each other.
+    count : (w,) int64
+        Samples that the fit used.
+    angular_frequency : float, rad/s
+        Of the basis.
+    decay : (w,) float64, 1/s
+        g of the basis.
+    residual : (n,) float64, m
+        Every sample less its window's fit; NaN outside all windows and where unmeasured.
+    flags : (n,) uint8
+        The conditioned flags and the false echoes found here.
+    lost : int
+        Windows with too few usable samples, which carry no point.
+    """
+
+    t: F8
+    amplitude: F8
+    phase: F8
+    offset: F8
+    noise: F8
+    covariance: F8
+    count: NDArray[np.int64]
+    angular_frequency: float
+    decay: F8
+    residual: F8
+    flags: U8
+    lost: int
+
+    @cached_property
+    def noise_m(self) -> float:
+        """Standard deviation of one sample over the whole record, m."""
+        dof = np.maximum(self.count - 3, 1)
+        return math.sqrt(float((dof * self.noise**2).sum()) / float(dof.sum()))
+
+
+def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None = None) -> Demodulated:
+    """Fit rest position, amplitude and phase in every window, robustly.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    cycles : Cycles
+    params : Params, optional
+
+    Returns
+    -------
+    Demodulated
+
+    Raises
+    ------
+    AnalysisError
+        If no window holds enough usable samples.
+
+    Notes
+    -----
+    Every window is a linear least-squares problem in :math:`(o, a, b)` of
+    :math:`o + e^{-g\\tau}(a\\cos\\omega\\tau - b\\sin\\omega\\tau)`, all solved at once. False echoes come in clusters
+    that move with the bob, a fifth of a period long and more, so the first fit of a window may be pulled by them:
+    weights of Cauchy's form with a scale that shrinks from round to round let go of them, windows that disagree with
+    their neighbours start again from these, then residuals beyond ``clip_sigmas`` leave the fit for good. Without
+    :math:`g`, which a second pass knows for each window, the conjugate line would bias the amplitude by
+    :math:`g/2\\omega` of itself.
+    """
+    params = params or Params()
+    windows = Windows.cut(conditioned, cycles.bounds)
+    tuning = Tuning.constant(2.0 * math.pi * cycles.frequency_hz, len(windows.y))
+    basis = tuning.basis(windows)
+    rough = retune(windows, solve(windows, basis, windows.usable), tuning, degree=1)
+    basis = rough.decayed(windows, basis)
+    solution = _let_go(windows, basis, conditioned.noise_m, params)
+    solution = _rescue(windows, basis, solution, tuning, params)
+    solution, weights = _clip(windows, basis, solution, params)
+    if conditioned.clipped_from_m:
+        crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, _level(windows, solution))
+        windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
+        weights = np.where(crest, 0.0, weights)
+    # Once more in a basis that turns and decays in each window as the record does there.
+    tuning = retune(windows, solution, tuning)
+    basis = tuning.basis(windows)
+    solution, weights = _clip(windows, basis, solve(windows, basis, weights), params)
+    return _finish(conditioned, windows, solution, weights, tuning)
+
+
+def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> Solution:
+    """Fit every window; those that scatter more than noise does, with weights that let go of clusters of echoes."""
+    solution = solve(windows, basis, windows.usable)
+    spread = MAD_TO_SIGMA * ranked(np.abs(solution.residual), windows.usable, 0.5)
+    odd = np.flatnonzero(spread > 1.3 * noise_m)
+    if not odd.size:
+        return solution
+    some, part = windows.take(odd), basis[odd]
+    size, spread = np.abs(solution.residual[odd]), spread[odd]
+    for _ in range(params.rounds):
+        ratio = size / np.maximum(spread, noise_m + windows.tiny)[:, None]
+        trial = solve(some, part, some.usable / (1.0 + ratio**2) ** 2)
+        size = np.abs(trial.residual)
+        spread = MAD_TO_SIGMA * ranked(size, some.usable, 0.5)
+    return solution.replaced(odd, trial, np.ones(odd.size, np.bool_))
+
+
+def _rescue(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, params: Params) -> Solution:
+    """Fit windows that disagree with their neighbours again, starting from what the neighbours predict.
+
+    Where false echoes hold half of a window its own fit may have settled on them; the amplitude, phase and rest
+    position of the windows around it tell which half to believe.
+    """
+    n = len(windows.y)
+    if n < 5:
+        return solution
+    z = solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]
+    # Turned back to one instant, so that medians are taken of slow quantities.
+    turning = np.exp(1j * tuning.angular_frequency * (windows.centre - windows.centre[0]))
+    steady = z / turning
+    around = _neighbours(n)
+    expected = np.empty_like(solution.coefficients)
+    expected[:, 0] = np.median(solution.coefficients[around, 0], axis=1)
+    smooth = (np.median(steady.real[around], axis=1) + 1j * np.median(steady.imag[around], axis=1)) * turning
+    expected[:, 1], expected[:, 2] = smooth.real, smooth.imag
+    away = np.abs(solution.coefficients - expected).max(axis=1)
+    level = _level(windows, solution)
+    bound = params.clip_sigmas * level
+    before = np.sum((np.abs(solution.residual) <= bound) * windows.usable, axis=1)
+    few = before < 0.7 * windows.usable.sum(axis=1)
+    odd = np.flatnonzero((away > 5.0 * MAD_TO_SIGMA * float(np.median(away))) | few | ~solution.good)
+    if not odd.size:
+        return solution
+    some, part = windows.take(odd), basis[odd]
+    size = np.abs(some.y - (expected[odd, None, :] @ part[:, :3])[:, 0, :])
+    for _ in range(params.rounds):
+        # A third of the samples is believed at first, so that echoes may hold more than half of a window.
+        spread = np.maximum(ranked(size, some.usable, 0.3) / THIRD_TO_SIGMA, level)
+        trial = solve(some, part, some.usable / (1.0 + (size / spread[:, None]) ** 2) ** 2)
+        size = np.abs(trial.residual)
+    after = np.sum((size <= bound) * some.usable, axis=1)
+    better = trial.good & ((after > before[odd]) | ~solution.good[odd])
+    return solution.replaced(odd[better], trial, better)
+
+
+def _neighbours(n: int) -> NDArray[np.int64]:
+    """(n, 6 or fewer): the nearest other windows of each, one-sided at the record's ends."""
+    reach = min(7, n)
+    first = np.clip(np.arange(n) - reach // 2, 0, n - reach)
+    block = first[:, None] + np.arange(reach)
+    others: NDArray[np.int64] = block[block != np.arange(n)[:, None]].reshape(n, reach - 1)
+    return others
+
+
+def _level(windows: Windows, solution: Solution) -> float:
+    """Spread of the samples about their windows' fits, typical of the record."""
+    spread = MAD_TO_SIGMA * ranked(np.abs(solution.residual), windows.usable, 0.5)
+    return max(float(np.median(spread[solution.good])), windows.tiny) if solution.good.any() else windows.tiny
+
+
+def _clip(windows: Windows, basis: F8, solution: Solution, params: Params) -> tuple[Solution, F8]:
+    """Take residuals beyond the clip out and fit again."""
+    size = np.abs(solution.residual)
+    spread = MAD_TO_SIGMA * ranked(size, windows.usable, 0.5)
+    level = max(float(np.median(spread[solution.good])) if solution.good.any() else 0.0, windows.tiny)
+    # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
+    bound = params.clip_sigmas * np.clip(spread, 0.75 * level, 2.0 * level)
+    weights = np.where(size <= bound[:, None], windows.usable, 0.0)
+    return solve(windows, basis, weights), weights
+
+
+def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, weights: F8, tuning: Tuning) -> Demodulated:
+    good = solution.good
+    if not good.any():
+        raise AnalysisError(
+            "no period of the record holds enough usable samples for a fit; see the counts of flagged samples"
+        )
+    counts = (weights > 0).sum(axis=1)
+    squares = np.sum(weights * solution.residual**2, axis=1)
+    noise = np.sqrt(squares / np.maximum(counts - 3, 1))
+    pooled = math.sqrt(np.sum(squares[good]) / max(np.sum(counts[good] - 3), 1))
+    pooled = _with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
+    # A window's own noise is known to a tenth only: it is drawn towards the record's.
+    prior = 30.0
+    shrunk = ((prior * pooled**2 + counts * noise**2) / (prior + counts))[good]
+    _, a, b = solution.coefficients[good].T
+    t = windows.centre[good]
+    smooth = unwrap(np.arctan2(b, a), t, tuning.angular_frequency) if tuning.phase is None else tuning.phase[good]
+    expected = None if tuning.amplitude is None else tuning.amplitude[good]
+    amplitude, phase, covariance = polar(a, b, solution.inverse[good] * shrunk[:, None, None], smooth, expected)
+    flags = conditioned.flags.copy()
+    inside = windows.inside & good[:, None]
+    echoes = inside & (windows.usable > 0) & (weights == 0)
+    flags[windows.rows[echoes]] |= np.uint8(Quality.FALSE_ECHO)
+    crests = inside & (windows.usable == 0) & (flags[windows.rows] == 0)
+    flags[windows.rows[crests]] |= np.uint8(Quality.CLIPPED)
+    residual = _residual_of_all(conditioned, windows, solution, tuning)
+    return Demodulated(
+        t,
+        amplitude,
+        phase,
+        solution.coefficients[good, 0] + windows.level,
+        noise[good],
+        covariance,
+        counts[good],
+        tuning.angular_frequency,
+        tuning.decay[good],
+        residual,
+        flags,
+        int(np.count_nonzero(~good)),
+    )
+
+
+def _with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
+    """The record's noise, drawn towards the one that sensor or scene state, if the two agree.
+
+    A stated noise counts as much as thirty samples; it matters to records of a few periods only.
+    """
+    if stated_m is None or abs(noise_m / stated_m - 1.0) > 3.3 / math.sqrt(2.0 * max(dof, 1.0)):
+        return noise_m
+    return math.sqrt((dof * noise_m**2 + 30.0 * stated_m**2) / (dof + 30.0))
+
+
+def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 | None) -> tuple[F8, F8, F8]:
+    """Return amplitude, total phase and covariance of (amplitude, phase, offset) of windows.
+
+    Parameters
+    ----------
+    a, b : (w,) float64, m
+        Of :math:`a\\cos\\omega\\tau - b\\sin\\omega\\tau`.
+    covariance : (w, 3, 3) float64
+        Of (offset, a, b).
+    smooth_phase : (w,) float64, rad
+        Total phase from a smooth curve through the record; says how many turns lie between windows.
+    smooth_amplitude : (w,) float64, m, or None
+        The same of the amplitude.
+
+    Notes
+    -----
+    An amplitude from :math:`\\sqrt{a^2+b^2}` is too large by half the variance of the phase, which is taken off. Where
+    the smooth amplitude is below seven of its uncertainties, amplitude and phase are read along and across the smooth
+    phase instead: linear in a and b, they are right on average in the deepest noise, and an amplitude may come out
+    negative.
+    """
+    size = np.maximum(np.hypot(a, b), 1e-150)
+    along, scale = np.arctan2(b, a), size
+    weak, any_weak = np.zeros(a.size, np.bool_), False
+    turned = along - smooth_phase
+    turned -= 2.0 * math.pi * np.rint(turned / (2.0 * math.pi))
+    if smooth_amplitude is not None:
+        u = np.sqrt(0.5 * (covariance[:, 1, 1] + covariance[:, 2, 2]))
+        weak = smooth_amplitude < WEAK * u
+        any_weak = bool(weak.any())
+    if turned.max() - turned.min() > math.pi:
+        turned[~weak] = np.unwrap(turned[~weak])
+    if smooth_amplitude is not None and any_weak:
+        along = np.where(weak, smooth_phase, along)
+        scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
+        cosine, sine = np.cos(along), np.sin(along)
+        turned = np.where(weak, (b * cosine - a * sine) / scale, turned)
+    else:
+        cosine, sine = np.cos(along), np.sin(along)
+    turned_into = _turned(covariance, cosine, sine, scale)
+    amplitude = size * (1.0 - 0.5 * turned_into[:, 1, 1])
+    if any_weak:
+        amplitude = np.where(weak, a * cosine + b * sine, amplitude)
+    return amplitude, smooth_phase + turned, turned_into
+
+
+def _turned(covariance: F8, cosine: F8, sine: F8, scale: F8) -> F8:
+    """Covariances (w, 3, 3) of (offset, a, b) as those of (amplitude, phase, offset)."""
+    oo, oa, ob = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 0, 2]
+    aa, ab, bb = covariance[:, 1, 1], covariance[:, 1, 2], covariance[:, 2, 2]
+    # Products with the two directions: along the phase, and across it over the amplitude.
+    over, under = cosine / scale, sine / scale
+    along_a, along_b = aa * cosine + ab * sine, ab * cosine + bb * sine
+    across_a, across_b = ab * over - aa * under, bb * over - ab * under
+    found = np.empty_like(covariance)
+    found[:, 0, 0] = along_a * cosine + along_b * sine
+    found[:, 0, 1] = found[:, 1, 0] = along_b * over - along_a * under
+    found[:, 0, 2] = found[:, 2, 0] = oa * cosine + ob * sine
+    found[:, 1, 1] = across_b * over - across_a * under
+    found[:, 1, 2] = found[:, 2, 1] = ob * over - oa * under
+    found[:, 2, 2] = oo
+    return found
+
+
+def _residual_of_all(conditioned: Conditioned, windows: Windows, solution: Solution, tuning: Tuning) -> F8:
+    """Residuals of flagged samples too, so that a report can show what was left out."""
+    residual = np.full(len(conditioned.track), np.nan)
+    known = windows.inside & (windows.usable > 0) & solution.good[:, None]
+    residual[windows.rows[known]] = solution.residual[known]
+    track = conditioned.track
+    window = np.searchsorted(windows.rows[:, 0], np.arange(len(track)), side="right") - 1
+    left = np.flatnonzero(np.isnan(residual) & np.isfinite(track.y) & np.isfinite(track.t) & (window >= 0))
+    left = left[solution.good[window[left]]]
+    if left.size:
+        w = window[left]
+        tau = track.t[left] - windows.centre[w]
+        angle = (tuning.angular_frequency + tuning.detuning[w]) * tau
+        offset, a, b = solution.coefficients[w].T
+        swing = np.exp(-tuning.decay[w] * tau) * (a * np.cos(angle) - b * np.sin(angle))
+        residual[left] = track.y[left] - windows.level - offset - swing
+    return residual

@@ -1,0 +1,183 @@
+"""Beside: what a real record holds beside the main oscillation, found and taken out where it would do harm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pipeline.motion.rest import Rest
+from pipeline.motion.waveform import Waveform
+from pipeline.oscillation import sideways as swings
+from pipeline.oscillation import steps as jumps
+from pipeline.oscillation.condition import Conditioned
+from pipeline.oscillation.cycles import Cycles
+from pipeline.oscillation.demodulate import Demodulated, demodulate
+from pipeline.oscillation.demodulate import Params as Demodulation
+from pipeline.oscillation.modes import Sideways
+from pipeline.oscillation.sideways import find_sideways, without
+from pipeline.oscillation.steps import Step, find_steps, staircase, unstepped, weighed
+from pipeline.track import F8
+
+__all__ = ["Beside", "Params", "set_apart"]
+
+SHARE = 0.1  # of the uncertainty that an effect may disturb without being modelled
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`set_apart`.
+
+    Parameters
+    ----------
+    sideways : pipeline.oscillation.sideways.Params
+    steps : pipeline.oscillation.steps.Params
+    modes : bool
+        Whether modes are looked for at all.
+    rounds : int
+        Most times that the modes are looked for, with the windows' fits of the record without them.
+    """
+
+    sideways: swings.Params = field(default_factory=swings.Params)
+    steps: jumps.Params = field(default_factory=jumps.Params)
+    modes: bool = True
+    rounds: int = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beside:
+    """What was found beside the main oscillation.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+        The record without it: what later stages work on.
+    sideways : Sideways
+        Modes, harmonics and products of both.
+    modelled : bool
+        Whether ``sideways`` was taken out: it would disturb the amplitude by more than a tenth of its uncertainty.
+    leak_m : float
+        By how much it would, m.
+    steps : tuple of Step
+        Of the rest position; always taken out.
+    """
+
+    conditioned: Conditioned
+    sideways: Sideways
+    modelled: bool
+    leak_m: float
+    steps: tuple[Step, ...]
+
+    @classmethod
+    def nothing(cls, conditioned: Conditioned) -> Beside:
+        """Return what says that nothing was found, or sought."""
+        return cls(conditioned, Sideways((), None), False, 0.0, ())
+
+    def __bool__(self) -> bool:
+        return self.modelled or bool(self.steps)
+
+    def columns(self, t: F8) -> F8:
+        """Return (n, k): what was taken out, as columns of a fit that is linear in them."""
+        parts = [np.empty((t.size, 0))]
+        if self.modelled:
+            parts.append(self.sideways.columns(t))
+        parts.extend((t >= step.time.value).astype(np.float64)[:, None] for step in self.steps)
+        return np.concatenate(parts, axis=1)
+
+    def put_back(self, rest: Rest, waveform: Waveform) -> tuple[Rest, Waveform]:
+        """Return rest position and waveform of the whole record from those of the record without."""
+        if not self:
+            return rest, waveform
+        t = self.conditioned.track.t
+        added = staircase(self.steps, t)
+        if self.modelled:
+            added = added + self.sideways.position(t)
+        return rest.stepping(self.steps), replace(waveform, position=waveform.position + added)
+
+
+def set_apart(
+    conditioned: Conditioned,
+    cycles: Cycles,
+    demodulated: Demodulated,
+    params: Params | None = None,
+    demodulation: Demodulation | None = None,
+) -> tuple[Demodulated, Beside]:
+    """Look for modes and steps, and demodulate again without them.
+
+    Parameters
+    ----------
+    conditioned, cycles, demodulated
+        Outputs of the stages of those names.
+    params : Params, optional
+    demodulation : pipeline.oscillation.demodulate.Params, optional
+
+    Returns
+    -------
+    demodulated : Demodulated
+        Of the record without what was found; as given where nothing was.
+    beside : Beside
+
+    Notes
+    -----
+    A mode of amplitude B at a distance :math:`\\Delta f` from the main frequency leaves up to
+    :math:`B/(\\pi\\,\\Delta f\\,T)` in the amplitude of a record of length T. Where that is less than a tenth of the
+    amplitude's standard uncertainty the mode is reported and left where it is. Where it is taken out, the windows'
+    variances grow by what it costs to know it from the same samples.
+    """
+    params = params or Params()
+    sideways = find_sideways(conditioned, demodulated, params.sideways) if params.modes else Sideways((), None)
+    leak_m = _leak(sideways)
+    modelled = bool(sideways) and leak_m > SHARE * _u_amplitude(demodulated)
+    cleared = conditioned
+    for again in range(params.rounds if modelled else 0):
+        if again:
+            # The windows' fits without the modes tell false echoes and the main oscillation better.
+            sideways = find_sideways(conditioned, demodulated, params.sideways) or sideways
+        cleared = without(conditioned, sideways)
+        demodulated = demodulate(cleared, cycles, demodulation)
+    if modelled:
+        demodulated = replace(demodulated, covariance=demodulated.covariance * _price(sideways))
+    steps = find_steps(cleared, demodulated, params.steps)
+    if steps:
+        whole = cleared
+        demodulated = demodulate(unstepped(whole, steps), cycles, demodulation)
+        steps, demodulated = weighed(steps, demodulated)
+        cleared = unstepped(whole, steps)
+    return demodulated, Beside(cleared, sideways, modelled, leak_m, steps)
+
+
+def _u_amplitude(demodulated: Demodulated) -> float:
+    return 1.0 / math.sqrt(float(np.sum(1.0 / np.maximum(demodulated.covariance[:, 0, 0], 1e-300))))
+
+
+def _price(sideways: Sideways) -> float:
+    """By what factor variances grow because the modes were estimated from the same samples.
+
+    That of rest position, amplitude, phase, frequency and decay, whichever grows most, from the normal equations with
+    and without the modes' columns, on a dozen times a period.
+    """
+    carrier = sideways.carrier
+    assert carrier is not None
+    start, end = carrier.t[0], carrier.t[-1]
+    t = np.linspace(start, end, int(12 * (end - start) * carrier.angular_frequency / (2.0 * math.pi)))
+    phase, x = carrier.phase(t), (t - start) / (end - start) - 0.5
+    pair = carrier.relative(t) * np.array([np.cos(phase), np.sin(phase)])
+    main = np.concatenate([np.ones((1, t.size)), pair, x * pair])
+    both = np.concatenate([main, sideways.columns(t).T])
+    both /= np.linalg.norm(both, axis=1)[:, None]
+    alone = np.linalg.pinv(both[:5] @ both[:5].T, hermitian=True)
+    together = np.linalg.pinv(both @ both.T, hermitian=True)[:5, :5]
+    return max(1.0, float(np.max(np.diag(together) / np.diag(alone))))
+
+
+def _leak(sideways: Sideways) -> float:
+    """The most that any mode would leave in the amplitude of the main oscillation, m."""
+    if sideways.carrier is None:
+        return 0.0
+    carrier = sideways.carrier
+    main, seconds = carrier.angular_frequency / (2.0 * math.pi), float(carrier.t[-1] - carrier.t[0])
+    return max(
+        (mode.amplitude.value / (math.pi * abs(mode.frequency.value - main) * seconds) for mode in sideways.modes),
+        default=0.0,
+    )

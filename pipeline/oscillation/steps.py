@@ -1,0 +1,328 @@
+"""Steps: jumps of the rest position, told from smooth drift, and placed to the sample."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.median import median, median_size
+from pipeline.numerics.regression import correlation_length, solve_weighted
+from pipeline.oscillation.carrier import Carrier
+from pipeline.oscillation.condition import MAD_TO_SIGMA, Conditioned
+from pipeline.oscillation.demodulate import Demodulated
+from pipeline.track import F8, UNUSABLE
+
+__all__ = ["Params", "Step", "find_steps", "staircase", "unstepped", "weighed"]
+
+DEGREES = (0, 1, 2, 4, 6, 9, 12)  # of the smooth drift that steps compete with
+SUDDEN = 4.0  # fall of chi-square by which a jump must beat a glide
+POSSIBLE_DRAW = 5.1  # standard deviation of a jump's place over (noise/height)^2, samples: root of 26
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`find_steps`.
+
+    Parameters
+    ----------
+    false_alarm : float
+        Probability that a rest position that does not jump shows a step.
+    most : int
+        Steps in a record; where there seem to be more, the rest wanders and is followed by its drift alone.
+    apart : int
+        Fewest windows between steps, and before the first and after the last.
+    """
+
+    false_alarm: float = 0.005
+    most: int = 12
+    apart: int = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One jump of the rest position.
+
+    Parameters
+    ----------
+    time : Estimate
+        s.
+    height : Estimate
+        From before to after, m.
+    false_alarm : float
+        Probability that a rest position that does not jump shows as much anywhere in the record.
+    """
+
+    time: Estimate
+    height: Estimate
+    false_alarm: float
+
+
+def find_steps(conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None) -> tuple[Step, ...]:
+    """Find the jumps of the rest position, in order of time.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+        Its samples place each jump.
+    demodulated : Demodulated
+        Its windows show whether there are any.
+    params : Params, optional
+
+    Returns
+    -------
+    tuple of Step
+
+    Notes
+    -----
+    Polynomials of several degrees compete, each with the steps that it needs besides: a step is added where it lowers
+    chi-square most, as long as that fall, over the residuals' correlation length, is more than noise would show
+    anywhere (Bonferroni's bound on all windows); the BIC chooses among them, a step counting two parameters. So a
+    smooth drift is no staircase. What the samples show as a glide over a period or more is no step either. The
+    uncertainty of a place is that of a maximum of a random walk's likelihood [1]_.
+
+    References
+    ----------
+    .. [1] Y.-C. Yao, "Approximating the distribution of the maximum likelihood estimate of the change-point",
+       Ann. Statist. 15 (1987) 1321, doi:10.1214/aos/1176350509.
+    """
+    params = params or Params()
+    rest = _Windows.of(demodulated)
+    if rest.t.size < 2 * params.apart + 2 or not rest.suspicious(params):
+        return ()
+    coarse = rest.staircase(params)
+    if not coarse:
+        return ()
+    used = (demodulated.flags & UNUSABLE) == 0
+    t = conditioned.track.t[used]
+    still = conditioned.track.y[used] - Carrier.through(demodulated, float(t[0]), float(t[-1])).swing(t)
+    placed = (_place(t, still, rest, index, coarse, params.apart) for index in coarse)
+    return tuple(step for step in placed if step is not None)
+
+
+def staircase(steps: tuple[Step, ...], t: F8) -> F8:
+    """Return the sum of the steps at times t (n,), m: 0 before the first."""
+    total = np.zeros(t.size)
+    for step in steps:
+        total += step.height.value * (t >= step.time.value)
+    return total
+
+
+def weighed(steps: tuple[Step, ...], demodulated: Demodulated) -> tuple[tuple[Step, ...], Demodulated]:
+    """Fit the heights of all steps together, to windows from which the steps were taken out.
+
+    Returns
+    -------
+    steps : tuple of Step
+    demodulated : Demodulated
+        With its rest positions less what the heights changed.
+
+    Notes
+    -----
+    Only now do the windows that hold a step know their rest position. A line is fitted along, so that a drift does not
+    pass for height.
+    """
+    rest = _Windows.of(demodulated)
+    after = np.array([rest.t >= step.time.value for step in steps], np.float64)
+    x = (rest.t - rest.t.mean()) / float(np.ptp(rest.t))
+    design = np.stack([np.ones_like(x), x, *after], axis=1)
+    line = solve_weighted(design, rest.y, np.full(rest.t.size, rest.u))
+    widened = math.sqrt(correlation_length(line.residual) * max(1.0, line.chi2 / max(x.size - design.shape[1], 1)))
+    more, u = line.values[2:], widened * np.sqrt(np.diag(line.covariance)[2:])
+    better = tuple(
+        replace(step, height=Estimate(step.height.value + float(d), float(s), "m"))
+        for step, d, s in zip(steps, more, u, strict=True)
+    )
+    change = staircase(better, demodulated.t) - staircase(steps, demodulated.t)
+    return better, replace(demodulated, offset=demodulated.offset - change)
+
+
+def unstepped(conditioned: Conditioned, steps: tuple[Step, ...]) -> Conditioned:
+    """Return the record with the steps taken out of its distances; flags and times stay."""
+    track = conditioned.track
+    return replace(conditioned, track=replace(track, y=track.y - staircase(steps, track.t)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Windows:
+    """Rest positions of the windows, over their uncertainty.
+
+    ``u`` holds what neighbours differ, so that beats do not count as steps; single windows far off are left out.
+    """
+
+    t: F8
+    y: F8
+    u: float
+
+    @classmethod
+    def of(cls, demodulated: Demodulated) -> _Windows:
+        t, offset = demodulated.t, demodulated.offset
+        if t.size < 5:
+            return cls(t, offset, 1.0)
+        around = np.lib.stride_tricks.sliding_window_view(np.pad(offset, 2, mode="edge"), 5)
+        away = np.abs(offset - np.partition(around, 2, axis=1)[:, 2])
+        kept = away <= 8.0 * max(MAD_TO_SIGMA * median(away), 1e-300)
+        t, offset = t[kept], offset[kept]
+        stated = median(np.sqrt(demodulated.covariance[kept, 2, 2]))
+        apart = MAD_TO_SIGMA * median_size(np.diff(offset)) / math.sqrt(2.0)
+        return cls(t, offset, max(stated, apart, 1e-15 * float(np.max(np.abs(offset))) + 1e-100))
+
+    @property
+    def spacing(self) -> float:
+        """Time between windows, s."""
+        return float(np.median(np.diff(self.t)))
+
+    def threshold(self, params: Params, dof: float = math.inf) -> float:
+        """Fall of chi-square that noise shows anywhere with the probability of a false alarm.
+
+        Student's quantile by its expansion about the normal one, since the noise is known from the windows themselves.
+        """
+        z = NormalDist().inv_cdf(1.0 - params.false_alarm / (2.0 * self.t.size))
+        first, second = (z**3 + z) / 4.0, (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
+        return (z + first / dof + second / dof**2) ** 2
+
+    def suspicious(self, params: Params) -> bool:
+        """Whether one step in a constant would be worth a look."""
+        residual = (self.y - self.y.mean()) / self.u
+        _, gain = _best_step(residual, self.polynomial(0), params.apart)
+        return gain > self.threshold(params)
+
+    def polynomial(self, degree: int) -> F8:
+        """Orthonormal powers of time, (w, degree + 1)."""
+        x = 2.0 * (self.t - self.t[0]) / (self.t[-1] - self.t[0]) - 1.0
+        return np.linalg.qr(np.polynomial.legendre.legvander(x, degree))[0]
+
+    def staircase(self, params: Params) -> dict[int, float]:
+        """First window after each step, and the probability that noise shows as much."""
+        trials = [self.grow(degree, params) for degree in DEGREES if degree <= self.t.size // 6]
+        # One correlation length for all: that of the model that leaves least.
+        length = correlation_length(min(trials, key=lambda trial: float(trial[1] @ trial[1]))[1])
+        price = math.log(self.t.size)
+        costs = [
+            float(left @ left) / length + (degree + 1 + 2 * len(steps)) * price
+            for (steps, left), degree in zip(trials, DEGREES, strict=False)
+        ]
+        steps, left = trials[int(np.argmin(costs))]
+        if len(steps) > params.most:
+            return {}
+        degree = DEGREES[int(np.argmin(costs))]
+        return {index: self.chance(index, steps, left, degree, length) for index in sorted(steps)}
+
+    def grow(self, degree: int, params: Params) -> tuple[list[int], F8]:
+        """Add steps to a polynomial as long as each counts; return them and what is left over ``u``.
+
+        Residuals of too few steps are correlated by those that are missing. So steps are added as if noise were white,
+        and the first number of them is kept at which every one stands against the correlation of what is left.
+        """
+        polynomial, steps = self.polynomial(degree), list[int]()
+        y = (self.y - self.y.mean()) / self.u
+        basis, left = polynomial, y - polynomial @ (polynomial.T @ y)
+        kept = (list[int](), left)
+        while len(steps) <= params.most:
+            index, gain = _best_step(left, basis, params.apart, steps)
+            if index < 0 or gain <= self.threshold(params):
+                break
+            steps.append(index)
+            basis = np.linalg.qr(np.concatenate([basis, _after(self.t.size, index)[:, None]], axis=1))[0]
+            left = y - basis @ (basis.T @ y)
+            if self.all_count(y, left, polynomial, steps, params):
+                kept = (list(steps), left)
+            elif kept[0]:
+                break
+        return kept
+
+    def all_count(self, y: F8, left: F8, polynomial: F8, steps: list[int], params: Params) -> bool:
+        """Whether each of the steps, the others given, is more than noise as correlated as ``left`` shows."""
+        dof = max(self.t.size - polynomial.shape[1] - 2.0 * len(steps), 1.0)
+        chi2, length = float(left @ left), correlation_length(left)
+        least = length * max(1.0, chi2 / dof) * self.threshold(params, max(dof / length, 2.0))
+        return all(_without(y, polynomial, steps, index) - chi2 > least for index in steps)
+
+    def chance(self, index: int, steps: list[int], left: F8, degree: int, length: float) -> float:
+        """Probability that noise shows a step as high as this one, the others given."""
+        y = (self.y - self.y.mean()) / self.u
+        gain = max(_without(y, self.polynomial(degree), steps, index) - float(left @ left), 0.0) / length
+        return min(1.0, self.t.size * math.erfc(math.sqrt(0.5 * gain)))
+
+
+def _after(size: int, index: int) -> F8:
+    return np.asarray(np.arange(size) >= index, np.float64)
+
+
+def _without(y: F8, polynomial: F8, steps: list[int], index: int) -> float:
+    """Chi-square with one of the steps left out."""
+    others = [_after(y.size, other)[:, None] for other in steps if other != index]
+    basis = np.linalg.qr(np.concatenate([polynomial, *others], axis=1))[0]
+    return float(y @ y) - float(np.sum((basis.T @ y) ** 2))
+
+
+def _best_step(left: F8, basis: F8, apart: int, taken: list[int] | None = None) -> tuple[int, float]:
+    """First window of the step that lowers chi-square most beyond the basis, and by how much; -1 where none fits.
+
+    Sums from the end give every step's projections at once.
+    """
+    size = left.size
+    along = np.cumsum(left[::-1])[::-1]
+    inside = np.cumsum(basis[::-1], axis=0)[::-1]
+    length = np.arange(size, 0, -1) - np.einsum("wp,wp->w", inside, inside)
+    possible = length > 0.05
+    possible[:apart], possible[size - apart + 1 :] = False, False
+    for index in taken or ():
+        possible[max(index - apart + 1, 0) : index + apart] = False
+    gain = np.where(possible, along**2 / np.where(possible, length, 1.0), -1.0)
+    best = int(np.argmax(gain))
+    return (best, float(gain[best])) if possible[best] else (-1, 0.0)
+
+
+def _place(t: F8, still: F8, rest: _Windows, index: int, coarse: dict[int, float], apart: int) -> Step | None:
+    """Find the sample at which the rest position jumps, near where the windows see it; None where it glides."""
+    edges = [0, *coarse, rest.t.size]
+    here = edges.index(index)
+    first, last = max(edges[here - 1], index - 2 * apart), min(edges[here + 1], index + 2 * apart) - 1
+    span = (t >= rest.t[first]) & (t <= rest.t[last])
+    seconds, y = t[span], still[span]
+    near = (seconds > rest.t[max(index - 2, first)]) & (seconds <= rest.t[min(index + 1, last)])
+    cuts = np.flatnonzero(near)
+    cuts = cuts[(cuts >= 5) & (cuts <= y.size - 5)]
+    if not cuts.size:
+        return None
+    noise = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(y)))) / math.sqrt(2.0)
+    # Heavy tails would draw the place towards themselves.
+    middle, apart_m = float(np.median(y)), float(np.median(y[: cuts[0]]) - np.median(y[cuts[-1] :]))
+    reach = 4.0 * noise + 0.5 * abs(apart_m)
+    y = np.clip(y, middle - reach, middle + reach)
+    gain = _gains(np.cumsum(y - y.mean()), cuts)
+    cut = int(cuts[int(np.argmax(gain))])
+    ramp = _best_ramp(seconds, y, 0.5 * (seconds[cut - 1] + seconds[cut]), rest.spacing)
+    left = y - np.where(np.arange(y.size) < cut, y[:cut].mean(), y[cut:].mean())
+    if gain.max() - ramp < SUDDEN * float(np.var(left)) * correlation_length(left):
+        return None
+    height = float(np.median(y[cut:]) - np.median(y[:cut]))
+    doubt = POSSIBLE_DRAW * (noise / height) ** 2 if height else y.size
+    u_time = float(np.median(np.diff(seconds))) * math.hypot(0.5, min(doubt, 0.5 * y.size))
+    # Of a difference of medians.
+    u_height = 1.25 * rest.u * math.sqrt(1.0 / max(index - first, 1) + 1.0 / max(last - index + 1, 1))
+    when = 0.5 * float(seconds[cut - 1] + seconds[cut])
+    return Step(Estimate(when, u_time, "s"), Estimate(height, u_height, "m"), coarse[index])
+
+
+def _gains(sums: F8, cuts: NDArray[np.int64]) -> F8:
+    """Fall of the sum of squares that a jump at each sample brings, of values whose sums from the start are given."""
+    before, n = cuts.astype(np.float64), float(sums.size)
+    return np.asarray(sums[cuts - 1] ** 2 * n / (before * (n - before)))
+
+
+def _best_ramp(t: F8, y: F8, centre: float, period: float) -> float:
+    """The same for the best of several ramps, a period long to all of the span, around a time."""
+    centred, best = y - y.mean(), 0.0
+    for width in (period, 2.0 * period, 4.0 * period, 8.0 * period, 2.0 * float(np.ptp(t))):
+        for shift in np.linspace(-0.75, 0.75, 7):
+            ramp = np.clip((t - centre - shift * period) / width + 0.5, 0.0, 1.0)
+            ramp -= ramp.mean()
+            power = float(ramp @ ramp)
+            best = max(best, float(ramp @ centred) ** 2 / power if power > 0 else 0.0)
+    return best

@@ -1,0 +1,88 @@
+"""Ambient: the air of a scene as uncertain inputs, and what depends on it."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any
+
+from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
+from pipeline.bench.instrument import Instrument
+from pipeline.bench.scene import Scene
+from pipeline.numerics.estimate import Estimate
+from pipeline.results.budget import Inputs, estimate_of, function, linear, product
+
+__all__ = ["Ambient"]
+
+# What a laboratory's air may be where the scene does not say.
+TYPICAL_TEMPERATURE = Estimate(20.0, 3.0, "degC")
+TYPICAL_PRESSURE = Estimate(101325.0, 1500.0, "Pa")
+TYPICAL_HUMIDITY = Estimate(0.5, 0.2, "")
+
+
+class Ambient:
+    """Density, viscosity and distance scale, each made of the same temperature, pressure and humidity.
+
+    Parameters
+    ----------
+    scene : Scene
+    inputs : Inputs
+        The variables are added there.
+    u_temperature_k : float
+        Standard uncertainty of a temperature stated without one, K.
+
+    Notes
+    -----
+    The formulas have uncertainties of their own, as inputs of value 1. One variable for the temperature: where it
+    moves density and speed of sound together, a result sees both at once.
+    """
+
+    def __init__(self, scene: Scene, inputs: Inputs, *, u_temperature_k: float) -> None:
+        given = scene.air_temperature_c
+        self.known = given is not None
+        if given is None:
+            celsius = TYPICAL_TEMPERATURE
+        else:
+            celsius = Estimate(given.value, given.u or u_temperature_k, "degC")
+        self._inputs = inputs
+        self._temperature = inputs.add("air_temperature", celsius, "B")
+        self._pressure = inputs.add("air_pressure", scene.air_pressure_pa or TYPICAL_PRESSURE, "B")
+        self._humidity = inputs.add("relative_humidity", scene.air_relative_humidity or TYPICAL_HUMIDITY, "B")
+        self._density_formula = inputs.add("density_formula", Estimate(1.0, U_DENSITY), "B")
+        self._viscosity_formula = inputs.add("viscosity_formula", Estimate(1.0, U_VISCOSITY), "B")
+
+    @cached_property
+    def density(self) -> Any:
+        """Density of the air, kg/m^3."""
+        air = (self._temperature, self._pressure, self._humidity)
+        return product(1.0, (function(air_density, *air), 1), (self._density_formula, 1))
+
+    def viscosity(self) -> Any:
+        """Return the dynamic viscosity of the air, Pa s."""
+        return product(1.0, (function(air_viscosity, self._temperature), 1), (self._viscosity_formula, 1))
+
+    def scale(self, instrument: Instrument) -> Any:
+        """Return the factor on all distances: 1, with what the speed of sound or a calibration leaves uncertain.
+
+        Notes
+        -----
+        A calibrated scale has the calibration's uncertainty and no other. Else the speed of sound is uncertain with
+        temperature, pressure, humidity and its formula; and where the record was made with another speed than the
+        scene's air has, the difference, which is not corrected, is the half-width of a rectangle.
+        """
+        if instrument.u_scale > 0:
+            return self._inputs.add("calibrated_scale", Estimate(1.0, instrument.u_scale), "B")
+        if not self.known:
+            return 1.0
+        sound = function(speed_of_sound, self._temperature, self._pressure, self._humidity)
+        actual = estimate_of(sound, "m/s").value
+        # Factors that are 1 but for their uncertainty: to first order their deviations add.
+        terms = [
+            (1.0 / actual, sound),
+            (1.0, self._inputs.add("speed_of_sound_formula", Estimate(1.0, U_SOUND), "B")),
+        ]
+        if instrument.speed_of_sound_m_per_s is not None:
+            half = abs(actual / instrument.speed_of_sound_m_per_s - 1.0)
+            recorded = Estimate(1.0, half / math.sqrt(3.0))
+            terms.append((1.0, self._inputs.add("recorded_speed_of_sound", recorded, "B")))
+        return linear(1.0, terms)

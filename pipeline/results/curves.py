@@ -1,0 +1,179 @@
+"""Curves with a band: energy against time, drag coefficient against amplitude."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.damping.select import Damping, LawFit
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.regression import solve_weighted
+from pipeline.oscillation.demodulate import Demodulated
+from pipeline.track import F8
+
+__all__ = ["Curve", "by_parameters", "drag_curve", "energy_curve"]
+
+POINTS = 200  # of a drawn curve
+GROUPS = 12  # of windows whose local slope is drawn beside the law
+LEAST_IN_GROUP = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A quantity as the selected law gives it, with its band, and as stretches of the record give it without a law.
+
+    Parameters
+    ----------
+    x, y, u : (n,) float64
+        The curve and its standard uncertainty, all known contributions included.
+    unit : str
+        Of y.
+    x_points, y_points, u_points : (m,) float64
+        From the windows' amplitudes; ``u_points`` is their scatter alone, which the points do not share.
+    """
+
+    x: F8
+    y: F8
+    u: F8
+    unit: str
+    x_points: F8
+    y_points: F8
+    u_points: F8
+
+
+def energy_curve(
+    damping: Damping, demodulated: Demodulated, factor: Estimate, weights: Mapping[str, float], unit: str
+) -> Curve:
+    """Return the mechanical energy :math:`E = \\frac12 m\\omega^2 A^2` against time.
+
+    Parameters
+    ----------
+    damping : Damping
+    demodulated : Demodulated
+    factor : Estimate
+        :math:`\\frac12 m\\omega^2`, the scale's square included.
+    weights : mapping of str to float
+        Of the other admissible laws.
+    unit : str
+        "J", or "J/kg" where no mass is known.
+
+    Notes
+    -----
+    :math:`u^2(E) = (2 E\\,u(A)/A)^2 + (E\\,u_F/F)^2`, with the covariance of the law's parameters in u(A) and what the
+    admissible laws differ by.
+    """
+    t = demodulated.t
+    x = np.linspace(damping.t0, float(t[-1]), POINTS)
+    best = damping.best
+    amplitude = best.amplitude(x - damping.t0)
+    energy = factor.value * amplitude**2
+    variance = (2.0 * factor.value * amplitude * best.u_amplitude(x - damping.t0)) ** 2
+    variance += (energy * factor.u / factor.value) ** 2
+    for name, weight in weights.items():
+        variance += weight * (factor.value * damping.fits[name].amplitude(x - damping.t0) ** 2 - energy) ** 2
+    points = factor.value * demodulated.amplitude**2
+    return Curve(
+        x,
+        energy,
+        np.sqrt(variance),
+        unit,
+        t,
+        points,
+        2.0 * factor.value * demodulated.amplitude * damping.scatter.u,
+    )
+
+
+def drag_curve(
+    damping: Damping, demodulated: Demodulated, factor: Estimate, weights: Mapping[str, float]
+) -> Curve | None:
+    """Return the drag coefficient against amplitude; None where the amplitude does not fall.
+
+    Parameters
+    ----------
+    damping : Damping
+    demodulated : Demodulated
+    factor : Estimate
+        :math:`F = 3\\pi m/(2\\omega\\rho S)`, m.
+    weights : mapping of str to float
+        Of the other admissible laws.
+
+    Notes
+    -----
+    The coefficient that purely quadratic drag would need to take the same energy in one cycle:
+    :math:`C(A) = F\\,(-\\dot A - \\mu)/A^2`. Friction is no drag and stays out where the law has it; every other loss,
+    the spring's own included, is in. The points are slopes of ln A through stretches of the record.
+    """
+    best = damping.best
+    elapsed = demodulated.t - damping.t0
+    fitted = best.amplitude(elapsed)
+    least, most = float(np.min(fitted)), float(np.max(fitted))
+    if not (0.0 < least < most):
+        return None
+    # Amplitudes beyond the record would be extrapolated; equal ratios show the small ones too.
+    x = np.geomspace(least, most, POINTS)
+
+    def coefficient(fit: LawFit) -> F8:
+        return factor.value * _drag_rate(fit, x) / x**2
+
+    y = coefficient(best)
+    gradient = by_parameters(best, coefficient)
+    variance = np.einsum("in,ij,jn->n", gradient, best.joint.covariance, gradient)
+    variance = np.maximum(variance, 0.0) + (y * factor.u / factor.value) ** 2
+    for name, weight in weights.items():
+        variance += weight * (coefficient(damping.fits[name]) - y) ** 2
+    return Curve(x, y, np.sqrt(variance), "", *_local_drag(damping, demodulated, factor.value))
+
+
+def by_parameters(fit: LawFit, f: Callable[[LawFit], F8 | float]) -> F8:
+    """Return the derivatives (p, ...) of what a law says by its parameters.
+
+    Parameters
+    ----------
+    fit : LawFit
+    f : callable
+        Of a fit; a number or an array.
+
+    Notes
+    -----
+    Central differences over a thousandth of each parameter's uncertainty, so that their error is far below it.
+    """
+    theta = fit.joint.values
+    u = np.sqrt(np.maximum(np.diag(fit.joint.covariance), 0.0))
+    steps = np.maximum(1e-3 * u, 1e-7 * np.maximum(np.abs(theta), 1e-9))
+
+    def at(values: F8) -> F8:
+        return np.asarray(f(replace(fit, joint=replace(fit.joint, values=values))))
+
+    return np.array([(at(theta + d) - at(theta - d)) / (2.0 * h) for d, h in zip(np.diag(steps), steps, strict=True)])
+
+
+def _friction(fit: LawFit) -> float:
+    names = fit.joint.names
+    return float(fit.joint.values[names.index("mu")]) if "mu" in names else 0.0
+
+
+def _drag_rate(fit: LawFit, amplitude: F8) -> F8:
+    """-dA/dt without friction, m/s."""
+    return fit.law.rate(amplitude, fit.joint.values) - _friction(fit)
+
+
+def _local_drag(damping: Damping, demodulated: Demodulated, factor: float) -> tuple[F8, F8, F8]:
+    """Coefficient, amplitude and scatter of stretches of windows, no law assumed."""
+    kept = damping.scatter.kept
+    t, amplitude, u = demodulated.t[kept], demodulated.amplitude[kept], damping.scatter.u[kept]
+    groups = min(GROUPS, t.size // LEAST_IN_GROUP)
+    rows = []
+    for part in np.array_split(np.arange(t.size), groups) if groups else []:
+        a, middle = amplitude[part], float(np.mean(t[part]))
+        if np.any(a <= 0):
+            continue
+        line = solve_weighted(np.stack([np.ones(part.size), t[part] - middle], axis=1), np.log(a), u[part] / a)
+        centre = math.exp(float(line.values[0]))
+        slope = -float(line.values[1]) - _friction(damping.best) / centre
+        spread = math.sqrt(float(line.covariance[1, 1]) * damping.scatter.correlation)
+        rows.append((centre, factor * slope / centre, factor * spread / centre))
+    x, y, scatter = np.array(rows).reshape(-1, 3).T
+    return x, y, scatter

@@ -1,0 +1,331 @@
+"""Derive: from frequency, amplitude and damping to what the experiment is about, with uncertainties."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pipeline.bench.instrument import U_CRYSTAL, Instrument
+from pipeline.bench.scene import Scene
+from pipeline.damping.fitted_law import mean_squared_rate
+from pipeline.damping.select import Damping
+from pipeline.motion.phase import PhaseFit
+from pipeline.motion.rest import Rest
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.median import median_size
+from pipeline.oscillation.condition import MAD_TO_SIGMA
+from pipeline.oscillation.demodulate import Demodulated
+from pipeline.results.ambient import Ambient
+from pipeline.results.budget import Budget, Budgets, Inputs, added, estimate_of, linear, product
+from pipeline.results.curves import Curve, drag_curve, energy_curve
+from pipeline.results.effects import ADDED_MASS_SHAPE, Effect
+from pipeline.track import F8, UNUSABLE, Quality
+
+__all__ = ["Derived", "Params", "derive"]
+
+# Powers of length and of one over time in the unit of a law's parameter.
+_DIMENSIONS = {"A0": (1, 0), "gamma": (0, 1), "beta": (-1, 1), "mu": (1, 1)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`derive`.
+
+    Parameters
+    ----------
+    u_clock_nominal : float
+        Relative standard uncertainty of a clock by its crystal's specification: 50 ppm taken as half-width of a
+        rectangle. It does not average away.
+    u_air_temperature_k : float
+        Standard uncertainty of an air temperature stated without one, K.
+    """
+
+    u_clock_nominal: float = U_CRYSTAL
+    u_air_temperature_k: float = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Derived:
+    """Everything that Table 1 lists. Budgets, and what only they and curves need, are worked out when asked for.
+
+    Parameters
+    ----------
+    estimates : mapping of str to Estimate
+        With every known contribution to the uncertainty, the clock's and the scale's among them.
+    coefficients : mapping of str to Estimate
+        The selected law's parameters with every known contribution.
+    budgets : mapping of str to Budget
+        Of every estimate and coefficient: which input contributes what.
+    law_weights : mapping of str to float
+        Of the admissible laws other than the selected one; with that one's they add up to 1.
+    parts : mapping of str to (variable, str)
+        What the properties below are read from, with units; absent where the scene does not give it.
+    """
+
+    estimates: Mapping[str, Estimate]
+    coefficients: Mapping[str, Estimate]
+    budgets: Mapping[str, Budget]
+    law_weights: Mapping[str, float]
+    parts: Mapping[str, tuple[Any, str]]
+
+    @cached_property
+    def statistical(self) -> Mapping[str, Estimate]:
+        """The estimates with what the record's own scatter contributes to their uncertainties alone (Type A)."""
+        return {name: Estimate(e.value, self.budgets[name].u_of("A"), e.unit) for name, e in self.estimates.items()}
+
+    @cached_property
+    def effective_mass_kg(self) -> Estimate | None:
+        """Mass that oscillates: bob, a third of the spring, air carried along, as far as the scene requires them."""
+        return self._part("mass")
+
+    @cached_property
+    def own_mass_kg(self) -> Estimate | None:
+        """What of the mass belongs to this run alone."""
+        return self._part("own_mass")
+
+    @cached_property
+    def spring_share_kg(self) -> Estimate | None:
+        """The share of the spring in the mass, which other runs have too."""
+        return self._part("spring_share")
+
+    @cached_property
+    def half_stiffness(self) -> Estimate:
+        """Mechanical energy over the recorded amplitude's square, N/m; per kilogram where the scene gives no mass."""
+        return estimate_of(*self.parts["half_stiffness"])
+
+    @cached_property
+    def drag_length(self) -> Estimate | None:
+        """Drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude, m.
+
+        None without disc, mass or air temperature.
+        """
+        return self._part("drag_length")
+
+    def _part(self, name: str) -> Estimate | None:
+        return estimate_of(*self.parts[name]) if name in self.parts else None
+
+    def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve:
+        """Return the mechanical energy against time with its band, J; J/kg where no mass is known.
+
+        Parameters
+        ----------
+        damping : Damping
+        demodulated : Demodulated
+            Of the same run.
+        """
+        unit = "J/kg" if self.effective_mass_kg is None else "J"
+        return energy_curve(damping, demodulated, self.half_stiffness, self.law_weights, unit)
+
+    def drag_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
+        """Return the drag coefficient against amplitude with its band; None where the scene or the record gives none.
+
+        Parameters
+        ----------
+        damping : Damping
+        demodulated : Demodulated
+            Of the same run.
+        """
+        if self.drag_length is None:
+            return None
+        return drag_curve(damping, demodulated, self.drag_length, self.law_weights)
+
+
+def derive(
+    demodulated: Demodulated,
+    damping: Damping,
+    phase: PhaseFit,
+    rest: Rest,
+    scene: Scene,
+    effects: tuple[Effect, ...],
+    *,
+    instrument: Instrument,
+    params: Params | None = None,
+) -> Derived:
+    """Propagate uncertainties to everything that is asked of a run.
+
+    Parameters
+    ----------
+    demodulated, damping, phase, rest
+        Outputs of the stages of those names.
+    scene : Scene
+        What is not known there leaves out what depends on it.
+    effects : tuple of Effect
+        Say which masses count.
+    instrument : Instrument
+        Clock and scale of the sensor.
+    params : Params, optional
+
+    Returns
+    -------
+    Derived
+
+    Notes
+    -----
+    First-order propagation [1]_ through the ``uncertainties`` package, every input one variable wherever it enters:
+    with the clock's rate r and the distances' scale s (both 1 but for their uncertainty)
+    :math:`\\omega = r\\omega_0`, :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`,
+    :math:`k = (\\omega^2 + \\overline{\\lambda^2}) (m + m_s/3 + m_a)`, :math:`A_0 = s a_0`, :math:`\\beta = r b/s`,
+    :math:`Q = \\omega/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start,
+    :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta`,
+    :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
+    What depends on the damping law carries the covariance of the selected law's parameters, and beside it what the
+    admissible laws differ by: :math:`\\sum_i w_i (x_i - x)^2` with :math:`w_i \\propto e^{-\\mathrm{BIC}_i/2}`.
+
+    References
+    ----------
+    .. [1] JCGM 100:2008, "Guide to the expression of uncertainty in measurement".
+    .. [2] K. Lelas, R. Pezer, arXiv:2502.07458.
+    """
+    params = params or Params()
+    inputs = Inputs()
+    ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
+    laws = _Laws(damping, inputs, demodulated.t - damping.t0)
+    rate = inputs.add("clock_rate", instrument.clock_rate, "B")
+    scale = ambient.scale(instrument)
+    omega = product(1.0, (inputs.add("angular_frequency", phase.angular_frequency, "A"), 1), (rate, 1))
+    start = product(1.0, (laws.start(), 1), (scale, 1))
+    lam = product(1.0, (laws.rate_at_start(), 1), (rate, 1))
+    v_rms = product(1.0, (omega, 1), (scale, 1), (laws.root_mean_square(), 1))
+    zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, "m"), "B")
+    offset = product(1.0, (inputs.add("rest_position", rest.mean, "A"), 1), (scale, 1))
+    found: dict[str, tuple[Any, str]] = {
+        "period": (product(2 * math.pi, (omega, -1)), "s"),
+        "frequency": (product(1.0 / (2 * math.pi), (omega, 1)), "Hz"),
+        "angular_frequency": (omega, "rad/s"),
+        "amplitude": (start, "m"),
+        "offset": (added(offset, zero), "m"),
+        "phase": (inputs.add("phase", phase.phase, "A"), "rad"),
+        "noise": (inputs.add("noise", _noise(demodulated), "A"), "m"),
+        "damping_rate": (lam, "1/s"),
+        "velocity_rms": (v_rms, "m/s"),
+    }
+    if laws.rate > 0:
+        found["quality_factor"] = (product(0.5, (omega, 1), (lam, -1)), "")
+    coefficients = _coefficients(damping, laws, rate, scale)
+    diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
+    own, share = _masses(scene, effects, diameter, ambient, inputs)
+    mass = own if share is None else added(own, share)
+    parts = {"half_stiffness": (product(0.5, (omega, 2), (scale, 2), (1.0 if mass is None else mass, 1)), "N/m")}
+    for name, x in (("mass", mass), ("own_mass", own), ("spring_share", share)):
+        if x is not None:
+            parts[name] = x, "kg"
+    if mass is not None:
+        squared = added(product(1.0, (omega, 2)), product(laws.squared_rate, (rate, 2)))
+        found["spring_constant"] = (product(1.0, (squared, 1), (mass, 1)), "N/m")
+    if diameter is not None:
+        found["keulegan_carpenter_number"] = (product(2 * math.pi, (start, 1), (diameter, -1)), "")
+        if ambient.known:
+            reynolds = product(1.0, (ambient.density, 1), (v_rms, 1), (diameter, 1), (ambient.viscosity(), -1))
+            found["reynolds_number"] = (reynolds, "")
+        if ambient.known and mass is not None:
+            # C over beta; the area, the mass and the density are in it once.
+            over_beta = product(6.0, (mass, 1), (omega, -1), (ambient.density, -1), (diameter, -2))
+            parts["drag_length"] = product(1.0, (over_beta, 1), (rate, 1), (scale, -1)), "m"
+            if damping.settled and "beta" in coefficients:
+                found["drag_coefficient"] = (product(1.0, (over_beta, 1), (coefficients["beta"][0], 1)), "")
+    return Derived(
+        estimates={name: estimate_of(x, unit) for name, (x, unit) in found.items()},
+        coefficients={name: estimate_of(x, unit) for name, (x, unit) in coefficients.items()},
+        budgets=Budgets(inputs, found | coefficients),
+        law_weights=laws.weights,
+        parts=parts,
+    )
+
+
+class _Laws:
+    """The damping laws as inputs: the selected one's parameters, and what the other admissible ones say instead."""
+
+    def __init__(self, damping: Damping, inputs: Inputs, elapsed: F8) -> None:
+        self.best = damping.best
+        self.variables = inputs.add_joint("damping_law", self.best.joint, "A")
+        names = damping.admissible or (damping.selected,)
+        odds = {name: math.exp(-0.5 * (damping.fits[name].bic - self.best.bic)) for name in names}
+        total = sum(odds.values())
+        self.weights = {name: x / total for name, x in odds.items() if name != damping.selected}
+        alternatives = inputs.add_alternatives("choice_of_law", self.weights, "A")
+        self.choices = list(alternatives.values())
+        self.fits = (self.best, *(damping.fits[name] for name in alternatives))
+        self.rate = self.best.rate_at_start()
+        self.amplitude, self.jacobian = self.best.law.both(elapsed, self.best.joint.values)
+        each = (self.amplitude, *(fit.amplitude(elapsed) for fit in self.fits[1:]))
+        self.sizes = [math.sqrt(float(amplitude @ amplitude) / (2.0 * elapsed.size)) for amplitude in each]
+
+    def start(self) -> Any:
+        """Return the amplitude at the first sample as a variable, m."""
+        slopes = [1.0] + [0.0] * (self.best.joint.values.size - 1)
+        return self._quantity(slopes, [float(fit.joint.values[0]) for fit in self.fits])
+
+    def rate_at_start(self) -> Any:
+        """Return the logarithmic rate of the amplitude there as a variable, 1/s."""
+        others = [fit.rate_at_start() for fit in self.fits[1:]]
+        return self._quantity(self.best.slopes_of_rate().tolist(), [self.rate, *others])
+
+    def root_mean_square(self) -> Any:
+        """Return that of the displacement over the windows as a variable, m."""
+        power = 2.0 * self.amplitude.size * self.sizes[0]
+        return self._quantity((self.amplitude @ self.jacobian / max(power, 1e-300)).tolist(), self.sizes)
+
+    @property
+    def squared_rate(self) -> float:
+        """As :meth:`pipeline.damping.select.Damping.squared_rate` over the windows, 1/s^2."""
+        return mean_squared_rate(self.best, self.amplitude)
+
+    def _quantity(self, slopes: list[float], values: list[float]) -> Any:
+        """A quantity's value under each law as one variable: linear in the selected law's parameters."""
+        terms = list(zip(slopes, self.variables, strict=True))
+        terms += [(other - values[0], z) for other, z in zip(values[1:], self.choices, strict=True)]
+        return linear(values[0], terms)
+
+
+def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
+    """The selected law's parameters in true seconds and metres."""
+    joint = damping.best.joint
+    found: dict[str, tuple[Any, str]] = {}
+    for name, unit, x in zip(joint.names, joint.units, laws.variables, strict=True):
+        if name in _DIMENSIONS and name != "A0":
+            length, per_time = _DIMENSIONS[name]
+            found[name] = (product(1.0, (x, 1), (scale, length), (rate, per_time)), unit)
+    if "n" in joint.names:
+        c, n = (laws.variables[joint.names.index(name)] for name in ("c", "n"))
+        found["c"] = (c * rate * scale ** (1 - n), joint.units[joint.names.index("c")])
+        found["n"] = (n, "")
+    return found
+
+
+def _masses(
+    scene: Scene, effects: tuple[Effect, ...], diameter: Any, ambient: Ambient, inputs: Inputs
+) -> tuple[Any, Any]:
+    """Bob with the air it carries, and a third of the spring, as far as the effects table includes them."""
+    if scene.bob_mass_kg is None:
+        return None, None
+    own = inputs.add("bob_mass", scene.bob_mass_kg, "B")
+    included = {effect.name for effect in effects if effect.included}
+    if "added_mass" in included and diameter is not None:
+        own = added(own, product(ADDED_MASS_SHAPE / 8.0, (ambient.density, 1), (diameter, 3)))
+    if "spring_mass" in included and scene.spring_mass_kg is not None:
+        return own, product(1.0 / 3.0, (inputs.add("spring_mass", scene.spring_mass_kg, "B"), 1))
+    return own, None
+
+
+def _noise(demodulated: Demodulated) -> Estimate:
+    """Noise of one sample, m, from the residuals' median.
+
+    Tails heavier than the normal distribution's make "the" standard deviation a matter of definition. The uncertainty
+    holds the difference to the root mean square of the samples used, and what a share e of wide draws like those left
+    out does to a median: 0.5 e / (2 phi(0.6745)) = 1.17 e of it.
+    """
+    flags, residual = demodulated.flags, demodulated.residual
+    clean = not flags.any()
+    if not clean:
+        residual = residual[(flags & UNUSABLE) == 0]
+    used = int(np.count_nonzero(np.isfinite(residual)))
+    dof = float(max(used - 3 * demodulated.count.size, demodulated.count.size))
+    value = MAD_TO_SIGMA * median_size(residual, used) * math.sqrt(used / dof)
+    wide = 0.0 if clean else np.count_nonzero(flags & np.uint8(Quality.FALSE_ECHO)) / flags.size
+    parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)
+    return Estimate(value, math.hypot(*parts), "m")

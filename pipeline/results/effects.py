@@ -1,0 +1,256 @@
+"""Effects: what could act at this bench, how large it should be, how large it was, and whether the model holds it.
+
+An effect enters the model only where its predicted or its measured size exceeds a tenth of the uncertainty it would
+disturb; the table shows all of them, in or out, with the reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from pipeline.bench.air import air_density, air_viscosity, speed_of_sound
+from pipeline.bench.instrument import Instrument
+from pipeline.bench.scene import Scene
+from pipeline.damping.select import Damping
+from pipeline.motion.phase import PhaseFit, words_on_exponent
+from pipeline.motion.rest import Rest
+from pipeline.numerics.estimate import Estimate
+from pipeline.oscillation.disturbances import Beside
+
+__all__ = ["ADDED_MASS_SHAPE", "Effect", "added_mass_kg", "tabulate"]
+
+SHARE = 0.1  # of the uncertainty that an effect would disturb
+SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
+ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc: added mass over rho a^3
+STEEL_KG_PER_M3 = 7850.0
+STEADY_DISC_DRAG = 1.17  # drag coefficient of a disc broadside on in steady flow, Re > 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One line of the effects table.
+
+    Parameters
+    ----------
+    name : str
+    predicted : float or None
+        Size that the scene predicts, in ``unit``; None where the scene says too little.
+    measured : float or None
+        Size that the record shows; None where the record cannot show it.
+    unit : str
+    included : bool
+        Whether the model holds it.
+    why : str
+        One sentence.
+    """
+
+    name: str
+    predicted: float | None
+    measured: float | None
+    unit: str
+    included: bool
+    why: str
+
+
+def added_mass_kg(scene: Scene) -> float:
+    """Mass of air that a thin disc carries along broadside on, :math:`(8/3)\\rho a^3`, kg.
+
+    References
+    ----------
+    H. Lamb, "Hydrodynamics", 6th ed., Cambridge 1932, art. 102.
+    """
+    if scene.disc_diameter_m is None:
+        return 0.0
+    return ADDED_MASS_SHAPE * _density(scene) * (0.5 * scene.disc_diameter_m.value) ** 3
+
+
+def tabulate(
+    scene: Scene,
+    damping: Damping,
+    phase: PhaseFit,
+    rest: Rest,
+    *,
+    noise_m: float,
+    instrument: Instrument,
+    beside: Beside | None = None,
+) -> tuple[Effect, ...]:
+    """Return the effects table.
+
+    Parameters
+    ----------
+    scene, damping, phase, rest
+        The bench and what the stages found.
+    noise_m : float
+        Standard deviation of one sample, m.
+    instrument : Instrument
+        Clock and scale of the sensor.
+    beside : Beside, optional
+        Modes beside the main oscillation; left out, they were not sought.
+    """
+    omega = phase.angular_frequency
+    u_k = 2.0 * math.hypot(omega.u / omega.value, instrument.clock_rate.u)
+    if scene.bob_mass_kg is not None:
+        u_k = math.hypot(u_k, scene.bob_mass_kg.u / scene.bob_mass_kg.value)
+    return (
+        *_masses(scene, u_k),
+        *_drags(scene, damping, omega.value),
+        _backbone(phase, damping),
+        _rest_drift(rest, noise_m),
+        *_modes(beside),
+        _buoyancy(scene, omega.value),
+        _speed_of_sound(scene, instrument),
+        _clock_rate(instrument),
+    )
+
+
+def _density(scene: Scene) -> float:
+    return air_density(
+        _value(scene.air_temperature_c, 20.0),
+        _value(scene.air_pressure_pa, 101325.0),
+        _value(scene.air_relative_humidity, 0.5),
+    )
+
+
+def _value(estimate: Estimate | None, otherwise: float) -> float:
+    return otherwise if estimate is None else estimate.value
+
+
+def _masses(scene: Scene, u_k: float) -> Iterator[Effect]:
+    if scene.bob_mass_kg is None:
+        for name in ("spring_mass", "added_mass"):
+            yield Effect(name, None, None, "1", False, "the scene gives no bob mass, so no spring constant is derived")
+        return
+    mass = scene.bob_mass_kg.value
+    if scene.spring_mass_kg is None:
+        yield Effect(
+            "spring_mass", None, None, "1", False, "the scene gives no spring mass; a third of it would add to the bob"
+        )
+    else:
+        yield _mass_effect(
+            "spring_mass", scene.spring_mass_kg.value / 3.0 / mass, u_k, "a third of the spring's mass swings along"
+        )
+    if scene.disc_diameter_m is None:
+        yield Effect(
+            "added_mass",
+            None,
+            None,
+            "1",
+            False,
+            "the scene names no disc; the bob alone carries a negligible mass of air",
+        )
+    else:
+        yield _mass_effect(
+            "added_mass", added_mass_kg(scene) / mass, u_k, "the disc carries (8/3) rho a^3 of air along"
+        )
+
+
+def _mass_effect(name: str, share: float, u_k: float, what: str) -> Effect:
+    included = share > SHARE * u_k
+    relation = "more" if included else "less"
+    why = f"{what}: {share:.2g} of the bob's mass, {relation} than a tenth of u(k)/k = {u_k:.2g}"
+    return Effect(name, share, None, "1", included, why)
+
+
+def _drags(scene: Scene, damping: Damping, omega: float) -> Iterator[Effect]:
+    names = damping.best.joint.names
+    gamma = damping.best.joint["gamma"].value if "gamma" in names else None
+    beta = damping.best.joint["beta"].value if "beta" in names else None
+    chosen = f"selected law: {damping.selected}; admissible: {', '.join(damping.admissible) or 'none'}"
+    predicted_gamma = predicted_beta = None
+    if scene.disc_diameter_m is not None and scene.bob_mass_kg is not None:
+        radius, mass = 0.5 * scene.disc_diameter_m.value, scene.bob_mass_kg.value
+        # Creeping flow past a disc broadside on: F = 16 eta a v.
+        predicted_gamma = 8.0 * air_viscosity(_value(scene.air_temperature_c, 20.0)) * radius / mass
+        b = 0.5 * STEADY_DISC_DRAG * _density(scene) * math.pi * radius**2
+        predicted_beta = 4.0 * b * omega / (3.0 * math.pi * mass)
+    yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
+    yield Effect("quadratic_drag", predicted_beta, beta, "1/(m s)", beta is not None, chosen)
+    mu = damping.best.joint["mu"].value if "mu" in names else None
+    tried = any("mu" in fit.joint.names for fit in damping.fits.values())
+    why = chosen if tried else "no law with friction is among those tried"
+    yield Effect("friction", None, mu, "m/s", mu is not None, why)
+
+
+def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
+    name, unit = "amplitude_dependent_frequency", "1"
+    if phase.backbone is None:
+        why = "a constant frequency describes the phase: an ideal spring needs no more"
+        return Effect(name, None, None, unit, False, why)
+    start = damping.best.joint["A0"].value
+    shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
+    why = (
+        f"the phase bends: the frequency shifts by {shift:.2g} of itself from rest to the first amplitude, "
+        f"with {words_on_exponent(phase.exponent)}, far beyond its uncertainty"
+    )
+    return Effect(name, None, shift, unit, True, why)
+
+
+def _rest_drift(rest: Rest, noise_m: float) -> Effect:
+    if not rest.moves:
+        why = f"a constant rest position describes the record (noise of one sample {noise_m * 1e3:.2g} mm)"
+        return Effect("rest_drift", None, rest.drift_m, "m", False, why)
+    parts = ["it is followed by a smooth curve"] if rest.drifts else []
+    if rest.steps:
+        parts.append(f"its steps, {len(rest.steps)} in number, are taken out")
+    why = f"the rest position moves more than its scatter allows; {' and '.join(parts)}"
+    return Effect("rest_drift", None, rest.range_m, "m", True, why)
+
+
+def _modes(beside: Beside | None) -> Iterator[Effect]:
+    """A mode of its own frequency, and what turns with the main oscillation or with both."""
+    found = () if beside is None else beside.sideways.modes
+    own = [mode for mode in found if mode.kind == "mode"]
+    locked = [mode for mode in found if mode.kind != "mode"]
+    names = (("sideways_mode", own, "mode of a frequency of its own"), ("harmonics", locked, "harmonic or product"))
+    for name, members, what in names:
+        if beside is None or beside.sideways.carrier is None:
+            yield Effect(name, None, None, "m", False, "not sought: too few periods, or not at this accuracy")
+        elif not members:
+            yield Effect(name, None, None, "m", False, f"no {what} stands out of what the main oscillation leaves")
+        else:
+            size = math.sqrt(sum(mode.amplitude.value**2 for mode in members))
+            verdict = "more" if beside.modelled else "less"
+            why = (
+                f"{_count(len(members), what)}, together of this amplitude; the strongest line found would leave up to "
+                f"{beside.leak_m * 1e3:.2g} mm in the main amplitude, {verdict} than a tenth of its uncertainty"
+            )
+            yield Effect(name, None, size, "m", beside.modelled, why)
+
+
+def _count(number: int, what: str) -> str:
+    return f"one {what}" if number == 1 else f"{number} times a {what}"
+
+
+def _buoyancy(scene: Scene, omega: float) -> Effect:
+    shift = _density(scene) / STEEL_KG_PER_M3 * 9.81 / omega**2
+    why = "a constant force: it moves the rest position (a steel bob's by this much) and nothing else"
+    return Effect("buoyancy", shift, None, "m", False, why)
+
+
+def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
+    record = instrument.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD
+    why = "it scales every distance alike: amplitude and beta, not the spring constant"
+    if instrument.u_scale > 0:
+        why += "; the distances were calibrated, so the calibration's uncertainty stands in its place"
+        return Effect("speed_of_sound", None, None, "1", False, why)
+    if scene.air_temperature_c is None:
+        why = f"the scene gives no air temperature, so its 0.18 %/K stand in no uncertainty: {why}"
+        return Effect("speed_of_sound", None, None, "1", False, why)
+    actual = speed_of_sound(
+        scene.air_temperature_c.value,
+        _value(scene.air_pressure_pa, 101325.0),
+        _value(scene.air_relative_humidity, 0.5),
+    )
+    whose = "of the record" if instrument.speed_of_sound_m_per_s else "that old recordings take for granted"
+    why += f"; relative to the {record:g} m/s {whose}; the air's uncertainty stands in theirs"
+    if instrument.speed_of_sound_m_per_s:
+        why += ", and so does the difference, which is not corrected"
+    return Effect("speed_of_sound", actual / record - 1.0, None, "1", True, why)
+
+
+def _clock_rate(instrument: Instrument) -> Effect:
+    rate = instrument.clock_rate
+    shift = None if rate.value == 1.0 else rate.value - 1.0
+    return Effect("clock_rate", rate.u, shift, "1", True, instrument.clock_words)

@@ -1,0 +1,328 @@
+"""Judge: say in words what holds, what does not, and what the record cannot tell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.damping.laws import LAWS
+from pipeline.damping.mixture import MixedDrag, find_mixed
+from pipeline.damping.select import Damping
+from pipeline.motion.overdamped.relaxation import Relaxation
+from pipeline.motion.phase import PhaseFit, words_on_exponent
+from pipeline.motion.rest import Rest
+from pipeline.motion.waveform import Waveform
+from pipeline.oscillation.condition import Conditioned
+from pipeline.oscillation.cycles import Cycles, NoOscillation
+from pipeline.oscillation.demodulate import Demodulated
+from pipeline.oscillation.disturbances import Beside
+from pipeline.oscillation.echoes import Clusters, find_clusters
+from pipeline.track import U8, UNUSABLE, Quality
+
+__all__ = ["Finding", "Severity", "by_severity", "count_quality", "judge", "judge_samples", "judge_still"]
+
+GRAVITY_M_PER_S2 = 9.81
+COUNTED = {
+    str(quality.name).lower(): int(quality)
+    for quality in Quality
+    if quality not in (Quality.GAP_BEFORE, Quality.MALFORMED)
+}
+
+Severity = Literal["info", "warning", "error"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One sentence about a run.
+
+    Parameters
+    ----------
+    code : str
+        From the closed list of the program's findings.
+    severity : {"info", "warning", "error"}
+        An error means that a number of the result must not be used.
+    message : str
+    """
+
+    code: str
+    severity: Severity
+    message: str
+
+
+def count_quality(flags: U8) -> dict[str, int]:
+    """Return how many samples carry each flag, and how many were used.
+
+    Examples
+    --------
+    >>> count_quality(np.array([0, 1, 2, 2], np.uint8))["false_echo"]
+    2
+    """
+    counts = np.bincount(flags) if flags.any() else np.array([flags.size])
+    held = [(value, count) for value, count in enumerate(counts.tolist()) if count]
+    found = {name: sum(count for value, count in held if value & bit) for name, bit in COUNTED.items()}
+    return {**found, "used": sum(count for value, count in held if not value & int(UNUSABLE))}
+
+
+def judge_samples(
+    conditioned: Conditioned, flags: U8, noise_m: float, clusters: Clusters | None = None
+) -> tuple[Finding, ...]:
+    """Return what the samples alone say, whether they oscillate or not.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    flags : (n,) uint8
+        Final ones.
+    noise_m : float
+        Standard deviation of one sample, m.
+    clusters : Clusters, optional
+        Of false echoes, where the record oscillates.
+    """
+    return tuple(_sample_findings(conditioned, flags, noise_m, clusters))
+
+
+def judge_still(why: NoOscillation) -> Finding:
+    """Return what is said of a record without cycles to analyse.
+
+    Parameters
+    ----------
+    why : NoOscillation
+        Or the relaxation that was found instead.
+    """
+    if not isinstance(why, Relaxation):
+        return Finding("no_oscillation", "error", why.why)
+    if why.kind == "strong":
+        return Finding(
+            "strongly_damped",
+            "info",
+            f"{why.why}; it was fitted as one solution of the equation of motion with linear drag, "
+            "and no damping law was chosen",
+        )
+    return Finding("overdamped", "warning", why.why)
+
+
+def judge(
+    conditioned: Conditioned,
+    cycles: Cycles,
+    demodulated: Demodulated,
+    damping: Damping,
+    phase: PhaseFit,
+    rest: Rest,
+    waveform: Waveform,
+    beside: Beside | None = None,
+) -> tuple[Finding, ...]:
+    """Return every finding on a run that oscillates, the gravest first.
+
+    Parameters
+    ----------
+    conditioned, cycles, demodulated, damping, phase, rest, waveform, beside
+        Outputs of the stages of those names.
+    """
+    clusters = find_clusters(demodulated, lambda rows: phase.total(conditioned.track.t[rows]))
+    findings = [
+        *_damping_findings(damping),
+        *_motion_findings(cycles, demodulated, phase, rest, waveform),
+        *_mode_findings(demodulated, phase, beside),
+        *judge_samples(conditioned, demodulated.flags, demodulated.noise_m, clusters),
+    ]
+    return by_severity(findings)
+
+
+def by_severity(*groups: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return all findings, the gravest first, else in their order."""
+    rank = {"error": 0, "warning": 1, "info": 2}
+    return tuple(sorted((one for group in groups for one in group), key=lambda finding: rank[finding.severity]))
+
+
+def _sample_findings(
+    conditioned: Conditioned, flags: U8, noise_m: float, clusters: Clusters | None
+) -> Iterator[Finding]:
+    track, plateaus_m, quantum_m = conditioned.track, conditioned.plateaus_m, conditioned.quantum_m
+    counts, n = count_quality(flags), len(track)
+    if counts["clipped"]:
+        levels = " and ".join(f"{level * 1e3:.1f} mm" for level in plateaus_m) or "a level flagged in the record"
+        yield Finding(
+            "clipped",
+            "warning",
+            f"{counts['clipped']} of {n} samples lie on a plateau at {levels}: a fixed object or a lost target cut the "
+            "motion there; they were left out and the amplitude comes from the rest of each cycle",
+        )
+    if counts["false_echo"]:
+        share = counts["false_echo"] / n
+        yield Finding(
+            "false_echoes",
+            "warning" if share > 0.1 else "info",
+            f"{counts['false_echo']} of {n} samples ({share:.1%}) are false echoes and were left out of the fit"
+            + _words_on(clusters),
+        )
+    if counts["missing"]:
+        yield Finding("missing_samples", "info", f"{counts['missing']} of {n} samples carry no distance")
+    if counts["duplicate_time"]:
+        yield Finding("duplicate_time", "warning", f"{counts['duplicate_time']} samples repeat an earlier time")
+    if counts["non_monotonic_time"]:
+        yield Finding("non_monotonic_time", "warning", f"{counts['non_monotonic_time']} samples run backward in time")
+    if track.clock == "nominal":
+        yield Finding(
+            "nominal_clock",
+            "info",
+            "times are row numbers over the nominal rate; a crystal's 50 ppm is part of every period's uncertainty",
+        )
+    if track.stated_error_m is not None and track.stated_error_m > 3.0 * noise_m:
+        yield Finding(
+            "stated_error_is_not_noise",
+            "info",
+            f"the file states an error of {track.stated_error_m * 1e3:.2f} mm for every distance; "
+            f"the samples scatter by {noise_m * 1e3:.2g} mm, so the stated error was not used as noise",
+        )
+    if quantum_m is not None and noise_m > 0 and quantum_m > 3.0 * noise_m:
+        yield Finding(
+            "quantised",
+            "warning",
+            f"distances come in steps of {quantum_m * 1e3:.3g} mm, more than three times their noise: "
+            "amplitudes may err by several times their stated uncertainty",
+        )
+
+
+def _damping_findings(damping: Damping) -> Iterator[Finding]:
+    rejected = [name for name, fit in damping.fits.items() if fit.rejected]
+    if damping.fits and len(rejected) == len(damping.fits):
+        yield Finding(
+            "law_rejected", "error", "every damping law tried is rejected: none describes the amplitude's fall"
+        )
+    yield from _rejections(damping)
+    if (mixed := find_mixed(damping)) is not None:
+        yield Finding("mixed_drag", "info", _words_on_mixed(mixed, damping))
+    drags = [name for name in damping.admissible if name != "none"]
+    if len(damping.admissible) > 1:
+        names = ", ".join(damping.admissible)
+        tail = "" if drags == list(damping.admissible) else "; it does not even show for certain that there is any"
+        yield Finding("laws_not_separable", "info", f"the record cannot tell these damping laws apart: {names}{tail}")
+
+
+def _words_on_mixed(mixed: MixedDrag, damping: Damping) -> str:
+    fit = mixed.fit
+    terms = " and ".join(f"{name} = {fit.joint[name]}" for name in fit.law.parameters[1:])
+    alone = ", ".join(f"{LAWS[name].words} by {_number(excess)}" for name, excess in mixed.against.items())
+    words = f"{fit.law.words}: {terms}; the BIC of one term alone is higher, of {alone}"
+    if not fit.rejected:
+        return words
+    power = damping.fits.get("power")
+    free = "" if power is None else f"; a free power of the amplitude is n = {power.joint['n']}"
+    return (
+        f"{words}. Constant coefficients do not hold from the first amplitude to the last (reduced chi-square "
+        f"{_number(fit.reduced_chi2)}): uncertainties and BIC are by what they leave{free}"
+    )
+
+
+def _rejections(damping: Damping) -> Iterator[Finding]:
+    """One sentence for each reason that speaks against laws, with the laws."""
+    by_reason: dict[str, list[str]] = {}
+    for fit in damping.fits.values():
+        by_reason.setdefault(fit.rejection, []).append(f"{fit.law.words} ({_number(fit.reduced_chi2)})")
+    if "misfit" in by_reason:
+        yield Finding(
+            "law_rejected",
+            "info",
+            f"rejected by their reduced chi-square, where {damping.selected} leaves {damping.best.reduced_chi2:.2g}: "
+            + ", ".join(by_reason["misfit"]),
+        )
+    if "negative" in by_reason:
+        yield Finding(
+            "law_rejected",
+            "info",
+            "rejected because a coefficient is negative beyond three standard uncertainties (reduced chi-square in "
+            f"brackets): {', '.join(by_reason['negative'])}",
+        )
+    for fit in damping.fits.values():
+        if fit.rejection == "not converged":
+            yield Finding("law_rejected", "info", f"{fit.law.words}: no convergence after {fit.tried}")
+    for name, why in damping.unfitted.items():
+        yield Finding("law_rejected", "info", f"no fit of the law {name}: {why}")
+
+
+def _number(value: float) -> str:
+    """Three digits, in full."""
+    return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
+
+
+def _motion_findings(
+    cycles: Cycles, demodulated: Demodulated, phase: PhaseFit, rest: Rest, waveform: Waveform
+) -> Iterator[Finding]:
+    if demodulated.t.size < 4:
+        yield Finding(
+            "short_record",
+            "warning",
+            f"only {cycles.count:.1f} periods were recorded: damping and its law need ten and more",
+        )
+    if demodulated.lost:
+        yield Finding(
+            "missing_samples",
+            "warning",
+            f"{demodulated.lost} of {demodulated.lost + demodulated.t.size} periods hold too few usable samples "
+            "and carry no amplitude",
+        )
+    if phase.backbone is not None:
+        start = phase.damping.best.joint["A0"].value
+        shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
+        yield Finding(
+            "amplitude_dependent_frequency",
+            "warning",
+            f"the frequency depends on amplitude: it is {abs(shift):.2%} {'higher' if shift > 0 else 'lower'} at "
+            f"{start * 1e3:.0f} mm than at rest and shifts with {words_on_exponent(phase.exponent)}; "
+            "the period given is the record's mean, its uncertainty covers the bend",
+        )
+    if rest.moves:
+        yield Finding("rest_drift", "warning", _words_on_rest(rest))
+    ratio = waveform.rms_m / demodulated.noise_m if demodulated.noise_m > 0 else 1.0
+    excess = phase.damping.scatter.excess
+    if ratio > 1.5:
+        extra = f"; amplitudes of single periods scatter by {excess * 1e3:.2g} mm beyond their noise" if excess else ""
+        yield Finding(
+            "correlated_residuals",
+            "warning",
+            f"the smooth model leaves {waveform.rms_m * 1e3:.2g} mm where samples scatter by "
+            f"{demodulated.noise_m * 1e3:.2g} mm within a period{extra}; uncertainties were widened by what is left",
+        )
+
+
+def _mode_findings(demodulated: Demodulated, phase: PhaseFit, beside: Beside | None) -> Iterator[Finding]:
+    own = [] if beside is None else [mode for mode in beside.sideways.modes if mode.kind == "mode"]
+    if beside is None or not own:
+        return
+    main = phase.angular_frequency.value / (2.0 * math.pi)
+    mode = own[0]
+    f, share = mode.frequency.value, mode.amplitude.value / float(np.median(demodulated.amplitude))
+    pendulum = (
+        f"; a pendulum {GRAVITY_M_PER_S2 / (2.0 * math.pi * f) ** 2:.2g} m long swings like that" if f < main else ""
+    )
+    others = f", and {len(own) - 1} more" if len(own) > 1 else ""
+    fate = "they were" if others else "it was"
+    yield Finding(
+        "sideways_mode",
+        "warning" if beside.modelled and share > 0.01 else "info",
+        f"a second mode of {mode.amplitude.value * 1e3:.2g} mm at {f:.4g} Hz beats with the oscillation every "
+        f"{1.0 / abs(f - main):.2g} s{pendulum}{others}; "
+        + (f"{fate} fitted along" if beside.modelled else f"{fate} left in, too small to disturb the amplitude"),
+    )
+
+
+def _words_on_rest(rest: Rest) -> str:
+    drift = f"drifts by {rest.drift_m * 1e3:.2g} mm during the record" if rest.drifts else ""
+    shown = [f"{step.height.value * 1e3:+.2g} mm at {step.time.value:.4g} s" for step in rest.steps[:5]]
+    more = f" and {len(rest.steps) - 5} more" if len(rest.steps) > 5 else ""
+    jumps = f"jumps {len(rest.steps)} time{'s' * (len(rest.steps) > 1)}: {', '.join(shown)}{more}" if shown else ""
+    return f"the rest position {' and '.join(part for part in (drift, jumps) if part)}"
+
+
+def _words_on(clusters: Clusters | None) -> str:
+    if clusters is None or not clusters.count:
+        return ""
+    many = f"{clusters.count} cluster{'s' * (clusters.count > 1)}"
+    return (
+        f"; {clusters.samples} of them come in {many}, {clusters.turning} of these at turning "
+        f"points; left in, all of them would change the amplitude by {clusters.shift_m * 1e3:+.2g} mm"
+    )

@@ -1,0 +1,128 @@
+"""From a loaded input to its analysis and result: the steps that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.accuracy import params_for
+from pipeline.analyse import Analysis, analyse
+from pipeline.bench.scene import Scene
+from springmass.errors import USAGE, ProgramError
+from springmass.runs.json_results import result_of
+from springmass.runs.loading import Loaded
+
+if TYPE_CHECKING:
+    from pipeline.results.classic import Classic
+
+__all__ = ["Analysed", "analyse_loaded", "distinct_names", "make_folder", "now_utc"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysed:
+    """One input with everything that was made of it.
+
+    Parameters
+    ----------
+    loaded : Loaded
+    analysis : Analysis
+    classic : Classic or None
+    result : dict
+        As printed under ``--json``.
+    """
+
+    loaded: Loaded
+    analysis: Analysis
+    classic: Classic | None
+    result: dict[str, Any]
+
+
+def analyse_loaded(
+    loaded: Loaded,
+    scene: Scene | None,
+    *,
+    parameters: Mapping[str, Any],
+    accuracy: str = "standard",
+    with_classic: bool = False,
+    time_utc: str | None = None,
+) -> Analysed:
+    """Analyse one input.
+
+    Parameters
+    ----------
+    loaded : Loaded
+    scene : Scene or None
+        None: the scene that a run file carries, if any.
+    parameters : mapping
+        Options as resolved, stored with the result.
+    accuracy : {"fast", "standard", "best"}
+        Tier.
+    with_classic : bool
+        Whether the report's method is wanted; its estimates then stand in the result.
+    time_utc : str, optional
+        ISO 8601; left out, now.
+
+    Raises
+    ------
+    pipeline.errors.AnalysisError, pipeline.errors.SceneError
+    """
+    if scene is None:
+        scene = Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
+    analysis = analyse(loaded.track, scene, params_for(accuracy))
+    classic = None
+    if with_classic:
+        from pipeline.results.classic import classic as evaluate
+
+        classic = evaluate(loaded.track, scene)
+    result = result_of(
+        loaded,
+        analysis,
+        time_utc=time_utc or now_utc(),
+        accuracy="classic" if with_classic else accuracy,
+        parameters={**parameters, "scene": scene.to_mapping()},
+        classic=classic,
+    )
+    return Analysed(loaded, analysis, classic, result)
+
+
+def distinct_names(paths: Sequence[str]) -> list[str]:
+    """Return a name for each input: its file's without the suffix, later ones of one name numbered.
+
+    Examples
+    --------
+    >>> distinct_names(["a/bob.txt", "b/bob.txt", "disc.h5"])
+    ['bob', 'bob-2', 'disc']
+    """
+    names: list[str] = []
+    for path in paths:
+        stem, count = Path(path).stem, 1
+        while (name := stem if count == 1 else f"{stem}-{count}") in names:
+            count += 1
+        names.append(name)
+    return names
+
+
+def make_folder(path: str | Path) -> Path:
+    """Return a folder for results, made where it is not there yet.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if it cannot be.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ProgramError(
+            f"{folder}: a folder for results was demanded, {error.strerror}; name another with --out", USAGE
+        ) from error
+    return folder
+
+
+def now_utc() -> str:
+    """Return the time as ISO 8601 in UTC, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")

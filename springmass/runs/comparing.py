@@ -1,0 +1,191 @@
+"""Several runs of one spring, compared: the steps that the commands share, and their JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pipeline.analyse import Motion
+from pipeline.bench.scene import Scene
+from pipeline.damping.joint import JointDamping, JointFit, fit_joint
+from pipeline.errors import AnalysisError
+from pipeline.numerics.estimate import Estimate
+from pipeline.results.compare import Comparison, SpringRun, compare_springs
+from pipeline.results.findings import Finding
+from springmass.errors import USAGE, ProgramError
+from springmass.runs.analysing import Analysed
+from springmass.runs.json_results import SCHEMA, estimate_json, finding_json, finite
+
+__all__ = ["Compared", "compare_analysed", "comparison_json", "demand_one_spring"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compared:
+    """What several runs of one spring say together.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of their spring constants.
+    joint : tuple of JointDamping
+        One for each bob that several runs have in common.
+    findings : tuple of Finding
+        Gravest first.
+    """
+
+    comparison: Comparison
+    joint: tuple[JointDamping, ...]
+    findings: tuple[Finding, ...]
+
+
+def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
+    """Refuse scenes from which no spring constants can be compared.
+
+    Parameters
+    ----------
+    scenes : sequence of (name, Scene)
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if a scene gives no bob mass, or the scenes state different springs.
+    """
+    missing = [name for name, scene in scenes if scene.bob_mass_kg is None]
+    if missing:
+        raise ProgramError(
+            f"compare needs the mass of every run's bob; no [bob] mass_kg for {', '.join(missing)}: "
+            "give --scene FILE, one for all runs or one for each in their order",
+            USAGE,
+        )
+    first, *others = scenes
+    for name, scene in others:
+        if scene.spring_mass_kg != first[1].spring_mass_kg:
+            raise ProgramError(
+                f"compare takes runs of one spring; [spring] mass_kg is {first[1].spring_mass_kg or 'not given'} for "
+                f"{first[0]} and {scene.spring_mass_kg or 'not given'} for {name}: state the same in both scenes",
+                USAGE,
+            )
+
+
+def compare_analysed(named: Sequence[tuple[str, Analysed]], *, mass_correlation: float = 0.0) -> Compared:
+    """Compare analysed runs of one spring.
+
+    Parameters
+    ----------
+    named : sequence of (name, Analysed)
+        Two at least.
+    mass_correlation : float
+        Of the errors of two bobs' masses, 0 to 1.
+
+    Raises
+    ------
+    AnalysisError
+        If a run does not oscillate or has no bob mass.
+    """
+    motions = [(name, _moving(name, analysed)) for name, analysed in named]
+    shares = [m.derived.spring_share_kg for _, m in motions if m.derived.spring_share_kg is not None]
+    comparison = compare_springs(
+        [
+            SpringRun.of(name, motion.derived, clock=analysed.analysis.track.clock)
+            for (name, motion), (_, analysed) in zip(motions, named, strict=True)
+        ],
+        shared_mass_kg=shares[0] if shares else None,
+        mass_correlation=mass_correlation,
+    )
+    joint = tuple(
+        fit_joint([(name, motion.demodulated, motion.damping) for name, motion in group])
+        for group in _of_one_bob(motions, [analysed.analysis.scene for _, analysed in named])
+    )
+    return Compared(comparison, joint, tuple(_findings(comparison, joint)))
+
+
+def comparison_json(
+    compared: Compared, named: Sequence[tuple[str, Analysed]], provenance: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return a comparison as JSON-able mapping; numbers that are not finite are None.
+
+    Parameters
+    ----------
+    compared : Compared
+    named : sequence of (name, Analysed)
+    provenance : mapping
+    """
+    found = compared.comparison
+    derived = [_moving(name, analysed).derived for name, analysed in named]
+    each = zip(found.names, derived, found.each, found.own_u, found.pulls, strict=True)
+    return {
+        "schema": SCHEMA,
+        "comparison": {
+            "agree": found.agree,
+            "spring_constant": estimate_json(found.spring_constant) if found.agree else None,
+            "chi2": finite(found.chi2),
+            "dof": found.dof,
+            "largest_deviation": finite(found.largest_deviation),
+            "exchanged": list(found.exchanged),
+            "exchanged_chi2": finite(found.exchanged_chi2),
+            "message": found.message,
+            "each": [
+                {
+                    "name": name,
+                    "period": estimate_json(d.estimates["period"]),
+                    "mass": estimate_json(d.effective_mass_kg or Estimate(float("nan"), float("nan"), "kg")),
+                    "spring_constant": estimate_json(k),
+                    "u_own": finite(u_own),
+                    "pull": finite(pull),
+                }
+                for name, d, k, u_own, pull in each
+            ],
+        },
+        "joint_damping": [
+            {
+                "runs": list(joint.runs),
+                "one_law": joint.one_law,
+                "selected": joint.selected,
+                "admissible": list(joint.admissible),
+                "message": joint.message,
+                "laws": {name: _law(fit) for name, fit in joint.fits.items()},
+            }
+            for joint in compared.joint
+        ],
+        "findings": [finding_json(f) for f in compared.findings],
+        "runs": [analysed.result for _, analysed in named],
+        "provenance": dict(provenance),
+    }
+
+
+def _moving(name: str, analysed: Analysed) -> Motion:
+    motion = analysed.analysis.motion
+    if not isinstance(motion, Motion):
+        raise AnalysisError(f"{name}: no oscillation to compare: {motion.why}")
+    return motion
+
+
+def _of_one_bob(motions: list[tuple[str, Motion]], scenes: list[Scene]) -> list[list[tuple[str, Motion]]]:
+    """Groups of two runs and more with the same bob and disc: the laws' coefficients go as one over the mass."""
+    groups: dict[tuple[Estimate | None, Estimate | None], list[tuple[str, Motion]]] = {}
+    for one, scene in zip(motions, scenes, strict=True):
+        groups.setdefault((scene.bob_mass_kg, scene.disc_diameter_m), []).append(one)
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Finding]:
+    findings = []
+    if comparison.exchanged:
+        findings.append(Finding("runs_exchanged", "error", comparison.message))
+    elif not comparison.agree:
+        findings.append(Finding("springs_differ", "error", comparison.message))
+    findings += [Finding("laws_differ", "warning", one.message) for one in joint if not one.one_law]
+    return findings
+
+
+def _law(fit: JointFit) -> dict[str, Any]:
+    return {
+        "parameters": {name: estimate_json(e) for name, e in fit.coefficients.estimates().items()},
+        "reduced_chi2": finite(fit.reduced_chi2),
+        "dof": finite(fit.dof),
+        "bic": finite(fit.bic),
+        "excess_chi2": finite(fit.excess_chi2),
+        "excess_dof": finite(fit.excess_dof),
+        "rejection": fit.rejection,
+    }

@@ -1,0 +1,388 @@
+"""From a path to a track: old recordings and run files alike, with what was seen on the way."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from acquisition.block import Block
+from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
+from acquisition.live.timebase import fit_clock
+from acquisition.recordings.identify import open_recording
+from acquisition.recordings.recording import Original, Recording, Trap
+from acquisition.source import SourceInfo
+from pipeline.bench.scene import Scene
+from pipeline.errors import SceneError
+from pipeline.track import Track
+from springmass.errors import UNREADABLE, USAGE, ProgramError
+from storage.run_file.layout import MAGIC
+from storage.wire_log.records import MAGIC as WIRE_MAGIC
+
+__all__ = ["Loaded", "kind_of", "load", "read_scene", "sample_data", "to_track"]
+
+MOTION_SENSOR = "motion-sensor"  # fixes the speed of sound
+LINE_PROTOCOL = "line-protocol"  # sends echo times
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """One input, read.
+
+    The original files inside a run file, and its digest, are read when they are asked for.
+
+    Parameters
+    ----------
+    path : Path
+    format : str
+        The family that read it, "run" for a run file, "wire" for a wire log.
+    info : SourceInfo
+    channel : str
+    title : str
+    samples : Block
+    track : Track
+        The samples for the pipeline, cut to the seconds asked for.
+    traps : tuple of Trap
+    malformed_rows : int
+    take_originals : callable
+        Gives the original files.
+    take_sha256 : callable
+        Gives the SHA-256 of the file's bytes.
+    scene : mapping or None
+        The scene a run file carries.
+    provenance : mapping
+        What a run file says of its origin.
+    recorded_format : str
+        The family that read the old recording inside a run file; empty where it holds none.
+    """
+
+    path: Path
+    format: str
+    info: SourceInfo
+    channel: str
+    title: str
+    samples: Block
+    track: Track
+    traps: tuple[Trap, ...]
+    malformed_rows: int
+    take_originals: Callable[[], tuple[Original, ...]]
+    take_sha256: Callable[[], str]
+    scene: Mapping[str, Any] | None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    recorded_format: str = ""
+
+    @cached_property
+    def originals(self) -> tuple[Original, ...]:
+        """The original files, bit for bit.
+
+        Raises
+        ------
+        storage.errors.StorageError
+            If one inside a run file is not what was written, or the run file is another by now.
+        """
+        return self.take_originals()
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the file's bytes; of a wire log empty where nothing of it was kept.
+
+        Raises
+        ------
+        storage.errors.StorageError
+            If the samples that were read from a run file are not those that were written, or the file is another
+            by now.
+        """
+        return self.take_sha256()
+
+    def samples_in_blocks(self, size: int = 1024) -> Iterator[Block]:
+        """Yield the samples in blocks of at most ``size``."""
+        for start in range(0, len(self.samples), size):
+            yield self.samples[start : start + size]
+
+
+def load(
+    path: str | Path,
+    *,
+    velocity: str | Path | None = None,
+    channel: str | None = None,
+    rate_hz: float | None = None,
+    unit: str | None = None,
+    run: str | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+) -> Loaded:
+    """Read a recording, a run file or a wire log.
+
+    Parameters
+    ----------
+    path : path
+    velocity : path, optional
+        The velocity file that belongs to a position file; joined by time.
+    channel, rate_hz, unit, run : optional
+        What the file leaves out or leaves open. Of a wire log of several sensors ``channel`` names one, by its number
+        or its port.
+    from_s, to_s : float, optional
+        Use samples of these seconds only; the rest stays in the file.
+
+    Raises
+    ------
+    acquisition.errors.FormatError, storage.errors.StorageError
+        If it cannot be read; one line.
+    ProgramError
+        If no sample lies within the seconds asked for.
+    """
+    where = Path(path)
+    kind = kind_of(where)
+    answers = {"velocity": velocity, "rate-hz": rate_hz, "unit": unit, "run": run}
+    if kind == "run":
+        _refuse(where, "a run file", {**answers, "channel": channel})
+        loaded = _load_run(where)
+    elif kind == "wire":
+        _refuse(where, "a wire log", answers)
+        loaded = _load_wire(where, channel)
+    else:
+        recording = open_recording(where, channel=channel, rate_hz=rate_hz, unit=unit, run=run, velocity_path=velocity)
+        loaded = _from_recording(where, recording)
+    if from_s is None and to_s is None:
+        return loaded
+    return replace(loaded, track=_between(loaded, from_s, to_s))
+
+
+def to_track(
+    samples: Block, info: SourceInfo, *, recorded_format: str = "", sensor: Mapping[str, Any] | None = None
+) -> Track:
+    """Hand samples over to the pipeline.
+
+    Parameters
+    ----------
+    samples : Block
+    info : SourceInfo
+    recorded_format : str
+        Family of the recording that they come from, if any: it says which speed of sound stands in the distances.
+    sensor : mapping, optional
+        What a run file says of the sensor that it was recorded with.
+
+    Notes
+    -----
+    The noise stated by a source is passed on; the error column of a file is not noise and travels apart.
+    """
+    return Track(
+        t=samples.t,
+        y=samples.distance,
+        flags=samples.flags,
+        rate_hz=info.rate_hz,
+        sigma_m=info.sigma_m,
+        quantum_m=info.quantum_m,
+        stated_error_m=info.stated_error_m,
+        clock=info.clock,
+        kind=info.kind,
+        velocity=samples.velocity,
+        **_clock_comparison(samples, info),
+        **_scale(recorded_format, sensor or {}),
+    )
+
+
+def _clock_comparison(samples: Block, info: SourceInfo) -> dict[str, float]:
+    """How the device's clock ran against the host's, where stamps of both are there."""
+    if info.clock != "device" or samples.host_ns is None or not (samples.host_ns >= 0).all():
+        return {}
+    fit = fit_clock(samples.t, samples.host_ns)
+    if not np.isfinite(fit.rate_error_ppm):
+        return {}
+    return {"rate_error": fit.rate_error_ppm * 1e-6, "u_rate_error": fit.u_rate_error_ppm * 1e-6}
+
+
+def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, float]:
+    """What made distances: the speed of sound where echo times were recorded, and the calibration's uncertainties."""
+    if recorded_format == MOTION_SENSOR:
+        return {"speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
+    if not sensor:
+        return {}
+    calibration = Calibration.from_mapping(sensor.get("calibration", {}))
+    known = {"u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
+    # Families that state a distance have applied a speed of their own that nobody knows.
+    if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
+        known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
+    return known
+
+
+def read_scene(path: str | Path) -> Scene:
+    """Read a scene file (TOML).
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if it is absent, no TOML, or says something impossible; the line names file, key and value.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            tables = tomllib.load(file)
+        return Scene.from_mapping(tables, where=str(path))
+    except OSError as error:
+        raise ProgramError(f"{path}: a scene file was demanded, {error.strerror}; check the name", USAGE) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ProgramError(f"{path}: not a TOML file ({error}); see the scene file in the reference", USAGE) from error
+    except SceneError as error:
+        raise ProgramError(str(error), USAGE) from error
+
+
+def sample_data() -> Path:
+    """Return the folder of the bundled recordings: inside an installed package, beside a checkout's."""
+    here = Path(__file__).resolve().parent
+    for folder in (here / "sample_data", here.parent / "sample_data"):
+        if (folder / "undamped_simulated_position.txt").is_file():
+            return folder
+    raise ProgramError(f"{here}: the bundled recordings are missing; install springmass again", UNREADABLE)
+
+
+def kind_of(path: Path) -> Literal["run", "wire", "recording"]:
+    """Tell run files and wire logs from recordings, by their first bytes."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(MAGIC))
+    except (OSError, ValueError):
+        return "recording"  # the format registry says what is wrong with it
+    if head == MAGIC:
+        return "run"
+    return "wire" if head.startswith(WIRE_MAGIC) else "recording"
+
+
+def _refuse(path: Path, what: str, answers: Mapping[str, object]) -> None:
+    """Demand that nothing was said of a file that says it all."""
+    given = [f"--{name}" for name, value in answers.items() if value is not None]
+    if given:
+        raise ProgramError(
+            f"{path}: {', '.join(given)} complete old recordings; {what} holds all of them, leave them out", USAGE
+        )
+
+
+def _from_recording(path: Path, recording: Recording) -> Loaded:
+    return Loaded(
+        path,
+        recording.format,
+        recording.info,
+        recording.channel,
+        recording.title,
+        recording.samples,
+        to_track(recording.samples, recording.info, recorded_format=recording.format),
+        recording.traps,
+        recording.malformed_rows,
+        lambda: recording.originals,
+        lambda: recording.originals[0].sha256,
+        None,
+        provenance=_origin(recording),
+        recorded_format=recording.format,
+    )
+
+
+def _origin(recording: Recording) -> dict[str, Any]:
+    """Return what an old recording says of where and when it comes from."""
+    told = {"start_time": recording.start_time, "recorded_run": recording.run}
+    return {name: value for name, value in told.items() if value}
+
+
+def _load_run(path: Path) -> Loaded:
+    from storage.run_file.reading import open_run
+
+    stamp = _stamp(path)
+    with open_run(path) as run:
+        samples = run.samples(digests=False)
+        return Loaded(
+            path,
+            "run",
+            run.info,
+            run.channel,
+            run.title,
+            samples,
+            to_track(samples, run.info, recorded_format=run.format, sensor=run.provenance.get("sensor")),
+            run.traps,
+            run.malformed_rows,
+            lambda: _originals_of(path, stamp),
+            lambda: _sha256_of(path, stamp, samples),
+            run.scene,
+            run.provenance,
+            run.format,
+        )
+
+
+def _stamp(path: Path) -> tuple[int, int, int] | None:
+    """Return what tells one file from another that took its name; None where none is there."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns
+
+
+def _demand_same(path: Path, stamp: tuple[int, int, int] | None) -> None:
+    if _stamp(path) != stamp:
+        raise ProgramError(f"{path}: the file that was loaded was demanded, got another; load it again", UNREADABLE)
+
+
+def _originals_of(path: Path, stamp: tuple[int, int, int] | None) -> tuple[Original, ...]:
+    """Read the original files inside a run file that was loaded."""
+    from storage.run_file.reading import open_run
+
+    _demand_same(path, stamp)
+    with open_run(path) as run:
+        return run.originals()
+
+
+def _sha256_of(path: Path, stamp: tuple[int, int, int] | None, samples: Block) -> str:
+    """Digest a run file that was loaded, and hold the samples read from it against their own digests."""
+    from storage.run_file.reading import open_run
+
+    _demand_same(path, stamp)
+    with open_run(path) as run:
+        run.check(samples)
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _load_wire(path: Path, channel: str | None) -> Loaded:
+    """Recover a log into a run file that is thrown away, and take that; the log stays as it is."""
+    from storage.recover import recover
+
+    with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
+        report = recover(path, Path(folder) / "run.h5")
+        names = {str(each.sensor.channel): each for each in report.runs}
+        listed = ", ".join(f'"{number}" ({each.sensor.port})' for number, each in names.items())
+        if channel is None and len(names) > 1:
+            demand = f"the log holds {len(names)} sensors: {listed}; name the one to take with --channel"
+            raise ProgramError(f"{path}: {demand}", UNREADABLE)
+        wanted = [each for number, each in names.items() if channel in (None, number, each.sensor.port)]
+        if len(wanted) != 1:
+            demand = f'channel "{channel}" was asked for, the log holds {listed}; name one of these'
+            raise ProgramError(f"{path}: {demand}", UNREADABLE)
+        loaded = _load_run(wanted[0].path)
+        originals = loaded.originals  # while the run file is there
+    return replace(
+        loaded,
+        path=path,
+        format="wire",
+        take_originals=lambda: originals,
+        take_sha256=lambda: originals[0].sha256 if originals else "",
+        recorded_format="wire",
+    )
+
+
+def _between(loaded: Loaded, from_s: float | None, to_s: float | None) -> Track:
+    t = loaded.track.t
+    low = -np.inf if from_s is None else from_s
+    high = np.inf if to_s is None else to_s
+    keep = (t >= low) & (t <= high)
+    if not keep.any():
+        told = t[np.isfinite(t)]
+        span = f"spans {told.min():g} to {told.max():g} s" if told.size else "holds no sample"
+        raise ProgramError(f"{loaded.path}: no sample lies between {low:g} and {high:g} s; the record {span}", USAGE)
+    track = loaded.track
+    velocity = None if track.velocity is None else track.velocity[keep]
+    return replace(track, t=t[keep], y=track.y[keep], flags=track.flags[keep], velocity=velocity)

@@ -1,0 +1,56 @@
+"""A run's samples as an ``xarray.Dataset``: read piece by piece from the file, or checked and in memory."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import h5netcdf
+import xarray as xr
+
+from acquisition.block import Block
+from storage.errors import reading
+from storage.run_file import layout
+from storage.run_file.handle import Contents
+from storage.run_file.header import Header
+
+__all__ = ["checked_dataset", "lazy_dataset"]
+
+
+def lazy_dataset(contents: Contents) -> xr.Dataset:
+    """Return a dataset that reads from the run's own open file; see :meth:`storage.run_file.reading.Run.dataset`.
+
+    Raises
+    ------
+    RunClosed, RunDamaged
+    """
+    for name in contents.header.columns:
+        contents.column(name)  # type and length, which a lazy reading would take as it finds them
+    with reading(contents.path, layout.SIGNAL):
+        # Through the run's own handle: the path may by now name another file.
+        file = h5netcdf.File(contents.file(), "r")
+        store = xr.backends.H5NetCDFStore(file, group=layout.SIGNAL)
+        dataset = xr.open_dataset(store, decode_times=False)  # elapsed seconds are no dates
+    dataset.attrs = _attributes(contents.header)
+    return dataset
+
+
+def checked_dataset(contents: Contents, samples: Block) -> xr.Dataset:
+    """Return a dataset of samples that were checked; see :meth:`storage.run_file.reading.Run.load_dataset`."""
+    header = contents.header
+    values = layout.arrays(samples, header.info.sigma_m)
+    variables = {}
+    for column in layout.COLUMNS:
+        if column.path.startswith(layout.SIGNAL) and column.name in header.columns:
+            attributes = layout.column_attributes(column, header)
+            attributes.pop("_FillValue", None)  # xarray keeps it with the encoding
+            variables[column.name] = ("time", values[column.name], attributes)
+    return xr.Dataset(variables, attrs=_attributes(header))
+
+
+def _attributes(header: Header) -> dict[str, Any]:
+    instrument = {
+        path.rpartition("/")[2]: value
+        for path, value in layout.fields(header).items()
+        if path.startswith(layout.INSTRUMENT)
+    }
+    return instrument | layout.signal_attributes(header)

@@ -1,0 +1,373 @@
+"""Run files, read: :func:`open_run` opens one lazily and checks what it reads.
+
+Examples
+--------
+>>> import tempfile
+>>> import numpy as np
+>>> from acquisition.block import Block
+>>> from acquisition.source import SourceInfo
+>>> from storage.run_file.writing import write_run
+>>> block = Block(0, np.arange(3) / 100, np.array([0.30, np.nan, 0.31]), np.array([0, 1, 0], np.uint8))
+>>> with tempfile.TemporaryDirectory() as folder:
+...     path = write_run(folder + "/run.h5", [block], SourceInfo("simulated", "spring.toml", 100.0))
+...     with open_run(path) as run:
+...         run.info.kind, len(run), run.samples().distance
+('simulated', 3, array([0.3 ,  nan, 0.31]))
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.block import Block
+from acquisition.recordings.recording import Original, Trap
+from acquisition.source import SourceInfo
+from storage.errors import NotARun, damaged, reading
+from storage.run_file import layout
+from storage.run_file import verification as verify
+from storage.run_file.handle import Contents, open_contents
+from storage.run_file.layout import CHUNK
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["Run", "is_run", "open_run"]
+
+
+def is_run(head: bytes) -> bool:
+    """Tell from a file's first eight bytes whether it may be a run file: whether it is HDF5.
+
+    Whether it is one of ours, :func:`open_run` says.
+    """
+    return head.startswith(layout.MAGIC)
+
+
+def open_run(path: str | os.PathLike[str]) -> Run:
+    """Open a run file for reading.
+
+    Returns
+    -------
+    Run
+        To be used in a ``with``, or closed.
+
+    Raises
+    ------
+    NotARun
+        If nothing is there, or something else.
+    RunDamaged
+        If the file cannot be read, or its header is not what was written.
+    """
+    path = Path(path)
+    remedy = "name a run file; springmass formats FILE says what a file is"
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(len(layout.MAGIC))
+    except OSError as error:
+        raise NotARun(path, f"a run file was demanded, got none ({error.strerror})", remedy) from error
+    if not is_run(head):
+        raise NotARun(path, f"a run file (HDF5) was demanded, got a file that begins with {head!r}", remedy)
+    return Run(open_contents(path))
+
+
+class Run:
+    """An open run file.
+
+    What it says of itself is read at once, samples when they are asked for. Nothing is delivered unchecked:
+    every chunk carries a checksum, and every column read to its end is held against its SHA-256, unless
+    :meth:`samples` is told to leave that to :meth:`check`. Of the ways to the samples, :meth:`blocks` and
+    :meth:`dataset` are lazy, :meth:`samples` and :meth:`load_dataset` whole.
+
+    Parameters
+    ----------
+    contents : Contents
+        The open file; closed by :meth:`close`.
+    """
+
+    __slots__ = ("_contents",)
+
+    def __init__(self, contents: Contents) -> None:
+        self._contents = contents
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; again does no harm."""
+        self._contents.handle.close()
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._contents.path
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return self._contents.header.samples
+
+    def __repr__(self) -> str:
+        return f"<Run {os.fspath(self.path)!r}: {len(self)} samples, {self.info.kind}>"
+
+    @property
+    def info(self) -> SourceInfo:
+        """The source."""
+        return self._contents.header.info
+
+    @property
+    def title(self) -> str:
+        """The run's title; empty where it has none."""
+        return self._contents.header.title
+
+    @property
+    def channel(self) -> str:
+        """The quantity or column taken as distance."""
+        return self._contents.header.channel
+
+    @property
+    def format(self) -> str:
+        """The family of recordings that read it; empty where none did."""
+        return self._contents.header.format
+
+    @property
+    def scene(self) -> Mapping[str, Any] | None:
+        """The scene's tables; None where none were given."""
+        return self._contents.header.scene
+
+    @property
+    def traps(self) -> tuple[Trap, ...]:
+        """What was seen on reading the old file."""
+        return self._contents.header.traps
+
+    @property
+    def malformed_rows(self) -> int:
+        """Rows of the old file that were not samples."""
+        return self._contents.header.malformed_rows
+
+    @property
+    def provenance(self) -> Mapping[str, Any]:
+        """What the writer said of software, configuration and times."""
+        return self._contents.header.provenance
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the content: of the header, which holds those of all arrays and original files.
+
+        Two files of the same content have the same, whatever their bytes.
+        """
+        return hashlib.sha256(self._contents.header.encode()).hexdigest()
+
+    def blocks(self, size: int = 1024) -> Iterable[Block]:
+        """Return the samples in blocks, read as they are asked for.
+
+        Parameters
+        ----------
+        size : int
+            Samples a block; the last may be shorter.
+
+        Returns
+        -------
+        iterable of Block
+            Can be gone through more than once, while the run is open.
+
+        Raises
+        ------
+        ValueError
+            If ``size`` is not positive.
+        RunDamaged
+            While iterating: where a chunk cannot be read, and before the last chunk's blocks where a whole
+            column is not what was written.
+        """
+        if size < 1:
+            raise ValueError(f"blocks hold at least 1 sample, got size = {size}")
+        return _Blocks(self._contents, size)
+
+    def samples(self, *, digests: bool = True) -> Block:
+        """Return all samples as one block.
+
+        Parameters
+        ----------
+        digests : bool
+            Whether the columns are held against their SHA-256. Where they are not, damage of what is read is an
+            error all the same, by the chunks' checksums, but an array that someone rewrote is not; :meth:`check`
+            finds it later. Columns that the header gives a formula for are then calculated and not read: they are
+            what was written, whatever became of the array.
+
+        Raises
+        ------
+        RunDamaged
+            If they are not what was written.
+        """
+        header = self._contents.header
+        implied = {} if digests else header.implied
+        values = {}
+        for name in (name for name in _BLOCK_COLUMNS if name in header.columns):
+            if name in implied:
+                values[name] = self._contents.implied(name)
+                continue
+            column = self._contents.column(name)
+            with reading(self.path, f"the column {name!r} from sample 0"):
+                values[name] = column[:]
+            # Fletcher's sum of zeros is zero: only a digest tells a chunk of zeros from one that was lost.
+            digests = digests or (column.compression is None and _has_empty_chunk(values[name], column.chunks))
+        block = _block(header.first, values)
+        if digests:
+            self.check(block)
+        return block
+
+    def check(self, samples: Block) -> None:
+        """Hold samples that :meth:`samples` returned against their digests.
+
+        Raises
+        ------
+        RunDamaged
+            Naming the first column that is not what was written.
+        """
+        for name in (name for name in _BLOCK_COLUMNS if name in self._contents.header.columns):
+            values = np.ascontiguousarray(getattr(samples, _BLOCK_COLUMNS[name]))
+            self._contents.check(name, hashlib.sha256(values.data).hexdigest())
+
+    def dataset(self) -> xarray.Dataset:
+        """Return the samples as a dataset that reads what is asked for, when it is asked for.
+
+        Returns
+        -------
+        xarray.Dataset
+            On the dimension ``time``: time (s), distance (m), quality, and where the file has them
+            distance_errors (m) and velocity (m/s), with the file's attributes. Its own attributes are kind,
+            channel, title, format and the instrument's name, clock and numbers.
+
+        Raises
+        ------
+        RunClosed, RunDamaged
+            If the run is closed, or the signal's structure is not what was written.
+
+        Notes
+        -----
+        Opening reads the times, for they are the index; of the rest, memory holds only the part looked at. A
+        part cannot be held against the digest of the whole: a flipped bit is still an error (every chunk
+        carries a checksum, and reading it raises ``OSError``), an array that someone rewrote is not.
+        :meth:`load_dataset` finds both, and :meth:`verify` does so once for many readings. What has not been
+        read when the run is closed cannot be read any more (``KeyError``): use the dataset inside the run's
+        ``with``, or ``load()`` it there. Closing the dataset leaves the run open.
+        """
+        from storage.run_file.dataset import lazy_dataset
+
+        return lazy_dataset(self._contents)
+
+    def load_dataset(self) -> xarray.Dataset:
+        """Return the samples as a dataset in memory, checked and free of the file.
+
+        Returns
+        -------
+        xarray.Dataset
+            The same as :meth:`dataset`. It takes 25 to 40 bytes a sample and outlives the run.
+
+        Raises
+        ------
+        RunClosed, RunDamaged
+            If the run is closed, or the samples are not what was written.
+        """
+        from storage.run_file.dataset import checked_dataset
+
+        return checked_dataset(self._contents, self.samples())
+
+    def originals(self) -> tuple[Original, ...]:
+        """Return the original files, bit for bit; none where none were kept.
+
+        Raises
+        ------
+        RunDamaged
+            If one is not what was written.
+        """
+        found = []
+        start = 0
+        for entry in self._contents.header.originals:
+            what = f"the original file {entry.name!r}"
+            with reading(self.path, what):
+                data = self._contents.file()[f"{layout.WIRE}/bytes"][start : start + entry.size].tobytes()
+            original = Original(entry.name, data)
+            if original.sha256 != entry.sha256:
+                raise damaged(self.path, what, "its SHA-256 differs")
+            found.append(original)
+            start += entry.size
+        return tuple(found)
+
+    def verify(self) -> None:
+        """Read everything again and hold it against what was written.
+
+        Raises
+        ------
+        RunDamaged
+            Naming the first array, original file, field or attribute that differs.
+        """
+        for _ in self.blocks(CHUNK):
+            pass
+        verify.columns(self._contents, verify.BESIDE_BLOCKS)
+        self.originals()
+        verify.fields(self._contents)
+        verify.attributes(self._contents)
+
+
+@dataclass(frozen=True, slots=True)
+class _Blocks:
+    """The samples of a run in blocks, anew at every iteration."""
+
+    contents: Contents
+    size: int
+
+    def __iter__(self) -> Iterator[Block]:
+        run, samples = self.contents, self.contents.header.samples
+        names = [name for name in _BLOCK_COLUMNS if name in run.header.columns]
+        columns = {name: run.column(name) for name in names}
+        digests = {name: hashlib.sha256() for name in names}
+        step = self.size * max(1, CHUNK // self.size)  # whole blocks, about a chunk at a time
+        for start in range(0, samples, step):
+            values = {}
+            for name in names:
+                with reading(run.path, f"the column {name!r} from sample {start}"):
+                    run.file()
+                    values[name] = columns[name][start : start + step]
+                digests[name].update(values[name].tobytes())
+            if start + step >= samples:
+                for name, digest in digests.items():
+                    run.check(name, digest.hexdigest())
+            read = _block(run.header.first + start, values)
+            for row in range(0, len(read), self.size):
+                yield read[row : row + self.size]
+
+
+def _has_empty_chunk(values: NDArray[Any], chunks: tuple[int, ...] | None) -> bool:
+    """Tell whether all bytes of some chunk are zero."""
+    size = chunks[0] if chunks else max(values.size, 1)
+    suspects = np.flatnonzero(values[::size] == 0) * size
+    return any(not values[start : start + size].view(np.uint8).any() for start in suspects.tolist())
+
+
+_BLOCK_COLUMNS = {
+    "time": "t",
+    "distance": "distance",
+    "quality": "flags",
+    "host_mono_ns": "host_ns",
+    "velocity": "velocity",
+}
+
+
+def _block(first: int, values: Mapping[str, NDArray[Any]]) -> Block:
+    fields: dict[str, Any] = {_BLOCK_COLUMNS[n]: array for n, array in values.items() if n in _BLOCK_COLUMNS}
+    return Block(first, **fields)

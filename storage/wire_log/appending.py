@@ -1,0 +1,332 @@
+"""The wire log: the exact bytes off the wire, each read a record with a checksum, appended and never changed.
+
+:class:`WireLogWriter` appends; :func:`read_log` (of :mod:`storage.wire_log.scanning`) reads whatever is left of a
+log. The
+layout of a record is that of :mod:`storage.wire_log.records`.
+
+Examples
+--------
+>>> import tempfile
+>>> header = LogHeader(sensors=(SensorEntry(0, "maxbotix", "COM3", 9600),), mono_ns=0, unix_ns=0)
+>>> with tempfile.TemporaryDirectory() as folder:
+...     log = WireLogWriter(folder + "/run.wire", header)
+...     log.append(Kind.DATA, b"R0500\\r", mono_ns=10_000_000)
+...     log.close()
+...     for record in read_log(folder + "/run.wire"):
+...         print(record.sequence, record.kind.name, len(record.payload))
+1
+0 HEADER 248
+1 DATA 6
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import secrets
+import threading
+from collections.abc import Callable, Iterable
+from itertools import accumulate
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from storage.errors import RunExists, WriteFailed, one_line
+from storage.wire_log.records import HEAD_BYTES, MAX_PAYLOAD, Kind, LogHeader, SensorEntry, ends_item, frame, frames
+from storage.wire_log.scanning import Damage, LogContents, NotALog, Record, parse_log, read_log
+
+__all__ = [
+    "Damage",
+    "Item",
+    "Kind",
+    "LogContents",
+    "LogFile",
+    "LogHeader",
+    "NotALog",
+    "Record",
+    "SensorEntry",
+    "WireLogWriter",
+    "Written",
+    "open_log_file",
+    "parse_log",
+    "read_log",
+]
+
+FIRST_COPY = 8192
+"""Byte of the log past which the header is first repeated."""
+WRITE_BYTES = 1 << 18
+"""So much is written at a time where many records wait."""
+
+Item = tuple[Kind, int, int, bytes]
+"""What a record is made of: kind, channel, host's monotonic clock in ns, payload."""
+
+
+class LogFile(Protocol):
+    """The seam between the writer and the disk; tests put a failing one in its place."""
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Append; return how many bytes were taken, as ``os.write`` does. Raises OSError."""
+        ...
+
+    def sync(self) -> None:
+        """Return when what was written is on the disk. Raises OSError."""
+        ...
+
+    def close(self) -> None:
+        """Close."""
+        ...
+
+
+class _OsFile:
+    """A file descriptor; nothing is buffered on this side of the kernel."""
+
+    # macOS and Windows have no fdatasync; fsync does more than it.
+    _sync: Callable[[int], None] = staticmethod(getattr(os, "fdatasync", os.fsync))
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+
+    def write(self, data: bytes | memoryview) -> int:
+        return os.write(self._descriptor, data)
+
+    def sync(self) -> None:
+        self._sync(self._descriptor)
+
+    def close(self) -> None:
+        os.close(self._descriptor)
+
+
+def open_log_file(path: Path) -> LogFile:
+    """Make a file that is not there yet, for appending, its name safe on the disk. Raises OSError."""
+    flags = os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_WRONLY
+    descriptor = os.open(path, flags | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0), 0o666)
+    # Windows opens no folder, and some file systems sync none: there the name is as safe as it gets.
+    with contextlib.suppress(OSError):
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    return _OsFile(descriptor)
+
+
+class Written(NamedTuple):
+    """How far a log has come: records, and bytes of the file."""
+
+    records: int = 0
+    bytes: int = 0
+
+
+class WireLogWriter:
+    """Appends records to a new log.
+
+    One thread appends; others may call :meth:`sync` at the same time. :attr:`written` and ``synced`` say how far the
+    log has come, in the kernel's hands and on the disk; ``extended`` how many items of the last call are whole in the
+    log.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        The log to be made; its folder must exist.
+    header : LogHeader
+        Written and synced before the constructor returns.
+    open_file : callable
+        Makes the file: the seam for tests.
+    log : int, optional
+        The number that all records carry; left out, a random one.
+
+    Raises
+    ------
+    RunExists
+        If a file stands there: a recording is never written over.
+    WriteFailed
+        If the log cannot be made; none is left behind then.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        header: LogHeader,
+        *,
+        open_file: Callable[[Path], LogFile] = open_log_file,
+        log: int | None = None,
+    ) -> None:
+        self.path = Path(path)
+        # Two numbers, and a Written only for who asks: to make one costs as much as to write a record.
+        self._written = (0, 0)
+        self.synced = Written()
+        self.extended = 0
+        self._log = secrets.randbits(32) if log is None else log
+        self._next_copy = FIRST_COPY
+        self._syncing = threading.Lock()
+        self._append_error: WriteFailed | None = None
+        self._sync_error: WriteFailed | None = None
+        try:
+            self._header = header.encode()
+        except (TypeError, ValueError) as error:
+            remedy = "give the scene and options as plain texts and numbers"
+            raise WriteFailed(self.path, f"the header cannot be written ({one_line(error)})", remedy) from error
+        self._file = self._made(open_file)
+        try:
+            self.append(Kind.HEADER, self._header, mono_ns=header.mono_ns)
+            self.sync()
+        except BaseException:
+            with contextlib.suppress(OSError):
+                self._file.close()
+                self.path.unlink()
+            raise
+
+    def _made(self, open_file: Callable[[Path], LogFile]) -> LogFile:
+        try:
+            return open_file(self.path)
+        except FileExistsError as error:
+            demand = "a new wire log was to be begun, but a file stands there"
+            raise RunExists(self.path, demand, "choose another name; a recording is never written over") from error
+        except OSError as error:
+            raise self._failed("could not be made", error) from error
+
+    def append(self, kind: Kind, payload: bytes, *, mono_ns: int, channel: int = 0) -> int:
+        """Append a record, or several where the payload is long.
+
+        Parameters
+        ----------
+        kind : Kind
+        payload : bytes
+        mono_ns : int
+            Host's monotonic clock, ns.
+        channel : int
+            0 to 255.
+
+        Returns
+        -------
+        int
+            Sequence number of the last record written.
+
+        Raises
+        ------
+        WriteFailed
+            If the disk does not take it all. Then nothing more is taken; what was written before stands.
+        """
+        self.extend(((kind, channel, mono_ns, payload),))
+        return self.written.records - 1
+
+    def extend(self, items: Iterable[Item]) -> None:
+        """Append the records of many items with few writes.
+
+        Parameters
+        ----------
+        items : iterable of Item
+
+        Raises
+        ------
+        WriteFailed
+            If the disk does not take them all. Then nothing more is taken; :attr:`extended` says how many of them are
+            whole in the log.
+        """
+        self.extended = 0
+        if error := self._append_error or self._sync_error:
+            raise error
+        batch: list[bytes] = []
+        laid, end = 0, self._written[1]
+        try:
+            for kind, channel, mono_ns, payload in items:
+                if end >= self._next_copy:
+                    # Doubling distances: about twenty copies in a day's log, and no zeroed page takes all of them.
+                    # Before the record and not after it, so that an error always means that the record itself is not
+                    # whole in the log.
+                    self._next_copy = 2 * end
+                    end += self._lay(batch, Kind.HEADER, 0, mono_ns, self._header)
+                end += self._lay(batch, kind, channel, mono_ns, payload)
+                laid += 1
+                if end - self._written[1] >= WRITE_BYTES:
+                    whole, batch = batch, []
+                    self._write(whole, laid)
+                    laid = 0
+        finally:
+            if batch:
+                self._write(batch, laid)
+
+    def _lay(self, batch: list[bytes], kind: Kind, channel: int, mono_ns: int, payload: bytes) -> int:
+        """Add an item's records to those that are to be written; return their bytes."""
+        before = len(batch)
+        sequence = self._written[0] + before
+        if len(payload) <= MAX_PAYLOAD:
+            # By position: at 100 records a second everything is cold each time, and names cost 5 us.
+            batch.append(frame(kind, payload, sequence, mono_ns, self._log, channel))
+            return HEAD_BYTES + len(payload)
+        batch += frames(kind, payload, sequence=sequence, mono_ns=mono_ns, log=self._log, channel=channel)
+        return sum(map(len, batch[before:]))
+
+    def _write(self, batch: list[bytes], items: int) -> None:
+        """Write the records of so many items, and count those that are whole in the log."""
+        data = b"".join(batch)
+        taken = 0
+        try:
+            taken = self._file.write(data)
+            while taken < len(data):  # a nearly full disk takes a part, then says why
+                more = self._file.write(memoryview(data)[taken:])
+                if more <= 0:
+                    raise OSError(errno.EIO, f"{taken} of {len(data)} bytes were taken")
+                taken += more
+        except OSError as error:
+            whole = [record for record, end in zip(batch, accumulate(map(len, batch)), strict=True) if end <= taken]
+            self._count(len(whole), sum(map(len, whole)), sum(map(ends_item, whole)))
+            self._append_error = self._failed("could not be written further", error)
+            raise self._append_error from error
+        self._count(len(batch), taken, items)
+
+    def _count(self, records: int, size: int, items: int) -> None:
+        records_before, bytes_before = self._written
+        self._written = (records_before + records, bytes_before + size)
+        self.extended += items
+
+    @property
+    def written(self) -> Written:
+        """How far the log has come in the kernel's hands."""
+        return Written(*self._written)
+
+    def sync(self) -> Written:
+        """Return when everything appended before the call is on the disk, and how much that is.
+
+        Raises
+        ------
+        WriteFailed
+            If the disk refuses. What :attr:`synced` says stands; the rest is not certain, nor is it ever again:
+            a kernel forgets which pages it failed to write, so a second attempt would prove nothing.
+        """
+        with self._syncing:
+            if self._sync_error:
+                raise self._sync_error
+            reached = self.written
+            try:
+                self._file.sync()
+            except OSError as error:
+                self._sync_error = self._failed("could not be synced to the disk", error)
+                raise self._sync_error from error
+            self.synced = reached
+        return reached
+
+    @property
+    def syncing(self) -> bool:
+        """Whether a sync is under way: what is written meanwhile may wait for it."""
+        return self._syncing.locked()
+
+    def close(self) -> None:
+        """Close the file without syncing it; call once.
+
+        Raises
+        ------
+        WriteFailed
+            If the disk says only now that something failed.
+        """
+        try:
+            self._file.close()
+        except OSError as error:
+            raise self._failed("could not be closed", error) from error
+
+    def _failed(self, what: str, error: OSError) -> WriteFailed:
+        reason = error.strerror or one_line(error)
+        remedy = "check the disk's space and permissions"
+        if self.written.records:
+            remedy += f"; {self.written.records} records up to byte {self.written.bytes} are kept"
+        return WriteFailed(self.path, f"the wire log {what} ({reason})", remedy)

@@ -1,0 +1,305 @@
+"""The wire log's layout: how a record lies in the file, and what the header says.
+
+A log is nothing but records, one after the other, little-endian::
+
+    offset  size  field
+         0     2  magic      F5 A9; F5 occurs in no UTF-8 text
+         2     2  length     u16, bytes of payload
+         4     4  sequence   u32, 0 for the first record, one more for each, modulo 2^32
+         8     8  mono_ns    i64, ns, host's monotonic clock: of the read for data, of the moment for all else
+        16     4  log        u32, random, the same in every record of a log
+        20     1  kind       1 header, 2 data, 3 mark, 4 event, 5 end
+        21     1  channel    u8, the sensor; 0 where no sensor is meant
+        22     2  parts      u16, bit 0: goes on in the next record; bit 1: goes on from the one before
+        24     4  crc32      of bytes 0 to 23 and the payload (zlib's polynomial)
+        28        payload
+
+``log`` tells the records from those of another log: an old one whose disk blocks show through after a power cut, or
+one that a device happened to send as its data. Payloads over 65535 bytes are split; the parts follow each other.
+
+=======  ====================================================================================================
+header   JSON, see :class:`LogHeader`. Repeated where the log passes 8, 16, 32, ... KiB: no lost page takes all
+data     the bytes of one read of a port, as they came
+mark     UTF-8 text
+event    JSON ``{"kind": text, "facts": {...}}``: lost, reopened, timeout, overflow, trigger, calibration, ...
+end      JSON, counts; its absence means that the recording was cut short
+=======  ====================================================================================================
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import json
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
+
+from acquisition.source import Kind as SourceKind
+from storage.run_file.header import json_text
+
+__all__ = [
+    "HEAD_BYTES",
+    "MAGIC",
+    "MAX_PAYLOAD",
+    "Kind",
+    "LogHeader",
+    "Parts",
+    "Record",
+    "SensorEntry",
+    "ends_item",
+    "event_payload",
+    "frame",
+    "frames",
+    "unframe",
+]
+
+MAGIC = b"\xf5\xa9"
+MAX_PAYLOAD = 65535
+LOG_VERSION = 1
+_HEAD = struct.Struct("<2sHIqIBBH")
+_CRC = struct.Struct("<I")
+HEAD_BYTES = _HEAD.size + _CRC.size
+_WRAP = 1 << 32
+
+
+class Kind(enum.IntEnum):
+    """What a record holds; the values are part of the log and never change."""
+
+    HEADER = 1
+    DATA = 2
+    MARK = 3
+    EVENT = 4
+    END = 5
+
+
+class Parts(enum.IntFlag):
+    """How a record belongs to its neighbours where a payload was split."""
+
+    GOES_ON = 1
+    GOES_ON_FROM = 2
+
+
+_KINDS = {kind.value: kind for kind in Kind}
+_ALL_PARTS = int(Parts.GOES_ON | Parts.GOES_ON_FROM)
+
+
+@dataclass(frozen=True, slots=True)
+class SensorEntry:
+    """One sensor of a run.
+
+    Parameters
+    ----------
+    channel : int
+        0 to 255, its number within the run.
+    family : str
+        As ``--sensor`` took it.
+    port : str
+        Address of the port.
+    baud : int
+    rate_hz : float or None
+        Readings per second that it is set to, Hz; None for the family's.
+    options : mapping
+        Of the family's decoder; JSON-able.
+    calibration : mapping
+        Numbers of :class:`acquisition.live.calibration.Calibration` by name; empty for the default.
+    """
+
+    channel: int
+    family: str
+    port: str = ""
+    baud: int = 0
+    rate_hz: float | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    calibration: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.channel <= 255:
+            raise ValueError(f"a channel must lie in 0 to 255, got {self.channel}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogHeader:
+    """What a log says of its run before the first byte came.
+
+    Parameters
+    ----------
+    sensors : tuple of SensorEntry
+        Each with a channel of its own.
+    mono_ns, unix_ns : int
+        The host's monotonic clock and UTC since 1970 at one and the same moment, ns: the map between the two.
+    kind : {"live", "simulated", "replay"}
+        Travels with the data: simulated data cannot pass for measured.
+    scene : mapping or None
+        The scene's tables; JSON-able.
+    title, version : str
+        The run's title; the version of springmass that records it.
+    """
+
+    sensors: tuple[SensorEntry, ...]
+    mono_ns: int
+    unix_ns: int
+    kind: SourceKind = "live"
+    scene: Mapping[str, Any] | None = None
+    title: str = ""
+    version: str = ""
+
+    def __post_init__(self) -> None:
+        channels = [sensor.channel for sensor in self.sensors]
+        if len(set(channels)) != len(channels):
+            raise ValueError(f"each sensor must have a channel of its own, got {channels}")
+        if self.kind not in ("live", "simulated", "replay"):
+            raise ValueError(f"kind must be live, simulated or replay, got {self.kind!r}")
+
+    def utc(self, mono_ns: int) -> str:
+        """Return the wall clock (ISO 8601, UTC) at a moment of the monotonic clock in ns."""
+        micros = (self.unix_ns + mono_ns - self.mono_ns) // 1000
+        moment = datetime.fromtimestamp(micros // 10**6, UTC).replace(microsecond=micros % 10**6)
+        return moment.isoformat(timespec="microseconds")
+
+    def encode(self) -> bytes:
+        """Return the payload of a header record.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the scene or an option holds what JSON cannot.
+        """
+        content = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+        return json_text({"log": LOG_VERSION, "start_utc": self.utc(self.mono_ns), **content}).encode("ascii")
+
+    @classmethod
+    def decode(cls, payload: bytes) -> LogHeader:
+        """Read what :meth:`encode` wrote.
+
+        Raises
+        ------
+        TypeError, ValueError, KeyError, AttributeError
+            If the payload is of another version.
+        """
+        content = json.loads(payload)
+        if (version := content.pop("log")) != LOG_VERSION:
+            raise ValueError(f"a log of version {LOG_VERSION} was demanded, got {version!r}")
+        del content["start_utc"]  # for people; the clock map says the same
+        content["sensors"] = tuple(SensorEntry(**sensor) for sensor in content["sensors"])
+        return cls(**content)
+
+
+class Record(NamedTuple):
+    """One record; a mark, event or header that was split is joined again, data come part by part.
+
+    Parameters
+    ----------
+    offset : int
+        Byte of the log at which it begins.
+    sequence : int
+        As written, modulo 2^32.
+    mono_ns : int
+        Host's monotonic clock, ns.
+    kind : Kind
+    channel : int
+    payload : bytes
+    lost_before : int
+        Records that are missing between this one and the one delivered before it; a frame must not be put together
+        across them.
+    """
+
+    offset: int
+    sequence: int
+    mono_ns: int
+    kind: Kind
+    channel: int
+    payload: bytes
+    lost_before: int = 0
+
+    def text(self) -> str:
+        """Return the payload as text."""
+        return self.payload.decode("utf-8", "replace")
+
+    def json(self) -> Mapping[str, Any]:
+        """Return the payload as a JSON object; empty where it is none."""
+        try:
+            content = json.loads(self.payload)
+        except ValueError:
+            return {}
+        return content if isinstance(content, dict) else {}
+
+
+def event_payload(kind: str, facts: Mapping[str, Any]) -> bytes:
+    """Return the payload of an event; facts that JSON cannot hold go in as text, for an event is never lost."""
+    try:
+        text = json_text({"kind": kind, "facts": facts})
+    except (TypeError, ValueError):
+        text = json_text({"kind": kind, "facts": {name: repr(value) for name, value in facts.items()}})
+    return text.encode("ascii")
+
+
+def frame(kind: Kind, payload: bytes, sequence: int, mono_ns: int, log: int, channel: int = 0, parts: int = 0) -> bytes:
+    """Return one record with a payload of at most 65535 bytes.
+
+    Examples
+    --------
+    >>> frame(Kind.DATA, b"R0500", sequence=7, mono_ns=1, log=2, channel=3).hex(" ", -4)
+    'f5a90500 07000000 01000000 00000000 02000000 02030000 034438e3 52303530 30'
+    """
+    head = _HEAD.pack(MAGIC, len(payload), sequence % _WRAP, mono_ns, log, kind, channel, parts)
+    return head + _CRC.pack(zlib.crc32(payload, zlib.crc32(head))) + payload
+
+
+def frames(kind: Kind, payload: bytes, *, sequence: int, mono_ns: int, log: int, channel: int = 0) -> Iterator[bytes]:
+    """Return the records of a payload of any length, numbered from ``sequence``."""
+    starts = range(0, max(1, len(payload)), MAX_PAYLOAD)
+    for number, start in enumerate(starts):
+        parts = (Parts.GOES_ON if number < len(starts) - 1 else 0) | (Parts.GOES_ON_FROM if number else 0)
+        piece = payload[start : start + MAX_PAYLOAD]
+        yield frame(
+            kind, piece, sequence=sequence + number, mono_ns=mono_ns, log=log, channel=channel, parts=int(parts)
+        )
+
+
+def ends_item(record: bytes) -> bool:
+    """Return whether a record is the last of what was appended: no part that goes on, and no copy of the header.
+
+    Examples
+    --------
+    >>> [ends_item(record) for record in frames(Kind.DATA, bytes(70_000), sequence=0, mono_ns=0, log=1)]
+    [False, True]
+    """
+    *_, kind, _, parts = _HEAD.unpack_from(record)
+    return kind != Kind.HEADER and not parts & Parts.GOES_ON
+
+
+def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, Kind, int, int, bytes] | None:
+    """Return the record that begins at a byte, None where no whole and sound one does.
+
+    Parameters
+    ----------
+    data : bytes
+    at : int
+        Index of the record's first byte.
+    log : int or None
+        The log it must belong to; None for any.
+
+    Returns
+    -------
+    tuple
+        sequence, mono_ns, log, kind, channel, parts, payload.
+    """
+    start = at + HEAD_BYTES
+    if start > len(data):
+        return None
+    magic, length, sequence, mono_ns, found, code, channel, parts = _HEAD.unpack_from(data, at)
+    # The cheap checks first: a search through damage comes here for every magic that chance has put there.
+    kind = _KINDS.get(code)
+    if magic != MAGIC or kind is None or parts > _ALL_PARTS or start + length > len(data):
+        return None
+    if log is not None and found != log:
+        return None
+    payload = data[start : start + length]
+    head = data[at : at + _HEAD.size]
+    if _CRC.unpack_from(data, at + _HEAD.size)[0] != zlib.crc32(payload, zlib.crc32(head)):
+        return None
+    return sequence, mono_ns, found, kind, channel, parts, payload

@@ -1,0 +1,199 @@
+"""The line protocol is what its page of the reference says."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.decoders.line_protocol import (
+    FAMILY,
+    LONGEST,
+    LineProtocolDecoder,
+    LineProtocolEncoder,
+    checksum,
+    frame,
+)
+
+ROOT = Path(__file__).resolve().parents[4]
+PAGE = (ROOT / "docs" / "reference" / "line-protocol.md").read_text(encoding="utf-8")
+SKETCH = (ROOT / "firmware" / "springmass_rangefinder" / "springmass_rangefinder.ino").read_text(encoding="utf-8")
+GOOD = b"$R1,0,1000000,2040.75,2130,E*CCAA\n"
+
+
+def section(title: str) -> str:
+    """Return a section of the page."""
+    found = re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
+    assert found is not None
+    return found[1]
+
+
+def vectors() -> list[tuple[str, ...]]:
+    """Return the rows of the page's table of vectors, without quotes."""
+    rows = re.findall(r"^\| `(.*)` \|(.*)\|$", section("Vectors"), re.MULTILINE)
+    return [(line, *(cell.strip().strip("`") for cell in rest.split("|"))) for line, rest in rows]
+
+
+def number(cell: str) -> float:
+    """Return a cell's number, NaN for a dash."""
+    return math.nan if cell == "-" else float(cell)
+
+
+def decode(data: bytes) -> tuple[list[tuple[float, ...]], dict[str, int]]:
+    """Return sequence, device us, echo us, degC and flags of each reading, and the faults that were counted."""
+    decoder = LineProtocolDecoder()
+    r = decoder.feed(0, data)
+    rows = zip(r.sequence, r.device_us, r.echo_us, r.temperature_c, r.flags, strict=True)
+    return [tuple(map(float, row)) for row in rows], {k: v for k, v in decoder.faults.items() if v}
+
+
+def body_of(**change: str) -> bytes:
+    """Return a body with some fields changed."""
+    parts = {"tag": "R1", "sequence": "5", "device": "50000", "echo": "2040.75", "celsius": "2130", "status": "E"}
+    return ",".join((parts | change).values()).encode()
+
+
+def test_the_page_has_vectors_of_every_kind() -> None:
+    """Readings, silences, and each fault that the page names."""
+    named = set(re.findall(r"^\| `(\w+)` \|", section("What a reader counts"), re.MULTILINE))
+    assert {row[6] for row in vectors()} - {""} == named - {"garbage_bytes"}
+    assert {row[5] for row in vectors()} == {"yes", "no", "-"}
+    assert named == set(LineProtocolDecoder().faults)
+
+
+@pytest.mark.parametrize("vector", vectors(), ids=lambda row: row[0])
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"], ids=["LF", "CRLF"])
+def test_a_vector_of_the_page_is_read_as_it_says(vector: tuple[str, ...], end: bytes) -> None:
+    """Fields, missing flag, fault."""
+    line, *cells, missing, fault = vector
+    rows, faults = decode(line.encode() + end)
+    if fault:
+        assert rows == []
+        assert faults == {fault: 1, "garbage_bytes": len(line) + len(end)}
+        return
+    expected = [*map(number, cells), float(missing == "yes")]
+    np.testing.assert_array_equal(rows, [expected])
+    assert faults == {}
+
+
+@pytest.mark.parametrize("vector", [row for row in vectors() if row[5] != "-"], ids=lambda row: row[0])
+def test_a_vector_of_the_page_is_written_as_it_says(vector: tuple[str, ...]) -> None:
+    """The encoder makes the same line of the fields, but for a B, which no simulated sensor has."""
+    line, sequence, device_us, echo_us, celsius, *_ = vector
+    written = LineProtocolEncoder().encode(
+        sequence=int(sequence),
+        device_us=int(device_us),
+        echo_us=number(echo_us),
+        distance_m=number(echo_us) * 171.5e-6,
+        temperature_c=number(celsius),
+    )
+    if ",B*" in line:
+        body = line[1:].partition("*")[0].replace("B", "N").encode()
+        assert written == frame(body)
+    else:
+        assert written == line.encode() + b"\n"
+
+
+def test_the_checksum_is_the_one_the_page_names() -> None:
+    """Its check value stands there, and the firmware begins it the same way."""
+    assert f"it is {checksum(b'123456789'):04X}" in PAGE
+    assert "crc = 0xFFFF" in SKETCH
+    assert "_crc_xmodem_update" in SKETCH
+
+
+def test_the_firmware_sends_at_the_speed_and_rate_of_the_family() -> None:
+    """What the sketch's comments and constants say is what `springmass sensors` says."""
+    assert f"{FAMILY.baud} baud" in SKETCH
+    assert f"{FAMILY.baud} baud" in PAGE
+    period = re.search(r"PERIOD_US (\d+)UL", SKETCH)
+    assert period is not None
+    assert 1e6 / int(period[1]) == FAMILY.rate_hz
+    assert pytest.approx(0.25e-6 * 343 / 2, rel=0.01) == FAMILY.resolution_m
+
+
+def test_the_longest_line_is_as_the_page_says_and_fits() -> None:
+    """Every field at its longest is read; a longer line is dropped whole."""
+    body = body_of(sequence="4294967295", device="4294967295", echo="999999.75", celsius="-99999")
+    assert f"at most {LONGEST} bytes" in PAGE
+    assert len(frame(body)) < LONGEST
+    assert decode(frame(body))[0] == [(4294967295, 4294967295, 999999.75, -999.99, 0)]
+    padded = b"$R1," + b"0" * LONGEST + b"\n"
+    assert decode(padded + GOOD) == (decode(GOOD)[0], {"bad_frame": 1, "garbage_bytes": len(padded)})
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"sequence": "4294967296"},
+        {"device": "4294967296"},
+        {"sequence": "-1"},
+        {"sequence": ""},
+        {"device": " 5"},
+        {"echo": "2040"},
+        {"echo": "2040.7"},
+        {"echo": "-2040.75"},
+        {"echo": "nan"},
+        {"celsius": "21.3"},
+        {"status": "e"},
+        {"status": "EE"},
+        {"status": "E,1"},
+        {"tag": "R2"},
+    ],
+    ids=str,
+)
+def test_a_sound_checksum_over_a_wrong_field_is_no_reading(change: dict[str, str]) -> None:
+    """It may be a later version's; it is counted and not guessed at."""
+    rows, faults = decode(frame(body_of(**change)))
+    assert rows == []
+    assert faults.pop("unknown_record") == 1
+    assert set(faults) == {"garbage_bytes"}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"status": "N"}, {"status": "B"}, {"status": "Z"}, {"echo": ""}, {"echo": "0.00"}, {"status": "N", "echo": ""}],
+    ids=str,
+)
+def test_an_echo_that_no_e_vouches_for_is_missing(change: dict[str, str]) -> None:
+    """Whatever number stands there; the row stays, with its sequence and time."""
+    (row,), faults = decode(frame(body_of(**change)))
+    assert row[:2] == (5, 50000)
+    assert math.isnan(row[2])
+    assert row[4] == 1
+    assert faults == {}
+
+
+@pytest.mark.parametrize("before", [b"noise ", b"\xff\x00\xfe", GOOD[:-1], b"$R1,0,10", b"# begun"], ids=repr)
+def test_garbage_before_a_line_costs_no_line(before: bytes) -> None:
+    """What follows the last dollar sign is read; a line whose end was lost is not."""
+    rows, faults = decode(before + GOOD)
+    assert rows == decode(GOOD)[0]
+    assert faults == {"bad_frame": 1, "garbage_bytes": len(before)}
+
+
+def test_every_change_of_one_or_two_bits_is_found() -> None:
+    """As the page promises: of one bit anywhere in the line, of two in what the CRC covers."""
+    sent = decode(GOOD)[0]
+    bits = range((len(GOOD) - 1) * 8)
+    covered = range(8, GOOD.index(b"*") * 8)
+    pairs = [(bit,) for bit in bits] + [(a, b) for a in covered for b in covered if a < b]
+    lines = []
+    for pair in pairs:
+        line = bytearray(GOOD)
+        for bit in pair:
+            line[bit // 8] ^= 1 << bit % 8
+        lines.append(bytes(line))
+    rows, _ = decode(b"".join(lines))
+    assert len(pairs) > 20_000
+    assert [row for row in rows if row not in sent] == []
+    assert len(rows) == 0
+
+
+def test_echo_times_are_written_in_the_firmware_s_steps() -> None:
+    """0.25 us, 43 um of distance."""
+    encoder = LineProtocolEncoder()
+    line = encoder.encode(sequence=0, device_us=0, echo_us=2040.63, distance_m=0.35, temperature_c=math.nan)
+    assert line == frame(b"R1,0,0,2040.75,,E")

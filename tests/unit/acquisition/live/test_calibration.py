@@ -1,0 +1,177 @@
+"""Calibration: a bob at rest, a ruler, and the speed of sound that can be applied again."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition.errors import CalibrationError
+from acquisition.live.calibration import Calibration, StillPoint, against_ruler, from_still
+
+
+def still(rest_m: float, noise_m: float = 1e-4, seed: int = 1, n: int = 300) -> StillPoint:
+    """Return what three seconds of a bob at rest give."""
+    return from_still(rest_m + noise_m * np.random.default_rng(seed).standard_normal(n))
+
+
+def one_line(error: pytest.ExceptionInfo[CalibrationError]) -> str:
+    """Return the text of an error, which is one line."""
+    text = str(error.value)
+    assert text
+    assert "\n" not in text
+    return text
+
+
+def test_a_still_bob_gives_rest_and_noise_with_an_honest_uncertainty() -> None:
+    """Over 200 seeds the rest's error has the size that u states, and the noise is right."""
+    points = [still(0.3, 2e-4, seed) for seed in range(200)]
+    z = [(point.rest_m - 0.3) / point.u_rest_m for point in points]
+    assert 0.8 < np.std(z) < 1.2
+    assert np.median([point.noise_m for point in points]) == pytest.approx(2e-4, rel=0.1)
+    assert {point.samples for point in points} == {300}
+
+
+def test_outliers_and_missing_samples_do_not_move_the_rest() -> None:
+    """A tenth of false echoes and a few missing samples leave the rest within its noise."""
+    distance = 0.3 + 1e-4 * np.random.default_rng(2).standard_normal(300)
+    distance[::10] += 0.02
+    distance[5:15] = np.nan
+    point = from_still(distance)
+    assert point.rest_m == pytest.approx(0.3, abs=1e-4)
+    assert point.samples == 290
+    assert point.noise_m < 3e-4
+
+
+def test_a_coarse_sensor_that_reads_one_number_is_still() -> None:
+    """Identical readings of a sensor with steps of 1 cm are a rest position, and so is a last digit that flickers."""
+    assert from_still(np.full(30, 0.31)).rest_m == 0.31
+    flicker = np.where(np.arange(30) % 3 == 0, 0.311, 0.310)
+    assert from_still(flicker).rest_m == 0.310
+
+
+@pytest.mark.parametrize("amplitude_m", [0.003, 0.05])
+def test_a_moving_bob_is_refused(amplitude_m: float) -> None:
+    """A swing of 3 mm is seen beside noise of 0.1 mm."""
+    t = np.arange(300) / 100
+    moving = 0.3 + amplitude_m * np.sin(7.9 * t) + 1e-4 * np.random.default_rng(3).standard_normal(300)
+    with pytest.raises(CalibrationError, match="the bob moves") as error:
+        from_still(moving)
+    assert "let it hang still" in one_line(error)
+
+
+def test_a_bob_out_of_view_is_refused() -> None:
+    """Nine distances are too few, with their count and a hint."""
+    distance = np.full(300, np.nan)
+    distance[:9] = 0.3
+    with pytest.raises(CalibrationError, match="got 9 of 300") as error:
+        from_still(distance)
+    one_line(error)
+
+
+def test_one_ruler_distance_gives_the_offset() -> None:
+    """One known distance shifts and leaves the scale; its u joins the ruler's and the measurement's."""
+    point = StillPoint(0.300, 3e-4, 1e-3, 300)
+    found = against_ruler((point,), (0.312,), 4e-4)
+    assert (found.scale, found.offset_m) == (1.0, pytest.approx(0.012))
+    assert found.u_offset_m == pytest.approx(5e-4)
+
+
+def test_two_ruler_distances_give_offset_and_scale() -> None:
+    """Distances measured through a known scale and offset come out where the ruler says."""
+    scale, offset = 1.012, 0.008
+    known = (0.2, 0.5, 0.9)
+    points = tuple(still((y - offset) / scale, seed=i) for i, y in enumerate(known))
+    found = against_ruler(points, known, 2e-4)
+    assert found.scale == pytest.approx(scale, abs=4 * found.u_scale)
+    assert found.offset_m == pytest.approx(offset, abs=4 * found.u_offset_m)
+    assert 0 < found.u_scale < 1e-3
+
+
+def test_the_rulers_uncertainty_covers() -> None:
+    """Over 300 seeds the error of scale and offset has the size that is stated."""
+    known = (0.2, 0.5, 0.9)
+    z = []
+    for seed in range(300):
+        read = np.array(known) + 5e-4 * np.random.default_rng(seed).standard_normal(3)
+        found = against_ruler(tuple(StillPoint(y, 1e-6, 1e-5, 100) for y in known), tuple(read), 5e-4)
+        z.append([(found.scale - 1) / found.u_scale, found.offset_m / found.u_offset_m])
+    assert np.std(z, axis=0) == pytest.approx([1.0, 1.0], abs=0.15)
+
+
+def test_a_ruler_goes_on_from_the_calibration_before() -> None:
+    """Points measured with a base calibration give one that carries raw distances to the ruler's."""
+    base = Calibration(343.0, 1.02, 0.004)
+    raw = np.array([0.2, 0.6])
+    known = 1.005 * (1.02 * raw + 0.004) + 0.003
+    points = tuple(StillPoint(float(d), 1e-5, 1e-4, 300) for d in 1.02 * raw + 0.004)
+    found = against_ruler(points, tuple(known), 1e-5, base)
+    np.testing.assert_allclose([found.distance(math.nan, distance) for distance in raw], known, atol=1e-12)
+    assert found.speed_of_sound_m_per_s == 343.0
+
+
+def test_distances_close_together_give_no_scale() -> None:
+    """Two marks 1 cm apart at half a metre tell an offset and nothing of the scale."""
+    points = (StillPoint(0.50, 1e-4, 1e-3, 300), StillPoint(0.51, 1e-4, 1e-3, 300))
+    found = against_ruler(points, (0.503, 0.513), 5e-4)
+    assert (found.scale, found.u_scale) == (1.0, 0.0)
+    assert found.offset_m == pytest.approx(0.003)
+
+
+def test_a_wrong_unit_is_refused() -> None:
+    """A ruler read in inches asks for a scale that no sensor has."""
+    points = (StillPoint(0.2, 1e-4, 1e-3, 300), StillPoint(0.6, 1e-4, 1e-3, 300))
+    with pytest.raises(CalibrationError, match="wrong unit") as error:
+        against_ruler(points, (0.2 / 0.0254, 0.6 / 0.0254), 1e-3)
+    one_line(error)
+
+
+def test_each_ruler_distance_needs_its_measurement() -> None:
+    """Numbers that do not pair are refused with both counts, and so is nothing at all."""
+    with pytest.raises(CalibrationError, match="got 2 and 1") as error:
+        against_ruler((still(0.3),), (0.2, 0.3), 1e-3)
+    one_line(error)
+    with pytest.raises(CalibrationError, match="got 0 and 0"):
+        against_ruler((), (), 1e-3)
+
+
+def test_another_speed_of_sound_scales_stored_echo_times() -> None:
+    """Echo times are stored, so distances follow the speed applied; a stated distance does not."""
+    readings = [(1000.0, math.nan), (math.nan, 0.25), (2000.0, math.nan)]
+    slow, fast = ([Calibration(speed).distance(*reading) for reading in readings] for speed in (340.0, 345.1))
+    np.testing.assert_allclose(slow, [0.17, 0.25, 0.34], rtol=1e-15)
+    np.testing.assert_allclose(np.divide(fast, slow), [345.1 / 340.0, 1.0, 345.1 / 340.0], rtol=1e-14)
+
+
+def test_missing_stays_missing() -> None:
+    """Neither scale nor offset makes a distance of a reading that has none."""
+    assert math.isnan(Calibration(344.0, 1.1, 0.1).distance(math.nan, math.nan))
+
+
+def test_the_mapping_goes_there_and_back_through_json() -> None:
+    """What is written in a log gives the same calibration to the last bit."""
+    given = Calibration(343.21, 1.0 + 1e-9, -0.0123, 1e-4, 2e-5)
+    assert Calibration.from_mapping(json.loads(json.dumps(given.to_mapping()))) == given
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        {"speed_of_sound_m_per_s": 34.4},
+        {"speed_of_sound_m_per_s": float("nan")},
+        {"scale": 0.0},
+        {"scale": float("nan")},
+        {"offset_m": float("inf")},
+        {"colour": 1.0},
+        {"scale": "wide"},
+        {"scale": None},
+    ],
+)
+def test_numbers_that_calibrate_nothing_are_refused_in_one_line(numbers: dict[str, Any]) -> None:
+    """Values out of range, of no number and unknown names are a CalibrationError."""
+    with pytest.raises(CalibrationError) as error:
+        Calibration.from_mapping(numbers)
+    one_line(error)

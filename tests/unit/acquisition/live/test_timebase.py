@@ -1,0 +1,262 @@
+"""Sensor time from the device's clock, its counter or the host, and the rate of one clock against the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.block import Flag
+from acquisition.live.timebase import Gap, Timebase, fit_clock
+from acquisition.readings import Reading, Readings
+
+RATE_HZ = 100.0
+STEP_US = 10_000
+SECOND_NS = 1_000_000_000
+WRAP = 1 << 32
+
+
+def readings(
+    device_us: object = None, sequence: object = None, host_ns: object = None, *, start_ns: int = 5 * SECOND_NS
+) -> Readings:
+    """Return readings with those columns; the host's is on time where it is left out."""
+    given_columns = [column for column in (device_us, sequence, host_ns) if column is not None]
+    n = len(given_columns[0])  # type: ignore[arg-type]
+    none = np.full(n, -1, np.int64)
+    host = start_ns + np.arange(n) * SECOND_NS // 100 if host_ns is None else np.asarray(host_ns, np.int64)
+    columns = (host, none if sequence is None else sequence, none if device_us is None else device_us)
+    whole = zip(*(np.asarray(column, np.int64).tolist() for column in columns), strict=True)
+    return Readings(Reading(*row, echo_us=1000.0) for row in whole)
+
+
+def times(base: Timebase, part: Iterable[Reading]) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and flags of readings."""
+    rows = [base.push(reading) for reading in part]
+    return np.array([t for t, _ in rows]), np.array([flag for _, flag in rows], np.uint8)
+
+
+def pushed(whole: Readings) -> tuple[np.ndarray, np.ndarray, Timebase]:
+    """Return times and flags of readings, and the timebase."""
+    base = Timebase(RATE_HZ)
+    return *times(base, whole), base
+
+
+def test_device_time_goes_on_through_its_wrap() -> None:
+    """Microseconds that start over at 2^32 give even steps and no flag."""
+    ticks = np.arange(200) * STEP_US
+    t, flags, base = pushed(readings(device_us=(WRAP - 700_000 + ticks) % WRAP))
+    np.testing.assert_array_equal(t, ticks * 1e-6)
+    assert not flags.any()
+    assert (base.gaps, base.restarts, base.clock) == ([], 0, "device")
+
+
+def test_two_wraps_within_one_silence_are_counted() -> None:
+    """After three hours without a reading the host tells how often the device's clock went round."""
+    silence_s = 3 * 3600
+    device = np.array([100, 100 + silence_s * 1_000_000]) % WRAP
+    t, flags, base = pushed(readings(device_us=device, host_ns=[0, silence_s * SECOND_NS]))
+    assert t[1] == pytest.approx(silence_s, abs=1e-9)
+    assert flags[1] == Flag.GAP_BEFORE
+    assert base.restarts == 0
+
+
+def test_a_counter_alone_is_time_over_the_rate() -> None:
+    """Without a device clock the counter over the nominal rate is the time, however late the host's stamps."""
+    late = 5 * SECOND_NS + np.arange(50) * SECOND_NS // 100 + np.random.default_rng(1).integers(0, 10**8, 50)
+    t, flags, base = pushed(readings(sequence=1000 + np.arange(50), host_ns=late))
+    np.testing.assert_allclose(t, np.arange(50) / RATE_HZ, atol=1e-15)
+    assert not flags.any()
+    assert base.clock == "device"
+
+
+def test_host_stamps_alone_are_the_time() -> None:
+    """With neither clock nor counter the stamps count; a late one is no gap, a quarter second of silence is."""
+    host = 7 * SECOND_NS + np.arange(20) * SECOND_NS // 100
+    host[8:] += 60_000_000
+    host[15:] += 400_000_000
+    t, flags, base = pushed(readings(host_ns=host))
+    np.testing.assert_allclose(t, (host - host[0]) * 1e-9, atol=1e-12)
+    assert np.flatnonzero(flags).tolist() == [15]
+    assert base.gaps == [Gap(15, pytest.approx(0.41), 40)]
+    assert base.clock == "host"
+
+
+@pytest.mark.parametrize("column", ["device_us", "sequence"])
+def test_gaps_have_their_length_and_their_lost_count(column: str) -> None:
+    """Seven readings left out are a gap of eight steps with seven lost, at the first reading after it."""
+    index = np.concatenate([np.arange(10), np.arange(17, 27)])
+    values = index * STEP_US if column == "device_us" else index
+    t, flags, base = pushed(readings(**{column: values}))
+    assert np.flatnonzero(flags).tolist() == [10]
+    assert flags[10] == Flag.GAP_BEFORE
+    assert base.gaps == [Gap(10, pytest.approx(0.08), 7)]
+    np.testing.assert_allclose(t, index / RATE_HZ, atol=1e-12)
+
+
+def test_repeats_and_steps_back_are_flagged_and_move_nothing_after_them() -> None:
+    """A repeated and a late reading keep their own time; those that follow stand where they would have stood."""
+    order = np.array([0, 1, 2, 2, 3, 1, 4, 5, 6])
+    t, flags, base = pushed(readings(device_us=50_000 + order * STEP_US))
+    np.testing.assert_allclose(t, order / RATE_HZ, atol=1e-12)
+    expected = np.zeros(9, np.uint8)
+    expected[3], expected[5] = Flag.DUPLICATE_TIME, Flag.NON_MONOTONIC_TIME
+    np.testing.assert_array_equal(flags, expected)
+    assert base.gaps == []
+
+
+@pytest.mark.parametrize("column", ["device_us", "sequence"])
+@pytest.mark.parametrize("silence_s", [0.0, 0.01, 3.0, 30.0])
+def test_a_device_that_starts_again_is_joined_by_the_host_clock(column: str, silence_s: float) -> None:
+    """After a restart time goes on by the host's elapsed time, and the first reading is flagged in any case."""
+    unit = STEP_US if column == "device_us" else 1
+    values = np.concatenate([500 + np.arange(10), np.arange(10)]) * unit
+    host = np.arange(20) * SECOND_NS // 100
+    host[10:] += int(silence_s * SECOND_NS)
+    t, flags, base = pushed(readings(**{column: values}, host_ns=host))
+    assert base.restarts == 1
+    assert np.flatnonzero(flags).tolist() == [10]
+    assert t[10] - t[9] == pytest.approx(0.01 + silence_s, abs=1e-9)
+    np.testing.assert_allclose(np.diff(t[10:]), 0.01, atol=1e-12)
+    assert base.gaps[0].lost == round(silence_s * RATE_HZ)
+
+
+def test_a_device_that_was_young_when_it_started_again_is_joined_too() -> None:
+    """A clock that shows less than the silence lasted has started again although it reads higher than before."""
+    device = np.concatenate([np.arange(5) * STEP_US, 1_500_000 + np.arange(5) * STEP_US])
+    host = np.arange(10) * SECOND_NS // 100
+    host[5:] += 20 * SECOND_NS
+    t, _, base = pushed(readings(device_us=device, host_ns=host))
+    assert base.restarts == 1
+    assert t[5] - t[4] == pytest.approx(20.01)
+
+
+def test_a_host_that_slept_moves_no_reading() -> None:
+    """Readings that waited in the port for six seconds keep the device's time."""
+    host = np.arange(20) * SECOND_NS // 100
+    host[10:] += 6 * SECOND_NS
+    t, flags, base = pushed(readings(device_us=np.arange(20) * STEP_US, host_ns=host))
+    np.testing.assert_allclose(t, np.arange(20) / RATE_HZ, atol=1e-12)
+    assert (base.restarts, flags.any()) == (0, False)
+
+
+STEPS = st.lists(
+    st.one_of(
+        st.just(STEP_US),
+        st.just(STEP_US),
+        st.just(STEP_US),
+        st.just(STEP_US),
+        st.integers(9_000, 15_001),
+        st.sampled_from([0, -STEP_US, 40_000, 3_000_000, -2_000_000, WRAP - 30_000]),
+    ),
+    min_size=1,
+    max_size=120,
+)
+
+
+@given(steps=STEPS, start=st.integers(0, WRAP - 1), kind=st.integers(0, 2))
+def test_the_short_way_of_regular_readings_is_the_general_one(steps: list[int], start: int, kind: int) -> None:
+    """Every reading taken the general way gives the same times, flags and gaps to the last bit."""
+    device = (start + np.cumsum(steps)) % WRAP
+    host = np.cumsum(np.abs(steps)) * 1000
+    whole = [
+        readings(device_us=device, host_ns=host),
+        readings(sequence=device // STEP_US, host_ns=host),
+        readings(host_ns=host),
+    ][kind]
+    unit_s = (1e-6, 1.0 / RATE_HZ, 1e-9)[kind]
+    t, flags, base = pushed(whole)
+    general = Timebase(RATE_HZ)
+    rows = [general._step((r.device_us, r.sequence, r.host_ns)[kind], unit_s, r.host_ns) for r in whole]
+    assert t.tobytes() == np.array([t for t, _ in rows]).tobytes()
+    assert flags.tolist() == [flag for _, flag in rows]
+    assert (base.gaps, base.restarts) == (general.gaps, general.restarts)
+    unflagged = t[(flags & (Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)) == 0]
+    assert np.all(np.diff(unflagged) > 0)
+
+
+def test_the_first_reading_decides_the_clock() -> None:
+    """Before a reading came the times are said to be the host's."""
+    base = Timebase(RATE_HZ)
+    assert base.clock == "host"
+    times(base, readings(device_us=[5]))
+    assert base.clock == "device"
+
+
+@pytest.mark.parametrize("rate_hz", [0.0, -1.0, math.nan, math.inf])
+def test_a_rate_is_positive_and_finite(rate_hz: float) -> None:
+    """Any other rate is refused with its value."""
+    with pytest.raises(ValueError, match=r"rate_hz must be positive and finite, got"):
+        Timebase(rate_hz)
+
+
+JITTERS: dict[str, Callable[[np.random.Generator, int], np.ndarray]] = {
+    "uniform": lambda rng, n: rng.uniform(0.0, 0.020, n),
+    "exponential": lambda rng, n: rng.exponential(0.020, n),
+    "half-normal": lambda rng, n: np.abs(rng.normal(0.0, 0.020, n)),
+}
+
+
+@pytest.mark.parametrize("jitter", JITTERS)
+def test_clock_rate_is_recovered_under_host_jitter(jitter: str) -> None:
+    """Two minutes at 100 Hz with stamps up to 20 ms late give the crystal's error within 5 ppm, with an honest u."""
+    t = np.arange(12_000) / RATE_HZ
+    errors, z = [], []
+    for seed in range(100):
+        rng = np.random.default_rng([seed, len(jitter)])
+        ppm = float(rng.uniform(-100.0, 100.0))
+        true = t / (1.0 + ppm * 1e-6)
+        host = np.round((true + JITTERS[jitter](rng, t.size)) * 1e9).astype(np.int64)
+        fit = fit_clock(t, 3 * SECOND_NS + host)
+        errors.append(fit.rate_error_ppm - ppm)
+        z.append(errors[-1] / fit.u_rate_error_ppm)
+        assert 0.002 < fit.jitter_s < 0.03
+    assert np.max(np.abs(errors)) < 5.0
+    assert 0.8 < np.std(z) < 1.25
+    assert abs(np.mean(z)) < 0.4
+
+
+def test_clock_rate_with_scatter_to_both_sides() -> None:
+    """Where stamps scatter to both sides the error stays within its stated uncertainty."""
+    t = np.arange(12_000) / RATE_HZ
+    z = []
+    for seed in range(40):
+        host = np.round((t + np.random.default_rng(seed).normal(0.0, 1e-3, t.size)) * 1e9).astype(np.int64)
+        fit = fit_clock(t, host)
+        z.append(fit.rate_error_ppm / fit.u_rate_error_ppm)
+    assert 0.6 < np.std(z) < 1.5
+
+
+@pytest.mark.parametrize("seconds", [5, 30, 300])
+def test_a_clock_rate_is_covered_by_its_uncertainty_however_short_the_run(seconds: int) -> None:
+    """From five seconds on, 68 and 95 % intervals cover as they claim: a dozen stretches tell their scatter badly."""
+    t = np.arange(seconds * 100) / RATE_HZ
+    z = []
+    for seed in range(200):
+        rng = np.random.default_rng([seed, seconds])
+        ppm = float(rng.uniform(-100.0, 100.0))
+        host = np.round((t / (1.0 + ppm * 1e-6) + rng.exponential(1e-3, t.size)) * 1e9).astype(np.int64)
+        fit = fit_clock(t, host)
+        z.append((fit.rate_error_ppm - ppm) / fit.u_rate_error_ppm)
+    assert np.mean(np.abs(z) < 1.0) == pytest.approx(0.683, abs=0.10)
+    assert np.mean(np.abs(z) < 1.96) == pytest.approx(0.95, abs=0.04)
+
+
+def test_too_few_readings_say_nothing_of_the_clock() -> None:
+    """Below 24 readings, or with all of them at one time, the rate error is unknown and its u infinite."""
+    for t in (np.arange(23.0), np.zeros(40)):
+        fit = fit_clock(t, np.arange(t.size, dtype=np.int64))
+        assert math.isnan(fit.rate_error_ppm)
+        assert math.isinf(fit.u_rate_error_ppm)
+
+
+def test_two_bunches_of_readings_claim_no_certainty() -> None:
+    """Readings at the two ends alone do not make a line without scatter."""
+    rng = np.random.default_rng(5)
+    t = np.concatenate([np.arange(200), 10_000 + np.arange(200)]) / RATE_HZ
+    fit = fit_clock(t, np.round((t + rng.exponential(0.02, t.size)) * 1e9).astype(np.int64))
+    assert fit.u_rate_error_ppm > 1.0
+    assert abs(fit.rate_error_ppm) < 5.0 * fit.u_rate_error_ppm

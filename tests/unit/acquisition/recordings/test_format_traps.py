@@ -1,0 +1,212 @@
+"""What real files of each family do that a careless reader takes at face value, one by one."""
+
+from __future__ import annotations
+
+import io
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from acquisition.errors import NeedsAnswer
+from acquisition.recordings.identify import get_format
+from acquisition.recordings.recording import Recording
+
+HEAD = ["LabVIEW Measurement", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tOne"]
+END = "***End_of_Header***"
+
+
+def segment(names: str, *facts: str, channels: int = 1) -> list[str]:
+    """Return the header of one segment of an LVM file."""
+    return [f"Channels\t{channels}", *facts, END, names]
+
+
+def lvm(*lines: str, mark: str = "\t", encoding: str = "utf-8", **options: str) -> Recording:
+    """Read an LVM file of these lines; a unit is said unless told otherwise."""
+    data = "\r\n".join(lines).replace("\t", mark).encode(encoding)
+    return get_format("lvm").read("run.lvm", data, **{"unit": "m", **options})
+
+
+def codes(recording: Recording) -> set[str]:
+    """Return what was seen."""
+    return {trap.code for trap in recording.traps}
+
+
+def test_lvm_of_several_headers_is_several_runs() -> None:
+    """Multi_Headings Yes: each further header begins a segment of its own, asked for by name."""
+    first = segment("X_Value\tPosition", "Delta_X\t0.01", "X0\t0")
+    second = segment("X_Value\tPosition", "Delta_X\t0.02", "X0\t5")
+    lines = [*HEAD, "Multi_Headings\tYes", END, *first, "0.00\t1.5", "0.01\t1.6", *second, "5.00\t2.5", "5.02\t2.6"]
+    a, b = (lvm(*lines, run=f"Segment {i}") for i in (1, 2))
+    assert (a.samples.distance.tolist(), a.info.rate_hz) == ([1.5, 1.6], 100)
+    assert (b.samples.distance.tolist(), b.info.rate_hz, b.samples.t.tolist()) == ([2.5, 2.6], 50, [5.0, 5.02])
+
+
+@pytest.mark.parametrize(("declared", "present"), [(8192, 16384), (1_050_000, 3941)])
+def test_lvm_keeps_all_rows_whatever_the_header_declares(declared: int, present: int) -> None:
+    """More or fewer rows than ``Samples`` are kept, and it is said."""
+    rows = [f"{i * 0.01:.2f}\t{i % 7}.5" for i in range(present)]
+    head = segment("X_Value\tPosition", f"Samples\t{declared}", "X0\t0", "Delta_X\t0.01")
+    recording = lvm(*HEAD, "Multi_Headings\tNo", END, *head, *rows)
+    assert len(recording.samples) == present
+    stale = [trap for trap in recording.traps if trap.code == "stale_header"]
+    assert [trap.count for trap in stale] == [abs(declared - present)]
+
+
+def test_lvm_believes_the_column_where_the_header_went_stale() -> None:
+    """Rows 5 ms apart under a header that says 19.5 us are 5 ms apart, and it is said."""
+    rows = [f"{i * 0.005:.6f}\t1.{i % 10}" for i in range(400)]
+    recording = lvm(*HEAD, END, *segment("X_Value\tPosition", "X0\t0", "Delta_X\t1.95E-5"), *rows)
+    assert recording.info.rate_hz == 200
+    assert "stale_header" in codes(recording)
+
+
+def test_lvm_takes_the_formula_where_the_column_is_rounded_from_it() -> None:
+    """Steps printed as 19 and 20 us are 19.53125 us, as the header says."""
+    step = 1.953125e-5
+    printed = [f"{i * step:.6f}" for i in range(300)]
+    assert {round((float(b) - float(a)) * 1e6) for a, b in pairwise(printed)} == {19, 20}
+    head = segment("X_Value\tPosition", "X0\t0.0", "Delta_X\t1.953125E-5")
+    recording = lvm(*HEAD, END, *head, *(f"{t}\t1.5" for t in printed))
+    assert recording.info.rate_hz == 51200
+    np.testing.assert_allclose(recording.samples.t, np.arange(300) * step, rtol=1e-15)
+    assert "stale_header" not in codes(recording)
+
+
+@pytest.mark.parametrize("mark", ["|", ";", ","])
+def test_lvm_is_separated_by_whatever_follows_the_tag(mark: str) -> None:
+    """``Separator`` may name any character, and separators at the end of a row make no cell."""
+    head = [*HEAD[:2], "Separator\tOwn", *HEAD[4:]]
+    rows = ["0.00\t1.5\t", "0.01\t1.6\t\t", "0.02\t1.7"]
+    recording = lvm(*head, END, *segment("X_Value\tPosition\tComment", "Delta_X\t0.01"), *rows, mark=mark)
+    assert recording.samples.distance.tolist() == [1.5, 1.6, 1.7]
+    assert recording.malformed_rows == 0
+
+
+def test_lvm_without_a_decimal_separator_shows_it_in_its_numbers() -> None:
+    """``Decimal_Separator`` left out: commas in the cells are decimal marks."""
+    head = [line for line in HEAD if not line.startswith("Decimal")]
+    recording = lvm(*head, END, *segment("X_Value\tPosition", "Delta_X\t0,01"), "0,00\t1,5", "0,01\t-1,6E-1", "")
+    assert recording.samples.distance.tolist() == [1.5, -0.16]
+
+
+def test_lvm_channels_may_end_one_before_the_other() -> None:
+    """Empty cells at the end of a channel belong to the longer one beside it; one within is a lost sample."""
+    rows = ["0.00\t1.5\t9.5", "0.01\t\t9.6", "0.02\t1.7\t9.7", "0.03\t\t9.8", "0.04\t\t9.9"]
+    lines = [*HEAD, END, *segment("X_Value\tA\tB", "Delta_X\t0.01", channels=2), *rows]
+    short, long = (lvm(*lines, channel=name).samples.distance for name in "AB")
+    np.testing.assert_array_equal(short, [1.5, np.nan, 1.7])
+    assert long.tolist() == [9.5, 9.6, 9.7, 9.8, 9.9]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
+def test_lvm_headers_keep_their_letters(encoding: str) -> None:
+    """Names and units beyond ASCII come in UTF-8 or cp1252."""
+    head = segment("X_Value\tPressão", "Y_Unit_Label\tµm", "Delta_X\t0.01")
+    recording = lvm(*HEAD, END, *head, "0.00\t1.5", "0.01\t1.6", encoding=encoding, unit="um")
+    assert recording.channel == "Pressão"
+    np.testing.assert_allclose(recording.samples.distance, [1.5e-6, 1.6e-6], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("date", "start"), [("1903/12/31", ""), ("1904/01/01", ""), ("2023/05/05", "2023-05-05T13:40:37.7")]
+)
+def test_lvm_of_labviews_zero_has_no_start(date: str, start: str) -> None:
+    """A date of 1903 or 1904 is LabVIEW's zero of time."""
+    head = segment("X_Value\tPosition", f"Date\t{date}", "Time\t13:40:37.7", "Delta_X\t0.01")
+    assert lvm(*HEAD, END, *head, "0.00\t1.5", "0.01\t1.6").start_time == start
+
+
+def test_tdms_is_scaled_and_placed_as_its_properties_say() -> None:
+    """wf_start_offset and wf_increment make the times; a linear scaling makes the values."""
+    from nptdms import ChannelObject, TdmsWriter
+    from nptdms.types import Uint32
+
+    scaling = {
+        "NI_Number_Of_Scales": 1,
+        "NI_Scale[0]_Scale_Type": "Linear",
+        "NI_Scale[0]_Linear_Slope": 0.5,
+        "NI_Scale[0]_Linear_Y_Intercept": 2.0,
+        "NI_Scale[0]_Linear_Input_Source": Uint32(0xFFFFFFFF),  # the raw values
+    }
+    timing = {"wf_increment": 0.02, "wf_start_offset": 1.5, "wf_samples": 4, "unit_string": "m"}
+    file = io.BytesIO()
+    with TdmsWriter(file) as writer:
+        writer.write_segment([ChannelObject("G", "x", np.array([0.0, 2.0, 4.0, 6.0]), {**timing, **scaling})])
+    recording = get_format("tdms").read("run.tdms", file.getvalue())
+    assert recording.samples.distance.tolist() == [2.0, 3.0, 4.0, 5.0]
+    np.testing.assert_allclose(recording.samples.t, [1.5, 1.52, 1.54, 1.56], rtol=1e-12)
+
+
+def test_a_unit_with_line_ends_is_refused_in_one_line() -> None:
+    """What a damaged file gives for a name or a unit cannot break the line that quotes it."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    file = io.BytesIO()
+    with TdmsWriter(file) as writer:
+        facts = {"wf_increment": 0.02, "unit_string": "m\n\x1b[1m"}
+        writer.write_segment([ChannelObject("G", "x", np.arange(4.0), facts)])
+    with pytest.raises(NeedsAnswer) as caught:
+        get_format("tdms").read("run.tdms", file.getvalue())
+    assert str(caught.value).isprintable()
+
+
+def test_capstone_decides_decimal_mark_and_exponent_cell_by_cell() -> None:
+    """``-8,90E-4`` and a stray ``0.12`` stand in one column of a file with commas."""
+    cells = ["0,10", "-8,90E-4", "0.12", "1,3E-1", "0,14"]
+    rows = "\r\n".join(f"{i / 100:.2f};{cell}".replace(".", ",", 1) for i, cell in enumerate(cells))
+    data = f'\ufeff"Time (s) Run #1";"Position (m) Run #1"\r\n{rows}'.encode()
+    recording = get_format("capstone").read("run.csv", data)
+    assert recording.samples.distance.tolist() == [0.10, -8.90e-4, 0.12, 0.13, 0.14]
+
+
+def test_datastudio_mixes_fixed_point_and_exponents() -> None:
+    """Small numbers have an exponent (``-2.441E-4``), their neighbours have none."""
+    data = b"Position, ChA, Run #1\r\nTime ( s )\tPosition ( m )\r\n0.0\t0.019\r\n0.1\t-2.441E-4\r\n0.2\t-0.018\r\n"
+    assert get_format("datastudio").read("run.txt", data).samples.distance.tolist() == [0.019, -2.441e-4, -0.018]
+
+
+def test_phyphox_channels_have_times_of_their_own() -> None:
+    """Of several columns of times each channel takes the one to its left."""
+    rows = "\n".join(f"{i / 100:.3f},{i},{1 + i / 50:.3f},{i + 0.5}" for i in range(20))
+    data = f'"Time (s)","A (m)","Time (s)","B (m)"\n{rows}\n'.encode()
+    a, b = (get_format("phyphox").read("run.csv", data, channel=name) for name in "AB")
+    assert (a.info.rate_hz, float(a.samples.t[0])) == (100, 0.0)
+    assert (b.info.rate_hz, float(b.samples.t[0])) == (50, 1.0)
+
+
+@pytest.mark.parametrize("mass", ["", "mass A\n", "Masse A\t\t\n"])
+@pytest.mark.parametrize("fps", [25, 30])
+def test_tracker_may_leave_the_mass_out(mass: str, fps: int) -> None:
+    """The line above ``t x y`` may be absent or in any language; frames come at 25 or 30 a second."""
+    rows = "\n".join(f"{i / fps:.4f}\t1.0\t{i % 5}.25" for i in range(40))
+    recording = get_format("tracker").read("a.txt", f"{mass}t\tx\ty\n{rows}\n".encode(), channel="y", unit="m")
+    assert (recording.info.rate_hz, len(recording.samples)) == (fps, 40)
+
+
+@pytest.mark.parametrize(
+    ("headings", "unit"),
+    [("Tempo (s)\tPosizione (mm)", "mm"), ("Zeit (s)\tAbstand (cm)", "cm"), ("时间 (秒)\t位置 (厘米)", "cm")],
+)
+def test_headings_may_be_italian_german_or_chinese(headings: str, unit: str) -> None:
+    """Time and unit are known in the user's language."""
+    data = f"{headings}\n0.00\t12.5\n0.01\t12.6\n0.02\t12.7\n".encode()
+    per_metre = {"mm": 1000, "cm": 100}[unit]
+    distance = get_format("csv").read("run.txt", data).samples.distance
+    assert distance.tolist() == [x / per_metre for x in (12.5, 12.6, 12.7)]
+
+
+def test_a_motion_sensor_title_may_have_a_weekday() -> None:
+    """The date behind the title is whatever the computer's language prints."""
+    data = b"Motion Sensor Data File Thursday, September 20, 2018 1:40 PM\r\n0.010\t25.3\t0.239\r\n"
+    data += b"".join(f"{i / 100:.3f}\t25.{i:03d}\t0.239\r\n".encode() for i in range(2, 30))
+    assert get_format("motion-sensor").recognises(data)
+
+
+def test_times_that_repeat_by_the_thousand_are_all_flagged() -> None:
+    """2904 repeated stamps among 6206, as one logger has them: each is counted, none is dropped."""
+    stamps = np.sort(np.concatenate((np.arange(3302), np.arange(2904)))) / 100
+    rows = "\n".join(f"{t:.2f},{0.2 + 0.001 * (i % 9):.3f}" for i, t in enumerate(stamps))
+    recording = get_format("csv").read("run.csv", f"Time (s),Distance (m)\n{rows}\n".encode())
+    assert len(recording.samples) == 6206
+    assert [trap.count for trap in recording.traps if trap.code == "duplicate_time"] == [2904]

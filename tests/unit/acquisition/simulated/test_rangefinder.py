@@ -1,0 +1,202 @@
+"""The simulated rangefinder: every fault it is set to, of the size it is set to, and the same again from the seed."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition.block import Flag, concatenate
+from acquisition.clock import VirtualClock
+from acquisition.errors import SensorError
+from acquisition.simulated.rangefinder import Shot, VirtualRangefinder, VirtualSensor, VirtualSource
+
+QUIET: dict[str, Any] = {"noise_m": 0.0, "false_echo_rate_hz": 0.0}
+
+
+def shots(position: Callable[[float], float], n: int, seed: int = 1, **sensor: Any) -> list[Shot]:
+    """Return readings of a bob by a sensor that is quiet but for what is given."""
+    finder = VirtualRangefinder(position, VirtualSensor(**{**QUIET, **sensor}), np.random.default_rng(seed))
+    return [finder.shot(i) for i in range(n)]
+
+
+def distances(position: Callable[[float], float], n: int, seed: int = 1, **sensor: Any) -> np.ndarray:
+    """Return the distances of such readings."""
+    return np.array([shot.distance_m for shot in shots(position, n, seed, **sensor)])
+
+
+def bob(t: float) -> float:
+    """Return the position of a swing of 5 cm about 25 cm."""
+    return 0.25 + 0.05 * math.sin(7.9 * t)
+
+
+@pytest.mark.parametrize("tick_s", [0.25e-6, 4e-6, 1e-5])
+def test_echo_times_stand_on_the_tick_lattice(tick_s: float) -> None:
+    """Each echo time is a whole number of ticks, next to the true one."""
+    echo = np.array([shot.echo_us for shot in shots(bob, 500, tick_s=tick_s)])
+    ticks = echo * 1e-6 / tick_s
+    np.testing.assert_allclose(ticks, np.round(ticks), atol=1e-6)
+    true = np.array([2 * bob(i / 100) / 344.0 for i in range(500)])
+    assert np.max(np.abs(echo * 1e-6 - true)) <= 0.5 * tick_s * (1 + 1e-9)
+
+
+def test_distance_is_half_the_echo_time_at_the_speed_of_sound() -> None:
+    """A sensor in colder air hears later, and states the same distance."""
+    cold, warm = shots(bob, 50, speed_of_sound_m_per_s=331.3), shots(bob, 50, speed_of_sound_m_per_s=349.0)
+    for a, b in zip(cold, warm, strict=True):
+        assert a.echo_us > b.echo_us
+        assert a.distance_m == pytest.approx(0.5e-6 * a.echo_us * 331.3, rel=1e-12)
+        assert a.distance_m == pytest.approx(b.distance_m, abs=50e-6)
+
+
+@pytest.mark.parametrize("noise_m", [80e-6, 1e-3])
+def test_noise_has_the_level_asked_for(noise_m: float) -> None:
+    """The distances of a bob at rest scatter by the noise, normally and without memory."""
+    error = distances(lambda _: 0.3, 5000, noise_m=noise_m, tick_s=1e-9) - 0.3
+    assert np.std(error) == pytest.approx(noise_m, rel=0.05)
+    assert abs(np.mean(error)) < 4 * noise_m / math.sqrt(5000)
+    assert abs(np.corrcoef(error[1:], error[:-1])[0, 1]) < 0.06
+    assert np.mean(np.abs(error) < noise_m) == pytest.approx(0.683, abs=0.03)
+
+
+def test_an_echo_within_the_dead_time_is_no_target() -> None:
+    """Nearer than half the dead time's way there is neither echo nor distance, and everywhere else both."""
+    nearest = 0.5 * 1.2e-3 * 344.0
+    found = shots(bob, 500, dead_time_s=1.2e-3)
+    near = np.array([bob(i / 100) < nearest for i in range(500)])
+    assert 0 < near.sum() < 500
+    np.testing.assert_array_equal([math.isnan(shot.distance_m) for shot in found], near)
+    np.testing.assert_array_equal([math.isnan(shot.echo_us) for shot in found], near)
+
+
+def test_a_fixed_object_makes_a_plateau() -> None:
+    """Beyond the far limit every reading is the limit's."""
+    found = distances(bob, 500, far_limit_m=0.28)
+    beyond = np.array([bob(i / 100) >= 0.28 for i in range(500)])
+    assert beyond.sum() > 50
+    assert len(set(found[beyond])) == 1
+    assert found[beyond][0] == pytest.approx(0.28, abs=25e-6)
+    assert np.all(found[~beyond] < 0.28 + 25e-6)
+
+
+@pytest.mark.parametrize("crystal_ppm", [-80.0, 0.0, 50.0])
+def test_a_crystal_that_is_off_takes_its_readings_early_or_late(crystal_ppm: float) -> None:
+    """A clock that runs fast shows 10 ms a reading and takes them sooner than that."""
+    found = shots(bob, 12_000, crystal_ppm=crystal_ppm)
+    assert found[-1].device_us == 11_999 * 10_000
+    assert found[-1].true_s == pytest.approx(119.99 / (1 + crystal_ppm * 1e-6), rel=1e-12)
+    assert found[-1].distance_m == pytest.approx(bob(found[-1].true_s), abs=25e-6)
+
+
+def test_the_device_clock_wraps() -> None:
+    """After 71.6 minutes the microseconds start over while the sequence goes on."""
+    finder = VirtualRangefinder(bob, VirtualSensor(), np.random.default_rng(1))
+    before, after = finder.shot(429_496), finder.shot(429_497)
+    assert (before.device_us, after.device_us) == (4_294_960_000, 4_294_970_000 - (1 << 32))
+    assert after.sequence == 429_497
+
+
+def test_jitter_moves_the_moment_and_not_the_stamp() -> None:
+    """The stamps stay even while the distances scatter by speed times jitter."""
+    found = shots(lambda t: 0.3 + 0.1 * t, 2000, jitter_s=1e-3)
+    np.testing.assert_allclose(np.diff([shot.true_s for shot in found]), 0.01, atol=1e-9)
+    error = np.array([shot.distance_m - 0.3 - 0.1 * shot.true_s for shot in found])
+    assert np.std(error) == pytest.approx(1e-4, rel=0.1)
+
+
+def test_false_echoes_come_in_clusters_where_the_bob_turns_near_the_sensor() -> None:
+    """Runs of 3 to 17 readings lie 2.5 to 7.5 mm beyond the bob, each from a nearest turning point on."""
+    found = distances(bob, 20_000, false_echo_rate_hz=0.3)
+    off = found - np.array([bob(i / 100) for i in range(20_000)])
+    false = off > 1e-3
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], false, [False]]).astype(int)))
+    lengths = edges[1::2] - edges[::2]
+    assert 30 < lengths.size < 120
+    assert 3 <= lengths.min() <= lengths.max() <= 17
+    assert np.all((off[false] > 2.4e-3) & (off[false] < 7.6e-3))
+    assert all(bob((start - 1) / 100) < 0.2005 for start in edges[::2])
+    assert np.all(np.abs(off[~false]) < 25e-6)
+
+
+def test_the_seed_gives_the_same_readings_again() -> None:
+    """One seed is one run; another is another."""
+    noisy = {"noise_m": 1e-4, "false_echo_rate_hz": 0.5, "jitter_s": 1e-4}
+    first, again, other = (distances(bob, 500, seed, **noisy) for seed in (7, 7, 8))
+    assert first.tobytes() == again.tobytes()
+    assert first.tobytes() != other.tobytes()
+
+
+def test_readings_without_end_are_the_single_ones() -> None:
+    """The iterator takes the same readings as calls with consecutive numbers."""
+    finder = VirtualRangefinder(bob, VirtualSensor(), np.random.default_rng(3))
+    stream = finder.again().shots()
+    assert [next(stream) for _ in range(50)] == [finder.shot(i) for i in range(50)]
+
+
+def source(clock: VirtualClock, *, seconds: float = 120.0, block_samples: int = 1, **sensor: Any) -> VirtualSource:
+    """Return a simulated source."""
+    finder = VirtualRangefinder(bob, VirtualSensor(**sensor), np.random.default_rng(2))
+    return VirtualSource(finder, clock, seconds=seconds, name="bench", block_samples=block_samples)
+
+
+def test_two_minutes_on_a_virtual_clock_take_no_real_time() -> None:
+    """12,000 samples come in far less than the 120 s that the virtual clock shows."""
+    clock = VirtualClock(5_000_000_000)
+    began = time.monotonic()
+    with source(clock) as bench:
+        samples = concatenate(bench)
+    assert time.monotonic() - began < 12.0
+    assert len(samples) == 12_000
+    assert clock.now_ns() == 5_000_000_000 + 119_990_000_000
+    assert samples.host_ns is not None
+    assert samples.host_ns[0] == 5_000_000_000
+
+
+def test_simulated_data_says_that_it_is() -> None:
+    """The kind is simulated, the clock the device's, and the step that of a tick."""
+    info = source(VirtualClock(), tick_s=4e-6).info
+    assert (info.kind, info.clock, info.rate_hz, info.name) == ("simulated", "device", 100.0, "bench")
+    assert info.quantum_m == pytest.approx(0.5 * 4e-6 * 344.0)
+
+
+def test_samples_do_not_depend_on_the_size_of_blocks() -> None:
+    """One by one or by 64, the samples are the same to the last bit."""
+    joined = []
+    for size in (1, 64):
+        with source(VirtualClock(), seconds=10.0, block_samples=size) as bench:
+            joined.append(concatenate(bench))
+    for column in ("t", "distance", "flags", "host_ns"):
+        assert getattr(joined[0], column).tobytes() == getattr(joined[1], column).tobytes()
+
+
+def test_no_target_is_a_missing_sample_of_the_source() -> None:
+    """A reading within the dead time is NaN and flagged."""
+    with source(VirtualClock(), seconds=10.0, dead_time_s=1.2e-3) as bench:
+        samples = concatenate(bench)
+    missing = np.isnan(samples.distance)
+    assert 0 < missing.sum() < len(samples)
+    np.testing.assert_array_equal(samples.flags, np.where(missing, Flag.MISSING, 0))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "crystal_ppm", "expected"), [(0.07, 0.0, 7), (0.071, 0.0, 8), (1000.0, 100.0, 100_010), (0.0, 0.0, 0)]
+)
+def test_it_ends_after_its_seconds_of_true_time(seconds: float, crystal_ppm: float, expected: int) -> None:
+    """Every reading is taken before the end, and the next one would not be."""
+    with source(VirtualClock(), seconds=seconds, crystal_ppm=crystal_ppm, block_samples=5000) as bench:
+        assert sum(len(block) for block in bench) == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("rate_hz", 0.0), ("tick_s", math.nan), ("speed_of_sound_m_per_s", math.inf), ("noise_m", -1.0), ("jitter_s", -1)],
+)
+def test_impossible_settings_are_refused_by_name(name: str, value: float) -> None:
+    """The message is one line with the setting and its value."""
+    with pytest.raises(SensorError, match=f"{name} must .*got {value}") as error:
+        VirtualSensor(**{name: value})
+    assert "\n" not in str(error.value)

@@ -1,0 +1,94 @@
+"""Humid air against published tables."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from pipeline.bench.air import air_density, air_viscosity, speed_of_sound
+
+
+def cipm_2007(temperature_c: float, pressure_pa: float, humidity: float, carbon_dioxide: float = 4e-4) -> float:
+    """Density of moist air by the CIPM-2007 equation with all its constants, kg/m^3.
+
+    A. Picard, R. S. Davis, M. Glaeser, K. Fujii, Metrologia 45 (2008) 149, doi:10.1088/0026-1394/45/2/004, eqs. A1.1
+    to A1.4 and 1.
+    """
+    t, kelvin = temperature_c, temperature_c + 273.15
+    saturation = math.exp(1.2378847e-5 * kelvin**2 - 1.9121316e-2 * kelvin + 33.93711047 - 6.3431645e3 / kelvin)
+    enhancement = 1.00062 + 3.14e-8 * pressure_pa + 5.6e-7 * t**2
+    x = humidity * enhancement * saturation / pressure_pa
+    z = (
+        1.0
+        - pressure_pa
+        / kelvin
+        * (
+            1.58123e-6
+            - 2.9331e-8 * t
+            + 1.1043e-10 * t**2
+            + (5.707e-6 - 2.051e-8 * t) * x
+            + (1.9898e-4 - 2.376e-6 * t) * x**2
+        )
+        + (pressure_pa / kelvin) ** 2 * (1.83e-11 - 0.765e-8 * x**2)
+    )
+    dry = (28.96546 + 12.011 * (carbon_dioxide - 4e-4)) * 1e-3
+    return pressure_pa * dry / (z * 8.314472 * kelvin) * (1.0 - x * (1.0 - 18.01528e-3 / dry))
+
+
+@pytest.mark.parametrize(
+    ("temperature_c", "pressure_pa", "humidity"),
+    [(20.0, 101325.0, 0.5), (10.5, 90500.0, 0.1), (29.0, 109000.0, 0.75), (20.0, 101325.0, 0.0)],
+)
+def test_oracle_agrees_with_its_published_approximation(
+    temperature_c: float, pressure_pa: float, humidity: float
+) -> None:
+    """The equation above lies within 2.5e-4 of the approximation of OIML R 111-1 (2004), E.3-1."""
+    wet = 0.009 * 100.0 * humidity * math.exp(0.061 * temperature_c)
+    approximation = (0.34848 * pressure_pa / 100.0 - wet) / (273.15 + temperature_c)
+    assert cipm_2007(temperature_c, pressure_pa, humidity) == pytest.approx(approximation, rel=2.5e-4)
+
+
+@pytest.mark.parametrize("temperature_c", [10.0, 15.0, 20.0, 25.0, 30.0])
+@pytest.mark.parametrize("pressure_pa", [90_000.0, 101_325.0, 104_000.0])
+@pytest.mark.parametrize("humidity", [0.0, 0.4, 0.8])
+def test_density_is_the_cipm_2007_equations(temperature_c: float, pressure_pa: float, humidity: float) -> None:
+    """The mixture of ideal gases stays within 0.1 % of CIPM-2007 at room conditions."""
+    expected = cipm_2007(temperature_c, pressure_pa, humidity)
+    assert air_density(temperature_c, pressure_pa, humidity) == pytest.approx(expected, rel=1e-3)
+
+
+def test_density_of_dry_standard_air() -> None:
+    """Dry air at 20 degC and one atmosphere weighs 1.2041 kg/m^3, at 15 degC 1.2250 (U.S. Standard Atmosphere 1976)."""
+    assert air_density(20.0) == pytest.approx(1.2041, abs=5e-4)
+    assert air_density(15.0) == pytest.approx(1.2250, abs=5e-4)
+
+
+@pytest.mark.parametrize(("temperature_c", "micropascal_seconds"), [(-56.5, 14.216), (-17.474, 16.282), (15.0, 17.894)])
+def test_viscosity_is_the_standard_atmospheres(temperature_c: float, micropascal_seconds: float) -> None:
+    """Sutherland's formula gives the U.S. Standard Atmosphere 1976 at 11 km, 5 km and sea level."""
+    assert air_viscosity(temperature_c) * 1e6 == pytest.approx(micropascal_seconds, rel=1e-4)
+
+
+def test_viscosity_near_measurement() -> None:
+    """At 23 degC within 0.5 % of the reference 18.325 uPa s (R. T. Birge, Am. J. Phys. 13 (1945) 63)."""
+    assert air_viscosity(23.0) * 1e6 == pytest.approx(18.325, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("temperature_c", "metres_per_second"), [(-20.0, 318.9), (0.0, 331.3), (20.0, 343.2), (30.0, 349.0)]
+)
+def test_speed_of_sound_in_dry_air(temperature_c: float, metres_per_second: float) -> None:
+    """343.2 m/s at 20 degC (O. Cramer, J. Acoust. Soc. Am. 93 (1993) 2510, doi:10.1121/1.405827)."""
+    assert speed_of_sound(temperature_c) == pytest.approx(metres_per_second, abs=0.2)
+
+
+def test_speed_of_sound_rises_with_humidity() -> None:
+    """Saturated air at 20 degC is faster by 1.1 to 1.4 m/s (Cramer 1993, figure 2), at any pressure that of a lab."""
+    gain = speed_of_sound(20.0, 101325.0, 1.0) - speed_of_sound(20.0)
+    assert 1.1 < gain < 1.4
+
+
+def test_speed_of_sound_of_dry_air_knows_no_pressure() -> None:
+    """An ideal gas carries sound at one speed whatever its pressure."""
+    assert speed_of_sound(20.0, 80_000.0) == pytest.approx(speed_of_sound(20.0), rel=1e-12)

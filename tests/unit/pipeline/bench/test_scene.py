@@ -1,0 +1,191 @@
+"""A scene says what is at the bench; what it may not say is refused by file, key, value and what is allowed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.bench.scene import Scene
+from pipeline.errors import PipelineError, SceneError
+from pipeline.numerics.estimate import Estimate
+
+WHOLE = {
+    "bob": {"mass_kg": {"value": 0.2176, "u": 0.00005}},
+    "spring": {"mass_kg": {"value": 0.01, "u": 0.0005}, "constant_n_per_m": 14.0},
+    "disc": {"diameter_m": {"value": 0.102, "u": 0.0005}},
+    "air": {"temperature_c": 20.0, "pressure_pa": 101325, "relative_humidity": 0.4},
+    "sensor": {"position": "below", "sigma_m": 0.0003},
+    "start": {"displacement_m": -0.05, "velocity_m_per_s": 0.0},
+    "damping": {"gamma_per_s": 0.0073, "beta_per_m_s": 0.235, "mu_m_per_s": 0.0},
+}
+
+
+def test_every_key_of_the_reference_scene_is_read() -> None:
+    """Each quantity arrives with its value, uncertainty and unit."""
+    scene = Scene.from_mapping(WHOLE)
+    assert scene == Scene(
+        bob_mass_kg=Estimate(0.2176, 0.00005, "kg"),
+        spring_mass_kg=Estimate(0.01, 0.0005, "kg"),
+        spring_constant_n_per_m=Estimate(14.0, 0.0, "N/m"),
+        disc_diameter_m=Estimate(0.102, 0.0005, "m"),
+        air_temperature_c=Estimate(20.0, 0.0, "degC"),
+        air_pressure_pa=Estimate(101325.0, 0.0, "Pa"),
+        air_relative_humidity=Estimate(0.4, 0.0, ""),
+        sensor_sigma_m=Estimate(0.0003, 0.0, "m"),
+        sensor_position="below",
+        start_displacement_m=Estimate(-0.05, 0.0, "m"),
+        start_velocity_m_per_s=Estimate(0.0, 0.0, "m/s"),
+        gamma_per_s=Estimate(0.0073, 0.0, "1/s"),
+        beta_per_m_s=Estimate(0.235, 0.0, "1/(m s)"),
+        mu_m_per_s=Estimate(0.0, 0.0, "m/s"),
+    )
+    assert not scene.is_empty
+
+
+def test_nothing_known_is_empty() -> None:
+    """No tables, and tables without keys, leave every quantity None."""
+    for tables in ({}, {"bob": {}, "sensor": {}}):
+        scene = Scene.from_mapping(tables)
+        assert scene.is_empty
+        assert scene == Scene()
+        assert scene.to_mapping() == {}
+
+
+def test_position_alone_is_something() -> None:
+    """A scene that only says where the sensor is, is not empty."""
+    assert not Scene.from_mapping({"sensor": {"position": "above"}}).is_empty
+
+
+# table, key, value, words that the message must hold besides file, table, key and value
+REFUSED: list[tuple[str, str, Any, tuple[str, ...]]] = [
+    ("bob", "mass_g", 200.0, ("unknown key", "200", "mass_kg")),
+    ("bob", "mass", 0.2, ("unknown key", "0.2", "mass_kg")),
+    ("disc", "diameter_cm", 10.2, ("unknown key", "10.2", "diameter_m")),
+    ("air", "temperature_k", 293.0, ("unknown key", "293", "temperature_c", "pressure_pa", "relative_humidity")),
+    ("sensor", "height_m", 1, ("unknown key", "1", "sigma_m", "position")),
+    ("bob", "mass_kg", -0.2, ("more than 0 kg", "-0.2")),
+    ("bob", "mass_kg", 0, ("more than 0 kg", "got 0")),
+    ("bob", "mass_kg", {"value": -0.2, "u": 0.1}, ("more than 0 kg", "-0.2")),
+    ("spring", "mass_kg", -0.01, ("at least 0 kg", "-0.01")),
+    ("spring", "constant_n_per_m", 0.0, ("more than 0 N/m", "got 0")),
+    ("disc", "diameter_m", 0.0, ("more than 0 m", "got 0")),
+    ("air", "temperature_c", -300.0, ("more than -273.15 degC", "-300")),
+    ("air", "pressure_pa", 0, ("more than 0 Pa", "got 0")),
+    ("air", "relative_humidity", 40, ("at least 0", "at most 1", "40")),
+    ("air", "relative_humidity", -0.1, ("at least 0", "at most 1", "-0.1")),
+    ("sensor", "sigma_m", 0.0, ("more than 0 m", "got 0")),
+    ("sensor", "position", "beside", ("below", "above", "beside")),
+    ("sensor", "position", 1, ("below", "above", "1")),
+    ("damping", "gamma_per_s", -1e-3, ("at least 0 1/s", "-0.001")),
+    ("damping", "beta_per_m_s", -1, ("at least 0 1/(m s)", "-1")),
+    ("damping", "mu_m_per_s", -1, ("at least 0 m/s", "-1")),
+    ("bob", "mass_kg", "0.2", ("finite number", "'0.2'")),
+    ("bob", "mass_kg", True, ("finite number", "True")),
+    ("bob", "mass_kg", None, ("finite number", "None")),
+    ("bob", "mass_kg", [0.2], ("finite number", "[0.2]")),
+    ("bob", "mass_kg", math.nan, ("finite number", "nan")),
+    ("bob", "mass_kg", math.inf, ("finite number", "inf")),
+    ("start", "displacement_m", -math.inf, ("finite number", "-inf")),
+    ("bob", "mass_kg", {"value": 0.2, "u": -0.1}, ("u", "negative", "-0.1")),
+    ("bob", "mass_kg", {"value": 0.2, "u": "0.1"}, ("u", "finite number", "'0.1'")),
+    ("bob", "mass_kg", {"value": 0.2, "u": math.nan}, ("u", "finite number", "nan")),
+    ("bob", "mass_kg", {"value": 0.2, "sigma": 0.1}, ("value", "u", "sigma")),
+    ("bob", "mass_kg", {"u": 0.1}, ("value", "0.1")),
+    ("bob", "mass_kg", {}, ("value", "{}")),
+]
+
+
+@pytest.mark.parametrize(("table", "key", "value", "words"), REFUSED)
+def test_refusal_names_file_key_value_and_what_is_allowed(
+    table: str, key: str, value: object, words: tuple[str, ...]
+) -> None:
+    """Every impossible entry is one line with the file, the table, the key, the value and what is allowed."""
+    with pytest.raises(SceneError) as raised:
+        Scene.from_mapping({table: {key: value}}, where="bench.toml")
+    message = str(raised.value)
+    assert message.startswith("bench.toml:")
+    for word in (f"[{table}]", key, *words):
+        assert word in message, message
+    assert "\n" not in message
+
+
+def test_unknown_table_is_refused_with_the_known_ones() -> None:
+    """A table that no scene has is named together with those that it may have."""
+    with pytest.raises(SceneError, match=r"b\.toml: unknown table \[Bob\]; allowed are .*bob, spring, disc, air"):
+        Scene.from_mapping({"Bob": {"mass_kg": 0.2}}, where="b.toml")
+
+
+def test_number_in_place_of_a_table_is_refused() -> None:
+    """`bob = 0.2` is told how a table is written."""
+    with pytest.raises(SceneError, match=r"b\.toml: bob must be a table, got 0\.2; write \[bob\]"):
+        Scene.from_mapping({"bob": 0.2}, where="b.toml")
+
+
+def test_zero_is_allowed_where_it_means_none() -> None:
+    """A massless spring, dry air, no drag and rest at the start are scenes."""
+    scene = Scene.from_mapping(
+        {
+            "spring": {"mass_kg": 0},
+            "air": {"relative_humidity": 0},
+            "damping": {"gamma_per_s": 0},
+            "start": {"displacement_m": 0},
+        }
+    )
+    assert scene.spring_mass_kg == Estimate(0.0, 0.0, "kg")
+
+
+def test_reference_scene_comes_back() -> None:
+    """to_mapping gives the tables that from_mapping took."""
+    assert Scene.from_mapping(WHOLE).to_mapping() == WHOLE
+
+
+POSITIVE = st.floats(1e-12, 1e9)
+QUANTITY = st.one_of(
+    POSITIVE, st.builds(lambda v, u: {"value": v, "u": u}, POSITIVE, st.floats(0.0, 1e6)), st.integers(1, 10**6)
+)
+SCENES = st.fixed_dictionaries(
+    {},
+    optional={
+        "bob": st.fixed_dictionaries({}, optional={"mass_kg": QUANTITY}),
+        "spring": st.fixed_dictionaries({}, optional={"mass_kg": QUANTITY, "constant_n_per_m": QUANTITY}),
+        "disc": st.fixed_dictionaries({}, optional={"diameter_m": QUANTITY}),
+        "air": st.fixed_dictionaries(
+            {}, optional={"temperature_c": QUANTITY, "relative_humidity": st.floats(0.0, 1.0)}
+        ),
+        "sensor": st.fixed_dictionaries({}, optional={"position": st.sampled_from(["below", "above"])}),
+        "damping": st.fixed_dictionaries({}, optional={"mu_m_per_s": QUANTITY}),
+    },
+)
+
+
+@given(SCENES)
+def test_any_scene_survives_the_round_trip(tables: dict[str, Any]) -> None:
+    """from_mapping of to_mapping is the same scene."""
+    scene = Scene.from_mapping(tables)
+    assert Scene.from_mapping(scene.to_mapping()) == scene
+
+
+JSON = st.recursive(
+    st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5)),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=2),
+        st.dictionaries(st.sampled_from(["value", "u", "mass_kg", "position", "x"]), inner, max_size=3),
+    ),
+    max_leaves=4,
+)
+
+
+@given(st.dictionaries(st.sampled_from(["bob", "sensor", "air", "nowhere"]), JSON, max_size=3))
+def test_any_tables_make_a_scene_or_a_scene_error(tables: dict[str, Any]) -> None:
+    """Whatever a file holds, the outcome is a scene or one line of refusal."""
+    refusal = ""
+    try:
+        Scene.from_mapping(tables, where="any.toml")
+    except PipelineError as error:
+        refusal = str(error)
+    assert not refusal or refusal.startswith("any.toml:")
+    assert "\n" not in refusal

@@ -1,0 +1,182 @@
+"""The equation of motion, what a scene makes of it, and the choice of an integrator."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.bench.scene import Scene
+from pipeline.dynamics import INTEGRATORS, Equation, Problem, effective_mass_kg, get_integrator
+from pipeline.dynamics.choose import AUTO, choose, fit_step, least_tolerance
+from pipeline.dynamics.integrators.averaged import amplitude, stopping_time
+from pipeline.dynamics.stability_map import limits, runs_bounded
+from pipeline.dynamics.terms import required
+from pipeline.errors import DynamicsError, SceneError
+from pipeline.results.effects import added_mass_kg
+from springmass.session.simulated_bench import REST_M, bench_position
+
+BENCH = {
+    "bob": {"mass_kg": 0.2176},
+    "spring": {"mass_kg": 0.01, "constant_n_per_m": 14.0},
+    "disc": {"diameter_m": 0.102},
+    "start": {"displacement_m": 0.05},
+}
+
+
+@pytest.mark.parametrize(
+    "laws",
+    [
+        {"gamma_per_s": 0.05},
+        {"beta_per_m_s": 0.4},
+        {"mu_m_per_s": 2e-4},
+        {"gamma_per_s": 0.0073, "beta_per_m_s": 0.235, "mu_m_per_s": 1e-4},
+    ],
+)
+def test_the_amplitude_falls_as_the_scene_says(laws: dict[str, float]) -> None:
+    """Turning points of the equation lie on dA/dt = -(mu + gamma A + beta A^2), integrated here by small steps."""
+    run = get_integrator("taylor").run(Problem(Equation.from_laws(8.66, **laws), 0.05), 0.001, 60_000)
+    crests = np.flatnonzero((run.y[1:-1] > run.y[:-2]) & (run.y[1:-1] >= run.y[2:])) + 1
+    falling, step = [0.05], 1e-4
+    for _ in range(600_000):
+        a = falling[-1]
+        rate = laws.get("mu_m_per_s", 0.0) + laws.get("gamma_per_s", 0.0) * a + laws.get("beta_per_m_s", 0.0) * a * a
+        falling.append(a - step * rate)
+    expected = np.interp(run.t[crests], step * np.arange(len(falling)), falling)
+    np.testing.assert_allclose(run.y[crests], expected, rtol=2e-3)
+
+
+def test_a_cubic_spring_shifts_the_frequency() -> None:
+    """By 3 c A^2 / (8 omega), to first order."""
+    cubic = 200.0
+    run = get_integrator("taylor").run(
+        Problem(Equation(angular_frequency_per_s=8.66, cubic_per_m2_s2=cubic), 0.05), 0.001, 60_000
+    )
+    rising = np.flatnonzero((run.y[:-1] < 0) & (run.y[1:] >= 0))
+    at = run.t[rising] - run.y[rising] * 0.001 / (run.y[rising + 1] - run.y[rising])
+    omega = 2.0 * math.pi * (len(at) - 1) / (at[-1] - at[0])
+    assert omega - 8.66 == pytest.approx(3.0 * cubic * 0.05**2 / (8.0 * 8.66), rel=0.01)
+
+
+def test_the_mass_is_bob_a_third_of_the_spring_and_air() -> None:
+    """As an analysis counts it."""
+    scene = Scene.from_mapping(BENCH)
+    expected = 0.2176 + 0.01 / 3.0 + added_mass_kg(scene)
+    assert effective_mass_kg(scene) == pytest.approx(expected, rel=1e-15)
+    found = Problem.from_scene(scene).equation.angular_frequency_per_s
+    assert found == pytest.approx(math.sqrt(14.0 / expected), rel=1e-15)
+    with pytest.raises(SceneError, match=r"\[spring\] constant_n_per_m"):
+        Problem.from_scene(Scene.from_mapping({**BENCH, "spring": {}}))
+    with pytest.raises(SceneError, match="mass_kg"):
+        effective_mass_kg(Scene())
+
+
+def test_laws_go_forth_and_back() -> None:
+    """The coefficients of the amplitude come back from those of the equation."""
+    given = {"gamma_per_s": 0.1, "beta_per_m_s": 0.3, "mu_m_per_s": 0.002}
+    assert Equation.from_laws(7.0, **given).laws() == pytest.approx(tuple(given.values()), rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("gamma", "beta", "mu"), [(0.1, 0.0, 0.01), (0.0, 0.5, 0.01), (0.1, 0.5, 0.01), (0.1, 3.0, 0.0), (0.2, 0.1, 0.1)]
+)
+def test_the_averaged_amplitude_solves_its_equation(gamma: float, beta: float, mu: float) -> None:
+    """The derivative of the closed form is its law, until it stops at its stopping time."""
+    end = min(float(stopping_time(0.05, gamma, beta, mu)), 20.0)
+    t = np.linspace(0.0, 0.999 * end, 4001)
+    a = amplitude(0.05, gamma, beta, mu, t)
+    slope = (a[2:] - a[:-2]) / (t[2:] - t[:-2])
+    np.testing.assert_allclose(slope, -(mu + gamma * a + beta * a * a)[1:-1], rtol=1e-4)
+    if mu > 0:
+        assert amplitude(0.05, gamma, beta, mu, np.array([end * (1 - 1e-9)]))[0] < 1e-9
+        assert amplitude(0.05, gamma, beta, mu, np.array([end, 2 * end, 100 * end])).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_terms_below_their_share_are_left_out() -> None:
+    """What the tolerance does not require does not act, and the error that leaves stays within the tolerance."""
+    equation = Equation.from_laws(8.66, gamma_per_s=0.01, beta_per_m_s=1e-5, mu_m_per_s=1e-12, cubic_per_m2_s2=1e-6)
+    problem = Problem(equation, 0.05)
+    for tolerance, kept in ((1e-3, {"viscous_drag"}), (1e-4, {"viscous_drag", "quadratic_drag"})):
+        reduced, terms = required(problem, 120.0, tolerance)
+        assert {term.name for term in terms if term.included} == kept
+        full = get_integrator("taylor").run(problem, 0.1, 1200).y
+        less = get_integrator("taylor").run(reduced, 0.1, 1200).y
+        assert 0.0 < np.max(np.abs(full - less)) / 0.05 <= 0.1 * tolerance
+
+
+def test_tighter_tolerances_cost_more() -> None:
+    """From the averaged model over splitting to the series; always below the tolerance."""
+    problem = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
+    truth = get_integrator("taylor").run(problem, 0.01, 12_000).y
+    taken, costs = [], []
+    for tolerance in (1e-2, 1e-4, 1e-6, 1e-11):
+        choice = choose(problem, 0.01, 12_000, tolerance)
+        assert np.max(np.abs(choice.run(12_000).y - truth)) / 0.05 <= tolerance
+        taken.append(choice.integrator.name)
+        costs.append(choice.cost_ns)
+    assert taken == ["averaged", "strang", "strang", "taylor"]
+    assert costs == sorted(costs)
+
+
+def test_a_tolerance_out_of_reach_is_refused() -> None:
+    """The message says what can be reached."""
+    problem = Problem(Equation(angular_frequency_per_s=8.66), 0.05)
+    least = least_tolerance(problem, 120.0)
+    assert 1e-13 <= least < 1e-12
+    for tolerance in (0.5 * least, 0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(DynamicsError, match="tolerance must be finite and at least"):
+            choose(problem, 0.01, 12_000, tolerance)
+    assert choose(problem, 0.01, 12_000, least).integrator.name == "exact"
+
+
+def test_stiff_drag_is_chosen_for_too() -> None:
+    """Beyond the series' reach splitting is taken; a method that cannot keep the tolerance gives none."""
+    stiff = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=8.66e5, drag_per_m=1.0), 0.05)
+    assert choose(stiff, 0.01, 1000, 1e-6).integrator.name == "strang"
+    mixed = Problem(Equation.from_laws(8.66, beta_per_m_s=0.235), 0.05)
+    assert fit_step(get_integrator("averaged"), mixed, 0.01, 1000, 1e-10) is None
+    assert set(AUTO) <= set(INTEGRATORS.values())
+
+
+@pytest.mark.parametrize("name", ["forward-euler", "symplectic-euler", "verlet", "yoshida4", "rk4"])
+def test_the_stability_map_is_confirmed_by_running(name: str) -> None:
+    """Three per cent inside the limit of theory every run stays bounded, three per cent outside every one grows."""
+    method = get_integrator(name)
+    ratios = np.array([0.02, 0.2, 0.9, 1.0, 1.5, 12.0, 60.0])
+    for ratio, limit in zip(ratios.tolist(), limits(method, ratios).tolist(), strict=True):
+        assert runs_bounded(method, 0.97 * limit, ratio)
+        assert not runs_bounded(method, 1.03 * limit, ratio)
+
+
+def test_the_bench_moves_by_the_equation() -> None:
+    """Position by position within 1e-7 of the series, with friction and a stop too, in any order of asking."""
+    damping = {"gamma_per_s": 0.01, "beta_per_m_s": 0.2, "mu_m_per_s": 0.003}
+    scene = Scene.from_mapping({**BENCH, "damping": damping})
+    position = bench_position(scene)
+    run = get_integrator("taylor").run(Problem.from_scene(scene), 0.0137, 1500)
+    rows = np.random.default_rng(1).permutation(1501)[:400]
+    found = np.array([position(run.t[row]) for row in rows])
+    np.testing.assert_allclose(found - REST_M, run.y[rows], rtol=0, atol=0.05 * 2e-6)
+    assert position(1e3) == position(2e3) != REST_M
+    assert position(-1.0) == pytest.approx(REST_M + 0.05)
+
+
+def test_a_trajectory_between_its_states() -> None:
+    """The cubic through states a hundredth of a second apart errs by less than 1e-6 of the amplitude."""
+    problem = Problem(Equation(angular_frequency_per_s=8.66), 0.05)
+    coarse, fine = (get_integrator("exact").run(problem, h, round(2 / h)) for h in (0.01, 0.0007))
+    np.testing.assert_allclose(coarse.at(fine.t[:2000]), fine.y[:2000], rtol=0, atol=0.05e-6)
+    assert coarse.at(np.array([-1.0, 99.0])).tolist() == [coarse.y[0], coarse.y[-1]]
+
+
+def test_without_scipy_its_methods_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line that names the package and what runs without it; everything else runs."""
+    import importlib.util
+
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    problem = Problem(Equation.from_laws(8.66, beta_per_m_s=0.2), 0.05)
+    for name in ("lsoda", "dop853"):
+        with pytest.raises(DynamicsError, match="scipy is not installed"):
+            get_integrator(name).run(problem, 0.01, 10)
+    assert choose(problem, 0.01, 1000, 1e-6).integrator.name == "strang"

@@ -1,0 +1,393 @@
+"""The whole line: against another fitter, on what does not oscillate, and on whatever arrays there are."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from dataclasses import replace
+from types import ModuleType
+
+import lmfit
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from pipeline.accuracy import params_for
+from pipeline.analyse import Analysis, Motion, Params, analyse
+from pipeline.damping.select import Params as DampingParams
+from pipeline.errors import AnalysisError, PipelineError
+from pipeline.numerics.estimate import Estimate
+from pipeline.oscillation.cycles import NoOscillation
+from pipeline.track import Track
+
+TABLE = {
+    "period",
+    "frequency",
+    "angular_frequency",
+    "amplitude",
+    "offset",
+    "phase",
+    "noise",
+    "damping_rate",
+    "quality_factor",
+    "velocity_rms",
+}
+
+
+def run(synthetic: ModuleType, seconds: float = 10.0, sigma_m: float = 3e-4, seed: int = 1, **truth: float) -> Analysis:
+    """Analyse a synthetic record."""
+    t = synthetic.times(seconds)
+    return analyse(Track.from_arrays(t, synthetic.noisy(synthetic.Truth(**truth), t, sigma_m, seed)))
+
+
+def motion_of(result: Analysis) -> Motion:
+    """Return the motion of a record that has one."""
+    assert isinstance(result.motion, Motion), result.motion
+    return result.motion
+
+
+def pull(found: Estimate, truth: float) -> float:
+    """Return the error over the standard uncertainty."""
+    return (found.value - truth) / found.u
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "near", "alike"), [("fast", 0.5, 0.1), ("standard", 0.5, 0.1), ("best", 0.03, 0.04)]
+)
+@pytest.mark.parametrize("seconds", [10.0, 60.0])
+@pytest.mark.parametrize("sigma_m", [3e-4, 2.39e-3])
+def test_agrees_with_a_waveform_fit_by_lmfit(
+    synthetic: ModuleType, seconds: float, sigma_m: float, accuracy: str, near: float, alike: float
+) -> None:
+    """A damped sine fitted by lmfit has the same values within half a u, 0.03 u of the best tier, and the same u."""
+    truth = synthetic.Truth(gamma=0.01463)
+    t = synthetic.times(seconds)
+    y = synthetic.noisy(truth, t, sigma_m, 12)
+    model = lmfit.Model(lambda x, c, a, g, w, p: c + a * np.exp(-g * x) * np.cos(w * x + p), independent_vars=["x"])
+    other = model.fit(y, x=t, c=truth.offset, a=truth.amplitude, g=truth.gamma, w=truth.omega, p=truth.phase)
+    params = replace(params_for(accuracy), damping=DampingParams(laws=("linear",)))
+    result = analyse(Track.from_arrays(t, y), params=params)
+    motion = motion_of(result)
+    period = other.params["w"]
+    pairs = {
+        "period": (
+            motion.derived.statistical["period"],
+            2 * math.pi / period.value,
+            2 * math.pi / period.value**2 * period.stderr,
+        ),
+        "amplitude": (result.estimates["amplitude"], other.params["a"].value, other.params["a"].stderr),
+        "phase": (result.estimates["phase"], other.params["p"].value, other.params["p"].stderr),
+        "offset": (result.estimates["offset"], other.params["c"].value, other.params["c"].stderr),
+        "gamma": (motion.damping.fits["linear"].joint["gamma"], other.params["g"].value, other.params["g"].stderr),
+    }
+    for name, (found, value, u) in pairs.items():
+        assert abs(found.value - value) <= near * u, name
+        assert found.u == pytest.approx(u, rel=alike), name
+
+
+def test_estimates_and_units(synthetic: ModuleType) -> None:
+    """Without a scene the estimates are those that need none, each finite with its unit."""
+    found = run(synthetic, 60.0, gamma=0.01463).estimates
+    assert set(found) == TABLE
+    assert {name: e.unit for name, e in found.items()} == {
+        "period": "s",
+        "frequency": "Hz",
+        "angular_frequency": "rad/s",
+        "amplitude": "m",
+        "offset": "m",
+        "phase": "rad",
+        "noise": "m",
+        "damping_rate": "1/s",
+        "quality_factor": "",
+        "velocity_rms": "m/s",
+    }
+    assert all(math.isfinite(e.value) and e.u > 0 for e in found.values())
+
+
+def test_truth_of_mixed_drag_is_held(synthetic: ModuleType) -> None:
+    """Two minutes of mixed drag: law, coefficients and all that is estimated lie within 4 u of the truth."""
+    truth = synthetic.Truth(gamma=0.0073, beta=0.235)
+    result = run(synthetic, 120.0, gamma=0.0073, beta=0.235)
+    motion = motion_of(result)
+    assert motion.damping.admissible == ("linear+quadratic",)
+    joint = motion.damping.best.joint
+    for found, value in (
+        (motion.derived.statistical["period"], truth.period),
+        (result.estimates["amplitude"], truth.amplitude),
+        (result.estimates["offset"], truth.offset),
+        (result.estimates["phase"], truth.phase),
+        (result.estimates["noise"], 3e-4),
+        (result.estimates["damping_rate"], 0.0073 + 0.235 * 0.05),
+        (joint["gamma"], 0.0073),
+        (joint["beta"], 0.235),
+    ):
+        assert abs(pull(found, value)) < 4.0
+
+
+def test_waveform_leaves_the_noise(synthetic: ModuleType) -> None:
+    """What the model leaves of a clean record is the noise, and its velocity is the motion's."""
+    truth = synthetic.Truth(gamma=0.01463)
+    result = run(synthetic, 60.0, gamma=0.01463)
+    waveform = motion_of(result).waveform
+    assert waveform.rms_m == pytest.approx(3e-4, rel=0.03)
+    t = result.track.t
+    np.testing.assert_allclose(waveform.position, truth.position(t), atol=1e-4)
+    velocity = np.gradient(truth.position(np.linspace(0, 60, 600_001)), 1e-4)[::100][: t.size]
+    np.testing.assert_allclose(waveform.velocity, velocity, atol=1e-3)
+
+
+STILL = {
+    "constant": lambda t, _: np.full(t.size, 0.2),
+    "white noise": lambda t, rng: 0.2 + 1e-3 * rng.standard_normal(t.size),
+    "step": lambda t, rng: 0.2 + 0.05 * (t > 5.0) + 1e-4 * rng.standard_normal(t.size),
+    "clean step": lambda t, _: 0.2 + 0.05 * (t > 5.0),
+    "ramp": lambda t, rng: 0.2 + 0.01 * t + 1e-4 * rng.standard_normal(t.size),
+    "clean ramp": lambda t, _: 0.2 + 0.01 * t,
+    "one period": lambda t, rng: 0.2 + 0.05 * np.cos(2 * np.pi * t / 10.0) + 1e-4 * rng.standard_normal(t.size),
+    "zero": lambda t, _: np.zeros(t.size),
+}
+
+
+@pytest.mark.parametrize("what", STILL)
+def test_what_does_not_oscillate_is_an_error_in_words(what: str) -> None:
+    """There is no period, amplitude or damping of what does not oscillate: offset and noise only, and the reason."""
+    t = np.arange(1000) / 100
+    result = analyse(Track.from_arrays(t, STILL[what](t, np.random.default_rng(2))))
+    assert isinstance(result.motion, NoOscillation)
+    assert set(result.estimates) == {"offset", "noise"}
+    assert (result.findings[0].code, result.findings[0].severity) == ("no_oscillation", "error")
+    assert result.findings[0].message == result.motion.why
+    assert result.quality["used"] > 0
+
+
+def test_the_rest_position_of_a_step_is_not_stated_too_finely() -> None:
+    """Where the distance steps by 50 mm, the mean's uncertainty is of its size; in white noise it is that of a mean."""
+    t = np.arange(3000) / 100
+    noise = 3e-4 * np.random.default_rng(2).standard_normal(t.size)
+    step = analyse(Track.from_arrays(t, 0.3 + 0.05 * (t > 15) + noise)).estimates["offset"]
+    white = analyse(Track.from_arrays(t, 0.3 + noise)).estimates["offset"]
+    assert 0.01 < step.u < 0.05
+    assert white.u == pytest.approx(3e-4 / np.sqrt(t.size), rel=0.1)
+
+
+@pytest.mark.parametrize("y", [[0.1, 0.2], [np.nan] * 1000, [np.inf] * 50, [0.1] * 7])
+def test_too_few_distances_are_refused(y: list[float]) -> None:
+    """Two samples, nothing but missing ones, seven: refused with the number that there was."""
+    with pytest.raises(AnalysisError, match=f"of {len(y)}"):
+        analyse(Track.from_arrays(np.arange(len(y)) / 100, y))
+
+
+def test_missing_and_infinite_samples_are_left_out(synthetic: ModuleType) -> None:
+    """NaN and infinity here and there change the result by less than its uncertainty."""
+    t = synthetic.times(20)
+    y = synthetic.noisy(synthetic.Truth(gamma=0.005), t, 3e-4, 3)
+    whole = analyse(Track.from_arrays(t, y))
+    holes = y.copy()
+    holes[[0, 7, 8, 9, 700, 1999]] = np.nan
+    holes[[100, 900]] = np.inf
+    holes[[300]] = -np.inf
+    result = analyse(Track.from_arrays(t, holes))
+    assert result.quality["missing"] == 9
+    for name in ("period", "amplitude", "offset"):
+        assert abs(result.estimates[name].value - whole.estimates[name].value) < 0.7 * whole.estimates[name].u
+
+
+def test_unsorted_time_is_flagged_and_survived(synthetic: ModuleType) -> None:
+    """Swapped rows and a block out of order are flagged; what is left gives the right period."""
+    truth = synthetic.Truth(gamma=0.005)
+    t = synthetic.times(20)
+    y = synthetic.noisy(truth, t, 3e-4, 4)
+    order = np.arange(2000)
+    order[[500, 501]] = order[[501, 500]]
+    order[1200:1210] = order[1200:1210][::-1]
+    result = analyse(Track.from_arrays(t[order], y[order]))
+    assert result.quality["non_monotonic_time"] == 10
+    assert abs(pull(result.estimates["period"], truth.period)) < 4
+    assert abs(pull(result.estimates["amplitude"], truth.amplitude)) < 4
+
+
+@pytest.mark.parametrize("origin_s", [5.04, 100.0, 1e4, 1e6, 1.7e9])
+def test_time_origin_does_not_matter(synthetic: ModuleType, origin_s: float) -> None:
+    """Seconds of the run or of the Unix epoch give the same answer, to the digits that such times hold."""
+    t = synthetic.times(20)
+    y = synthetic.noisy(synthetic.Truth(gamma=0.01463), t, 3e-4, 5)
+    here = analyse(Track.from_arrays(t, y))
+    there = analyse(Track.from_arrays(t + origin_s, y, rate_hz=100.0))
+    assert np.array_equal(here.flags, there.flags)
+    for name, expected in here.estimates.items():
+        found = there.estimates[name]
+        assert abs(found.value - expected.value) <= 0.1 * expected.u, name
+        assert found.u == pytest.approx(expected.u, rel=0.05), name
+
+
+LENGTHS = {"amplitude", "offset", "noise", "velocity_rms"}
+
+
+@pytest.mark.parametrize("scale", [2e-8, 1e-3, 20.0, 2e4])
+def test_scale_of_length_does_not_matter(synthetic: ModuleType, scale: float) -> None:
+    """From amplitudes of 1 nm to 1 km lengths and their uncertainties scale, all else stays."""
+    t = synthetic.times(20)
+    y = synthetic.noisy(synthetic.Truth(gamma=0.01463), t, 3e-4, 6)
+    here, there = analyse(Track.from_arrays(t, y)), analyse(Track.from_arrays(t, scale * y))
+    for name, expected in here.estimates.items():
+        factor = scale if name in LENGTHS else 1.0
+        found = there.estimates[name]
+        assert found.value == pytest.approx(factor * expected.value, abs=1e-3 * factor * expected.u), name
+        assert found.u == pytest.approx(factor * expected.u, rel=1e-3), name
+
+
+@pytest.mark.parametrize("scale", [0.5, 4.0])
+def test_scale_of_time_does_not_matter(synthetic: ModuleType, scale: float) -> None:
+    """Twice as fast and four times as slow the relative errors are the same."""
+    t = synthetic.times(20)
+    y = synthetic.noisy(synthetic.Truth(gamma=0.01463), t, 3e-4, 6)
+    here, there = analyse(Track.from_arrays(t, y)), analyse(Track.from_arrays(scale * t, y))
+    for name, power in (("period", 1), ("frequency", -1), ("damping_rate", -1), ("amplitude", 0), ("velocity_rms", -1)):
+        found, expected = there.estimates[name], here.estimates[name]
+        assert found.value == pytest.approx(scale**power * expected.value, rel=1e-6), name
+        assert found.u == pytest.approx(scale**power * expected.u, rel=1e-3), name
+
+
+@pytest.mark.parametrize("samples", [8, 12, 20, 500])
+def test_samples_a_period(synthetic: ModuleType, samples: int) -> None:
+    """From eight samples a period to five hundred the truth is held."""
+    truth = synthetic.Truth(gamma=0.005)
+    rate = samples / truth.period
+    pulls = []
+    for seed in range(10):
+        t = synthetic.times(40.0, rate)
+        track = Track.from_arrays(t, synthetic.noisy(truth, t, 3e-4, seed), rate_hz=rate)
+        result = analyse(track, params=Params(damping=DampingParams(laws=("linear",))))
+        motion = motion_of(result)
+        pulls.append(
+            [
+                pull(motion.derived.statistical["period"], truth.period),
+                pull(result.estimates["amplitude"], truth.amplitude),
+                pull(result.estimates["phase"], truth.phase),
+            ]
+        )
+    assert np.max(np.abs(pulls)) < 4.5
+    assert np.all(np.sqrt(np.mean(np.square(pulls), axis=0)) < 1.7)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("how", ["anywhere", "one place"])
+def test_lone_false_echoes_do_no_harm(synthetic: ModuleType, share: float, how: str) -> None:
+    """With up to a fifth of all samples false the period still errs by less than 1.6 times the bound."""
+    truth = synthetic.Truth()
+    t = synthetic.times(10)
+    bound = synthetic.fisher_bounds(truth, t, 3e-4)["period"]
+    errors = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        y = synthetic.noisy(truth, t, 3e-4, seed + 100)
+        false = rng.random(t.size) < share
+        y[false] = rng.uniform(0.0, 2.0, np.count_nonzero(false)) if how == "anywhere" else y[false] + 0.4
+        motion = motion_of(analyse(Track.from_arrays(t, y)))
+        errors.append((motion.derived.statistical["period"].value - truth.period) / bound)
+    assert np.sqrt(np.mean(np.square(errors))) < 1.6
+
+
+def test_same_track_same_answer(synthetic: ModuleType) -> None:
+    """The analysis is a pure function and leaves its track alone."""
+    t = synthetic.times(20)
+    y = synthetic.noisy(synthetic.Truth(gamma=0.01), t, 3e-4, 7)
+    y[50] = np.nan
+    track = Track.from_arrays(t, y)
+    first, second = analyse(track), analyse(track)
+    assert first.estimates == second.estimates
+    assert first.findings == second.findings
+    np.testing.assert_array_equal(track.y, y)
+    np.testing.assert_array_equal(track.t, t)
+    assert not track.flags.any()
+
+
+def test_every_clock_leaves_its_crystal(synthetic: ModuleType) -> None:
+    """Whoever measured the times, the period's uncertainty holds a crystal's 29 ppm beside the scatter's."""
+    t = synthetic.times(20)
+    track = Track.from_arrays(t, synthetic.noisy(synthetic.Truth(), t, 3e-4, 8))
+    for clock in ("nominal", "device", "host"):
+        motion = motion_of(analyse(replace(track, clock=clock)))
+        period, scatter = motion.derived.estimates["period"], motion.derived.statistical["period"]
+        assert period.u == pytest.approx(math.hypot(scatter.u, period.value * 50e-6 / math.sqrt(3)), rel=1e-6)
+
+
+def sane(result: Analysis) -> None:
+    """Check what holds for every outcome."""
+    assert result.flags.shape == result.track.t.shape
+    assert result.quality["used"] == np.count_nonzero((result.flags & 0b10111111) == 0)
+    for estimate in result.estimates.values():
+        assert not estimate.u < 0
+    for finding in result.findings:
+        assert "\n" not in finding.message
+
+
+SIZES = st.integers(2, 120)
+METRES = st.floats(-1e3, 1e3, width=32)
+WITH_HOLES = st.one_of(METRES, st.sampled_from([math.nan, math.inf, -math.inf, 0.0]))
+
+
+@settings(max_examples=150)
+@given(st.data())
+def test_any_distances_are_analysed_or_refused(data: st.DataObject) -> None:
+    """Whatever the distances, the outcome is an analysis or a PipelineError, never a warning or another exception."""
+    n = data.draw(SIZES)
+    y = data.draw(hnp.arrays(np.float64, n, elements=WITH_HOLES))
+    with contextlib.suppress(PipelineError):
+        sane(analyse(Track.from_arrays(np.arange(n) / 100, y)))
+
+
+@settings(max_examples=150)
+@given(st.data())
+def test_any_times_are_analysed_or_refused(data: st.DataObject) -> None:
+    """Whatever the times, sorted or not, repeated or missing, the outcome is an analysis or a PipelineError."""
+    n = data.draw(SIZES)
+    t = data.draw(hnp.arrays(np.float64, n, elements=st.one_of(st.floats(0, 10, width=32), WITH_HOLES)))
+    y = 0.2 + 0.05 * np.cos(0.08 * np.arange(n)) + 1e-4 * np.random.default_rng(n).standard_normal(n)
+    with contextlib.suppress(PipelineError):
+        sane(analyse(Track.from_arrays(t, y, rate_hz=100.0)))
+
+
+@settings(max_examples=100)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    seconds=st.floats(0.1, 15.0),
+    omega=st.floats(0.5, 200.0),
+    sigma_m=st.sampled_from([0.0, 1e-6, 3e-4, 2.39e-3, 0.05, 0.5]),
+    gamma=st.floats(-0.5, 3.0),
+    step_m=st.sampled_from([0.0, 1e-4, 1e-2]),
+    holes=st.floats(0.0, 0.9),
+    echoes=st.floats(0.0, 0.5),
+)
+@example(seed=0, seconds=3.0, omega=10.0, sigma_m=0.0, gamma=1.0, step_m=0.01, holes=0.875, echoes=0.25)
+@example(seed=0, seconds=3.0, omega=7.0, sigma_m=0.00239, gamma=3.0, step_m=0.01, holes=0.875, echoes=0.0)
+@example(seed=0, seconds=3.0, omega=1.0, sigma_m=0.0, gamma=2.0, step_m=0.01, holes=0.875, echoes=0.25)
+@example(seed=0, seconds=3.0, omega=1.0, sigma_m=0.0, gamma=2.0, step_m=0.01, holes=0.75, echoes=0.25)
+@example(seed=0, seconds=3.0, omega=1.0, sigma_m=0.0, gamma=1.0, step_m=0.01, holes=0.875, echoes=0.25)
+@example(seed=0, seconds=2.0, omega=1.0, sigma_m=0.0, gamma=2.0, step_m=0.01, holes=0.75, echoes=0.25)
+@example(seed=0, seconds=2.0, omega=1.0, sigma_m=0.0, gamma=0.0, step_m=0.0, holes=0.875, echoes=0.25)
+def test_any_oscillation_is_analysed_or_refused(
+    synthetic: ModuleType,
+    seed: int,
+    seconds: float,
+    omega: float,
+    sigma_m: float,
+    gamma: float,
+    step_m: float,
+    holes: float,
+    echoes: float,
+) -> None:
+    """Short, fast, growing, dying, coarse, thinned and riddled records: an analysis or a PipelineError."""
+    rng = np.random.default_rng(seed)
+    t = synthetic.times(seconds)
+    if t.size < 2:
+        return
+    y = synthetic.noisy(synthetic.Truth(omega=omega, gamma=gamma), t, sigma_m, seed)
+    if step_m:
+        y = np.round(y / step_m) * step_m
+    y[rng.random(t.size) < echoes] += 0.3
+    y[rng.random(t.size) < holes] = np.nan
+    with contextlib.suppress(PipelineError):
+        sane(analyse(replace(Track.from_arrays(t, y), quantum_m=step_m or None)))

@@ -1,0 +1,95 @@
+"""A run file loaded: read by its checksums, held against its digests before a result names it."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import springmass
+from acquisition.block import Block
+from acquisition.recordings.recording import Original
+from acquisition.source import SourceInfo
+from springmass.errors import ProgramError
+from storage.errors import RunDamaged
+from storage.run_file.layout import CHUNK
+from storage.run_file.writing import write_run
+
+INFO = SourceInfo("replay", "old.txt", 100.0)
+ORIGINAL = Original("old.txt", b"Time (s)\tDistance (cm)\r\n")
+DISTANCE = "entry/signal/distance"
+
+
+def write(path: Path, distance: np.ndarray) -> Path:
+    """Write a run of so many distances."""
+    n = distance.size
+    block = Block(0, np.arange(n) / 100, distance, np.zeros(n, np.uint8))
+    return write_run(path, [block], INFO, originals=[ORIGINAL], overwrite=True)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Return a run of three chunks."""
+    return write(tmp_path / "run.h5", np.random.default_rng(4).normal(0.5, 0.1, 3 * CHUNK))
+
+
+def spoil(path: Path, number: int, *, to: bytes | None) -> None:
+    """Overwrite a chunk of distances, its checksum too, with one byte; with None flip a single bit of it."""
+    with h5py.File(path) as file:
+        chunk = file[DISTANCE].id.get_chunk_info(number)
+    content = bytearray(path.read_bytes())
+    if to is None:
+        content[chunk.byte_offset + chunk.size // 2] ^= 0x10
+    else:
+        content[chunk.byte_offset : chunk.byte_offset + chunk.size] = to * chunk.size
+    path.write_bytes(content)
+
+
+def test_the_digest_and_the_originals_are_those_of_the_file(path: Path) -> None:
+    """Asked for later, they are what they would have been at once."""
+    loaded = springmass.load(path)
+    assert loaded.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert loaded.originals == (ORIGINAL,)
+
+
+def test_a_flipped_bit_is_an_error_on_loading(path: Path) -> None:
+    """The checksum of the chunk tells it."""
+    spoil(path, 1, to=None)
+    with pytest.raises(RunDamaged, match="the column 'distance' from sample 0"):
+        springmass.load(path)
+
+
+def test_a_lost_chunk_is_an_error_on_loading(path: Path) -> None:
+    """A chunk of zeros has the checksum zero, so its column's digest is asked."""
+    spoil(path, 2, to=b"\0")
+    with pytest.raises(RunDamaged, match=r"the column 'distance'.*SHA-256"):
+        springmass.load(path)
+
+
+def test_a_chunk_of_true_zeros_loads(tmp_path: Path) -> None:
+    """A rangefinder that read nothing but zeros is no damaged file."""
+    loaded = springmass.load(write(tmp_path / "run.h5", np.zeros(CHUNK + 9)))
+    assert not loaded.samples.distance.any()
+
+
+def test_a_rewritten_array_is_an_error_before_a_result_names_it(path: Path) -> None:
+    """Its chunks have valid checksums, so loading cannot tell; the digest that a result states is refused."""
+    with h5py.File(path, "r+") as file:
+        file[DISTANCE][7] = 0.25
+    loaded = springmass.load(path)
+    assert loaded.samples.distance[7] == 0.25
+    with pytest.raises(RunDamaged, match="the column 'distance'"):
+        _ = loaded.sha256
+
+
+def test_a_file_that_was_replaced_gives_neither_digest_nor_originals(path: Path) -> None:
+    """What is read later must be of the file that the samples come from."""
+    loaded = springmass.load(path)
+    write(path, np.full(12, 0.3))
+    with pytest.raises(ProgramError, match="load it again"):
+        _ = loaded.sha256
+    with pytest.raises(ProgramError, match="load it again"):
+        _ = loaded.originals

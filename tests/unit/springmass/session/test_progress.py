@@ -1,0 +1,46 @@
+"""What a recording shows of itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from acquisition.block import Block, Flag
+from pipeline.streaming import LiveMotion, NotYet
+from springmass.session.progress import MOTION_EVERY_NS, SECOND_NS, Shown
+
+
+def block(first: int, n: int = 100) -> Block:
+    """Return one second of a swing of 1.27 s."""
+    t = (first + np.arange(n)) / 100
+    flags = np.zeros(n, np.uint8)
+    flags[0] = Flag.MISSING
+    y = 0.25 + 0.05 * np.cos(4.95 * t) + 1e-4 * np.random.default_rng(first).standard_normal(n)
+    return Block(first, t, np.where(flags == 0, y, np.nan), flags, (t * 1e9).astype(np.int64))
+
+
+def test_samples_and_missing_ones_are_counted_over_all_sensors() -> None:
+    """The rate is the first sensor's over the last second."""
+    shown = Shown(100.0)
+    for second in range(4):
+        shown.push([(0, block(100 * second)), (1, block(50 * second, 50))])
+    assert (shown.samples, shown.missing) == (600, 8)
+    assert shown.rate_hz(4 * SECOND_NS) == 100
+    assert shown.rate_hz(6 * SECOND_NS) == 0
+    shown.clear()
+    assert (shown.samples, shown.missing) == (0, 0)
+
+
+def test_the_motion_is_found_anew_every_other_second() -> None:
+    """Before there is one at each asking; then the last one is given for two seconds."""
+    shown = Shown(100.0)
+    assert isinstance(shown.motion(0), NotYet)
+    for second in range(10):
+        shown.push([(0, block(100 * second))])
+    first = shown.motion(SECOND_NS)
+    assert isinstance(first, LiveMotion)
+    assert abs(first.period.value - 2 * np.pi / 4.95) < 1e-3
+    shown.push([(0, block(1000))])
+    assert shown.motion(2 * SECOND_NS) is first
+    assert shown.motion(SECOND_NS + MOTION_EVERY_NS) is not first
+    shown.clear()
+    assert isinstance(shown.motion(3 * SECOND_NS), NotYet)

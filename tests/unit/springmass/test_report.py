@@ -1,0 +1,454 @@
+"""The report: what stands in its files, and what must never."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import functools
+import html
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.bench.scene import Scene
+from pipeline.motion.overdamped.relaxation import Relaxation
+from pipeline.numerics.estimate import Estimate
+from pipeline.oscillation.cycles import NoOscillation
+from pipeline.results.classic import classic
+from pipeline.results.compare import SpringRun, compare_springs
+from pipeline.results.findings import Finding
+from pipeline.track import UNUSABLE, Track
+from springmass.report import (
+    ReportRun,
+    budget_csv,
+    budget_tex,
+    budget_text,
+    budgets_of,
+    draw,
+    render,
+    results_csv,
+    table_rows,
+    table_tex,
+    text_table,
+    write_report,
+)
+from springmass.report.budgets import INPUTS
+from springmass.report.figures import comparison_figure, motion_figure
+from springmass.report.html import render_html
+from springmass.report.inline import inline_svg
+from springmass.report.motion import motion_csv, smoothed_or_why
+from springmass.report.tables import law_status, pretty, pretty_number
+from springmass.report.words import caption
+
+PROVENANCE = {"version": "0.1.0", "parameters": {"cycles": {"false_alarm": 1e-6}}, "command": "analyse <run>"}
+SCENE = Scene(
+    bob_mass_kg=Estimate(0.2176, 5e-5, "kg"),
+    spring_mass_kg=Estimate(0.01, 5e-4, "kg"),
+    disc_diameter_m=Estimate(0.102, 5e-4, "m"),
+    air_temperature_c=Estimate(20.0, 0.5, "degC"),
+)
+
+
+def track_of(
+    seconds: float, *, noise_m: float = 1e-4, gamma: float = 0.0065, beta: float = 0.2, echoes: bool = True
+) -> Track:
+    """Return a damped oscillation at 100 Hz, with false echoes unless told otherwise, a few samples missing."""
+    rng = np.random.default_rng(7)
+    t = np.arange(round(100 * seconds)) / 100
+    decay = np.exp(-gamma * t)
+    amplitude = 0.05 * decay / (1 + beta * 0.05 * (1 - decay) / gamma)
+    y = 0.22 + amplitude * np.cos(7.95 * t - 0.7) + noise_m * rng.standard_normal(t.size)
+    if echoes:
+        y[rng.integers(0, t.size, t.size // 200)] = 1.4
+    y[60:66] = np.nan
+    return Track.from_arrays(t, y, quantum_m=1e-5, kind="simulated")
+
+
+@functools.cache
+def damped() -> Analysis:
+    """Return the analysis of a long damped run in a known scene."""
+    return analyse(track_of(60.0), SCENE)
+
+
+@functools.cache
+def bare() -> Analysis:
+    """Return the analysis of a short run in an unknown scene."""
+    return analyse(track_of(8.0, gamma=0.003, beta=0.0))
+
+
+@functools.cache
+def still() -> Analysis:
+    """Return the analysis of a run in which nothing oscillates."""
+    rng = np.random.default_rng(3)
+    t = np.arange(800) / 100
+    return analyse(Track.from_arrays(t, 0.3 + 1e-4 * rng.standard_normal(800)))
+
+
+def run_of(analysis: Analysis, name: str = "run", **given: Any) -> ReportRun:
+    """Return a run as a caller hands it over."""
+    return ReportRun(name, analysis, {"path": f"{name}.txt", "format": "csv", **given})
+
+
+def written(directory: Path, *runs: ReportRun, **options: Any) -> str:
+    """Write a report and return its page."""
+    options.setdefault("results", [{"quality": run.analysis.quality} for run in runs])
+    page = write_report(directory, runs, provenance=PROVENANCE, **options)
+    assert page == directory / "report.html"
+    return page.read_text("utf-8")
+
+
+def page_of(*runs: ReportRun) -> str:
+    """Return the page without its figures, which take most of the time."""
+    return render_html(runs, [{} for _ in runs], provenance=PROVENANCE)
+
+
+def files_in(directory: Path) -> dict[str, bytes]:
+    """Return the content of every file below a directory."""
+    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+def test_every_file_of_a_report_is_written(tmp_path: Path) -> None:
+    """A report is a page, six tables and every figure that the scene allows in two forms, and nothing besides."""
+    written(tmp_path / "run.results", run_of(bare()))
+    figures = {
+        f"figures/{name}.{kind}"
+        for name in ("position", "amplitude", "phase", "energy", "motion")
+        for kind in ("svg", "pdf")
+    }
+    tables = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv", "budget.tex", "motion.csv"}
+    assert set(files_in(tmp_path / "run.results")) == tables | figures
+    written(tmp_path / "disc.results", run_of(damped()))
+    drag = {"figures/drag.svg", "figures/drag.pdf"}
+    assert set(files_in(tmp_path / "disc.results")) == tables | figures | drag
+
+
+def test_the_page_needs_nothing_from_outside(tmp_path: Path) -> None:
+    """The page holds no script, no link to another file and no address of the network."""
+    page = written(tmp_path, run_of(bare()))
+    assert re.search(r"<script|<link|<iframe|@import|https?://", page) is None
+    references = re.findall(r'(?:src|href|data)="([^"]*)"|url\(([^)]*)\)', page)
+    assert {(a or b)[:5] for a, b in references if not (a or b).startswith("#")} <= {"data:"}
+
+
+def test_no_two_elements_share_an_id_and_every_reference_is_met(tmp_path: Path) -> None:
+    """Inline figures of several runs keep their clip paths and markers to themselves."""
+    page = written(tmp_path, run_of(damped(), "one"), run_of(bare(), "two"))
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids)) > 8
+    assert set(re.findall(r'(?:href="#|url\(#)([^")]+)', page)) <= set(ids)
+
+
+def test_hostile_text_is_escaped_everywhere() -> None:
+    """A name, a title, a finding and a command that look like markup come out as text."""
+    bad = "<script>alert('x')</script>"
+    analysis = dataclasses.replace(damped(), findings=(Finding("clipped", "warning", bad),))
+    page = page_of(run_of(analysis, bad, title=bad))
+    assert "<script" not in page
+    assert page.count("&lt;script&gt;") >= 4
+    assert "analyse &lt;run&gt;" in page
+
+
+@pytest.mark.parametrize("make", [damped, bare, still])
+def test_every_finding_is_told(make: Any) -> None:
+    """Every message stands on the page word for word, errors before warnings before notes."""
+    page = page_of(run_of(make()))
+    assert make().findings
+    for finding in make().findings:
+        assert finding.message in html.unescape(page)
+    order = re.findall(r'<li class="(\w+)">', page)
+    assert order == sorted(order, key=["error", "warning", "info"].index)
+
+
+def test_rejected_laws_are_named_in_words() -> None:
+    """The top of the page says which law describes the amplitude and which ones the record rejects."""
+    top = page_of(run_of(damped())).split("Table 1")[0]
+    assert "linear and quadratic drag together" in top
+    assert re.search(r"Rejected: .*a lone exponential", top)
+
+
+def test_simulated_data_cannot_pass_for_measured() -> None:
+    """A simulated run says so at its head, a replayed one does not."""
+    assert "simulated, not measured" in page_of(run_of(bare()))
+    assert "simulated, not measured" not in page_of(run_of(still()))
+
+
+def test_the_same_arguments_give_the_same_bytes(tmp_path: Path) -> None:
+    """Every file, pictures included, is reproducible byte for byte."""
+    for name in ("a", "b"):
+        written(tmp_path / name, run_of(damped()))
+    assert files_in(tmp_path / "a") == files_in(tmp_path / "b")
+
+
+def test_the_page_of_a_long_record_stays_small(tmp_path: Path) -> None:
+    """Twelve thousand samples make a page of less than 700 kB."""
+    page = written(tmp_path, run_of(analyse(track_of(120.0), SCENE)))
+    assert len(page.encode()) < 700_000
+
+
+def test_the_motion_is_written_at_every_sample() -> None:
+    """Position, velocity and acceleration stand beside each distance; what is no number is an empty cell."""
+    analysis = damped()
+    smoothed = analysis.smoothed()
+    rows = list(csv.DictReader(io.StringIO(motion_csv(analysis, smoothed))))
+    assert len(rows) == len(analysis.track)
+    assert sum(row["used"] == "1" for row in rows) == analysis.quality["used"]
+    assert rows[62]["distance_m"] == ""
+    assert [float(row["time_s"]) for row in rows] == list(analysis.track.t)
+    for column, value in (
+        ("u_velocity_m_per_s", smoothed.u_velocity),
+        ("acceleration_m_per_s2", smoothed.acceleration),
+    ):
+        assert np.allclose([float(row[column]) for row in rows], value, rtol=1e-9, atol=0.0)
+
+
+def test_the_band_of_the_velocity_is_wider_at_the_edges() -> None:
+    """The figure's lowest panel shows the uncertainty grow towards both ends of the record."""
+    u = motion_figure(bare()).axes[3].lines[0].get_ydata()
+    middle = float(np.median(np.asarray(u)))
+    assert float(u[0]) > 1.3 * middle
+    assert float(u[-1]) > 1.3 * middle
+
+
+def test_the_law_of_the_figure_is_the_motion_itself() -> None:
+    """On a record that follows its law the difference drawn stays within three of its uncertainties."""
+    difference = np.asarray(motion_figure(damped()).axes[2].lines[0].get_ydata())
+    assert 0.0 < np.max(np.abs(difference)) < 3e3 * np.max(damped().smoothed().u_velocity)
+
+
+def test_a_record_that_cannot_be_smoothed_says_so(tmp_path: Path) -> None:
+    """Its page has a sentence in the figure's place, and a table of an earlier report is taken away."""
+    motion = bare().motion
+    assert isinstance(motion, Motion)
+    flags = np.full_like(motion.demodulated.flags, int(UNUSABLE))
+    blind = dataclasses.replace(
+        bare(), motion=dataclasses.replace(motion, demodulated=dataclasses.replace(motion.demodulated, flags=flags))
+    )
+    why = smoothed_or_why(blind)
+    assert isinstance(why, str)
+    assert "eight usable samples" in why
+    assert "motion" not in draw(bare(), why)
+    assert "to smooth this record" in page_of(run_of(blind))
+    written(tmp_path, run_of(bare()))
+    assert (tmp_path / "motion.csv").exists()
+    written(tmp_path, run_of(still()))
+    assert not (tmp_path / "motion.csv").exists()
+
+
+def test_csv_holds_every_estimate_and_every_law() -> None:
+    """The CSV gives back each number to its last digit."""
+    rows = list(csv.DictReader(io.StringIO(results_csv(["a, b"], [damped()]))))
+    motion = damped().motion
+    assert isinstance(motion, Motion)
+    expected = dict(damped().estimates)
+    for law, fit in motion.damping.fits.items():
+        expected |= {f"{law}.{name}": x for name, x in fit.joint.estimates().items()}
+    read = {row["name"]: Estimate(float(row["value"]), float(row["u"]), row["unit"]) for row in rows}
+    assert read == expected
+    assert {row["run"] for row in rows} == {"a, b"}
+
+
+def test_tex_is_balanced_and_states_uncertainties_in_parentheses() -> None:
+    """The LaTeX table closes what it opens, escapes names and writes value(u) with the unit's macro."""
+    tex = table_tex(["50%_run#1", "b"], [damped(), bare()])
+    plain = re.sub(r"\\[\\{}%_#&$]", "", tex)
+    assert plain.count("{") == plain.count("}")
+    assert plain.count("$") % 2 == 0
+    assert r"50\%\_run\#1" in tex
+    assert re.search(r"Period & \$T\$ & \\qty\{0\.\d+\(\d\d\)\}\{\\second\} & ", tex)
+    assert {line.count(" & ") for line in tex.splitlines() if line.endswith(r"\\")} == {3}
+
+
+def test_budget_tables_hold_every_input() -> None:
+    """The CSV gives back every contribution; the page and the LaTeX table those of a thousandth and more."""
+    motion = damped().motion
+    assert isinstance(motion, Motion)
+    budgets = motion.derived.budgets
+    rows = list(csv.DictReader(io.StringIO(budget_csv(["a"], [damped()]))))
+    assert [(row["quantity"], row["input"]) for row in rows] == [
+        (name, c.name) for name, budget in budgets.items() for c in budget.contributions
+    ]
+    for row in rows:
+        found = next(c for c in budgets[row["quantity"]].contributions if c.name == row["input"])
+        assert (float(row["contribution"]), float(row["share"]), row["type"]) == (found.u, found.share, found.kind)
+    page, tex = html.unescape(page_of(run_of(damped()))), budget_tex(["50%"], [damped()])
+    for row in budgets_of(damped()):
+        assert row.rest + sum(c.share for c in row.contributions) == pytest.approx(1.0)
+        assert all(INPUTS[c.name] in page and INPUTS[c.name] in tex for c in row.contributions)
+    plain = re.sub(r"\\[\\{}%_#&$]", "", tex)
+    assert plain.count("{") == plain.count("}")
+    assert {line.count(" & ") for line in tex.splitlines() if line.endswith(r"\\")} == {5}
+    assert budget_csv(["b"], [still()]).count("\n") == 1
+    assert budgets_of(still()) == ()
+
+
+def test_budget_in_brief_names_the_greatest_inputs() -> None:
+    """A line a quantity that has several inputs, in ASCII and within the terminal; nothing where nothing moves."""
+    text = budget_text(damped())
+    assert text.isascii()
+    assert max(map(len, text.splitlines())) <= 105
+    line = next(line for line in text.splitlines() if "spring constant" in line)
+    assert line.split("spring constant")[1].lstrip().startswith("mass of the spring (B) ")
+    assert "noise" not in text
+    assert budget_text(still()) == ""
+
+
+@pytest.mark.parametrize(
+    ("estimate", "tex"),
+    [
+        (Estimate(0.752857, 0.001429, "s"), r"\qty{0.7529(14)}{\second}"),
+        (Estimate(13.94, 1.23, ""), r"\num{13.9(12)}"),
+        (Estimate(1103.0, 148.0, ""), r"\num{1100(150)}"),
+        (Estimate(-8.36e-5, 9.6e-7, "m"), r"\qty{-8.360(96)e-5}{\metre}"),
+        (Estimate(14.0, 0.0, "N/m"), r"\qty{14}{\newton\per\metre}"),
+        (Estimate(float("nan"), 1.0, "m"), "--"),
+    ],
+)
+def test_tex_and_page_show_the_digits_that_u_allows(estimate: Estimate, tex: str) -> None:
+    """Value and uncertainty end at the same digit, small numbers as powers of ten, exact ones without u."""
+    analysis = dataclasses.replace(still(), estimates={"period": estimate})
+    assert tex in table_tex(["run"], [analysis])
+
+
+def test_page_numbers_are_typeset() -> None:
+    """A minus is a minus, a power of ten stands raised, what is no number is a dash."""
+    assert pretty(Estimate(-8.36e-5, 9.6e-7, "1/(m s)")) == "(−8.360 ± 0.096) × 10⁻⁵ m⁻¹ s⁻¹"
+    assert pretty(None) == pretty_number(None) == pretty_number(float("nan")) == "–"
+    assert pretty_number(-0.00077) == "−0.00077"
+
+
+def test_json_is_strict(tmp_path: Path) -> None:
+    """What is no number becomes null, numpy's numbers plain ones; one run gives an object, several a list."""
+    result = {"a": float("nan"), "b": [np.float64("inf"), np.int64(3), np.bool_(True)], "c": Path("x"), "d": None}
+    written(tmp_path / "one", run_of(still()), results=[result])
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    text = (tmp_path / "one/results.json").read_text("utf-8")
+    assert json.loads(text, parse_constant=refuse) == {"a": None, "b": [None, 3, True], "c": "x", "d": None}
+    written(tmp_path / "two", run_of(still(), "a"), run_of(still(), "b"), results=[result, {}])
+    assert len(json.loads((tmp_path / "two/results.json").read_text("utf-8"))) == 2
+
+
+def test_a_run_without_oscillation_gives_a_report_too(tmp_path: Path) -> None:
+    """Its report has the position alone, says why, and takes away figures that an earlier one left."""
+    assert isinstance(still().motion, NoOscillation)
+    written(tmp_path, run_of(bare()))
+    page = written(tmp_path, run_of(still()))
+    assert {name for name in files_in(tmp_path) if "figures" in name} == {
+        "figures/position.svg",
+        "figures/position.pdf",
+    }
+    assert 'class="error"' in page
+    assert "Phase plot" not in page
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        lambda t: 0.06 * np.exp(-0.8 * t) - 0.01 * np.exp(-6.0 * t),
+        lambda t: 0.05 * (1.0 + 3.0 * t) * np.exp(-3.0 * t),
+        lambda t: 0.05 * np.exp(-t) * np.cos(8.0 * t),
+    ],
+    ids=["overdamped", "critical", "strong"],
+)
+def test_a_relaxation_is_drawn_with_its_fit(shape: Any) -> None:
+    """The curve over the samples of a motion that damping ends is that motion."""
+    t = np.arange(1000) / 100
+    rng = np.random.default_rng(2)
+    analysis = analyse(Track.from_arrays(t, 0.3 + shape(t) + 3e-4 * rng.standard_normal(t.size)))
+    assert isinstance(analysis.motion, Relaxation)
+    (fit,) = [line for line in draw(analysis)["position"].axes[0].lines if line.get_label() == "fit"]
+    x, y = np.asarray(fit.get_xdata()), np.asarray(fit.get_ydata())
+    assert np.max(np.abs(y - 1e3 * (0.3 + shape(x)))) < 0.3
+    assert "nothing oscillates" not in caption("position", analysis)
+
+
+@pytest.mark.parametrize("seconds", [1.6, 3.0])
+def test_a_very_short_record_can_be_drawn(tmp_path: Path, seconds: float) -> None:
+    """Two and four periods give every figure."""
+    analysis = analyse(track_of(seconds, noise_m=2e-3), SCENE)
+    assert "Energy" in written(tmp_path, run_of(analysis))
+
+
+def test_several_runs_stand_side_by_side(tmp_path: Path) -> None:
+    """Table 1 has a column a run, each run its section and its own figures, the comparison its sentence."""
+    runs = [run_of(damped(), "same"), run_of(damped(), "same")]
+    mass = Estimate(0.2176, 5e-5, "kg")
+    springs = [SpringRun(run.name, run.analysis.estimates["angular_frequency"], mass) for run in runs]
+    comparison = compare_springs(springs)
+    page = written(tmp_path, *runs, comparison=comparison)
+    assert page.count("<th>same</th>") >= 2
+    assert page.count("Phase plot") == 2
+    assert html.escape(comparison.message.replace("+-", "±")) in page
+    assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 13
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.1])
+def test_a_comparison_is_drawn_with_every_run(factor: float) -> None:
+    """Every run has its bar and its pull; a mean is drawn where the runs agree, and only there."""
+    mass, omega = Estimate(0.2, 5e-5, "kg"), Estimate(8.0, 1e-4, "rad/s")
+    long = "a_run_with_a_name_that_no_column_holds_in_capitals_WMWMWMWM"
+    springs = [SpringRun("a", omega, mass), SpringRun(long, Estimate(8.0 * factor, 1e-4, "rad/s"), mass)]
+    found = compare_springs(springs)
+    figure = comparison_figure(found)
+    left, right = figure.axes
+    assert left.get_yticklabels()[0].get_text() == "a"
+    assert all(label.get_window_extent().x0 > 0 for label in left.get_yticklabels())
+    labels = left.get_legend_handles_labels()[1]
+    assert ("mean ± u" in labels) == found.agree == (factor == 1.0)
+    drawn = right.collections[-1].get_offsets()
+    np.testing.assert_allclose(np.asarray(drawn)[:, 0], found.pulls)
+
+
+def test_the_classic_method_is_set_beside_with_its_biases() -> None:
+    """Its numbers stand next to this analysis's own, each with what is wrong with it."""
+    run = dataclasses.replace(run_of(bare()), classic=classic(track_of(8.0, echoes=False)))
+    page = page_of(run)
+    assert "two sampled maxima decide" in page
+    assert "false echoes enter" in page
+
+
+def test_text_table_is_ascii_and_fits_the_terminal() -> None:
+    """Columns that do not fit follow in another block, names of runs are cut, not numbers."""
+    names = ["a run with quite a long name é.txt", "b", "c"]
+    table = text_table(names, [damped(), bare(), still()], width=80)
+    assert table.isascii()
+    assert max(map(len, table.splitlines())) <= 80
+    assert table.count("quantity") > 1
+    for row in table_rows([damped()]):
+        assert row.cells[0] in table
+
+
+def test_a_law_that_fails_is_never_called_selected_alone() -> None:
+    """Where every law is rejected the least bad one is called so."""
+    motion = damped().motion
+    assert isinstance(motion, Motion)
+    name = motion.damping.selected
+    assert law_status(motion.damping, name) == "selected"
+    fits = {law: dataclasses.replace(fit, rejection="misfit") for law, fit in motion.damping.fits.items()}
+    assert law_status(dataclasses.replace(motion.damping, fits=fits), name).startswith("rejected")
+
+
+def test_inlining_leaves_the_text_of_a_figure_alone() -> None:
+    """Coordinates lose digits, labels do not, and nothing in the element speaks for the whole page."""
+    figure = draw(still())["position"]
+    figure.axes[0].set_title("0.123456 mm")
+    element = str(inline_svg(render(figure, "svg"), "p"))
+    assert element.startswith("<svg")
+    assert ">0.123456 mm</text>" in element
+    assert "<style" not in element
+    assert "<?xml" not in element
+
+
+def test_a_report_needs_a_result_for_each_run(tmp_path: Path) -> None:
+    """Runs and results that do not match are refused before anything is written."""
+    with pytest.raises(ValueError, match="one result for each"):
+        write_report(tmp_path / "x", [run_of(still())], provenance={}, results=[])
+    assert not (tmp_path / "x").exists()

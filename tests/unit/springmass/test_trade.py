@@ -1,0 +1,207 @@
+"""The trade: bounds against the tests' own, reference methods against the truth, front and recommendation by hand."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from pipeline.errors import AnalysisError
+from pipeline.numerics.estimate import Estimate
+from pipeline.track import Track
+from springmass.trade.figure import trade_figure
+from springmass.trade.front import Point, front
+from springmass.trade.measure import Row, Trade, measure, own_record
+from springmass.trade.methods import Method, fft_peak, hilbert, matrix_pencil, methods, zero_crossings
+from springmass.trade.truth import Truth, bounds, record
+
+
+def clean(damping: float, seconds: float = 30.0) -> tuple[np.ndarray, np.ndarray, Truth]:
+    """Return a record with a micrometre of noise, and its truth."""
+    truth = Truth(seconds=seconds, noise_m=1e-6, damping_per_s=damping)
+    return truth.times, record(truth, np.random.default_rng(2)), truth
+
+
+@pytest.mark.parametrize(("seconds", "damping"), [(10.0, 0.0), (120.0, 0.01463)])
+def test_bounds_are_those_of_the_tests(synthetic: ModuleType, seconds: float, damping: float) -> None:
+    """The inverse Fisher information agrees with a derivation that shares no code."""
+    truth = Truth(seconds=seconds, damping_per_s=damping)
+    found = bounds(truth)
+    each = []
+    for phase in np.linspace(-math.pi, math.pi, 9)[:-1]:
+        other = synthetic.Truth(omega=2 * math.pi * truth.frequency_hz, gamma=damping, phase=float(phase))
+        each.append(synthetic.fisher_bounds(other, truth.times, truth.noise_m))
+    mean = {name: math.sqrt(np.mean([b[name] ** 2 for b in each])) for name in ("omega", "amplitude", "gamma")}
+    assert found["frequency"] == pytest.approx(mean["omega"] / (2 * math.pi), rel=1e-6)
+    assert found["amplitude"] == pytest.approx(mean["amplitude"], rel=1e-6)
+    assert found["damping_rate"] == pytest.approx(mean["gamma"], rel=1e-6)
+
+
+def test_bounds_are_those_of_the_literature() -> None:
+    """120 s at 0.3 mm: 8.6e-7 Hz, 0.011 mm and 5.4e-6 1/s, as tabulated; false echoes tell nothing."""
+    found = bounds(Truth())
+    assert found == {
+        "frequency": pytest.approx(8.6e-7, rel=0.03),
+        "amplitude": pytest.approx(1.1e-5, rel=0.03),
+        "damping_rate": pytest.approx(5.4e-6, rel=0.03),
+    }
+    assert bounds(Truth(echoes=0.2))["frequency"] == pytest.approx(found["frequency"] / math.sqrt(0.8))
+
+
+def test_records_are_as_described() -> None:
+    """Noise, amplitude, offset and the share of echoes are what was asked for; a seed gives one record."""
+    truth = Truth(noise_m=1e-3, damping_per_s=0.0, echoes=0.1)
+    y = record(truth, np.random.default_rng(7))
+    assert np.array_equal(y, record(truth, np.random.default_rng(7)))
+    away = np.abs(y - truth.offset_m) > truth.amplitude_m + 6e-3
+    assert np.mean(away) == pytest.approx(0.094, abs=0.01)  # the rest of the echoes lies within the swing
+    assert np.sqrt(2 * np.var(y[~away])) == pytest.approx(truth.amplitude_m, rel=0.02)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.01463])
+def test_methods_for_damped_motion_find_it(damping: float) -> None:
+    """Matrix pencil and the full fits give frequency, amplitude and damping of a nearly perfect record."""
+    t, y, truth = clean(damping)
+    fits = {method.name: method for method in methods()[0]}
+    results = {name: fits[name].run(Track.from_arrays(t, y)) for name in ("lmfit", "fast", "standard", "best")}
+    for name, found in {**results, "matrix_pencil": matrix_pencil(t, y)}.items():
+        assert found["frequency"].value == pytest.approx(truth.frequency_hz, rel=1e-6), name
+        assert found["amplitude"].value == pytest.approx(0.05, rel=1e-4), name
+        assert found["damping_rate"].value == pytest.approx(damping, abs=2e-6), name
+
+
+def test_rough_methods_are_as_rough_as_they_are() -> None:
+    """Zero crossings and Hilbert come within 1e-4 of an undamped frequency, the interpolated line within 1e-3."""
+    t, y, truth = clean(0.0, 30.3)
+    assert zero_crossings(t, y)["frequency"].value == pytest.approx(truth.frequency_hz, rel=1e-4)
+    assert hilbert(t, y)["frequency"].value == pytest.approx(truth.frequency_hz, rel=1e-4)
+    assert hilbert(t, y)["amplitude"].value == pytest.approx(0.05, rel=0.01)
+    assert fft_peak(t, y)["frequency"].value == pytest.approx(truth.frequency_hz, rel=1e-3)
+    assert fft_peak(t, y)["amplitude"].value == pytest.approx(0.05, rel=0.02)
+
+
+def test_zero_crossings_count_through_weak_swings() -> None:
+    """Swings that vanish in the middle of a record are counted by the time that passes."""
+    t = np.arange(6000) / 100
+    y = 0.2 + 0.05 * np.cos(2 * math.pi * 1.25 * t) * np.where((t > 20) & (t < 40), 1e-3, 1.0)
+    assert zero_crossings(t, y)["frequency"].value == pytest.approx(1.25, rel=1e-4)
+
+
+def test_a_record_that_does_not_oscillate_is_given_up() -> None:
+    """Zero crossings, matrix pencil and tiers refuse what does not swing, in one line."""
+    t = np.arange(50) / 100
+    with pytest.raises(AnalysisError, match="three upward crossings"):
+        zero_crossings(t, 0.2 + t)
+    with pytest.raises(AnalysisError, match="twelve blocks"):
+        matrix_pencil(t[:20], np.sin(30 * t[:20]))
+    tier = methods()[0][0]
+    with pytest.raises(AnalysisError):
+        tier.run(Track.from_arrays(np.arange(1000) / 100, np.full(1000, 0.2)))
+
+
+def row(name: str, seconds: float, error: dict[str, float], failed: int = 0) -> Row:
+    """Return a row of a measurement made by hand; tiers are named so."""
+    kind = "tier" if name in ("fast", "standard", "best") else "reference"
+    method = Method(name, name, kind, lambda _: {})  # type: ignore[arg-type]
+    return Row(method, seconds, error, dict.fromkeys(error, 0.0), failed)
+
+
+def trade(*rows: Row, seeds: int = 10_000) -> Trade:
+    """Return a measurement of these rows."""
+    return Trade(Truth(), seeds, {"frequency": 1.0, "amplitude": 1.0}, rows)
+
+
+def test_beaten_means_slower_and_nowhere_better() -> None:
+    """One is beaten by what is quicker and as good in all it estimates, but not by what estimates less or fails."""
+    quick = row("quick", 1.0, {"frequency": 1.5})
+    fast = row("fast", 2.0, {"frequency": 1.2, "amplitude": 1.3})
+    best = row("best", 9.0, {"frequency": 1.0, "amplitude": 1.0})
+    silly = row("silly", 10.0, {"frequency": 1.0, "amplitude": 1.1})
+    lame = row("lame", 0.5, {"frequency": 0.9, "amplitude": 0.9}, failed=3)
+    found = trade(quick, fast, best, silly, lame)
+    assert [found.beaten(each) for each in found.rows] == [None, None, None, "best", None]
+
+
+def test_the_quickest_tier_within_a_tenth_is_recommended() -> None:
+    """Fast where it reaches 1.1 bounds, else standard, else whichever errs least."""
+    fast, standard, best = (
+        row(name, cost, {"frequency": error})
+        for name, cost, error in (("fast", 1.0, 1.3), ("standard", 2.0, 1.08), ("best", 3.0, 1.0))
+    )
+    assert trade(fast, standard, best).recommended == "standard"
+    assert trade(row("fast", 1.0, {"frequency": 1.1}), standard, best).recommended == "fast"
+    assert (
+        trade(fast, row("standard", 2.0, {"frequency": 1.25}), row("best", 3.0, {"frequency": 1.2})).recommended
+        == "best"
+    )
+    assert trade(row("fast", 1.0, {"frequency": 1.0}, failed=1), standard, best).recommended == "standard"
+
+
+def test_a_method_that_gives_up_is_counted() -> None:
+    """Failures are counted, errors are over the bound, times are the least, and every record is told."""
+    truth = Truth(seconds=5.0)
+
+    def moody(track: Track) -> dict[str, Estimate]:
+        if track.y[0] < 0.22:
+            raise AnalysisError("no")
+        return {"frequency": Estimate(truth.frequency_hz + 2 * bounds(truth)["frequency"], 0.0, "Hz")}
+
+    ticks, done = itertools.count(), []
+    method = Method("moody", "moody", "reference", moody)
+    found = measure(truth, [method], 20, timer=lambda: float(next(ticks)), progress=done.append)
+    (only,) = found.rows
+    low = sum(record(truth, np.random.default_rng(seed))[0] < 0.22 for seed in range(20))
+    assert only.failed == low
+    assert 0 < low < 20
+    assert only.error == {"frequency": pytest.approx(2.0)}
+    assert only.bias == {"frequency": pytest.approx(2.0)}
+    assert only.seconds == 1.0
+    assert done == list(range(21))
+
+
+def test_an_own_record_says_why_a_method_gave_up() -> None:
+    """The reason stands in the place of the estimates."""
+
+    def never(_: Track) -> dict[str, Estimate]:
+        raise AnalysisError("nothing\nto see")
+
+    method = Method("never", "never", "reference", never)
+    track = Track.from_arrays([0.0, 1.0], [0.0, 1.0])
+    assert own_record(track, [method], timer=lambda: 0.0) == [(method, "nothing to see", 0.0)]
+
+
+def test_gaps_are_bridged_for_references() -> None:
+    """A missing distance keeps no reference method from its estimate."""
+    t, y, truth = clean(0.0)
+    y[100] = math.nan
+    for method in methods()[0]:
+        assert method.run(Track.from_arrays(t, y))["frequency"].value == pytest.approx(truth.frequency_hz, rel=0.02)
+
+
+def test_the_front_keeps_what_nothing_beats() -> None:
+    """Cheapest first; equal within a hundredth is not better."""
+    points = [
+        Point("a", 1.0, 9.0),
+        Point("b", 2.0, 9.5),
+        Point("c", 3.0, 1.0),
+        Point("d", 4.0, 0.995),
+        Point("e", 5.0, 0.5),
+    ]
+    assert [point.name for point in front(points)] == ["a", "c", "e"]
+
+
+def test_names_in_the_figure_do_not_overlap() -> None:
+    """Ten points, three of them at one place: no name covers another or leaves its panel."""
+    rng = np.random.default_rng(4)
+    cloud = [Point(f"method {i}", float(10 ** rng.uniform(-3, -1)), float(10 ** rng.uniform(0, 1))) for i in range(7)]
+    tiers = [Point(name, 0.02, 1.0 + 0.01 * i, "tier") for i, name in enumerate(("fast", "standard", "best"))]
+    figure = trade_figure({"frequency": [*cloud, *tiers]}, labels={"frequency": "error / bound"})
+    (panel,) = figure.axes
+    boxes = [super(type(text), text).get_window_extent() for text in panel.texts]
+    assert len(boxes) == 10
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+    room = panel.get_window_extent()
+    assert all(room.x0 <= box.x0 and box.x1 <= room.x1 and room.y0 <= box.y0 and box.y1 <= room.y1 for box in boxes)

@@ -1,0 +1,471 @@
+"""The run file: written whole, read lazily, believed only where it can be checked."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from acquisition.block import Block, concatenate
+from acquisition.errors import SourceError
+from acquisition.recordings.recording import Original, Trap
+from acquisition.source import SourceInfo
+from storage.errors import NotARun, RunClosed, RunDamaged, RunExists, WriteFailed
+from storage.run_file.layout import CHUNK, HEADER
+from storage.run_file.reading import is_run, open_run
+from storage.run_file.writing import write_run
+
+INFO = SourceInfo("live", "COM3", 100.0, sigma_m=3e-4, quantum_m=1e-4, clock="device", stated_error_m=0.001)
+SCENE = {"bob": {"mass_kg": {"value": 0.2176, "u": 0.00005}}, "sensor": {"position": "below"}}
+TRAPS = (Trap("truncated_row", "The last row was cut.", 1, 12003), Trap("nominal_clock", "No times."))
+ORIGINALS = (Original("run position.txt", bytes(range(256)) * 3), Original("run velocity.txt", b""))
+PROVENANCE = {"software": "springmass", "version": "0.1.0", "configuration": {"rate_hz": 100.0}}
+
+
+def block(n: int, first: int = 0, **columns: Any) -> Block:
+    """Return n samples of an oscillation with a few of them missing."""
+    t = np.arange(first, first + n) / 100
+    distance = 0.5 + 0.05 * np.sin(14 * t) + np.random.default_rng(abs(first)).normal(0, 3e-4, n)
+    distance[::7] = np.nan
+    return Block(first, t, distance, np.isnan(distance).astype(np.uint8), **columns)
+
+
+def same(a: Block, b: Block) -> bool:
+    """Tell whether two blocks are the same bit for bit."""
+    columns = [(getattr(a, n), getattr(b, n)) for n in ("t", "distance", "flags", "host_ns", "velocity")]
+    return a.first == b.first and all(
+        (x is None) == (y is None) and (x is None or (x.dtype == y.dtype and x.tobytes() == y.tobytes()))
+        for x, y in columns
+    )
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Return a run of 300 samples with everything that a run can have."""
+    t = np.arange(300)
+    return write_run(
+        tmp_path / "run.h5",
+        [block(300, host_ns=t * 10_000_000 + 5, velocity=t / 7)],
+        INFO,
+        originals=ORIGINALS,
+        scene=SCENE,
+        title="Träger 3",
+        channel="position",
+        traps=TRAPS,
+        malformed_rows=2,
+        format="motion-sensor",
+        provenance=PROVENANCE,
+    )
+
+
+def edit(path: Path, change: Any) -> None:
+    """Change a run file behind its back."""
+    with h5py.File(path, "r+") as file:
+        change(file)
+
+
+def test_everything_comes_back(path: Path) -> None:
+    """What was handed to the writer is what the reader says."""
+    with open_run(path) as run:
+        assert (run.info, run.title, run.channel, run.format) == (
+            INFO,
+            "Träger 3",
+            "position",
+            "motion-sensor",
+        )
+        assert (run.scene, run.traps, run.malformed_rows) == (SCENE, TRAPS, 2)
+        assert (run.provenance, run.originals(), len(run)) == (PROVENANCE, ORIGINALS, 300)
+        t = np.arange(300)
+        assert same(run.samples(), block(300, host_ns=t * 10_000_000 + 5, velocity=t / 7))
+        run.verify()
+
+
+def test_the_least_run_comes_back(tmp_path: Path) -> None:
+    """What was not given is empty or None, not a default that looks measured."""
+    with open_run(write_run(tmp_path / "a.h5", [block(3)], SourceInfo("replay", "a.txt", 50.0))) as run:
+        samples = run.samples()
+        assert samples.host_ns is None
+        assert samples.velocity is None
+        assert (run.scene, run.traps, run.originals(), run.title) == (None, (), (), "")
+        run.verify()
+
+
+def test_no_samples_are_a_run_too(tmp_path: Path) -> None:
+    """A recording stopped before its first sample is a file that opens."""
+    with open_run(write_run(tmp_path / "a.h5", [], INFO)) as run:
+        assert (len(run), list(run.blocks()), len(run.samples())) == (0, [], 0)
+        assert run.load_dataset().sizes == run.dataset().sizes == {"time": 0}
+        run.verify()
+
+
+def test_many_chunks_come_back_in_blocks_of_any_size(tmp_path: Path) -> None:
+    """Blocks longer and shorter than a chunk, in and out, and columns that come late, keep every sample."""
+    cuts = [0, 10, CHUNK - 1, CHUNK + 5, 2 * CHUNK + 9, 3 * CHUNK, 3 * CHUNK + 11]
+    parts = [block(stop - start, 40 + start) for start, stop in itertools.pairwise(cuts)]
+    late = parts[-2]
+    velocity, host = np.arange(len(late)) / 3, np.arange(len(late), dtype=np.int64)
+    parts[-2] = Block(late.first, late.t, late.distance, late.flags, host, velocity)
+    whole = concatenate(parts)
+    path = write_run(tmp_path / "a.h5", iter(parts), INFO)
+    with open_run(path) as run:
+        for size in (1000, CHUNK, len(whole), 10 * CHUNK):
+            got = list(run.blocks(size))
+            assert {len(b) for b in got[:-1]} <= {size}
+            assert same(concatenate(got), whole)
+        run.verify()
+
+
+def test_blocks_can_be_gone_through_again(path: Path) -> None:
+    """A replay may loop: each iteration begins at the first sample."""
+    with open_run(path) as run:
+        blocks = run.blocks(70)
+        assert [b.first for b in blocks] == [b.first for b in blocks] == [0, 70, 140, 210, 280]
+
+
+def test_memory_stays_flat(tmp_path: Path) -> None:
+    """The writer asks for blocks as it writes: the first chunk is on disk before the iterable has ended."""
+    sizes = []
+
+    def source() -> Iterator[Block]:
+        for first in range(0, 4 * CHUNK, CHUNK):
+            yield block(CHUNK, first)
+            (part,) = tmp_path.glob(".*.part")
+            sizes.append(part.stat().st_size)
+
+    write_run(tmp_path / "a.h5", source(), INFO)
+    assert sizes[-1] > 2 * CHUNK * 8
+
+
+def test_a_block_size_below_one_is_refused(path: Path) -> None:
+    """A size that would never end is an error at the call, not at the first sample."""
+    with open_run(path) as run, pytest.raises(ValueError, match="at least 1 sample, got size = 0"):
+        run.blocks(0)
+
+
+def test_a_closed_run_says_so(path: Path) -> None:
+    """Reading after the with is an error of one line; what was read at opening is still there."""
+    with open_run(path) as run:
+        blocks = iter(run.blocks(100))
+        next(blocks)
+    run.close()
+    assert run.title == "Träger 3"
+    for read in (run.samples, run.originals, run.verify, run.dataset, run.load_dataset):
+        with pytest.raises(RunClosed, match="read inside its with"):
+            read()
+
+
+def test_the_loaded_dataset_leaves_no_handle_open(path: Path) -> None:
+    """Others may open the file for writing while the dataset lives, and its values stay."""
+    with open_run(path) as run:
+        dataset = run.load_dataset()
+        distance = run.samples().distance
+    edit(path, lambda file: file.attrs.create("x", 1))
+    np.testing.assert_array_equal(dataset.distance.values, distance)
+    assert dataset.distance.dims == ("time",)
+    assert (dataset.time.attrs["units"], dataset.distance.attrs["units"]) == ("s", "m")
+    assert (dataset.attrs["kind"], dataset.attrs["rate_hz"], dataset.attrs["clock"]) == (
+        "live",
+        100.0,
+        "device",
+    )
+
+
+def test_the_lazy_dataset_is_the_checked_one(path: Path) -> None:
+    """Values, attributes of every variable and those of the instrument are the same, read lazily or at once."""
+    with open_run(path) as run, run.dataset() as lazy:
+        assert {name: lazy[name]._in_memory for name in lazy.data_vars} == dict.fromkeys(lazy.data_vars, False)
+        assert (lazy.attrs["kind"], lazy.attrs["rate_hz"], lazy.attrs["sigma_m"]) == ("live", 100.0, 3e-4)
+        assert lazy.time.dtype == np.float64
+        xr.testing.assert_identical(lazy.load(), run.load_dataset())
+
+
+def test_the_lazy_dataset_reads_only_what_is_asked_for(tmp_path: Path) -> None:
+    """A damaged chunk elsewhere keeps nobody from a slice, and reading it is an error, not a value."""
+    n = 3 * CHUNK
+    noise = np.random.default_rng(2).normal(size=n)
+    path = write_run(tmp_path / "a.h5", [Block(0, np.arange(n) / 100, noise, np.zeros(n, np.uint8))], INFO)
+    with h5py.File(path) as file:
+        chunk = file["entry/signal/distance"].id.get_chunk_info(2)
+    content = bytearray(path.read_bytes())
+    content[chunk.byte_offset + chunk.size // 2] ^= 0x40
+    path.write_bytes(content)
+    with open_run(path) as run:
+        lazy = run.dataset()
+        np.testing.assert_array_equal(lazy.distance[1000:1010].values, noise[1000:1010])
+        with pytest.raises(OSError, match="Can't"):
+            _ = lazy.distance[-5:].values
+        with pytest.raises(RunDamaged, match="the column 'distance' from sample"):
+            run.load_dataset()
+
+
+def test_the_lazy_dataset_closes_without_the_run_and_dies_with_it(path: Path) -> None:
+    """Closing the dataset leaves the run open; after the run only what was read is there."""
+    with open_run(path) as run:
+        with run.dataset() as lazy:
+            first = float(lazy.distance[1])
+        assert run.samples().distance[1] == first
+        late = run.dataset()
+        seen = late.quality.values
+    np.testing.assert_array_equal(late.quality.values, seen)
+    with pytest.raises(KeyError, match="invalid"):
+        _ = late.distance.values
+
+
+def test_the_lazy_dataset_stays_with_its_run(path: Path) -> None:
+    """A run written over the same name does not mix into a dataset of the one that is open."""
+    with open_run(path) as run:
+        before = run.samples().distance
+        write_run(path, [block(300, 7)], INFO, overwrite=True)
+        np.testing.assert_array_equal(run.dataset().distance.values, before)
+
+
+@pytest.mark.parametrize("kind", ["live", "replay", "simulated"])
+def test_the_kind_travels_with_the_data(tmp_path: Path, kind: Any) -> None:
+    """Simulated data cannot pass for measured, whichever part of the file is looked at."""
+    path = write_run(tmp_path / "a.h5", [block(5)], SourceInfo(kind, "x", 100.0))
+    with h5py.File(path) as file:
+        assert file.attrs["kind"] == file["entry/signal"].attrs["kind"] == kind.encode()
+        assert file["entry/instrument/kind"].asstr()[()] == kind
+    with open_run(path) as run:
+        assert run.info.kind == run.load_dataset().attrs["kind"] == kind
+
+
+def test_errors_of_missing_samples_are_missing(path: Path) -> None:
+    """The standard deviation stands beside measured samples only."""
+    with open_run(path) as run:
+        dataset = run.load_dataset()
+    missing = np.isnan(dataset.distance.values)
+    np.testing.assert_array_equal(np.isnan(dataset.distance_errors.values), missing)
+    assert set(dataset.distance_errors.values[~missing]) == {np.float32(3e-4)}
+
+
+def test_without_sigma_there_is_no_error_column(tmp_path: Path) -> None:
+    """What the source does not know is not stated."""
+    path = write_run(tmp_path / "a.h5", [block(5)], SourceInfo("live", "x", 100.0))
+    with open_run(path) as run:
+        assert "distance_errors" not in run.load_dataset()
+        assert run.load_dataset().distance.attrs["ancillary_variables"] == "quality"
+
+
+def test_a_standing_run_is_not_overwritten_unasked(path: Path) -> None:
+    """Measured data are immutable: the refusal comes before any block is asked for."""
+
+    def never() -> Iterator[Block]:
+        raise AssertionError("asked for a block")
+        yield
+
+    before = path.read_bytes()
+    with pytest.raises(RunExists):
+        write_run(path, never(), INFO)
+    assert path.read_bytes() == before
+    write_run(path, [block(4)], INFO, overwrite=True)
+    with open_run(path) as run:
+        assert len(run) == 4
+
+
+@pytest.mark.parametrize("error", [SourceError("unplugged"), OSError("port gone"), KeyboardInterrupt()])
+@pytest.mark.parametrize("samples", [10, 2 * CHUNK])
+def test_a_failing_source_leaves_nothing(tmp_path: Path, error: BaseException, samples: int) -> None:
+    """A failure between blocks passes through as it is and leaves neither the file nor a part of it."""
+
+    def source() -> Iterator[Block]:
+        yield block(samples)
+        raise error
+
+    with pytest.raises(type(error)) as caught:
+        write_run(tmp_path / "a.h5", source(), INFO)
+    assert caught.value is error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failing_source_leaves_the_old_run(path: Path) -> None:
+    """Overwriting that fails half-way has not begun, as far as the old run is concerned."""
+
+    def source() -> Iterator[Block]:
+        yield block(10)
+        raise SourceError("unplugged")
+
+    before = path.read_bytes()
+    with pytest.raises(SourceError):
+        write_run(path, source(), INFO, overwrite=True)
+    assert path.read_bytes() == before
+    assert list(path.parent.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("blocks", "options", "message"),
+    [
+        ([block(5), block(5, 6)], {}, r"begins with sample 5 was demanded, got first = 6; number blocks"),
+        ([block(5, -1)], {}, r"got first = -1"),
+        ([block(5, velocity=np.zeros(4))], {}, r"5 values of velocity .* got shape \(4,\)"),
+        ([block(5)], {"scene": {"bob": object()}}, r"nothing that JSON can hold"),
+        ([block(5)], {"provenance": {"x": float("nan")}}, r"not JSON compliant"),
+    ],
+)
+def test_what_cannot_be_kept_is_refused(
+    tmp_path: Path, blocks: list[Block], options: dict[str, Any], message: str
+) -> None:
+    """Gaps, unequal columns and objects that JSON cannot hold are errors of one line, and leave no file."""
+    with pytest.raises(WriteFailed, match=message) as caught:
+        write_run(tmp_path / "a.h5", blocks, INFO, **options)
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits are POSIX")
+@pytest.mark.parametrize("limit", [0, 5000, 20_000, 300_000])
+def test_a_full_disk_is_one_line(tmp_path: Path, limit: int) -> None:
+    """A disk that takes no more is an error, not a crash of the process, and leaves nothing behind."""
+    code = f"""
+import resource, signal, sys
+import numpy as np
+from acquisition.block import Block
+from acquisition.source import SourceInfo
+from storage.errors import WriteFailed
+from storage.run_file.writing import write_run
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
+noise = np.random.default_rng(0).normal(size={CHUNK})
+blocks = [Block(k * {CHUNK}, noise, noise, np.zeros({CHUNK}, np.uint8)) for k in range(2)]
+try:
+    write_run(sys.argv[1], blocks, SourceInfo("live", "x", 100.0))
+except WriteFailed as error:
+    print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "a.h5")],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[4],
+    )
+    assert "could not be written (File too large)" in done.stdout
+    assert done.stdout.count("\n") == 1
+    assert done.stderr == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_flag_that_does_not_fit_is_refused(tmp_path: Path) -> None:
+    """Nothing is rounded or wrapped on the way into the file."""
+    t = np.arange(3.0)
+    with pytest.raises(WriteFailed, match="Cannot cast"):
+        write_run(tmp_path / "a.h5", [Block(0, t, t, np.array([0, 256, 1]))], INFO)  # type: ignore[arg-type]
+
+
+def test_other_files_are_no_runs(tmp_path: Path) -> None:
+    """A missing file, a folder, a text and another program's HDF5 are told apart from a damaged run."""
+    text, other = tmp_path / "a.txt", tmp_path / "other.h5"
+    text.write_text("0.1\t0.5\n")
+    with h5py.File(other, "w") as file:
+        file["x"] = 1
+    for path, message in [
+        (tmp_path / "none.h5", "No such file"),
+        (tmp_path, "directory|Permission"),
+        (text, "begins with b'0.1"),
+        (other, "HDF5 without /entry/provenance/header"),
+    ]:
+        with pytest.raises(NotARun, match=message) as caught:
+            open_run(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_sniffing_looks_at_the_magic(path: Path) -> None:
+    """HDF5 may be a run; a text and an empty file may not."""
+    assert is_run(path.read_bytes()[:8])
+    assert not is_run(b"HDF")
+    assert not is_run(b"")
+
+
+def test_a_later_schema_is_refused(path: Path) -> None:
+    """A file of a layout that this version does not know is not guessed at."""
+
+    def later(file: Any) -> None:
+        text = bytes(file[HEADER][()]).replace(b'"schema":1', b'"schema":9')
+        file[HEADER][()] = np.bytes_(text)
+        file[HEADER].attrs["sha256"] = np.bytes_(hashlib.sha256(text).hexdigest())
+
+    edit(path, later)
+    with pytest.raises(NotARun, match=r"schema 1 was demanded, got another \(schema 1 demanded, got 9\)"):
+        open_run(path)
+
+
+@pytest.mark.parametrize("name", ["time", "distance", "quality", "velocity"])
+def test_an_edited_sample_is_found(path: Path, name: str) -> None:
+    """A value rewritten with a valid checksum is still not what was written: samples and blocks refuse."""
+
+    def bump(file: Any) -> None:
+        file[f"entry/signal/{name}"][100] = 3
+
+    edit(path, bump)
+    with open_run(path) as run:
+        for read in (run.samples, run.load_dataset, run.verify, lambda: list(run.blocks(64))):
+            with pytest.raises(RunDamaged, match=f"the column '{name}' is not what was written"):
+                read()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda f: f["raw/sequence"].__setitem__(3, 9), "the column 'sequence' .* SHA-256 differs"),
+        (lambda f: f["entry/signal/distance_errors"].__setitem__(3, 9), "'distance_errors' .* SHA-256"),
+        (lambda f: f["wire/bytes"].__setitem__(3, 9), "the original file 'run position.txt' .* SHA-256"),
+        (
+            lambda f: f["entry/instrument/rate_hz"].__setitem__((), 50.0),
+            "/entry/instrument/rate_hz .* got .*50",
+        ),
+        (lambda f: f.attrs.__setitem__("kind", "simulated"), "/@kind .* b'live' was written"),
+        (lambda f: f["entry/signal/distance"].attrs.__setitem__("units", "mm"), "distance@units .* b'm' was"),
+        (
+            lambda f: f["entry/signal/distance"].attrs.__setitem__("scale_factor", 2.0),
+            "scale_factor .* added",
+        ),
+        (lambda f: f["entry/signal/time"].attrs.__delitem__("units"), "time@units .* missing"),
+        (lambda f: f.__delitem__("raw"), "the column 'host_mono_ns' is not what was written"),
+    ],
+)
+def test_verify_names_what_differs(path: Path, change: Any, message: str) -> None:
+    """Whatever other tools would see changed, verify finds and names in one line."""
+    edit(path, change)
+    with open_run(path) as run, pytest.raises(RunDamaged, match=message) as caught:
+        run.verify()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_cut_file_is_damaged(path: Path) -> None:
+    """A copy that ended early is refused at opening."""
+    path.write_bytes(path.read_bytes()[:-1000])
+    with pytest.raises(RunDamaged, match="truncated file"):
+        open_run(path)
+
+
+def test_equal_content_has_an_equal_digest(path: Path, tmp_path: Path) -> None:
+    """The digest is of decoded content: how samples were cut into blocks does not enter, a sample does."""
+    whole = block(300)
+    a = write_run(tmp_path / "a.h5", [whole], INFO)
+    b = write_run(tmp_path / "b.h5", [whole[:100], whole[100:]], INFO)
+    changed = whole.distance.copy()
+    changed[5] = np.nextafter(changed[5], 1)
+    c = write_run(tmp_path / "c.h5", [Block(0, whole.t, changed, whole.flags)], INFO)
+    digests = []
+    for each in (a, b, c):
+        with open_run(each) as run:
+            digests.append(run.sha256)
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_importing_is_cheap() -> None:
+    """The package imports no h5py, its reader no xarray."""
+    code = (
+        "import sys, storage, storage.atomic, storage.errors; assert 'h5py' not in sys.modules;"
+        "import storage.run_file.reading, storage.run_file.writing; assert 'xarray' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[4])

@@ -1,0 +1,433 @@
+"""The recorder: the reading thread never waits, and what is not recorded is told."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from acquisition.clock import Clock, VirtualClock
+from acquisition.live.reader import Sink
+from storage.disk import DiskNearlyFull
+from storage.errors import RunExists, WriteFailed
+from storage.recorder import Recorder, check_disk
+from storage.wire_log.appending import Kind, LogFile, LogHeader, SensorEntry, open_log_file, parse_log, read_log
+
+HEADER = LogHeader(sensors=(SensorEntry(0, "line"), SensorEntry(1, "line")), mono_ns=0, unix_ns=0)
+HOUR_S = 3600.0
+WAIT_S = 30.0
+
+
+class Disk:
+    """A file in memory whose writes and syncs a test can hold up or refuse."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.writes_pass, self.syncs_pass = threading.Event(), threading.Event()
+        self.writes_pass.set()
+        self.syncs_pass.set()
+        self.held = threading.Event()
+        self.write_trouble: OSError | None = None
+        self.sync_trouble: OSError | None = None
+        self.room = 1 << 30
+        self.takes: Callable[[], None] = lambda: None
+        self.threads: dict[str, set[str]] = {"write": set(), "sync": set()}
+
+    def __call__(self, path: Path) -> LogFile:
+        """Open."""
+        return self
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Take what there is room for."""
+        self._pass("write", self.writes_pass)
+        self.takes()
+        taken = min(len(data), self.room - len(self.data))
+        if self.write_trouble or not taken:
+            raise self.write_trouble or OSError(errno.ENOSPC, "No space left on device")
+        self.data += data[:taken]
+        return taken
+
+    def sync(self) -> None:
+        """Refuse if told to."""
+        self._pass("sync", self.syncs_pass)
+        if self.sync_trouble:
+            raise self.sync_trouble
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _pass(self, what: str, gate: threading.Event) -> None:
+        self.threads[what].add(threading.current_thread().name)
+        if not gate.is_set():
+            self.held.set()
+            assert gate.wait(WAIT_S)
+
+
+def recorder(
+    disk: Disk,
+    *,
+    sync_every_s: float = HOUR_S,
+    queue_bytes: int = 1 << 20,
+    own_clocks: bool = False,
+    clock: Clock | None = None,
+) -> Recorder:
+    """Return a recorder to a file in memory."""
+    return Recorder(
+        "run.wire",
+        HEADER,
+        clock or VirtualClock(7),
+        sync_every_s=sync_every_s,
+        queue_bytes=queue_bytes,
+        own_clocks=own_clocks,
+        open_file=disk,
+    )
+
+
+def test_everything_put_is_in_the_log_in_order(tmp_path: Path) -> None:
+    """Data of several channels, marks and events come back in the order they were put, then the end."""
+    with Recorder(tmp_path / "run.wire", HEADER, VirtualClock(7)) as recording:
+        sink: Sink = recording
+        for number in range(500):
+            recording.put(number % 2, number, b"R%04d\r" % number)
+        sink.reads([(1, 500, b"last")])
+        recording.mark("let go")
+        recording.mark("stopped", host_ns=9, channel=1)
+        sink.event(1, 501, "lost", {"why": "unplugged"})
+    whole = list(read_log(tmp_path / "run.wire"))
+    records = [record for record in whole if record.kind is not Kind.HEADER]
+    data = [(record.channel, record.mono_ns, record.payload) for record in records[:501]]
+    assert data == [(n % 2, n, b"R%04d\r" % n) for n in range(500)] + [(1, 500, b"last")]
+    told = [(record.kind, record.channel, record.mono_ns, record.payload) for record in records[501:503]]
+    assert told == [(Kind.MARK, 0, 7, b"let go"), (Kind.MARK, 1, 9, b"stopped")]
+    assert records[503].json() == {"kind": "lost", "facts": {"why": "unplugged"}}
+    assert (records[504].kind, len(records)) == (Kind.END, 505)
+    assert records[504].json() == {"records": len(whole) - 1, "dropped_records": 0, "dropped_bytes": 0}
+    assert read_log(tmp_path / "run.wire").damage.intact
+
+
+def test_a_recording_is_never_written_over(tmp_path: Path) -> None:
+    """The second recording of a name is refused before a thread starts."""
+    Recorder(tmp_path / "run.wire", HEADER, VirtualClock()).close()
+    threads = threading.active_count()
+    with pytest.raises(RunExists):
+        Recorder(tmp_path / "run.wire", HEADER, VirtualClock())
+    assert threading.active_count() == threads
+
+
+def test_putting_never_waits_for_the_disk() -> None:
+    """While a write hangs, everything goes into the queue; it is written when the disk comes back."""
+    disk = Disk()
+    recording = recorder(disk)
+    disk.writes_pass.clear()
+    recording.put(0, 0, b"first")
+    assert disk.held.wait(WAIT_S)
+    for number in range(100):
+        recording.put(0, number, b"x")
+    assert (recording.status.queued_records, recording.status.records) == (100, 1)
+    disk.writes_pass.set()
+    status = recording.drain()
+    assert (status.queued_records, status.records, status.dropped_records) == (0, 102, 0)
+    recording.close()
+    assert disk.threads["write"] == {"MainThread", "springmass-log"}  # the header and the end; all else
+
+
+def test_what_is_enqueued_is_appended_when_the_log_is_woken() -> None:
+    """The reading thread says when: many reads are then one write; closing leaves none behind."""
+    disk = Disk()
+    recording = recorder(disk)
+    recording.drain()
+    before = len(disk.data)
+    for number in range(10):
+        recording.take([(0, number, b"x")])
+    assert (recording.status.queued_records, recording.status.records, len(disk.data)) == (10, 1, before)
+    recording.wake()
+    assert recording.drain().records == 11
+    recording.take([(0, 10, b"last")])
+    recording.close()
+    assert [record.payload for record in parse_log(bytes(disk.data)) if record.kind is Kind.DATA][-1] == b"last"
+
+
+def test_what_needs_no_host_stamp_is_appended_by_the_thread_that_asks() -> None:
+    """Where sensors have clocks of their own all records of a call are in the log when it returns, in one write."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=True)
+    writes = 0
+
+    def count() -> None:
+        nonlocal writes
+        writes += 1
+
+    disk.takes = count
+    recording.take([(0, number, b"x") for number in range(10)])
+    assert (recording.status.queued_records, recording.status.records, writes) == (0, 11, 1)
+    recording.close()
+    assert disk.threads["write"] == {"MainThread"}
+
+
+def test_what_is_queued_comes_before_what_could_be_appended_at_once() -> None:
+    """A mark that waits for another thread stands before a read that came after it."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=True)
+    disk.writes_pass.clear()
+    recording.mark("let go")
+    assert disk.held.wait(WAIT_S)
+    recording.mark("held")
+    recording.take([(0, 1, b"x")])
+    assert recording.status.queued_records == 2
+    disk.writes_pass.set()
+    recording.wake()
+    recording.drain()
+    recording.close()
+    kinds = [record.kind for record in parse_log(bytes(disk.data))]
+    assert kinds == [Kind.HEADER, Kind.MARK, Kind.MARK, Kind.DATA, Kind.END]
+
+
+def test_the_thread_that_asks_does_not_wait_for_a_sync() -> None:
+    """While fdatasync has the file, another thread appends."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=True, sync_every_s=1e-4)
+    disk.syncs_pass.clear()
+    recording.take([(0, 0, b"first")])
+    recording.wake()
+    assert disk.held.wait(WAIT_S)
+    disk.writes_pass.clear()
+    recording.take([(0, 1, b"second")])
+    recording.wake()
+    assert recording.status.queued_records + recording.status.records >= 2
+    disk.writes_pass.set()
+    assert recording.drain().records == 3
+    assert disk.threads["write"] == {"MainThread", "springmass-log"}
+    disk.syncs_pass.set()
+    recording.close()
+
+
+def test_after_a_slow_write_another_thread_appends_for_a_while() -> None:
+    """A write that took 60 ms hands the next ten seconds over; then the thread that asks appends again."""
+    disk, clock = Disk(), VirtualClock()
+    recording = recorder(disk, own_clocks=True, clock=clock)
+
+    def threads_of(seconds: float) -> set[str]:
+        """Append one record that takes so long, and tell on which thread."""
+        disk.threads["write"].clear()
+        disk.takes = lambda: clock.sleep_until_ns(clock.now_ns() + round(seconds * 1e9))
+        recording.take([(0, 0, b"x")])
+        recording.wake()
+        recording.drain()
+        return disk.threads["write"]
+
+    assert threads_of(0.04) == {"MainThread"}
+    assert threads_of(0.06) == {"MainThread"}
+    assert threads_of(9.99) == {"springmass-log"}
+    assert threads_of(0.011) == {"springmass-log"}
+    assert threads_of(0.0) == {"MainThread"}
+    recording.close()
+
+
+def test_records_stand_in_their_order_whichever_thread_appends(tmp_path: Path) -> None:
+    """A mark wakes the other thread while the reading thread appends: the log keeps the queue's order."""
+    recording = Recorder(tmp_path / "run.wire", HEADER, VirtualClock(), own_clocks=True, sync_every_s=1e-4)
+    for number in range(3000):
+        recording.take([(0, number, b"%d" % number)])
+        if number % 3 == 0:
+            recording.mark(str(number), host_ns=number)
+        recording.wake()
+    recording.close()
+    records = [r for r in read_log(tmp_path / "run.wire") if r.kind in (Kind.DATA, Kind.MARK)]
+    assert [r.mono_ns for r in records] == sorted(r.mono_ns for r in records)
+    assert [int(r.payload) for r in records if r.kind is Kind.DATA] == list(range(3000))
+
+
+def test_a_full_disk_stops_the_appending_of_the_thread_that_asks() -> None:
+    """It is told by the status and by closing, and never raised to the thread that reads ports."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=True)
+    disk.room = len(disk.data) + 50
+    for number in range(5):
+        recording.take([(0, number, b"R%04d\r" % number)])
+        recording.wake()
+    assert "No space left on device" in recording.status.error
+    assert (recording.status.queued_records, recording.status.records + recording.status.dropped_records) == (0, 6)
+    with pytest.raises(WriteFailed, match="could not be written further"):
+        recording.close()
+
+
+def test_a_slow_sync_holds_up_no_write() -> None:
+    """Records are appended while fdatasync hangs, so a kill in that time loses none of them."""
+    disk = Disk()
+    recording = recorder(disk, sync_every_s=1e-4)
+    disk.syncs_pass.clear()
+    recording.put(0, 0, b"first")
+    assert disk.held.wait(WAIT_S)
+    for number in range(100):
+        recording.put(0, number, b"x")
+    status = recording.drain()
+    assert (status.records, status.synced_records) == (102, 1)
+    disk.syncs_pass.set()
+    recording.close()
+    assert recording.status.synced_records == recording.status.records == 103
+    assert "springmass-sync" in disk.threads["sync"]
+    assert "springmass-log" not in disk.threads["sync"]
+
+
+def test_syncs_come_by_themselves() -> None:
+    """Nobody asks: the records are on the disk after the interval."""
+    disk = Disk()
+    recording = recorder(disk, sync_every_s=1e-3)
+    recording.drain()
+    disk.syncs_pass.clear()
+    recording.put(0, 0, b"x")
+    assert disk.held.wait(WAIT_S)  # the syncer has come
+    disk.syncs_pass.set()
+    recording.close()
+
+
+def test_closing_does_not_wait_for_the_next_sync() -> None:
+    """The interval is an hour and the test is over at once."""
+    recording = recorder(Disk())
+    recording.put(0, 0, b"x")
+    assert recording.drain(sync=True).synced_records == 2
+    recording.close()
+    recording.close()
+    assert (recording.status.closed, recording.status.error) == (True, "")
+
+
+def test_an_overflow_is_told_where_it_happened() -> None:
+    """What finds the queue full is counted, and an event in its place says of which channel and how much."""
+    disk = Disk()
+    recording = recorder(disk, queue_bytes=530)
+    disk.writes_pass.clear()
+    recording.put(0, 0, b"first")
+    assert disk.held.wait(WAIT_S)
+    for number in range(100):
+        recording.put(number % 2, number, bytes([number]) * 10)
+    recording.put(0, 100, b"")  # would fit, but must not come before the event
+    kept = recording.status.queued_records
+    assert (kept, recording.status.dropped_records, recording.status.dropped_bytes) == (13, 88, 870)
+    disk.writes_pass.set()
+    recording.drain()
+    recording.put(0, 101, b"after")
+    recording.close()
+    _, _, *records = list(parse_log(bytes(disk.data)))
+    assert [record.payload for record in records[:13]] == [bytes([n]) * 10 for n in range(13)]
+    events = [(record.channel, record.mono_ns, record.json()) for record in records[13:15]]
+    assert events == [
+        (1, 99, {"kind": "overflow", "facts": {"records": 44, "bytes": 440, "first_ns": 13}}),
+        (0, 100, {"kind": "overflow", "facts": {"records": 44, "bytes": 430, "first_ns": 14}}),
+    ]
+    assert records[15].payload == b"after"
+    assert records[16].json()["dropped_records"] == 88
+
+
+@pytest.mark.parametrize("own_clocks", [False, True])
+def test_a_full_disk_stops_the_recording_and_says_so(own_clocks: bool) -> None:
+    """The status shows the error at once, putting goes on harmlessly, closing raises it, and the log is whole."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=own_clocks)
+    disk.room = len(disk.data) + 1000
+    for number in range(200):
+        recording.put(0, number, b"R%04d\r" % number)
+    status = recording.drain()
+    assert "run.wire: the wire log could not be written further (No space left on device)" in status.error
+    recording.put(0, 200, b"late")
+    before = recording.status
+    assert (before.queued_records, before.records + before.dropped_records) == (0, 1 + 200 + 1)
+    with pytest.raises(WriteFailed, match=r"No space left on device\); check the disk's space and permissions; 30 rec"):
+        recording.close()
+    recording.close()
+    contents = parse_log(bytes(disk.data))
+    assert [r.payload for r in contents if r.kind is Kind.DATA] == [b"R%04d\r" % n for n in range(29)]
+    assert recording.status.synced_records == recording.status.records == 30
+
+
+def test_what_a_full_disk_took_is_synced_at_once() -> None:
+    """Nobody may come to close a recording that stopped: what it has goes to the disk without waiting."""
+    disk = Disk()
+    recording = recorder(disk)
+    disk.room = len(disk.data) + 100
+    disk.syncs_pass.clear()
+    for number in range(10):
+        recording.put(0, number, b"x")
+    assert disk.held.wait(WAIT_S)
+    assert recording.status.error
+    disk.syncs_pass.set()
+    with pytest.raises(WriteFailed):
+        recording.close()
+
+
+@pytest.mark.parametrize("own_clocks", [False, True])
+def test_a_failed_sync_stops_the_recording(own_clocks: bool) -> None:
+    """Records that may never reach the disk must not look safe."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=own_clocks)
+    recording.put(0, 0, b"x")
+    assert recording.drain(sync=True).synced_records == 2
+    disk.sync_trouble = OSError(errno.EIO, "Input/output error")
+    recording.put(0, 1, b"y")
+    status = recording.drain(sync=True)
+    assert "could not be synced to the disk (Input/output error)" in status.error
+    assert (status.records, status.synced_records) == (3, 2)
+    with pytest.raises(WriteFailed, match="could not be synced"):
+        recording.close()
+    assert recording.status.synced_records == 2
+
+
+@pytest.mark.parametrize("own_clocks", [False, True])
+def test_a_defect_does_not_pass_for_a_recording(own_clocks: bool) -> None:
+    """A record that cannot be laid out stops the recording with a line, not a thread without a word."""
+    recording = recorder(Disk(), own_clocks=own_clocks)
+    recording.put(0, 1 << 70, b"x")
+    with pytest.raises(WriteFailed, match="a record could not be appended"):
+        recording.close()
+
+
+def test_a_channel_is_a_byte() -> None:
+    """A caller's error is raised to the caller."""
+    with recorder(Disk()) as recording, pytest.raises(ValueError, match="0 to 255, got 256"):
+        recording.put(256, 0, b"x")
+
+
+@pytest.mark.parametrize("own_clocks", [False, True])
+def test_putting_after_the_end_is_counted(own_clocks: bool) -> None:
+    """A reading thread that outlives the recording harms nothing and is not forgotten."""
+    disk = Disk()
+    recording = recorder(disk, own_clocks=own_clocks)
+    recording.close()
+    recording.put(0, 0, b"late")
+    assert (recording.status.dropped_records, recording.status.dropped_bytes) == (1, 4)
+
+
+def test_many_threads_may_put(tmp_path: Path) -> None:
+    """A thread per port where the system needs one: every record of each is there, in its order."""
+    recording = Recorder(tmp_path / "run.wire", HEADER, VirtualClock(), open_file=open_log_file)
+
+    def feed(channel: int) -> None:
+        for number in range(300):
+            recording.put(channel, number, b"%d" % number)
+
+    threads = [threading.Thread(target=feed, args=(channel,)) for channel in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    recording.close()
+    records = [record for record in read_log(tmp_path / "run.wire") if record.kind is Kind.DATA]
+    for channel in range(8):
+        mine = [int(record.payload) for record in records if record.channel == channel]
+        assert mine == list(range(300))
+
+
+def test_room_is_looked_at_before_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Enough room is returned; too little, or no folder, is one line."""
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=5_000_000))
+    assert check_disk(tmp_path / "run.wire", 5_000_000) == 5_000_000
+    with pytest.raises(DiskNearlyFull, match=r"run\.wire: the run needs 5\.1 MB, but 5\.0 MB are free; make room"):
+        check_disk(tmp_path / "run.wire", 5_100_000)
+    monkeypatch.undo()
+    assert check_disk(tmp_path / "run.wire", 1) > 1
+    with pytest.raises(WriteFailed, match=r"got none \(No such file or directory\); make the folder first"):
+        check_disk(tmp_path / "none" / "run.wire", 1)

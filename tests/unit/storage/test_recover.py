@@ -1,0 +1,259 @@
+"""Recovery: what the chain showed live is what the run file holds, and the log is inside it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition.block import Block, Flag, concatenate
+from acquisition.clock import VirtualClock
+from acquisition.decoders.registry import get_family
+from acquisition.live.calibration import Calibration
+from acquisition.live.decoding import SensorChain
+from storage import recover as module
+from storage.errors import RunDamaged, RunExists
+from storage.recorder import Recorder
+from storage.recover import recover
+from storage.run_file.reading import Run, open_run
+from storage.wire_log.appending import Kind, LogHeader, NotALog, SensorEntry, WireLogWriter, read_log
+from storage.wire_log.wire_samples import chains_of, decode_log
+
+FAMILY = "line-protocol"
+START_NS = 7_000_000_000
+HEADER = LogHeader(
+    sensors=(SensorEntry(0, FAMILY, "COM3", 115200, 100.0),),
+    mono_ns=START_NS,
+    unix_ns=1_600_000_000_000_000_000,
+    kind="simulated",
+    scene={"bob": {"mass_kg": 0.2}},
+    title="Run 3",
+    version="0.1.0",
+)
+
+
+def wire(count: int, seed: int = 0) -> list[tuple[int, bytes]]:
+    """Return the reads of a port at which a sensor sends lines at 100 Hz: host times in ns and bytes, cut anywhere."""
+    encoder = get_family(FAMILY).encoder()
+    rng = np.random.default_rng(seed)
+    reads: list[tuple[int, bytes]] = []
+    held = b""
+    for n in range(count):
+        distance = 0.3 + 0.05 * math.sin(0.14 * n)
+        held += encoder.encode(
+            sequence=n,
+            device_us=10_000 * n,
+            echo_us=2e6 * distance / 344,
+            distance_m=distance,
+            temperature_c=math.nan,
+        )
+        keep = int(rng.integers(0, 20))
+        reads.append((START_NS + 2_000_000_000 + 10_000_000 * n, held[: len(held) - keep]))
+        held = held[len(held) - keep :]
+    return [*reads, (reads[-1][0] + 1, held)]
+
+
+def write(path: Path, header: LogHeader = HEADER, count: int = 200) -> Path:
+    """Record the wire's reads on every channel, with a mark half way."""
+    with Recorder(path, header, VirtualClock(START_NS)) as recorder:
+        for number, (host_ns, data) in enumerate(wire(count)):
+            for sensor in header.sensors:
+                recorder.put(sensor.channel, host_ns, data)
+            if number == count // 2:
+                recorder.mark("half way", host_ns=host_ns)
+    return path
+
+
+def columns(block: Block) -> list[Any]:
+    """Return a block's values, comparable."""
+    assert block.host_ns is not None
+    return [block.t.tolist(), [repr(x) for x in block.distance.tolist()], block.flags.tolist(), block.host_ns.tolist()]
+
+
+def traps(run: Run) -> set[str]:
+    """Return the codes of a run's traps."""
+    return {trap.code for trap in run.traps}
+
+
+def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
+    """The samples equal those of the live chain bit for bit; the log, the header and the mark are in the file."""
+    log = write(tmp_path / "run.wire")
+    live = SensorChain(get_family(FAMILY), rate_hz=100.0)
+    shown = concatenate(live.feed(host_ns, data) for host_ns, data in wire(200))
+    report = recover(log, provenance={"software": "springmass"})
+    first, clock, last = report.describe()
+    assert first == f"{tmp_path / 'run.h5'}: 200 samples from {log}"
+    assert clock.startswith(f"{tmp_path / 'run.h5'}: sensor clock ")
+    assert " ppm against this host's" in clock
+    assert last == f"{log}: {report.damage.records} records"
+    with open_run(tmp_path / "run.h5") as run:
+        run.verify()
+        assert columns(run.samples()) == columns(shown)
+        assert run.originals()[0].data == log.read_bytes()
+        assert (run.info, run.title, run.scene) == (live.info("COM3", "simulated"), "Run 3", HEADER.scene)
+        assert (run.format, run.traps, run.malformed_rows) == ("wire", (), 0)
+        told = run.provenance
+    assert (told["software"], told["recorded_with"], told["reads"]) == ("springmass", "0.1.0", 201)
+    assert told["log"]["ended"]
+    assert (told["marks"][0]["text"], round(told["marks"][0]["t_s"], 9)) == ("half way", 1.0)
+    assert told["clock_map"]["t0_mono_ns"] == START_NS + 2_000_000_000
+    assert told["start_time"] == "2020-09-13T12:26:42.000000+00:00"
+
+
+def test_several_sensors_make_several_files(tmp_path: Path) -> None:
+    """Each channel has a run of its own, each with the whole log inside."""
+    sensors = (SensorEntry(0, FAMILY, "A"), SensorEntry(5, FAMILY, "B"))
+    log = write(tmp_path / "run.wire", LogHeader(sensors=sensors, mono_ns=0, unix_ns=0))
+    report = recover(log, tmp_path / "out.h5")
+    assert [run.path.name for run in report.runs] == ["out.0.h5", "out.5.h5"]
+    for run, name in zip(report.runs, "AB", strict=True):
+        with open_run(run.path) as opened:
+            assert (len(opened), opened.info.name) == (200, name)
+            assert opened.originals()[0].data == log.read_bytes()
+
+
+def test_a_torn_log_gives_what_it_holds_and_says_so(tmp_path: Path) -> None:
+    """A log cut in a record and damaged in another gives the rest; the damage is in the provenance and the traps."""
+    log = write(tmp_path / "run.wire")
+    data = bytearray(log.read_bytes()[:-40])
+    victim = [record for record in read_log(log) if record.kind is Kind.DATA][100]
+    data[victim.offset + 30] ^= 4
+    log.write_bytes(data)
+    report = recover(log)
+    assert (report.damage.lost, report.damage.intact, report.damage.ended) == (1, False, False)
+    with open_run(report.runs[0].path) as run:
+        assert 195 <= len(run) <= 199
+        assert traps(run) == {"damaged_log", "cut_short"}
+        assert run.provenance["log"]["lost"] == 1
+        samples = run.samples()
+        after = int(np.flatnonzero(samples.flags & Flag.GAP_BEFORE)[0])
+        assert samples.t[after] - samples.t[after - 1] > 0.015
+        expected = 0.3 + 0.05 * np.sin(14 * samples.t)
+        assert np.max(np.abs(samples.distance - expected)) < 1e-4
+        assert run.originals()[0].data == bytes(data)
+
+
+@pytest.mark.parametrize("event", ["lost", "reopened", "timeout", "overflow"])
+def test_no_frame_is_put_together_across_a_break(event: str, tmp_path: Path) -> None:
+    """Half a frame before the port went away and half a frame after it make no value."""
+    header = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr"), SensorEntry(1, "maxbotix-hr")), mono_ns=0, unix_ns=0)
+    log = tmp_path / "run.wire"
+    with Recorder(log, header, VirtualClock()) as recorder:
+        for channel in (0, 1):
+            recorder.put(channel, 1, b"R1000\rR1000\rR12")
+        recorder.event(0, 2, event, {})
+        for channel in (0, 1):
+            recorder.put(channel, 3, b"34\rR1000\rR1000\r")
+    broken, whole = decode_log(read_log(log), header.sensors)
+    assert 1234 not in np.round(broken.samples.distance * 1000).tolist()
+    assert 1234 in np.round(whole.samples.distance * 1000).tolist()
+    assert np.count_nonzero(broken.samples.flags & Flag.GAP_BEFORE) == 1
+
+
+def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
+    """A calibration made after the start counts for all of the run: what is stored are echo times."""
+    sensor = SensorEntry(0, FAMILY, calibration=Calibration(offset_m=1.0).to_mapping())
+    log = WireLogWriter(tmp_path / "run.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0))
+    for host_ns, data in wire(50):
+        log.append(Kind.DATA, data, mono_ns=host_ns)
+    log.close()
+    recover(log.path, tmp_path / "a.h5")
+    with Recorder(tmp_path / "b.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0), VirtualClock()) as recorder:
+        for host_ns, data in wire(50):
+            recorder.put(0, host_ns, data)
+        recorder.event(0, 1, "calibration", Calibration(offset_m=2.0).to_mapping())
+    recover(tmp_path / "b.wire", tmp_path / "b.h5")
+    with open_run(tmp_path / "a.h5") as one, open_run(tmp_path / "b.h5") as other:
+        assert one.samples().distance[0] == pytest.approx(1.3, abs=1e-4)
+        assert other.samples().distance[0] == pytest.approx(2.3, abs=1e-4)
+        assert other.provenance["sensor"]["calibration"]["offset_m"] == 2.0
+
+
+def test_a_run_without_samples_is_a_run(tmp_path: Path) -> None:
+    """A recording stopped before the first frame gives a file that opens."""
+    with Recorder(tmp_path / "run.wire", HEADER, VirtualClock()):
+        pass
+    report = recover(tmp_path / "run.wire")
+    with open_run(report.runs[0].path) as run:
+        run.verify()
+        assert len(run) == 0
+        assert run.provenance["start_time"] == "2020-09-13T12:26:40.000000+00:00"
+
+
+def test_nothing_is_written_over_unasked(tmp_path: Path) -> None:
+    """A run file stands, unless its overwriting is asked for."""
+    log = write(tmp_path / "run.wire", count=10)
+    (tmp_path / "run.h5").write_bytes(b"old")
+    with pytest.raises(RunExists, match=r"run\.h5: a new run file was to be written, but a file stands there"):
+        recover(log)
+    assert (tmp_path / "run.h5").read_bytes() == b"old"
+    assert recover(log, overwrite=True).runs[0].samples == 10
+
+
+def test_the_log_goes_only_when_the_run_file_verifies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked to remove the log, recovery does so after reading the run file back, and not before."""
+    log = write(tmp_path / "run.wire", count=10)
+
+    def damaged(_: Run) -> None:
+        raise RunDamaged("run.h5", "the column 'time' is not what was written", "restore it")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Run, "verify", damaged)
+        with pytest.raises(RunDamaged):
+            recover(log, remove_log=True)
+    assert log.exists()
+    assert not recover(log, overwrite=True).log_removed
+    assert recover(log, overwrite=True, remove_log=True).log_removed
+    assert not log.exists()
+
+
+def test_a_log_that_grew_meanwhile_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bytes that came after the reading are in no run file yet."""
+    log = write(tmp_path / "run.wire", count=10)
+    real = module.decode_log
+
+    def slow(*arguments: Any) -> Any:
+        with log.open("ab") as file:
+            file.write(b"more")
+        return real(*arguments)
+
+    monkeypatch.setattr(module, "decode_log", slow)
+    assert not recover(log, remove_log=True).log_removed
+    assert log.read_bytes().endswith(b"more")
+
+
+def test_a_log_without_its_header_needs_one(tmp_path: Path) -> None:
+    """The error says that the sensors must be named; named, all that the log holds is there."""
+    log = write(tmp_path / "run.wire", count=50)
+    data = log.read_bytes()
+    first, *_ = read_log(log)
+    log.write_bytes(bytes(first.offset + 28 + len(first.payload)) + data[28 + len(first.payload) :])
+    with pytest.raises(NotALog, match=r"header is lost in all its copies \(.*\); say which sensors were recorded"):
+        recover(log)
+    assert recover(log, header=HEADER).runs[0].samples == 50
+
+
+@pytest.mark.parametrize("data", [b"", b"Time (s)\t0.1\n", bytes(10_000)])
+def test_what_is_no_log_is_refused_in_one_line(data: bytes, tmp_path: Path) -> None:
+    """An empty file, a text and zeros are no logs, nor is a file that is not there."""
+    path = tmp_path / "any.wire"
+    with pytest.raises(NotALog, match="got no file that can be read"):
+        recover(path)
+    path.write_bytes(data)
+    with pytest.raises(NotALog, match=rf"any\.wire: a wire log was demanded, got {len(data)} bytes without one record"):
+        recover(path)
+    assert not (tmp_path / "any.h5").exists()
+
+
+def test_bytes_of_an_unnamed_channel_stay_in_the_log(tmp_path: Path) -> None:
+    """A channel that the header does not name is passed over, not mixed into another's."""
+    header = LogHeader(sensors=(SensorEntry(3, FAMILY),), mono_ns=0, unix_ns=0)
+    with Recorder(tmp_path / "run.wire", header, VirtualClock()) as recorder:
+        for host_ns, data in wire(20):
+            recorder.put(4, host_ns, data[::-1])
+            recorder.put(3, host_ns, data)
+    (decoded,) = decode_log(read_log(tmp_path / "run.wire"), header.sensors, chains_of)
+    assert (len(decoded.samples), decoded.reads) == (20, 21)

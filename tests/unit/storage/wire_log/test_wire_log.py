@@ -1,0 +1,361 @@
+"""The wire log: what is appended comes back, and what the disk refuses is said."""
+
+from __future__ import annotations
+
+import errno
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from storage.errors import RunExists, WriteFailed
+from storage.wire_log.appending import (
+    FIRST_COPY,
+    Kind,
+    LogHeader,
+    NotALog,
+    Record,
+    SensorEntry,
+    WireLogWriter,
+    Written,
+    parse_log,
+    read_log,
+)
+from storage.wire_log.records import HEAD_BYTES, MAX_PAYLOAD, event_payload, frame, frames
+
+HEADER = LogHeader(
+    sensors=(
+        SensorEntry(0, "maxbotix", "COM3", 9600, options={"unit": "mm"}),
+        SensorEntry(7, "line", "socket://bench:4000", 115200, 100.0, calibration={"scale": 1.01}),
+    ),
+    mono_ns=5_000_000_000,
+    unix_ns=1_500_000_000_123_456_789,
+    kind="simulated",
+    scene={"bob": {"mass_kg": {"value": 0.2176, "u": 5e-05}}},
+    title="Träger",
+    version="0.1.0",
+)
+
+
+class Disk:
+    """A file in memory that takes ``room`` bytes, ``bite`` at a time, and says ``trouble`` after that."""
+
+    def __init__(self, room: int = 1 << 30, bite: int = 1 << 30, trouble: int = errno.ENOSPC) -> None:
+        self.data = bytearray()
+        self.room, self.bite, self.trouble = room, bite, trouble
+        self.sync_trouble: int | None = None
+        self.syncs: list[int] = []
+
+    def __call__(self, path: Path) -> Disk:
+        """Open."""
+        return self
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Take what there is room for."""
+        taken = min(len(data), self.bite, self.room - len(self.data))
+        if taken <= 0 and self.trouble:
+            raise OSError(self.trouble, "No space left on device")
+        self.data += data[:taken]
+        return taken
+
+    def sync(self) -> None:
+        """Note how far the file was."""
+        if self.sync_trouble is not None:
+            raise OSError(self.sync_trouble, "Input/output error")
+        self.syncs.append(len(self.data))
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def content(record: Record) -> tuple[Any, ...]:
+    """Return what was appended."""
+    return record.kind, record.channel, record.mono_ns, record.payload
+
+
+def test_what_is_appended_comes_back(tmp_path: Path) -> None:
+    """Every kind of record returns with its time, channel and bytes, and an intact log says so."""
+    path = tmp_path / "run.wire"
+    log = WireLogWriter(path, HEADER)
+    told = [
+        (Kind.DATA, 7, 1, bytes(range(256))),
+        (Kind.DATA, 0, 2, b""),
+        (Kind.MARK, 0, 3, "Stoß ∂".encode()),
+        (Kind.EVENT, 7, 4, event_payload("reopened", {"gap_s": 0.25})),
+        (Kind.END, 0, 5, b"{}"),
+    ]
+    for number, (kind, channel, mono_ns, payload) in enumerate(told, 1):
+        assert log.append(kind, payload, mono_ns=mono_ns, channel=channel) == number
+    log.close()
+    contents = read_log(path)
+    header, *records = contents
+    assert [content(record) for record in records] == told
+    assert (header.kind, header.offset, contents.header) == (Kind.HEADER, 0, HEADER)
+    assert (records[2].text(), records[3].json()) == ("Stoß ∂", {"kind": "reopened", "facts": {"gap_s": 0.25}})
+    assert contents.damage.intact
+    assert (contents.damage.ended, contents.damage.describe()) == (True, "6 records")
+
+
+def test_a_record_lies_in_the_file_as_documented() -> None:
+    """The layout of the docstring is the layout of the bytes."""
+    record = frame(Kind.DATA, b"R0500\r", sequence=2**32 + 7, mono_ns=123, log=0xCAFE, channel=3)
+    head = struct.pack("<2sHIqIBBH", b"\xf5\xa9", 6, 7, 123, 0xCAFE, 2, 3, 0)
+    assert record == head + struct.pack("<I", zlib.crc32(head + b"R0500\r")) + b"R0500\r"
+    assert len(record) == HEAD_BYTES + 6 == 34
+
+
+def test_nothing_is_written_over(tmp_path: Path) -> None:
+    """A file of that name, whatever it is, stands."""
+    path = tmp_path / "run.wire"
+    path.write_bytes(b"last week")
+    with pytest.raises(RunExists, match=r"run\.wire: a new wire log was to be begun, but a file stands there; choose"):
+        WireLogWriter(path, HEADER)
+    assert path.read_bytes() == b"last week"
+
+
+def test_a_log_that_cannot_be_made_says_why(tmp_path: Path) -> None:
+    """A missing folder and a header that JSON cannot hold are one line each and leave nothing."""
+    with pytest.raises(WriteFailed, match="could not be made"):
+        WireLogWriter(tmp_path / "none" / "run.wire", HEADER)
+    odd = LogHeader(sensors=(), mono_ns=0, unix_ns=0, scene={"a": float("nan")})
+    with pytest.raises(WriteFailed, match="header cannot be written"):
+        WireLogWriter(tmp_path / "run.wire", odd)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_full_at_the_first_record_leaves_no_log(tmp_path: Path) -> None:
+    """A log without its header would only stand in the way of the next attempt."""
+    path = tmp_path / "run.wire"
+    path.touch()  # as if the seam had made it
+    with pytest.raises(WriteFailed, match="No space left"):
+        WireLogWriter(path, HEADER, open_file=Disk(room=10))
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("bite", [1, 3, 29])
+def test_short_writes_are_finished(bite: int) -> None:
+    """A disk that takes a few bytes at a time loses none."""
+    disk = Disk(bite=bite)
+    log = WireLogWriter("run.wire", HEADER, open_file=disk)
+    for number in range(20):
+        log.append(Kind.DATA, bytes([number] * number), mono_ns=number)
+    assert [record.payload for record in parse_log(bytes(disk.data))][1:] == [bytes([n] * n) for n in range(20)]
+    assert log.written == Written(21, len(disk.data))
+
+
+@pytest.mark.parametrize(("trouble", "words"), [(errno.ENOSPC, "No space left"), (0, "bytes were taken")])
+def test_a_full_disk_keeps_what_was_written(trouble: int, words: str) -> None:
+    """The error names what is kept, every later append raises it again, and the log reads up to there."""
+    disk = Disk(room=1000, trouble=trouble)
+    log = WireLogWriter("run.wire", HEADER, open_file=disk)
+    while disk.room - len(disk.data) >= HEAD_BYTES + 6:
+        log.append(Kind.DATA, b"R0500\r", mono_ns=0)
+    with pytest.raises(WriteFailed, match=words) as caught:
+        log.append(Kind.DATA, b"R0500\r", mono_ns=0)
+    kept = log.written.records
+    assert f"{kept} records up to byte {log.written.bytes} are kept" in str(caught.value)
+    disk.room = 1 << 30
+    with pytest.raises(WriteFailed, match=words):
+        log.append(Kind.DATA, b"R0500\r", mono_ns=0)
+    contents = parse_log(bytes(disk.data))
+    assert len(list(contents)) == kept
+    assert contents.damage.tail_bytes == 1000 - log.written.bytes
+    assert log.sync().records == kept
+
+
+def test_what_is_appended_together_is_one_write_and_the_same_log() -> None:
+    """Many items are one write; the bytes are those of items appended one by one, copies of the header among them."""
+    items = [(Kind.DATA, n % 3, n, bytes([n % 256]) * (n % 90)) for n in range(400)]
+    items.insert(200, (Kind.MARK, 0, 7, bytes(2 * MAX_PAYLOAD + 1)))
+    together, single = Disk(), Disk()
+    log = WireLogWriter("run.wire", HEADER, open_file=together, log=9)
+    writes: list[int] = []
+    take = together.write
+    together.write = lambda data: (writes.append(len(data)), take(data))[1]  # type: ignore[method-assign]
+    log.extend(items)
+    other = WireLogWriter("run.wire", HEADER, open_file=single, log=9)
+    for kind, channel, mono_ns, payload in items:
+        other.append(kind, payload, mono_ns=mono_ns, channel=channel)
+    assert together.data == single.data
+    assert (log.written, log.extended) == (other.written, len(items))
+    assert len(writes) == 1
+
+
+@pytest.mark.parametrize("room", [0, 27, 28, 5000, 20_000, 90_000, 140_000])
+def test_of_items_appended_together_those_that_are_whole_are_counted(room: int) -> None:
+    """A disk that fills up within a write keeps the records before; the log holds the items that were counted."""
+    disk = Disk()
+    log = WireLogWriter("run.wire", HEADER, open_file=disk)
+    disk.room = len(disk.data) + room
+    items = [(Kind.DATA, 1, n, b"R%04d\r" % n) for n in range(400)]
+    items[300:300] = [(Kind.MARK, 0, 300, bytes(2 * MAX_PAYLOAD + 1))]
+    with pytest.raises(WriteFailed, match="No space left"):
+        log.extend(items)
+    contents = parse_log(bytes(disk.data))
+    found = [content(record) for record in contents if record.kind is not Kind.HEADER]
+    assert found == items[: log.extended]
+    assert contents.damage.tail_bytes + contents.damage.skipped_bytes <= disk.room - log.written.bytes
+    with pytest.raises(WriteFailed):
+        log.extend(items)
+    assert log.extended == 0
+
+
+def test_a_failed_sync_is_never_taken_back() -> None:
+    """After one failed sync nothing more counts as safe: the kernel forgets which pages it could not write."""
+    disk = Disk()
+    log = WireLogWriter("run.wire", HEADER, open_file=disk)
+    log.append(Kind.DATA, b"R0500\r", mono_ns=0)
+    disk.sync_trouble = errno.EIO
+    with pytest.raises(WriteFailed, match="could not be synced"):
+        log.sync()
+    disk.sync_trouble = None
+    with pytest.raises(WriteFailed, match="could not be synced"):
+        log.sync()
+    with pytest.raises(WriteFailed, match="could not be synced"):
+        log.append(Kind.DATA, b"R0500\r", mono_ns=0)
+    assert (log.synced.records, log.written.records) == (1, 2)
+
+
+def test_the_header_is_on_the_disk_before_the_first_byte_comes() -> None:
+    """The constructor syncs; later syncs say how far they reached."""
+    disk = Disk()
+    log = WireLogWriter("run.wire", HEADER, open_file=disk)
+    assert disk.syncs == [len(disk.data)]
+    log.append(Kind.DATA, b"abc", mono_ns=1)
+    assert log.synced.records == 1
+    assert log.sync() == log.synced == Written(2, len(disk.data))
+
+
+@pytest.mark.parametrize("size", [MAX_PAYLOAD, MAX_PAYLOAD + 1, 3 * MAX_PAYLOAD + 5])
+def test_long_payloads_are_split_and_joined(size: int) -> None:
+    """Text comes back whole; data come part by part, with no byte lost."""
+    disk = Disk()
+    payload = bytes(number % 251 for number in range(size))
+    log = WireLogWriter("run.wire", HEADER, open_file=disk)
+    log.append(Kind.MARK, payload, mono_ns=1)
+    log.append(Kind.DATA, payload, mono_ns=2)
+    records = [record for record in parse_log(bytes(disk.data)) if record.kind is not Kind.HEADER]
+    assert records[0].payload == payload
+    assert b"".join(record.payload for record in records[1:]) == payload
+    assert {record.mono_ns for record in records[1:]} == {2}
+
+
+def test_a_text_with_a_lost_part_is_lost_and_counted() -> None:
+    """Half a text is never delivered, whichever part is missing."""
+    parts = list(frames(Kind.MARK, bytes(3 * MAX_PAYLOAD), sequence=0, mono_ns=0, log=1))
+    after = frame(Kind.DATA, b"x", sequence=3, mono_ns=0, log=1)
+    for missing in range(3):
+        contents = parse_log(b"".join(part for n, part in enumerate(parts) if n != missing) + after)
+        assert [(record.payload, record.lost_before) for record in contents] == [(b"x", 3)]
+        assert contents.damage.lost == 3
+
+
+def test_the_header_survives_its_first_page() -> None:
+    """A log longer than a page holds the header again."""
+    disk = Disk()
+    log = WireLogWriter("run.wire", HEADER, open_file=disk)
+    while log.written.bytes < 3 * FIRST_COPY:
+        log.append(Kind.DATA, bytes(100), mono_ns=0)
+    disk.data[:4096] = bytes(4096)
+    contents = parse_log(bytes(disk.data))
+    assert contents.header == HEADER
+    assert not contents.damage.intact
+    copies = [record.offset for record in contents if record.kind is Kind.HEADER]
+    assert len(copies) == 2
+    assert copies[1] > 1.9 * copies[0]
+
+
+def test_records_of_another_log_are_no_records() -> None:
+    """Old disk blocks, or a device that sends a log as its data, add nothing."""
+    mine = [frame(Kind.DATA, bytes([n]), sequence=n, mono_ns=n, log=1) for n in range(4)]
+    foreign = frame(Kind.DATA, b"foreign", sequence=2, mono_ns=2, log=2)
+    contents = parse_log(mine[0] + mine[1] + foreign + mine[3])
+    assert [(record.payload, record.lost_before) for record in contents] == [(b"\0", 0), (b"\1", 0), (b"\3", 1)]
+    assert contents.damage.stretches == ((len(mine[0] + mine[1]), len(foreign)),)
+    # The record that carries a record is torn: the carried one stays where it is.
+    carrier = frame(Kind.DATA, foreign * 3, sequence=2, mono_ns=2, log=1)
+    torn = carrier[:-1] + b"?"
+    assert [record.payload for record in parse_log(mine[0] + mine[1] + torn + mine[3])] == [b"\0", b"\1", b"\3"]
+
+
+def test_a_record_that_comes_twice_is_delivered_once() -> None:
+    """A number that runs back is an old copy; a number that wraps is not."""
+    mine = [frame(Kind.DATA, bytes([n]), sequence=n, mono_ns=n, log=1) for n in range(3)]
+    contents = parse_log(mine[0] + mine[1] + mine[0] + mine[2])
+    assert [record.payload for record in contents] == [b"\0", b"\1", b"\2"]
+    assert (contents.damage.strays, contents.damage.lost, contents.damage.intact) == (1, 0, False)
+    last = [frame(Kind.DATA, b"", sequence=n, mono_ns=0, log=1) for n in (2**31 - 1, 2**32 - 2, 2**32 - 1, 2**32)]
+    assert [record.sequence for record in parse_log(b"".join(last))] == [2**31 - 1, 2**32 - 2, 2**32 - 1, 0]
+
+
+@pytest.mark.parametrize("data", [b"", b"\xf5", b"\xf5\xa9" * 5000, bytes(100_000), b"R0500\r" * 1000])
+def test_what_is_no_log_has_no_records(data: bytes, tmp_path: Path) -> None:
+    """Any file opens, and its bytes are all accounted for."""
+    path = tmp_path / "any"
+    path.write_bytes(data)
+    contents = read_log(path)
+    assert (list(contents), contents.header, contents.damage.tail_bytes) == ([], None, len(data))
+
+
+def test_no_file_is_one_line(tmp_path: Path) -> None:
+    """A missing log and a folder are refused."""
+    for path in (tmp_path / "none.wire", tmp_path):
+        with pytest.raises(NotALog, match=r"a wire log was demanded, got no file that opens \(.*\); name a file"):
+            read_log(path)
+
+
+def test_a_long_log_is_read_in_windows(tmp_path: Path) -> None:
+    """Records on either side of a window's border, and damage across it, are read as anywhere else."""
+    disk = Disk()
+    log = WireLogWriter("run.wire", HEADER, open_file=disk)
+    ends = []
+    while log.written.bytes < 3 << 20:
+        log.append(Kind.DATA, bytes(60_000 + log.written.records), mono_ns=log.written.records)
+        ends.append(log.written.bytes)
+    path = tmp_path / "run.wire"
+    path.write_bytes(disk.data)
+    assert len(list(read_log(path))) == log.written.records
+    border = 1 << 20
+    disk.data[border - 40_000 : border + 40_000] = b"\xf5" * 80_000
+    path.write_bytes(disk.data)
+    contents = read_log(path)
+    assert sum(1 for _ in contents) == log.written.records - contents.damage.lost
+    assert 2 <= contents.damage.lost <= 3
+    assert contents.damage.tail_bytes == 0
+
+
+@pytest.mark.parametrize("shift", range(4))
+def test_a_record_that_begins_on_a_windows_border_is_found(shift: int) -> None:
+    """After a megabyte of damage the magic's halves may lie in different windows."""
+    garbage = bytes((1 << 20) - shift)
+    contents = parse_log(garbage + frame(Kind.DATA, b"x", sequence=0, mono_ns=0, log=1))
+    assert [(record.offset, record.payload) for record in contents] == [(len(garbage), b"x")]
+    assert (contents.damage.skipped_bytes, contents.damage.tail_bytes) == (len(garbage), 0)
+
+
+def test_the_clock_map_gives_the_wall_clock() -> None:
+    """Moments of the monotonic clock become UTC, to the microsecond."""
+    assert HEADER.utc(5_000_000_000) == "2017-07-14T02:40:00.123456+00:00"
+    assert HEADER.utc(4_000_000_000) == "2017-07-14T02:39:59.123456+00:00"
+
+
+def test_a_header_is_checked() -> None:
+    """Channels are bytes and differ, the kind is one of three, another version is refused."""
+    with pytest.raises(ValueError, match="0 to 255, got 256"):
+        SensorEntry(256, "line")
+    with pytest.raises(ValueError, match=r"channel of its own, got \[1, 1\]"):
+        LogHeader(sensors=(SensorEntry(1, "line"), SensorEntry(1, "line")), mono_ns=0, unix_ns=0)
+    with pytest.raises(ValueError, match="kind must be live"):
+        LogHeader(sensors=(), mono_ns=0, unix_ns=0, kind="real")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="version 1 was demanded, got 2"):
+        LogHeader.decode(HEADER.encode().replace(b'"log":1', b'"log":2'))
+
+
+def test_an_event_is_told_whatever_its_facts_are() -> None:
+    """Facts that JSON cannot hold go in as text: the reading thread must not fail on them."""
+    record = Record(0, 0, 0, Kind.EVENT, 0, event_payload("lost", {"why": OSError(5, "gone"), "gap_s": float("nan")}))
+    assert record.json()["facts"] == {"why": "OSError(5, 'gone')", "gap_s": "nan"}
+    assert Record(0, 0, 0, Kind.EVENT, 0, b"[1]").json() == {}
+    assert Record(0, 0, 0, Kind.EVENT, 0, b"\xff").json() == {}
