@@ -6,7 +6,7 @@ the reader's alone, and each sample tells how long it took from the wire until i
 
 Each design gives a port's bytes to a chain of its own, from which the samples are taken ten times a second; or once a
 second, beside a wire log, as `springmass record` does it, which then decodes many readings at a time. One design is
-what `springmass record` does: one thread reads, then decodes (`springmass/session/reads.py`). Beside it stand two
+what `springmass record` does: one thread reads, then decodes (`springmass/session/reads.py`). Disturbances it stand two
 with a thread
 for each port that reads what is there and decodes it as it comes: pyserial's own `serial.threaded.ReaderThread`, and
 the leanest such thread that we could write, which leaves out most of what pyserial does around each read.

@@ -44,7 +44,7 @@ def test_one_kilohertz_on_one_port(ports: ModuleType) -> None:
 
 @pytest.mark.parametrize("design", ["OneThread", "LeanThreads"])
 def test_every_sample_is_recorded(ports: ModuleType, design: str, tmp_path: Path) -> None:
-    """Beside a wire log the samples are the same, and the log holds every byte of them."""
+    """Disturbances a wire log the samples are the same, and the log holds every byte of them."""
     log = tmp_path / "run.wire"
     recorded = partial(getattr(ports, design), log=log)
     figures = ports.measure(recorded, ports=4, rate_hz=100.0, seconds=0.3, decode=True, look_s=0.3)

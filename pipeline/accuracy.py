@@ -18,7 +18,7 @@ PRESETS = {
     "fast": replace(
         STANDARD,
         damping=DampingParams(laws=FAST_LAWS, otherwise=DampingParams().laws),
-        beside=DisturbancesParams(modes=False),
+        disturbances=DisturbancesParams(modes=False),
     ),
     "standard": STANDARD,
     "best": replace(STANDARD, full=WaveformParams()),

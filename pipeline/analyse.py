@@ -28,11 +28,11 @@ from pipeline.numerics.regression import correlation_length
 from pipeline.oscillation import condition as conditioning
 from pipeline.oscillation import cycles as cycling
 from pipeline.oscillation import demodulate as demodulation
-from pipeline.oscillation import disturbances as besides
+from pipeline.oscillation import disturbances as separation
 from pipeline.oscillation.condition import Conditioned, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.oscillation.demodulate import Demodulated, demodulate
-from pipeline.oscillation.disturbances import Beside, set_apart
+from pipeline.oscillation.disturbances import Disturbances, separate
 from pipeline.results import derive as derivation
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
@@ -49,7 +49,7 @@ class Params:
 
     Parameters
     ----------
-    condition, cycles, demodulate, beside, damping, phase, derive, relaxation, motion
+    condition, cycles, demodulate, disturbances, damping, phase, derive, relaxation, motion
         Of the stages of those names.
     full : pipeline.motion.waveform_fit.Params, optional
         Of the fit of the whole waveform; None leaves it out.
@@ -58,7 +58,7 @@ class Params:
     condition: conditioning.Params = field(default_factory=conditioning.Params)
     cycles: cycling.Params = field(default_factory=cycling.Params)
     demodulate: demodulation.Params = field(default_factory=demodulation.Params)
-    beside: besides.Params = field(default_factory=besides.Params)
+    disturbances: separation.Params = field(default_factory=separation.Params)
     damping: dampings.Params = field(default_factory=dampings.Params)
     phase: phases.Params = field(default_factory=phases.Params)
     derive: derivation.Params = field(default_factory=derivation.Params)
@@ -78,7 +78,7 @@ class Motion:
     rest: Rest
     waveform: Waveform
     derived: Derived
-    beside: Beside
+    disturbances: Disturbances
     full: FullFit | None = None
 
 
@@ -141,7 +141,7 @@ class Analysis:
         if isinstance(self.motion, NoOscillation):
             raise AnalysisError(f"there is no oscillation to smooth: {self.motion.why}")
         motion = self.motion
-        return smooth(self.track, motion.demodulated, motion.phase, motion.rest, motion.beside)
+        return smooth(self.track, motion.demodulated, motion.phase, motion.rest, motion.disturbances)
 
 
 def analyse(track: Track, scene: Scene | None = None, params: Params | None = None) -> Analysis:
@@ -187,7 +187,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     demodulated = demodulate(conditioned, cycles, params.demodulate)
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
         return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or why)
-    demodulated, beside = set_apart(conditioned, cycles, demodulated, params.beside, params.demodulate)
+    demodulated, disturbances = separate(conditioned, cycles, demodulated, params.disturbances, params.demodulate)
     start = float(track.t[np.argmax(conditioned.used)])
     damping = fit_damping(demodulated, start, params.damping)
     solved = fit_motion(conditioned, demodulated, damping, params.motion, params.damping, stopped=stopped)
@@ -196,24 +196,24 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     if strong and linear and isinstance(relaxed := find_relaxation(conditioned, params.relaxation), Relaxation):
         return _still(track, scene, params, conditioned, relaxed)
     if isinstance(solved, MotionFit):
-        demodulated, beside = solved.windows(demodulated), Beside.nothing(conditioned)
+        demodulated, disturbances = solved.windows(demodulated), Disturbances.nothing(conditioned)
         damping, phase, rest = solved.damping, solved.phase(demodulated), solved.rest(demodulated)
         waveform = solved.waveform
     else:
         phase = fit_phase(demodulated, damping, params.phase)
         rest = fit_rest(demodulated)
-        waveform = reconstruct(beside.conditioned.track, demodulated, phase, rest)
+        waveform = reconstruct(disturbances.conditioned.track, demodulated, phase, rest)
     full = None
     if params.full is not None and not isinstance(solved, MotionFit):
         # The record without modes and with their columns: as good as the whole record with them, for the columns span
         # what was taken out. Values and intervals agree to rounding, and put_back serves both tiers.
-        extra = beside.columns(track.t)
+        extra = disturbances.columns(track.t)
         full = fit_record(
-            beside.conditioned, demodulated, damping, phase, rest, waveform, extra=extra, params=params.full
+            disturbances.conditioned, demodulated, damping, phase, rest, waveform, extra=extra, params=params.full
         )
         demodulated = replace(demodulated, flags=full.flags)
         damping, phase, rest, waveform = full.damping, full.phase, full.rest, full.waveform
-    rest, waveform = beside.put_back(rest, waveform)
+    rest, waveform = rest.stepping(disturbances.steps), waveform.with_disturbances(disturbances, track.t)
     instrument = Instrument.of(track, u_crystal=params.derive.u_clock_nominal)
     effects = tabulate(
         scene,
@@ -222,16 +222,16 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         rest,
         noise_m=demodulated.noise_m,
         instrument=instrument,
-        beside=beside,
+        disturbances=disturbances,
     )
     derived = derive(demodulated, damping, phase, rest, scene, effects, instrument=instrument, params=params.derive)
     findings = by_severity(
-        judge(conditioned, cycles, demodulated, damping, phase, rest, waveform, beside),
+        judge(conditioned, cycles, demodulated, damping, phase, rest, waveform, disturbances),
         judge_scene(scene, effects),
         () if full is None or full.converged else (_not_converged(full),),
         () if solved is None else (_on_solution(solved),),
     )
-    motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived, beside, full)
+    motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived, disturbances, full)
     return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
 
 

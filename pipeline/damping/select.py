@@ -15,7 +15,7 @@ from pipeline.damping.laws import LAWS, Law
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
-from pipeline.oscillation.condition import MAD_TO_SIGMA
+from pipeline.numerics.robust import MAD_TO_SIGMA
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.errors import DynamicsError, SceneError
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.effects import added_mass_kg
 from pipeline.track import F8
 
 __all__ = ["Equation", "Problem", "Real", "effective_mass_kg"]

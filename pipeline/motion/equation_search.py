@@ -15,9 +15,9 @@ from pipeline.damping.select import Damping, LawFit, choose, least_chi2, weigh
 from pipeline.damping.select import Params as DampingParams
 from pipeline.motion.equation_model import COEFFICIENTS, STATE, STEP, FreeMotion
 from pipeline.numerics import least_squares
-from pipeline.numerics.median import median
 from pipeline.numerics.regression import correlation_length
-from pipeline.oscillation.condition import MAD_TO_SIGMA, Conditioned
+from pipeline.numerics.robust import MAD_TO_SIGMA, median
+from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, UNUSABLE
 

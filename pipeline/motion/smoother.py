@@ -14,7 +14,7 @@ from pipeline.motion.rest import Rest
 from pipeline.numerics.random_walk import Chain
 from pipeline.numerics.spectrum import Blocks, smooth_density
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.disturbances import Beside
+from pipeline.oscillation.disturbances import Disturbances
 from pipeline.track import F8, UNUSABLE, Track
 
 __all__ = ["Params", "Smoothed", "smooth"]
@@ -109,7 +109,7 @@ def smooth(
     demodulated: Demodulated,
     phase: PhaseFit,
     rest: Rest,
-    beside: Beside | None = None,
+    disturbances: Disturbances | None = None,
     params: Params | None = None,
 ) -> Smoothed:
     """Estimate the motion at every sample from all samples, each weighted by what it can know.
@@ -123,7 +123,7 @@ def smooth(
     phase : PhaseFit
         Carries the damping law.
     rest : Rest
-    beside : Beside, optional
+    disturbances : Disturbances, optional
         Modes that were taken out.
     params : Params, optional
 
@@ -164,8 +164,8 @@ def smooth(
         raise AnalysisError(f"a smoother needs eight usable samples at least, got {np.count_nonzero(used)}")
     t = track.t[used]
     swing = track.y[used] - rest.at(t)
-    if beside is not None and beside.modelled:
-        swing = swing - beside.sideways.position(t)
+    if disturbances is not None and disturbances.modelled:
+        swing = swing - disturbances.sideways.position(t)
     at = np.where(known, track.t, t[0])
     last, best = float(t[-1]), phase.damping.best
     colour, each = None, list[_Followed]()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.rest import Rest
 from pipeline.oscillation.demodulate import Demodulated
+from pipeline.oscillation.disturbances import Disturbances
 from pipeline.track import F8, UNUSABLE, Track
 
 __all__ = ["Waveform", "reconstruct"]
@@ -34,6 +35,10 @@ class Waveform:
     velocity: F8
     residual: F8
     rms_m: float
+
+    def with_disturbances(self, disturbances: Disturbances, t: F8) -> Waveform:
+        """Return the waveform of the whole record, t (n,) s, from that of the record without its disturbances."""
+        return replace(self, position=self.position + disturbances.position(t)) if disturbances else self
 
 
 def reconstruct(track: Track, demodulated: Demodulated, phase: PhaseFit, rest: Rest) -> Waveform:

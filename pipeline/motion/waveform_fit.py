@@ -18,7 +18,8 @@ from pipeline.motion.waveform_model import Normal, Record, State, accumulate, sc
 from pipeline.motion.waveform_results import refined_phase, refined_rest, refined_waveform
 from pipeline.numerics.estimate import Joint
 from pipeline.numerics.regression import correlation_length
-from pipeline.oscillation.condition import MAD_TO_SIGMA, Conditioned
+from pipeline.numerics.robust import MAD_TO_SIGMA
+from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, UNUSABLE, Quality
 

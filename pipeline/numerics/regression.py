@@ -10,8 +10,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.median import median, median_size
-from pipeline.oscillation.condition import MAD_TO_SIGMA
+from pipeline.numerics.robust import MAD_TO_SIGMA, median, median_size
 from pipeline.track import F8
 
 __all__ = ["Line", "Scatter", "chi2_quantile", "correlation_length", "covariance_of", "scatter", "solve_weighted"]

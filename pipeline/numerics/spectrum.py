@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.median import median
+from pipeline.numerics.robust import median
 from pipeline.track import F8
 
 __all__ = [

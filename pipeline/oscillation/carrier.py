@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.numerics.median import median
-from pipeline.oscillation.condition import MAD_TO_SIGMA
+from pipeline.numerics.robust import MAD_TO_SIGMA, median
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
 

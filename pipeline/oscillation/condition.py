@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.numerics.median import median, median_size
+from pipeline.numerics.robust import MAD_TO_SIGMA, median, median_size
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
 __all__ = ["Conditioned", "Params", "coarsest_step", "condition", "fourth_difference_noise"]
 
 # Variance of y[i-2] - 4 y[i-1] + 6 y[i] - 4 y[i+1] + y[i+2] for unit white noise: 1 + 16 + 36 + 16 + 1.
 FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
-MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4)
 QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
 TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
 CREST_SIGMAS = 3.5

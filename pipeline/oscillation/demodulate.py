@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.oscillation.condition import MAD_TO_SIGMA, Conditioned
+from pipeline.numerics.robust import MAD_TO_SIGMA
+from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.tuning import Tuning, retune, unwrap
 from pipeline.oscillation.windows import Solution, Windows, ranked, solve

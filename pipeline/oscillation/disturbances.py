@@ -1,4 +1,4 @@
-"""Beside: what a real record holds beside the main oscillation, found and taken out where it would do harm."""
+"""Disturbances: what a real record holds beside the main oscillation, found and taken out where it would do harm."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.motion.rest import Rest
-from pipeline.motion.waveform import Waveform
 from pipeline.oscillation import sideways as swings
 from pipeline.oscillation import steps as jumps
 from pipeline.oscillation.condition import Conditioned
@@ -20,14 +18,14 @@ from pipeline.oscillation.sideways import find_sideways, without
 from pipeline.oscillation.steps import Step, find_steps, staircase, unstepped, weighed
 from pipeline.track import F8
 
-__all__ = ["Beside", "Params", "set_apart"]
+__all__ = ["Disturbances", "Params", "separate"]
 
 SHARE = 0.1  # of the uncertainty that an effect may disturb without being modelled
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Options of :func:`set_apart`.
+    """Options of :func:`separate`.
 
     Parameters
     ----------
@@ -46,7 +44,7 @@ class Params:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Beside:
+class Disturbances:
     """What was found beside the main oscillation.
 
     Parameters
@@ -70,7 +68,7 @@ class Beside:
     steps: tuple[Step, ...]
 
     @classmethod
-    def nothing(cls, conditioned: Conditioned) -> Beside:
+    def nothing(cls, conditioned: Conditioned) -> Disturbances:
         """Return what says that nothing was found, or sought."""
         return cls(conditioned, Sideways((), None), False, 0.0, ())
 
@@ -85,24 +83,19 @@ class Beside:
         parts.extend((t >= step.time.value).astype(np.float64)[:, None] for step in self.steps)
         return np.concatenate(parts, axis=1)
 
-    def put_back(self, rest: Rest, waveform: Waveform) -> tuple[Rest, Waveform]:
-        """Return rest position and waveform of the whole record from those of the record without."""
-        if not self:
-            return rest, waveform
-        t = self.conditioned.track.t
+    def position(self, t: F8) -> F8:
+        """(n,): what was taken out, m, at times t (n,), s."""
         added = staircase(self.steps, t)
-        if self.modelled:
-            added = added + self.sideways.position(t)
-        return rest.stepping(self.steps), replace(waveform, position=waveform.position + added)
+        return added + self.sideways.position(t) if self.modelled else added
 
 
-def set_apart(
+def separate(
     conditioned: Conditioned,
     cycles: Cycles,
     demodulated: Demodulated,
     params: Params | None = None,
     demodulation: Demodulation | None = None,
-) -> tuple[Demodulated, Beside]:
+) -> tuple[Demodulated, Disturbances]:
     """Look for modes and steps, and demodulate again without them.
 
     Parameters
@@ -116,7 +109,7 @@ def set_apart(
     -------
     demodulated : Demodulated
         Of the record without what was found; as given where nothing was.
-    beside : Beside
+    disturbances : Disturbances
 
     Notes
     -----
@@ -144,7 +137,7 @@ def set_apart(
         demodulated = demodulate(unstepped(whole, steps), cycles, demodulation)
         steps, demodulated = weighed(steps, demodulated)
         cleared = unstepped(whole, steps)
-    return demodulated, Beside(cleared, sideways, modelled, leak_m, steps)
+    return demodulated, Disturbances(cleared, sideways, modelled, leak_m, steps)
 
 
 def _u_amplitude(demodulated: Demodulated) -> float:

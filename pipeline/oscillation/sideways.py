@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.median import median_size
+from pipeline.numerics.robust import MAD_TO_SIGMA, median_size
 from pipeline.numerics.spectrum import Band, Blocks, Peak, false_alarm, spectral_density, strongest, worth_a_look
 from pipeline.oscillation.carrier import Carrier
-from pipeline.oscillation.condition import MAD_TO_SIGMA, Conditioned
+from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.modes import Mode, Sideways
 from pipeline.track import F8, UNUSABLE

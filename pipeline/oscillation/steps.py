@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.median import median, median_size
 from pipeline.numerics.regression import correlation_length, solve_weighted
+from pipeline.numerics.robust import MAD_TO_SIGMA, median, median_size
 from pipeline.oscillation.carrier import Carrier
-from pipeline.oscillation.condition import MAD_TO_SIGMA, Conditioned
+from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, UNUSABLE
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.median import median
+from pipeline.numerics.robust import median
 from pipeline.oscillation.condition import Conditioned
 from pipeline.track import F8
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.bench.added_mass import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping.fitted_law import mean_squared_rate
@@ -17,13 +18,12 @@ from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.rest import Rest
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.median import median_size
-from pipeline.oscillation.condition import MAD_TO_SIGMA
+from pipeline.numerics.robust import MAD_TO_SIGMA, median_size
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Budgets, Inputs, added, estimate_of, linear, product
 from pipeline.results.curves import Curve, drag_curve, energy_curve
-from pipeline.results.effects import ADDED_MASS_SHAPE, Effect
+from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality
 
 __all__ = ["Derived", "Params", "derive"]

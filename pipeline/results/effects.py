@@ -10,20 +10,20 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.bench.air import air_density, air_viscosity, speed_of_sound
+from pipeline.bench.added_mass import added_mass_kg, scene_air_density
+from pipeline.bench.air import air_viscosity, speed_of_sound
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.rest import Rest
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.disturbances import Beside
+from pipeline.oscillation.disturbances import Disturbances
 
-__all__ = ["ADDED_MASS_SHAPE", "Effect", "added_mass_kg", "tabulate"]
+__all__ = ["Effect", "tabulate"]
 
 SHARE = 0.1  # of the uncertainty that an effect would disturb
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
-ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc: added mass over rho a^3
 STEEL_KG_PER_M3 = 7850.0
 STEADY_DISC_DRAG = 1.17  # drag coefficient of a disc broadside on in steady flow, Re > 1000
 
@@ -54,18 +54,6 @@ class Effect:
     why: str
 
 
-def added_mass_kg(scene: Scene) -> float:
-    """Mass of air that a thin disc carries along broadside on, :math:`(8/3)\\rho a^3`, kg.
-
-    References
-    ----------
-    H. Lamb, "Hydrodynamics", 6th ed., Cambridge 1932, art. 102.
-    """
-    if scene.disc_diameter_m is None:
-        return 0.0
-    return ADDED_MASS_SHAPE * _density(scene) * (0.5 * scene.disc_diameter_m.value) ** 3
-
-
 def tabulate(
     scene: Scene,
     damping: Damping,
@@ -74,7 +62,7 @@ def tabulate(
     *,
     noise_m: float,
     instrument: Instrument,
-    beside: Beside | None = None,
+    disturbances: Disturbances | None = None,
 ) -> tuple[Effect, ...]:
     """Return the effects table.
 
@@ -86,7 +74,7 @@ def tabulate(
         Standard deviation of one sample, m.
     instrument : Instrument
         Clock and scale of the sensor.
-    beside : Beside, optional
+    disturbances : Disturbances, optional
         Modes beside the main oscillation; left out, they were not sought.
     """
     omega = phase.angular_frequency
@@ -98,18 +86,10 @@ def tabulate(
         *_drags(scene, damping, omega.value),
         _backbone(phase, damping),
         _rest_drift(rest, noise_m),
-        *_modes(beside),
+        *_modes(disturbances),
         _buoyancy(scene, omega.value),
         _speed_of_sound(scene, instrument),
         _clock_rate(instrument),
-    )
-
-
-def _density(scene: Scene) -> float:
-    return air_density(
-        _value(scene.air_temperature_c, 20.0),
-        _value(scene.air_pressure_pa, 101325.0),
-        _value(scene.air_relative_humidity, 0.5),
     )
 
 
@@ -163,7 +143,7 @@ def _drags(scene: Scene, damping: Damping, omega: float) -> Iterator[Effect]:
         radius, mass = 0.5 * scene.disc_diameter_m.value, scene.bob_mass_kg.value
         # Creeping flow past a disc broadside on: F = 16 eta a v.
         predicted_gamma = 8.0 * air_viscosity(_value(scene.air_temperature_c, 20.0)) * radius / mass
-        b = 0.5 * STEADY_DISC_DRAG * _density(scene) * math.pi * radius**2
+        b = 0.5 * STEADY_DISC_DRAG * scene_air_density(scene) * math.pi * radius**2
         predicted_beta = 4.0 * b * omega / (3.0 * math.pi * mass)
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
     yield Effect("quadratic_drag", predicted_beta, beta, "1/(m s)", beta is not None, chosen)
@@ -198,25 +178,25 @@ def _rest_drift(rest: Rest, noise_m: float) -> Effect:
     return Effect("rest_drift", None, rest.range_m, "m", True, why)
 
 
-def _modes(beside: Beside | None) -> Iterator[Effect]:
+def _modes(disturbances: Disturbances | None) -> Iterator[Effect]:
     """A mode of its own frequency, and what turns with the main oscillation or with both."""
-    found = () if beside is None else beside.sideways.modes
+    found = () if disturbances is None else disturbances.sideways.modes
     own = [mode for mode in found if mode.kind == "mode"]
     locked = [mode for mode in found if mode.kind != "mode"]
     names = (("sideways_mode", own, "mode of a frequency of its own"), ("harmonics", locked, "harmonic or product"))
     for name, members, what in names:
-        if beside is None or beside.sideways.carrier is None:
+        if disturbances is None or disturbances.sideways.carrier is None:
             yield Effect(name, None, None, "m", False, "not sought: too few periods, or not at this accuracy")
         elif not members:
             yield Effect(name, None, None, "m", False, f"no {what} stands out of what the main oscillation leaves")
         else:
             size = math.sqrt(sum(mode.amplitude.value**2 for mode in members))
-            verdict = "more" if beside.modelled else "less"
+            verdict = "more" if disturbances.modelled else "less"
             why = (
                 f"{_count(len(members), what)}, together of this amplitude; the strongest line found would leave up to "
-                f"{beside.leak_m * 1e3:.2g} mm in the main amplitude, {verdict} than a tenth of its uncertainty"
+                f"{disturbances.leak_m * 1e3:.2g} mm in the main amplitude, {verdict} than a tenth of its uncertainty"
             )
-            yield Effect(name, None, size, "m", beside.modelled, why)
+            yield Effect(name, None, size, "m", disturbances.modelled, why)
 
 
 def _count(number: int, what: str) -> str:
@@ -224,7 +204,7 @@ def _count(number: int, what: str) -> str:
 
 
 def _buoyancy(scene: Scene, omega: float) -> Effect:
-    shift = _density(scene) / STEEL_KG_PER_M3 * 9.81 / omega**2
+    shift = scene_air_density(scene) / STEEL_KG_PER_M3 * 9.81 / omega**2
     why = "a constant force: it moves the rest position (a steel bob's by this much) and nothing else"
     return Effect("buoyancy", shift, None, "m", False, why)
 

@@ -19,7 +19,7 @@ from pipeline.motion.waveform import Waveform
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import Cycles, NoOscillation
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.disturbances import Beside
+from pipeline.oscillation.disturbances import Disturbances
 from pipeline.oscillation.echoes import Clusters, find_clusters
 from pipeline.track import U8, UNUSABLE, Quality
 
@@ -113,20 +113,20 @@ def judge(
     phase: PhaseFit,
     rest: Rest,
     waveform: Waveform,
-    beside: Beside | None = None,
+    disturbances: Disturbances | None = None,
 ) -> tuple[Finding, ...]:
     """Return every finding on a run that oscillates, the gravest first.
 
     Parameters
     ----------
-    conditioned, cycles, demodulated, damping, phase, rest, waveform, beside
+    conditioned, cycles, demodulated, damping, phase, rest, waveform, disturbances
         Outputs of the stages of those names.
     """
     clusters = find_clusters(demodulated, lambda rows: phase.total(conditioned.track.t[rows]))
     findings = [
         *_damping_findings(damping),
         *_motion_findings(cycles, demodulated, phase, rest, waveform),
-        *_mode_findings(demodulated, phase, beside),
+        *_mode_findings(demodulated, phase, disturbances),
         *judge_samples(conditioned, demodulated.flags, demodulated.noise_m, clusters),
     ]
     return by_severity(findings)
@@ -289,9 +289,9 @@ def _motion_findings(
         )
 
 
-def _mode_findings(demodulated: Demodulated, phase: PhaseFit, beside: Beside | None) -> Iterator[Finding]:
-    own = [] if beside is None else [mode for mode in beside.sideways.modes if mode.kind == "mode"]
-    if beside is None or not own:
+def _mode_findings(demodulated: Demodulated, phase: PhaseFit, disturbances: Disturbances | None) -> Iterator[Finding]:
+    own = [] if disturbances is None else [mode for mode in disturbances.sideways.modes if mode.kind == "mode"]
+    if disturbances is None or not own:
         return
     main = phase.angular_frequency.value / (2.0 * math.pi)
     mode = own[0]
@@ -303,10 +303,10 @@ def _mode_findings(demodulated: Demodulated, phase: PhaseFit, beside: Beside | N
     fate = "they were" if others else "it was"
     yield Finding(
         "sideways_mode",
-        "warning" if beside.modelled and share > 0.01 else "info",
+        "warning" if disturbances.modelled and share > 0.01 else "info",
         f"a second mode of {mode.amplitude.value * 1e3:.2g} mm at {f:.4g} Hz beats with the oscillation every "
         f"{1.0 / abs(f - main):.2g} s{pendulum}{others}; "
-        + (f"{fate} fitted along" if beside.modelled else f"{fate} left in, too small to disturb the amplitude"),
+        + (f"{fate} fitted along" if disturbances.modelled else f"{fate} left in, too small to disturb the amplitude"),
     )
 
 

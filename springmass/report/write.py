@@ -66,7 +66,7 @@ def write_report(
 
     Notes
     -----
-    Beside the page: ``results.json`` (``summary``, else one object for one run and a list for several; what is no
+    Disturbances the page: ``results.json`` (``summary``, else one object for one run and a list for several; what is no
     number is null), ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, ``motion.csv`` of each run that
     oscillates, and ``figures/`` with every figure as SVG and PDF. Names of figures and motions begin with their run's
     where there are several.

@@ -189,20 +189,20 @@ def test_halves_of_a_run_agree_with_the_whole(name: str) -> None:
 def test_every_bob_swings_sideways(name: str) -> None:
     """Each run holds a second mode at 0.58 to 0.61 of the main frequency: a pendulum of 0.33 to 0.4 m, the bench's."""
     motion = motion_of(analysed(name))
-    mode = motion.beside.sideways.modes[0]
+    mode = motion.disturbances.sideways.modes[0]
     main = motion.phase.angular_frequency.value / (2 * np.pi)
     assert mode.kind == "mode"
     assert mode.false_alarm < 0.005
     assert 0.58 < mode.frequency.value / main < 0.61
     assert 0.33 < 9.81 / (2 * np.pi * mode.frequency.value) ** 2 < 0.40
     assert "sideways_mode" in codes(analysed(name))
-    assert motion.beside.modelled
+    assert motion.disturbances.modelled
 
 
 def test_disc_without_its_swing_is_six_times_sharper() -> None:
     """Amplitudes of the disc run scatter by 0.54 mm with the sideways mode of 0.96 mm, by under 0.12 mm without it."""
     motion = motion_of(analysed(DISC))
-    assert motion.beside.sideways.modes[0].amplitude.value == pytest.approx(9.6e-4, rel=0.05)
+    assert motion.disturbances.sideways.modes[0].amplitude.value == pytest.approx(9.6e-4, rel=0.05)
     assert motion.damping.scatter.excess < 1.2e-4
     assert motion.damping.fits["linear"].reduced_chi2 > 30
     assert motion.damping.fits["quadratic"].reduced_chi2 > 30

@@ -9,11 +9,11 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.motion.overdamped.decay_fit import DecayFit
 from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.cycles import NoOscillation
-from pipeline.results.effects import added_mass_kg
 
 __all__ = ["Kind", "Relaxation", "described", "spring_constant"]
 

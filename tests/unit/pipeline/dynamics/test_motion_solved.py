@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import INTEGRATORS, Equation, Problem, effective_mass_kg, get_integrator
 from pipeline.dynamics.choose import AUTO, choose, fit_step, least_tolerance
@@ -14,7 +15,6 @@ from pipeline.dynamics.integrators.averaged import amplitude, stopping_time
 from pipeline.dynamics.stability_map import limits, runs_bounded
 from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError, SceneError
-from pipeline.results.effects import added_mass_kg
 from springmass.session.simulated_bench import REST_M, bench_position
 
 BENCH = {

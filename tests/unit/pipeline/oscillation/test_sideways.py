@@ -11,7 +11,7 @@ from pipeline.analyse import Motion, analyse
 from pipeline.oscillation.condition import Conditioned, condition
 from pipeline.oscillation.cycles import Cycles, find_cycles
 from pipeline.oscillation.demodulate import Demodulated, demodulate
-from pipeline.oscillation.disturbances import set_apart
+from pipeline.oscillation.disturbances import separate
 from pipeline.oscillation.modes import Sideways
 from pipeline.oscillation.sideways import Params, find_sideways, without
 from pipeline.track import Track
@@ -140,7 +140,7 @@ def test_amplitudes_scatter_less_without_the_mode(synthetic: ModuleType) -> None
     alone = analyse(Track.from_arrays(t, clean)).motion
     assert isinstance(beating, Motion)
     assert isinstance(alone, Motion)
-    assert beating.beside.modelled
+    assert beating.disturbances.modelled
     assert beating.derived.statistical["period"].u < 1.3 * alone.derived.statistical["period"].u
     assert beating.waveform.rms_m < 1.05 * alone.waveform.rms_m
     # The fitted position is the whole distance: main oscillation, rest and mode.
@@ -155,9 +155,9 @@ def test_mode_that_disturbs_nothing_stays(synthetic: ModuleType) -> None:
     t = synthetic.times(120.0)
     y = synthetic.noisy(synthetic.Truth(gamma=0.01463), t, 3e-3, 1) + 7e-4 * np.cos(2 * np.pi * 4.1 * t)
     conditioned, cycles, demodulated = stages(t, y)
-    after, beside = set_apart(conditioned, cycles, demodulated)
-    assert beside.sideways
-    assert not beside.modelled
-    assert not beside
+    after, disturbances = separate(conditioned, cycles, demodulated)
+    assert disturbances.sideways
+    assert not disturbances.modelled
+    assert not disturbances
     assert after is demodulated
-    assert beside.columns(t).shape == (t.size, 0)
+    assert disturbances.columns(t).shape == (t.size, 0)

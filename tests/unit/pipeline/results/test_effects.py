@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import analyse
+from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping.select import fit_damping
@@ -17,7 +18,7 @@ from pipeline.motion.phase import fit_phase
 from pipeline.motion.rest import fit_rest
 from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.results.effects import Effect, added_mass_kg, tabulate
+from pipeline.results.effects import Effect, tabulate
 from pipeline.track import Track
 
 Windows = Callable[..., Demodulated]

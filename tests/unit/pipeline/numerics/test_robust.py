@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.numerics.median import median, median_size
+from pipeline.numerics.robust import median, median_size
 
 
 @given(st.lists(st.floats(-1e150, 1e150), min_size=1, max_size=40))

@@ -65,7 +65,9 @@ def rarely(count: int) -> bool:
 @pytest.mark.parametrize("seconds", [10.0, 60.0])
 def test_nothing_is_found_where_nothing_is(synthetic: ModuleType, seconds: float, law: str, rho: float) -> None:
     """At most 1 % of clean records show a mode, and at most 1 % a step, in white noise and in correlated."""
-    found = [(bool(m.beside.sideways), bool(m.rest.steps)) for m, _ in motions(synthetic, seconds, law=law, rho=rho)]
+    found = [
+        (bool(m.disturbances.sideways), bool(m.rest.steps)) for m, _ in motions(synthetic, seconds, law=law, rho=rho)
+    ]
     modes, steps = np.sum(found, axis=0)
     print(f"{seconds:g} s, {law}, rho {rho}: of {TRIALS} records {modes} show a mode, {steps} a step")
     assert rarely(modes)
@@ -77,7 +79,7 @@ def test_nothing_is_found_where_nothing_is(synthetic: ModuleType, seconds: float
 def test_what_is_there_is_found(synthetic: ModuleType, seconds: float, rho: float) -> None:
     """A mode of 0.5 mm and two steps of 1.5 mm in 0.3 mm of noise are found in 95 % of records, one at a time."""
     modes = sum(
-        any(abs(x.frequency.value - 0.803) < 1.0 / seconds for x in m.beside.sideways.modes if x.kind == "mode")
+        any(abs(x.frequency.value - 0.803) < 1.0 / seconds for x in m.disturbances.sideways.modes if x.kind == "mode")
         for m, _ in motions(synthetic, seconds, rho=rho, mode_m=5e-4)
     )
     steps = sum(len(m.rest.steps) == 2 for m, _ in motions(synthetic, seconds, rho=rho, steps=(1.5e-3, -1.5e-3)))

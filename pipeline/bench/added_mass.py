@@ -1,0 +1,36 @@
+"""Added mass: the air that a disc carries along."""
+
+from __future__ import annotations
+
+from pipeline.bench.air import air_density
+from pipeline.bench.scene import Scene
+from pipeline.numerics.estimate import Estimate
+
+__all__ = ["ADDED_MASS_SHAPE", "added_mass_kg", "scene_air_density"]
+
+ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc: added mass over rho a^3
+
+
+def added_mass_kg(scene: Scene) -> float:
+    """Mass of air that a thin disc carries along broadside on, :math:`(8/3)\\rho a^3`, kg.
+
+    References
+    ----------
+    H. Lamb, "Hydrodynamics", 6th ed., Cambridge 1932, art. 102.
+    """
+    if scene.disc_diameter_m is None:
+        return 0.0
+    return ADDED_MASS_SHAPE * scene_air_density(scene) * (0.5 * scene.disc_diameter_m.value) ** 3
+
+
+def scene_air_density(scene: Scene) -> float:
+    """Return the density of a scene's air, kg/m^3; where it says nothing, of air at 20 degC, 101,325 Pa and 50 %."""
+    return air_density(
+        _value(scene.air_temperature_c, 20.0),
+        _value(scene.air_pressure_pa, 101325.0),
+        _value(scene.air_relative_humidity, 0.5),
+    )
+
+
+def _value(estimate: Estimate | None, otherwise: float) -> float:
+    return otherwise if estimate is None else estimate.value
