@@ -236,7 +236,7 @@ def read_scene(path: str | Path) -> Scene:
 
 def sample_data() -> Path:
     """Return the folder of the bundled recordings: inside an installed package, beside a checkout's."""
-    here = Path(__file__).resolve().parent
+    here = Path(__file__).resolve().parent.parent
     for folder in (here / "sample_data", here.parent / "sample_data"):
         if (folder / "undamped_simulated_position.txt").is_file():
             return folder

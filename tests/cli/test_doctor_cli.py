@@ -84,7 +84,7 @@ def test_a_missing_library_is_found(cli: Cli, monkeypatch: pytest.MonkeyPatch) -
 
 def test_missing_recordings_are_found(cli: Cli, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """An installation without its bundled files says so."""
-    monkeypatch.setattr("springmass.runs.loading.__file__", str(tmp_path / "springmass" / "loading.py"))
+    monkeypatch.setattr("springmass.runs.loading.__file__", str(tmp_path / "springmass" / "runs" / "loading.py"))
     done = cli("doctor")
     assert done.code == 1
     assert "FAIL  bundled recordings" in done.out

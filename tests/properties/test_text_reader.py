@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from acquisition.errors import FormatError
 from acquisition.recordings.families.motion_sensor import FORMAT
 from acquisition.recordings.recording import Recording
-from acquisition.recordings.tables import cells, table_module
+from acquisition.recordings.tables import cells
+from acquisition.recordings.tables import table as table_module
 from acquisition.recordings.tables.fixed_point import Page
 from acquisition.recordings.tables.line_pages import Lines
 from acquisition.recordings.tables.table import Table, read_table
