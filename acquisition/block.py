@@ -9,12 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["B1", "F8", "I8", "U8", "Block", "Flag", "concatenate"]
+__all__ = ["B1", "F8", "I8", "U8", "UNITS", "Block", "Flag", "concatenate"]
 
 B1 = NDArray[np.bool_]
 F8 = NDArray[np.float64]
 I8 = NDArray[np.int64]
 U8 = NDArray[np.uint8]
+
+UNITS = {"length": "m", "angle": "rad", "voltage": "V", "acceleration": "m/s^2"}
+"""What a sample may be of, and the one SI unit that it is then in. `pipeline.track.UNITS` is the same table."""
 
 
 class Flag(enum.IntFlag):
@@ -50,6 +53,14 @@ class Block:
         Host clock at which each sample arrived; None where no host was there (an old file).
     velocity : (n,) float64, m/s, or None
         Velocity as the recording states it, where it states one; NaN where it does not.
+    quantity, unit : str
+        What ``distance`` holds, of :data:`UNITS`; every source of today gives a length in metres. A velocity is per
+        second of the same unit.
+
+    Raises
+    ------
+    ValueError
+        If the quantity is not of the table, or in another unit.
     """
 
     first: int
@@ -58,6 +69,13 @@ class Block:
     flags: U8
     host_ns: I8 | None = None
     velocity: F8 | None = None
+    quantity: str = "length"
+    unit: str = "m"
+
+    def __post_init__(self) -> None:
+        if UNITS.get(self.quantity) != self.unit:
+            known = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
+            raise ValueError(f"a block holds one of {known}, got {self.quantity} in {self.unit}; convert to SI first")
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -75,6 +93,8 @@ class Block:
             self.flags[cut],
             None if self.host_ns is None else self.host_ns[cut],
             None if self.velocity is None else self.velocity[cut],
+            self.quantity,
+            self.unit,
         )
 
 
@@ -83,11 +103,18 @@ def concatenate(blocks: Iterable[Block]) -> Block:
 
     A column that some blocks lack is filled there: velocity with NaN, host time with -1. No block at all
     gives an empty one.
+
+    Raises
+    ------
+    ValueError
+        If they are not of one quantity.
     """
     parts = list(blocks)
     if not parts:
         empty = np.empty(0)
         return Block(0, empty, empty, np.empty(0, np.uint8))
+    if len(quantities := {b.quantity for b in parts}) > 1:
+        raise ValueError(f"blocks of one quantity are joined, got {', '.join(sorted(quantities))}; keep them apart")
     host = velocity = None
     if any(b.host_ns is not None for b in parts):
         host = np.concatenate([b.host_ns if b.host_ns is not None else np.full(len(b), -1) for b in parts])
@@ -100,4 +127,6 @@ def concatenate(blocks: Iterable[Block]) -> Block:
         np.concatenate([b.flags for b in parts]),
         host,
         velocity,
+        parts[0].quantity,
+        parts[0].unit,
     )

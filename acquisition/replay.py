@@ -259,7 +259,7 @@ class Replay:
             self._segment += 1
             flags = flags.copy()
             flags[0] |= Flag.GAP_BEFORE.value
-        block = Block(self._delivered, part.t, part.distance, flags, part.host_ns, part.velocity)
+        block = replace(part, first=self._delivered, flags=flags)
         self._delivered += len(part)
         self._next = stop
         return block

@@ -162,6 +162,8 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     ------
     AnalysisError
         If fewer than eight samples are usable.
+    TrackError
+        If the track is no length.
 
     Examples
     --------
@@ -171,6 +173,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     >>> print(analyse(Track.from_arrays(t, y)).estimates["period"])  # 2 pi / 8.3 = 0.757010
     0.757011 +- 0.000022 s
     """
+    track.demand_length()
     scene, params = scene or Scene(), params or Params()
     if track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)

@@ -1,4 +1,4 @@
-"""The pipeline's border: a track is one run as plain arrays, in metres and seconds."""
+"""The pipeline's border: a track is one run as plain arrays, in SI units."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipeline.errors import TrackError
 
-__all__ = ["F8", "U8", "Quality", "Track"]
+__all__ = ["F8", "U8", "UNITS", "Quality", "Track"]
 
 F8 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
+
+UNITS = {"length": "m", "angle": "rad", "voltage": "V", "acceleration": "m/s^2"}
+"""What a track may be of, and the one SI unit that it is then in: `acquisition.block.UNITS`, held equal by a test."""
 
 
 class Quality(enum.IntFlag):
@@ -70,6 +73,13 @@ class Track:
         Relative standard uncertainty of the distances' scale from a calibration; 0 where none was made.
     u_offset_m : float
         Standard uncertainty of their zero from a calibration, m; 0 where none was made.
+    quantity, unit : str
+        What ``y`` holds, of :data:`UNITS`. Every stage of today takes a length in metres, see :meth:`demand_length`.
+
+    Raises
+    ------
+    TrackError
+        If the quantity is not of the table, or in another unit.
     """
 
     t: F8
@@ -87,9 +97,26 @@ class Track:
     speed_of_sound_m_per_s: float | None = None
     u_scale: float = 0.0
     u_offset_m: float = 0.0
+    quantity: str = "length"
+    unit: str = "m"
+
+    def __post_init__(self) -> None:
+        if UNITS.get(self.quantity) != self.unit:
+            known = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
+            raise TrackError(f"a track holds one of {known}, got {self.quantity} in {self.unit}; convert to SI first")
 
     def __len__(self) -> int:
         return int(self.t.size)
+
+    def demand_length(self) -> None:
+        """Refuse what is no length: the stages state metres, N/m and kg, which would be wrong of an angle.
+
+        Raises
+        ------
+        TrackError
+        """
+        if self.quantity != "length":
+            raise TrackError(f"an analysis takes a length in m so far, got {self.quantity} in {self.unit}")
 
     @classmethod
     def from_arrays(
@@ -102,6 +129,8 @@ class Track:
         sigma_m: float | None = None,
         quantum_m: float | None = None,
         kind: str = "replay",
+        quantity: str = "length",
+        unit: str = "m",
     ) -> Track:
         """Make a track of anything array-like.
 
@@ -117,12 +146,15 @@ class Track:
             As the attributes.
         kind : str
             "live", "replay" or "simulated".
+        quantity, unit : str
+            What ``y`` holds.
 
         Raises
         ------
         TrackError
             If the arrays are not one-dimensional or of different lengths, if fewer than two samples are
-            there, or if the rate, sigma_m or quantum_m is not positive and finite.
+            there, if the rate, sigma_m or quantum_m is not positive and finite, or if the quantity is none of
+            :data:`UNITS`.
 
         Examples
         --------
@@ -149,4 +181,4 @@ class Track:
         for name, value in (("rate_hz", rate_hz), ("sigma_m", sigma_m), ("quantum_m", quantum_m)):
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise TrackError(f"{name} must be positive and finite, got {value}; leave it out where it is not known")
-        return cls(t_s, y_m, bits, float(rate_hz), sigma_m, quantum_m, kind=kind)
+        return cls(t_s, y_m, bits, float(rate_hz), sigma_m, quantum_m, kind=kind, quantity=quantity, unit=unit)

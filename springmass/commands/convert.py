@@ -56,6 +56,12 @@ def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
             f"got {out.suffix or 'no suffix'}",
             USAGE,
         )
+    if loaded.samples.quantity != "length":
+        raise ProgramError(
+            f"{out}: this form holds a length in m, got {loaded.samples.quantity} in {loaded.samples.unit}; "
+            f"write a run file, one of {', '.join(RUN_SUFFIXES)}",
+            USAGE,
+        )
     start_time = str(loaded.provenance.get("start_time", ""))
     written = writer(str(loaded.path), loaded.samples, loaded.info, loaded.title, start_time)
     targets = [_beside(out, added) for added, _ in written.files]

@@ -43,7 +43,8 @@ def run(options: argparse.Namespace) -> int:
             )
             print(f"{path}: replayed from {loaded.path}", file=sys.stderr)
             return OK
-        print("time_s\tdistance_m\tflags")
+        samples = loaded.samples
+        print("time_s", "distance_m" if samples.quantity == "length" else samples.quantity, "flags", sep="\t")
         for block in source:
             for t, distance, flags in zip(block.t, block.distance, block.flags, strict=True):
                 shown = "NaN" if np.isnan(distance) else f"{distance:.6f}"

@@ -185,6 +185,8 @@ def to_track(
         clock=info.clock,
         kind=info.kind,
         velocity=samples.velocity,
+        quantity=samples.quantity,
+        unit=samples.unit,
         **_clock_comparison(samples, info),
         **_scale(recorded_format, sensor or {}),
     )

@@ -51,6 +51,9 @@ class Header:
         What was seen on reading.
     malformed_rows : int
         Rows that were not samples.
+    quantity, unit : str
+        What the samples are of, as in :class:`acquisition.block.Block`; empty in files from before it was written,
+        which hold a length in metres.
     """
 
     info: SourceInfo
@@ -66,6 +69,8 @@ class Header:
     traps: tuple[Trap, ...] = ()
     malformed_rows: int = 0
     provenance: Mapping[str, Any]
+    quantity: str = ""
+    unit: str = ""
 
     def encode(self) -> bytes:
         """Return the canonical JSON text.
@@ -76,6 +81,8 @@ class Header:
             If the scene or the provenance holds what JSON cannot: an object, NaN, an infinity.
         """
         content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        if not self.quantity:
+            del content["quantity"], content["unit"]  # an older file's text, and digest, come back as they were
         return json_text({"schema": SCHEMA, **content}).encode("ascii")
 
     @classmethod

@@ -6,10 +6,11 @@
     /entry                NXentry @default=signal; title, start_time where known
     /entry/signal         NXdata @signal=distance @axes=[time] @kind; on the dimension ``time``:
         time              f8 s, elapsed; @epoch says when t = 0 was, @clock where the times come from
-        distance          f8 m @ancillary_variables
+        distance          f8 m @ancillary_variables @quantity
         distance_errors   f4 m, standard deviation; only where the source knows it, NaN where unmeasured
         quality           u1 @flag_masks @flag_meanings
         velocity          f8 m/s; only where the recording states one
+                          (of another quantity than a length: in that unit, and in that unit per second)
     /entry/instrument     name, kind, clock, rate_hz, quantum_m, sigma_m, stated_error_m
     /entry/scene          @json: the scene's tables
     /entry/provenance     @software @version @configuration @traps ...; header, see below
@@ -218,7 +219,12 @@ def column_attributes(column: Column, header: Header) -> dict[str, Any]:
     if column.name == "time":
         found["clock"] = header.info.clock
         found["epoch"] = _text(header, "start_time") or "unknown"
+    if header.quantity not in ("", "length") and column.attributes.get("units") in ("m", "m/s"):
+        found["units"] = header.unit + column.attributes["units"].removeprefix("m")
+        found["long_name"] = column.attributes["long_name"].replace("distance from the sensor", header.quantity)
     if column.name == "distance":
+        if header.quantity:
+            found["quantity"] = header.quantity
         beside = ("distance_errors", "quality")
         found["ancillary_variables"] = " ".join(name for name in beside if name in header.columns)
     return found

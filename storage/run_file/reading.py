@@ -35,6 +35,7 @@ from storage.errors import NotARun, damaged, reading
 from storage.run_file import layout
 from storage.run_file import verification as verify
 from storage.run_file.handle import Contents, open_contents
+from storage.run_file.header import Header
 from storage.run_file.layout import CHUNK
 
 if TYPE_CHECKING:
@@ -225,7 +226,7 @@ class Run:
                 values[name] = column[:]
             # Fletcher's sum of zeros is zero: only a digest tells a chunk of zeros from one that was lost.
             digests = digests or (column.compression is None and _has_empty_chunk(values[name], column.chunks))
-        block = _block(header.first, values)
+        block = _block(header, header.first, values)
         if digests:
             self.check(block)
         return block
@@ -347,7 +348,7 @@ class _Blocks:
             if start + step >= samples:
                 for name, digest in digests.items():
                     run.check(name, digest.hexdigest())
-            read = _block(run.header.first + start, values)
+            read = _block(run.header, run.header.first + start, values)
             for row in range(0, len(read), self.size):
                 yield read[row : row + self.size]
 
@@ -368,6 +369,7 @@ _BLOCK_COLUMNS = {
 }
 
 
-def _block(first: int, values: Mapping[str, NDArray[Any]]) -> Block:
+def _block(header: Header, first: int, values: Mapping[str, NDArray[Any]]) -> Block:
     fields: dict[str, Any] = {_BLOCK_COLUMNS[n]: array for n, array in values.items() if n in _BLOCK_COLUMNS}
-    return Block(first, **fields)
+    # Files from before the quantity was written hold lengths.
+    return Block(first, **fields, quantity=header.quantity or "length", unit=header.unit or "m")

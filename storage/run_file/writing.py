@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import Block, concatenate
+from acquisition.block import UNITS, Block, concatenate
 from acquisition.recordings.recording import Original, Trap
 from acquisition.source import SourceInfo
 from storage.atomic import whole_h5, writing_h5
@@ -91,8 +91,9 @@ def write_run(
     RunExists
         If a file stands there and may not be replaced; no block has been asked for then.
     WriteFailed
-        If the file cannot be written, blocks do not follow each other, or the scene or the provenance holds
-        what JSON cannot. What the iterable of blocks raises passes through. What stood there before stands.
+        If the file cannot be written, blocks do not follow each other or hold two quantities, or the scene or the
+        provenance holds what JSON cannot. What the iterable of blocks raises passes through. What stood there before
+        stands.
     """
     path = Path(path)
     with whole_h5(path, overwrite=overwrite, libver=layout.LIBVER) as file:
@@ -114,6 +115,8 @@ def write_run(
             traps=tuple(traps),
             malformed_rows=malformed_rows,
             provenance=provenance or {},
+            quantity=columns.quantity,
+            unit=UNITS[columns.quantity],
         )
         with writing_h5(path):
             _write_originals(file, originals)
@@ -128,6 +131,7 @@ class _Columns:
         self.path, self.file, self.sigma_m = path, file, info.sigma_m
         self.implied = Implied(info.rate_hz)
         self.first: int | None = None
+        self.quantity = "length"
         self.rows = 0
         self.digests: dict[str, Any] = {}
         self._pending: list[Block] = []
@@ -136,7 +140,7 @@ class _Columns:
     def append(self, block: Block) -> None:
         """Take a block; write what fills whole chunks."""
         if self.first is None:
-            self.first = block.first
+            self.first, self.quantity = block.first, block.quantity
         self._demand_fit(block)
         self._pending.append(block)
         self.rows += len(block)
@@ -164,6 +168,9 @@ class _Columns:
         if block.first != expected or block.first < 0 or expected + len(block) > 2**32:
             demand = f"a block that begins with sample {expected} was demanded, got first = {block.first}"
             raise WriteFailed(self.path, demand, "number blocks without gaps, and flag what is missing")
+        if block.quantity != self.quantity:
+            demand = f"samples of {self.quantity} were demanded, got {block.quantity} from sample {block.first} on"
+            raise WriteFailed(self.path, demand, "write a run file for each quantity")
         for name, values in layout.arrays(block, None).items():
             if values is not None and values.shape != block.t.shape:
                 demand = f"{len(block)} values of {name} from sample {block.first} were demanded"

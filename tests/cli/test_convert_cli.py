@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import springmass
+from acquisition.block import Block
 from acquisition.recordings.recording import Original
 
 Cli = Callable[..., Any]
@@ -251,3 +252,18 @@ def test_a_run_file_needs_no_answers(cli: Cli, recording: Path, tmp_path: Path, 
     done = cli("convert", tmp_path / "run.h5", tmp_path / "back.txt", *option)
     assert done.code == 2
     assert "a run file holds all of them" in done.complaint
+
+
+def test_an_angle_goes_into_run_files_only(cli: Cli, recording: Path, tmp_path: Path) -> None:
+    """It comes from one run file into another with its unit; a form that prints metres refuses it, an analysis too."""
+    info = springmass.load(recording).info
+    angle = Block(0, np.arange(8) / 100, np.zeros(8), np.zeros(8, np.uint8), quantity="angle", unit="rad")
+    run = springmass.write_run(tmp_path / "run.h5", [angle], info)
+    assert cli("convert", run, tmp_path / "again.h5").code == 0
+    assert springmass.load(tmp_path / "again.h5").samples.unit == "rad"
+    assert cli("replay", run, "--speed", "max").out.startswith("time_s\tangle\tflags\n")
+    done = cli("convert", run, tmp_path / "angle.csv")
+    assert done.code == 2
+    assert "this form holds a length in m, got angle in rad" in done.complaint
+    assert not (tmp_path / "angle.csv").exists()
+    assert "a length in m so far, got angle in rad" in cli("analyse", run).complaint

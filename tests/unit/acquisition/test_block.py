@@ -67,3 +67,19 @@ def test_flag_values_are_those_of_the_run_file() -> None:
         "MALFORMED": 32,
         "GAP_BEFORE": 64,
     }
+
+
+@pytest.mark.parametrize(("quantity", "unit"), [("length", "mm"), ("angle", "m"), ("mass", "kg")])
+def test_an_unknown_quantity_or_unit_is_refused(quantity: str, unit: str) -> None:
+    """A block holds a known quantity in its SI unit."""
+    with pytest.raises(ValueError, match=f"length in m, angle in rad.*, got {quantity} in {unit}; convert to SI first"):
+        Block(0, np.zeros(1), np.zeros(1), np.zeros(1, np.uint8), quantity=quantity, unit=unit)
+
+
+def test_slices_and_joins_keep_the_quantity_and_two_are_not_joined() -> None:
+    """Volts stay volts, and do not follow metres."""
+    volts = Block(0, np.zeros(4), np.zeros(4), np.zeros(4, np.uint8), quantity="voltage", unit="V")
+    joined = concatenate([volts[:1], volts[1:]])
+    assert (joined.quantity, joined.unit) == ("voltage", "V")
+    with pytest.raises(ValueError, match="one quantity are joined, got length, voltage"):
+        concatenate([volts, Block(4, np.zeros(1), np.zeros(1), np.zeros(1, np.uint8))])

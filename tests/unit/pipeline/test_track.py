@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acquisition.block import UNITS as BLOCK_UNITS
 from acquisition.block import Flag
 from pipeline.errors import PipelineError, TrackError
-from pipeline.track import UNUSABLE, Quality, Track
+from pipeline.track import UNITS, UNUSABLE, Quality, Track
 
 
 def test_quality_is_the_run_files_flags() -> None:
@@ -108,3 +109,23 @@ def test_any_numbers_make_a_track_or_a_track_error(t: list[float], y: list[float
     np.testing.assert_array_equal(track.y, y)
     assert track.rate_hz > 0
     assert np.isfinite(track.rate_hz)
+
+
+def test_units_are_those_of_blocks() -> None:
+    """The pipeline's quantities and the acquisition's are one table."""
+    assert UNITS == BLOCK_UNITS
+
+
+@pytest.mark.parametrize(("quantity", "unit"), [("length", "cm"), ("angle", "m"), ("angle", "deg"), ("colour", "m")])
+def test_an_unknown_quantity_or_unit_is_refused(quantity: str, unit: str) -> None:
+    """Only the SI unit of a quantity that is known."""
+    with pytest.raises(TrackError, match=f"angle in rad.*, got {quantity} in {unit}"):
+        Track.from_arrays([0.0, 1.0], [0.0, 1.0], quantity=quantity, unit=unit)
+
+
+def test_a_track_of_a_quantity_keeps_it() -> None:
+    """A known quantity travels with the arrays, and says so where a length is needed."""
+    track = Track.from_arrays([0.0, 1.0], [0.0, 1.0], quantity="voltage", unit="V")
+    assert (track.quantity, track.unit) == ("voltage", "V")
+    with pytest.raises(TrackError, match="got voltage in V"):
+        track.demand_length()

@@ -1,0 +1,97 @@
+"""What samples are of travels with them, through the run file and back."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from acquisition.block import UNITS, Block
+from acquisition.clock import VirtualClock
+from acquisition.replay import Replay
+from acquisition.source import SourceInfo
+from pipeline.analyse import analyse
+from pipeline.errors import TrackError
+from springmass.runs.loading import load
+from storage.errors import RunDamaged, WriteFailed
+from storage.run_file.reading import open_run
+from storage.run_file.writing import write_run
+
+INFO = SourceInfo("replay", "pivot", 100.0, sigma_m=1e-3)
+
+
+def block(quantity: str = "angle", *, first: int = 0) -> Block:
+    """A second of a swing at 100 Hz, with a velocity."""
+    t = (first + np.arange(100)) / 100
+    y = 0.1 * np.cos(8.3 * t)
+    return Block(first, t, y, np.zeros(100, np.uint8), None, np.gradient(y, t), quantity, UNITS[quantity])
+
+
+@pytest.mark.parametrize("quantity", UNITS)
+def test_a_run_gives_back_quantity_and_unit(tmp_path: Path, quantity: str) -> None:
+    """Whole, in blocks, as a track and as either dataset, and other tools see the unit on the arrays."""
+    path = write_run(tmp_path / "run.h5", [block(quantity), block(quantity, first=100)], INFO)
+    with open_run(path) as run:
+        run.verify()
+        found = [run.samples(), *run.blocks(64)]
+        assert {(each.quantity, each.unit) for each in found} == {(quantity, UNITS[quantity])}
+        for dataset in (run.dataset().load(), run.load_dataset()):
+            assert dataset.distance.attrs["quantity"] == quantity
+            assert dataset.distance.attrs["units"] == dataset.distance_errors.attrs["units"] == UNITS[quantity]
+            assert dataset.velocity.attrs["units"] == UNITS[quantity] + "/s"
+    with xr.open_dataset(path, group="entry/signal", engine="h5netcdf") as signal:
+        assert signal.distance.attrs["units"] == UNITS[quantity]
+    track = load(path).track
+    assert (track.quantity, track.unit) == (quantity, UNITS[quantity])
+
+
+def test_a_replay_delivers_the_quantity() -> None:
+    """Cut anew and after a seek as before."""
+    with Replay([block()], VirtualClock(), info=INFO, block_samples=7) as source:
+        delivered = [next(iter(source))]
+        source.seek(0.5)
+        delivered += list(source)
+    assert {(each.quantity, each.unit) for each in delivered} == {("angle", "rad")}
+
+
+def test_a_file_from_before_holds_a_length(tmp_path: Path) -> None:
+    """A header and attributes without a quantity read as metres, verify, and keep their digest."""
+    path = write_run(tmp_path / "run.h5", [block("length")], INFO)
+    with h5py.File(path, "r+") as file:
+        header = json.loads(file["/entry/provenance/header"][()])
+        del header["quantity"], header["unit"], file["/entry/signal/distance"].attrs["quantity"]
+        text = json.dumps(header, sort_keys=True, separators=(",", ":")).encode()
+        del file["/entry/provenance/header"]
+        digest = hashlib.sha256(text).hexdigest()
+        file.create_dataset("/entry/provenance/header", data=np.bytes_(text)).attrs["sha256"] = np.bytes_(digest)
+    with open_run(path) as run:
+        run.verify()
+        samples = run.samples()
+        assert (samples.quantity, samples.unit, run.sha256) == ("length", "m", digest)
+
+
+def test_a_quantity_that_was_edited_is_damage(tmp_path: Path) -> None:
+    """The attribute that other tools see is held against the header."""
+    path = write_run(tmp_path / "run.h5", [block()], INFO)
+    with h5py.File(path, "r+") as file:
+        file["/entry/signal/distance"].attrs["quantity"] = np.bytes_("length")
+    with open_run(path) as run, pytest.raises(RunDamaged, match="@quantity"):
+        run.verify()
+
+
+def test_two_quantities_make_no_run(tmp_path: Path) -> None:
+    """Nothing is written, and the line says which came where."""
+    with pytest.raises(WriteFailed, match="samples of angle were demanded, got voltage from sample 100"):
+        write_run(tmp_path / "run.h5", [block("angle"), block("voltage", first=100)], INFO)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_angle_is_not_analysed_as_a_length(tmp_path: Path) -> None:
+    """Spring constants of radians would be numbers without sense."""
+    with pytest.raises(TrackError, match="a length in m so far, got angle in rad"):
+        analyse(load(write_run(tmp_path / "run.h5", [block()], INFO)).track)
