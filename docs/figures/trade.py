@@ -7,10 +7,10 @@ from pathlib import Path
 
 from springmass.commands.trade import LABELS
 from springmass.report.figures import render
-from springmass.trade.figure import trade_figure
+from springmass.trade.drawing import trade_figure
 from springmass.trade.measure import Trade, measure
 from springmass.trade.methods import UNITS, methods
-from springmass.trade.tables import ratio
+from springmass.trade.summary import ratio
 from springmass.trade.truth import Truth
 
 HERE = Path(__file__).resolve().parent

@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
 def _simulated(options: argparse.Namespace) -> int:
     from springmass.trade.measure import measure
     from springmass.trade.methods import methods
-    from springmass.trade.tables import trade_json, trade_text
+    from springmass.trade.summary import trade_json, trade_text
     from springmass.trade.truth import Truth
 
     asked = {
@@ -64,7 +64,7 @@ def _simulated(options: argparse.Namespace) -> int:
     content = trade_json(trade, absent, __version__)
     if out is not None:
         from springmass.report.figures import render
-        from springmass.trade.figure import trade_figure
+        from springmass.trade.drawing import trade_figure
         from storage.atomic import write_whole
 
         figure = trade_figure({q: trade.points(q) for q in trade.bound}, labels=LABELS)
@@ -101,7 +101,7 @@ def _own(options: argparse.Namespace) -> int:
     from springmass.runs.loading import load
     from springmass.trade.measure import own_record
     from springmass.trade.methods import methods
-    from springmass.trade.tables import own_json, own_text
+    from springmass.trade.summary import own_json, own_text
 
     loaded = load(options.input, **completions(options))
     found, absent = methods()

@@ -8,9 +8,9 @@ from pipeline.analyse import Analysis, Motion
 from pipeline.motion.overdamped.relaxation import Relaxation
 from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.cycles import NoOscillation
-from springmass.report.figures.phase import turn_step
+from springmass.report.figures.phase_plot import turn_step
 from springmass.report.figures.position import ZOOM_PERIODS, has_error_bars, is_long
-from springmass.report.motion import row_step
+from springmass.report.motion_table import row_step
 from springmass.report.tables import pretty
 
 __all__ = ["LETTERS", "caption", "kept", "verdict"]

@@ -15,7 +15,7 @@ from springmass.report.budgets import budget_csv
 from springmass.report.figures import MAKERS, comparison_figure, draw, render
 from springmass.report.html import ComparedRuns, ReportRun, render_html
 from springmass.report.latex import budget_tex, table_tex
-from springmass.report.motion import motion_csv, smoothed_or_why
+from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.tables import results_csv
 
 __all__ = ["ReportRun", "write_report"]

@@ -17,10 +17,10 @@ from pipeline.oscillation.cycles import NoOscillation
 from springmass.report.figures.amplitude import amplitude_figure
 from springmass.report.figures.canvas import render
 from springmass.report.figures.comparison import comparison_figure
-from springmass.report.figures.curves import drag_figure, energy_figure
-from springmass.report.figures.motion import motion_figure
-from springmass.report.figures.phase import phase_figure
+from springmass.report.figures.energy_drag import drag_figure, energy_figure
+from springmass.report.figures.phase_plot import phase_figure
 from springmass.report.figures.position import position_figure
+from springmass.report.figures.velocity import motion_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -42,7 +42,7 @@ from springmass.report.budgets import INPUTS
 from springmass.report.figures import comparison_figure, motion_figure
 from springmass.report.html import render_html
 from springmass.report.inline import inline_svg
-from springmass.report.motion import motion_csv, smoothed_or_why
+from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.tables import law_status, pretty, pretty_number
 from springmass.report.words import caption
 

@@ -22,7 +22,7 @@ from springmass.report.figures.canvas import (
     style,
     thinned,
 )
-from springmass.report.figures.phase import measured_phase
+from springmass.report.figures.phase_plot import measured_phase
 from springmass.report.figures.position import ZOOM_PERIODS, is_long
 
 if TYPE_CHECKING:

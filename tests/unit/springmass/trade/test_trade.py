@@ -12,7 +12,7 @@ import pytest
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.track import Track
-from springmass.trade.figure import trade_figure
+from springmass.trade.drawing import trade_figure
 from springmass.trade.front import Point, front
 from springmass.trade.measure import Row, Trade, measure, own_record
 from springmass.trade.methods import Method, fft_peak, hilbert, matrix_pencil, methods, zero_crossings
