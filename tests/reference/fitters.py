@@ -27,7 +27,7 @@ Fitter = Callable[[DataSet, np.ndarray], tuple[np.ndarray, bool]]
 
 def ours(data: DataSet, start: np.ndarray) -> tuple[np.ndarray, bool]:
     """Fit with pipeline.numerics.least_squares at the precision of reference values."""
-    fit = minimise(data.residuals, start, params=Params(precision=1e-8))
+    fit = minimise(data.residuals, start, params=Params(precision=1e-8, steps=2000))
     return fit.values, fit.converged
 
 

@@ -10,6 +10,7 @@ import pytest
 from pipeline.numerics.least_squares import Fit, Params, minimise
 
 ENOUGH = 6.0  # digits
+REFERENCE = Params(precision=1e-8, steps=2000)  # two starts need more than the 400 steps of a bench's fit
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +20,7 @@ def fits(nist: ModuleType) -> dict[tuple[str, int], tuple[Fit, float]]:
     for name in nist.MODELS:
         data = nist.read(name)
         for number, start in enumerate(data.starts, 1):
-            fit = minimise(data.residuals, start, params=Params(precision=1e-8))
+            fit = minimise(data.residuals, start, params=REFERENCE)
             found[name, number] = fit, nist.digits(fit.values, data.certified)
     return found
 
@@ -38,35 +39,35 @@ def test_the_sets_are_whole(nist: ModuleType) -> None:
             assert float(residual @ residual) == pytest.approx(data.rss, rel=1e-9), name
 
 
-def test_six_digits_on_more_than_93_percent_of_starts(fits: dict[tuple[str, int], tuple[Fit, float]]) -> None:
-    """At least 51 of 54 starts give six digits of every parameter."""
-    good = [key for key, (_, digits) in fits.items() if digits >= ENOUGH]
+def test_six_digits_on_every_start(fits: dict[tuple[str, int], tuple[Fit, float]]) -> None:
+    """All 54 starts give six digits of every parameter, and know it."""
     assert len(fits) == 54
-    assert len(good) / len(fits) >= 0.93, sorted(set(fits) - set(good))
+    assert [key for key, (fit, digits) in fits.items() if digits < ENOUGH or not fit.converged] == []
 
 
-def test_a_miss_says_so(fits: dict[tuple[str, int], tuple[Fit, float]]) -> None:
-    """Where the digits are not there the fit has not converged, and its words say what was tried."""
-    for key, (fit, digits) in fits.items():
-        if digits < ENOUGH:
-            assert not fit.converged, key
-            assert "again with short steps" in fit.tried
-            assert np.all(np.isnan(fit.covariance))
-
-
-def test_what_reaches_the_digits_knows_it(fits: dict[tuple[str, int], tuple[Fit, float]]) -> None:
-    """A fit that agrees with the certified values says that it converged."""
-    assert [key for key, (fit, digits) in fits.items() if digits >= ENOUGH and not fit.converged] == []
+def test_a_miss_says_so(nist: ModuleType) -> None:
+    """Stopped early, no fit that lacks the digits has converged: its words say what was tried."""
+    misses = 0
+    for name in nist.MODELS:
+        data = nist.read(name)
+        for start in data.starts:
+            for steps in (5, 20, 100):
+                fit = minimise(data.residuals, start, params=Params(precision=1e-8, steps=steps))
+                if nist.digits(fit.values, data.certified) >= ENOUGH:
+                    continue
+                misses += 1
+                assert not fit.converged, (name, steps)
+                assert "again by a trust region" in fit.tried
+                assert np.all(np.isnan(fit.covariance))
+    assert misses > 54
 
 
 def test_standard_deviations_are_the_certified_ones(
     nist: ModuleType, fits: dict[tuple[str, int], tuple[Fit, float]]
 ) -> None:
     """The covariance, scaled by what is left, gives the certified standard deviations to five digits."""
-    for (name, number), (fit, digits) in fits.items():
+    for (name, number), (fit, _) in fits.items():
         data = nist.read(name)
-        if digits < ENOUGH:
-            continue
         found = np.sqrt(np.diag(fit.covariance) * fit.cost / data.dof)
         # What Lanczos1 leaves is the rounding of its data, known to three digits.
         least = 3.0 if name == "Lanczos1" else 5.0
