@@ -15,7 +15,7 @@ from pipeline.damping.laws import LAWS, Law
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
-from pipeline.numerics.robust import MAD_TO_SIGMA
+from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
 
@@ -284,7 +284,7 @@ def _corner(fits: Mapping[str, LawFit], t: F8, amplitude: F8, noise: F8, spread:
     if spread.excess == 0.0 or not fit.reduced_chi2 < 0.25:
         return None
     residual = amplitude - fit.amplitude(t)
-    typical = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
+    typical = mad_sigma(residual)
     excess = math.sqrt(max(typical**2 - float(np.median(noise)) ** 2, 0.0))
     excess = excess if typical > 1.3 * float(np.median(noise)) else 0.0
     u = np.hypot(noise, excess)

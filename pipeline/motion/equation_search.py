@@ -16,7 +16,7 @@ from pipeline.damping.select import Params as DampingParams
 from pipeline.motion.equation_model import COEFFICIENTS, STATE, STEP, FreeMotion
 from pipeline.numerics import least_squares
 from pipeline.numerics.regression import correlation_length
-from pipeline.numerics.robust import MAD_TO_SIGMA, median
+from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, UNUSABLE
@@ -39,7 +39,7 @@ def stop_row(conditioned: Conditioned) -> int | None:
         return None
     y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
     noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)
-    end = median(y[blocks[-max(count // 10, 2) :]].ravel())
+    end = float(np.median(y[blocks[-max(count // 10, 2) :]]))
     # Most bobs move at the end of their record, and the last blocks say so.
     if _away(y[blocks[-4:]], end).max() > 2.0 * noise:
         return None
@@ -195,7 +195,7 @@ class Search:
             whole = self.model(every).position(self.theta)
             residual = self.conditioned.track.y - whole
             candidates = self.within & ~self.conditioned.near_plateau(whole, self.noise_m)
-            spread = max(MAD_TO_SIGMA * float(np.median(np.abs(residual[candidates]))), self.expected_m)
+            spread = max(mad_sigma(residual[candidates]), self.expected_m)
             kept = candidates & (np.abs(residual) <= self.clip_sigmas * spread)
             same = np.array_equal(kept, self.used)
             self.used = kept

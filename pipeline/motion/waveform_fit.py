@@ -18,7 +18,7 @@ from pipeline.motion.waveform_model import Normal, Record, State, accumulate, sc
 from pipeline.motion.waveform_results import refined_phase, refined_rest, refined_waveform
 from pipeline.numerics.estimate import Joint
 from pipeline.numerics.regression import correlation_length
-from pipeline.numerics.robust import MAD_TO_SIGMA
+from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, UNUSABLE, Quality
@@ -261,7 +261,7 @@ def _clipped(
     candidates = (base | (echo & ~told & ~others)) & ~cluster
     for _ in range(params.rounds):
         residual = solved.normal.residual
-        spread = MAD_TO_SIGMA * float(np.median(np.abs(residual[candidates])))
+        spread = mad_sigma(residual[candidates])
         kept = candidates & ~conditioned.near_plateau(record.y - residual + record.level, demodulated.noise_m)
         if spread > 1.5 * demodulated.noise_m:
             # What the model leaves is not noise alone: the windows' own verdict on each sample stands.

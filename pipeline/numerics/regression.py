@@ -10,7 +10,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.robust import MAD_TO_SIGMA, median, median_size
+from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 
 __all__ = ["Line", "Scatter", "chi2_quantile", "correlation_length", "covariance_of", "scatter", "solve_weighted"]
@@ -131,7 +131,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
         line = solve_weighted(design[kept], y[kept], total[kept])
         residual = y - design @ line.values
         # The smaller of two measures: the median is deaf to outliers, the root mean square knows flat patterns.
-        typical = MAD_TO_SIGMA * median_size(residual)
+        typical = mad_sigma(residual)
         spread = share * min(typical, float(np.sqrt(np.mean(residual[kept] ** 2))))
         excess = _excess(residual, u, spread)
         settled = excess == 0.0 and total is u
@@ -146,7 +146,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
 
 
 def _excess(residual: F8, u: F8, spread: float) -> float:
-    typical = median(u)
+    typical = float(np.median(u))
     # Under twice its own error a difference of variances is none: the median deviation is known to 1.17/sqrt(2n).
     doubt = 1.0 + 2.0 * 1.17 / math.sqrt(2.0 * residual.size)
     if spread <= typical * doubt:

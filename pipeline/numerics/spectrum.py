@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.robust import median
 from pipeline.track import F8
 
 __all__ = [
@@ -163,7 +162,7 @@ def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance
     inside = band.inside(frequency)
     if np.count_nonzero(inside) < 8:
         return False
-    usual = median(power[inside]) / math.log(2.0)
+    usual = float(np.median(power[inside])) / math.log(2.0)
     trials = _trials(inside, float(frequency[1]), blocks)
     fixed = np.min(np.abs(frequency[:, None] - np.array(fixed_hz)), axis=1) <= 1.0 / blocks.seconds
     # The taper costs a third of a line's power.

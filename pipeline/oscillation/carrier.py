@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.numerics.robust import MAD_TO_SIGMA, median
+from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
 
@@ -77,7 +77,7 @@ def _smooth(powers: F8, y: F8) -> F8:
     design, most = powers[1:-1], 2 * powers.shape[1]
     values = np.linalg.lstsq(design, y, rcond=None)[0]
     away = np.abs(y - design @ values)
-    kept = away <= 5.0 * MAD_TO_SIGMA * median(away)
+    kept = away <= 5.0 * mad_sigma(away)
     if np.count_nonzero(kept) > most and not kept.all():
         values = np.linalg.lstsq(design[kept], y[kept], rcond=None)[0]
     return np.asarray(powers @ values)

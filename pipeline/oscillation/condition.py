@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.numerics.robust import MAD_TO_SIGMA, median, median_size
+from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
 __all__ = ["Conditioned", "Params", "coarsest_step", "condition", "fourth_difference_noise"]
@@ -194,7 +194,7 @@ def fourth_difference_noise(y: F8) -> float:
     """
     if y.size < 5:
         return 0.0
-    return float(MAD_TO_SIGMA * median_size(np.diff(y, 4)) / FOURTH_DIFFERENCE_GAIN)
+    return float(mad_sigma(np.diff(y, 4)) / FOURTH_DIFFERENCE_GAIN)
 
 
 def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
@@ -256,8 +256,8 @@ def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
         smooth[spikes] = np.interp(np.flatnonzero(spikes), kept, y[kept])
     if np.count_nonzero(spikes) > 0.05 * y.size:
         # So many come in runs too, which a median of five believes; but hardly any lie within the motion.
-        middle = median(y[~spikes])
-        reach = 3.0 * MAD_TO_SIGMA * median_size(y[~spikes] - middle)
+        middle = float(np.median(y[~spikes]))
+        reach = 3.0 * mad_sigma(y[~spikes] - middle)
         spikes |= np.abs(y - middle) > reach
     return spikes
 

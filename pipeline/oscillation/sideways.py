@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.robust import MAD_TO_SIGMA, median_size
+from pipeline.numerics.robust import mad_sigma
 from pipeline.numerics.spectrum import Band, Blocks, Peak, false_alarm, spectral_density, strongest, worth_a_look
 from pipeline.oscillation.carrier import Carrier
 from pipeline.oscillation.condition import Conditioned
@@ -80,7 +80,7 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
         return Sideways((), None)
     carrier = Carrier.through(demodulated, float(t[0]), float(t[-1]))
     residual = conditioned.track.y[used] - carrier.position(t)
-    spread = MAD_TO_SIGMA * median_size(residual)
+    spread = mad_sigma(residual)
     if spread == 0.0:
         return Sideways((), carrier)
     believed = np.abs(residual) <= 8.0 * spread

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length, solve_weighted
-from pipeline.numerics.robust import MAD_TO_SIGMA, median, median_size
+from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.carrier import Carrier
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
@@ -165,10 +165,10 @@ class _Windows:
             return cls(t, offset, 1.0)
         around = np.lib.stride_tricks.sliding_window_view(np.pad(offset, 2, mode="edge"), 5)
         away = np.abs(offset - np.partition(around, 2, axis=1)[:, 2])
-        kept = away <= 8.0 * max(MAD_TO_SIGMA * median(away), 1e-300)
+        kept = away <= 8.0 * max(mad_sigma(away), 1e-300)
         t, offset = t[kept], offset[kept]
-        stated = median(np.sqrt(demodulated.covariance[kept, 2, 2]))
-        apart = MAD_TO_SIGMA * median_size(np.diff(offset)) / math.sqrt(2.0)
+        stated = float(np.median(np.sqrt(demodulated.covariance[kept, 2, 2])))
+        apart = mad_sigma(np.diff(offset)) / math.sqrt(2.0)
         return cls(t, offset, max(stated, apart, 1e-15 * float(np.max(np.abs(offset))) + 1e-100))
 
     @property
@@ -290,7 +290,7 @@ def _place(t: F8, still: F8, rest: _Windows, index: int, coarse: dict[int, float
     cuts = cuts[(cuts >= 5) & (cuts <= y.size - 5)]
     if not cuts.size:
         return None
-    noise = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(y)))) / math.sqrt(2.0)
+    noise = mad_sigma(np.diff(y)) / math.sqrt(2.0)
     # Heavy tails would draw the place towards themselves.
     middle, apart_m = float(np.median(y)), float(np.median(y[: cuts[0]]) - np.median(y[cuts[-1] :]))
     reach = 4.0 * noise + 0.5 * abs(apart_m)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.robust import median
 from pipeline.oscillation.condition import Conditioned
 from pipeline.track import F8
 
@@ -55,7 +54,7 @@ class Windows:
         inside = slots[None, :] < lengths[:, None]
         rows = np.minimum(bounds[:-1, None] + slots[None, :], bounds[-1] - 1)
         usable = conditioned.used[rows] & inside
-        level = median(track.y[conditioned.used])
+        level = float(np.median(track.y[conditioned.used]))
         y = np.where(usable, track.y[rows] - level, 0.0)
         tiny = 1e-12 * float(np.max(np.abs(y))) + 1e-150
         t = np.where(usable, track.t[rows], 0.0)

@@ -18,7 +18,7 @@ from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.rest import Rest
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.robust import MAD_TO_SIGMA, median_size
+from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Budgets, Inputs, added, estimate_of, linear, product
@@ -323,9 +323,10 @@ def _noise(demodulated: Demodulated) -> Estimate:
     clean = not flags.any()
     if not clean:
         residual = residual[(flags & UNUSABLE) == 0]
-    used = int(np.count_nonzero(np.isfinite(residual)))
+    residual = residual[np.isfinite(residual)]
+    used = residual.size
     dof = float(max(used - 3 * demodulated.count.size, demodulated.count.size))
-    value = MAD_TO_SIGMA * median_size(residual, used) * math.sqrt(used / dof)
+    value = mad_sigma(residual) * math.sqrt(used / dof)
     wide = 0.0 if clean else np.count_nonzero(flags & np.uint8(Quality.FALSE_ECHO)) / flags.size
     parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)
     return Estimate(value, math.hypot(*parts), "m")
