@@ -3,8 +3,6 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
-# Short linear algebra on small matrices: one thread is faster than several, and it makes timings mean something.
-export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test trials accuracy bench lint docs-figures docs-trade clean
 

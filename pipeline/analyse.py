@@ -25,6 +25,7 @@ from pipeline.motion.waveform import Waveform, reconstruct
 from pipeline.motion.waveform_fit import FullFit, fit_record
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length
+from pipeline.numerics.threads import one_thread
 from pipeline.oscillation import condition as conditioning
 from pipeline.oscillation import cycles as cycling
 from pipeline.oscillation import demodulate as demodulation
@@ -121,6 +122,7 @@ class Analysis:
         """Counts of samples by flag, and of those used."""
         return count_quality(self.flags)
 
+    @one_thread
     def smoothed(self) -> Smoothed:
         """Position, velocity and acceleration at every sample with their uncertainties; worked out when asked for.
 
@@ -144,6 +146,7 @@ class Analysis:
         return smooth(self.track, motion.demodulated, motion.phase, motion.rest, motion.disturbances)
 
 
+@one_thread
 def analyse(track: Track, scene: Scene | None = None, params: Params | None = None) -> Analysis:
     """Turn a track into estimates, laws, effects and findings.
 

@@ -1,0 +1,87 @@
+"""Linear algebra keeps to one thread inside an analysis, and only there."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+import pipeline.analyse
+from pipeline.analyse import analyse
+from pipeline.errors import AnalysisError
+from pipeline.numerics.threads import one_thread
+from pipeline.track import Track
+
+T = np.arange(1000) / 100.0
+Y = 0.2 + 0.05 * np.cos(8.3 * T) + 3e-4 * np.random.default_rng(1).standard_normal(T.size)
+
+
+def pools() -> set[int]:
+    """Return the numbers of threads of the linear algebra libraries that are loaded."""
+    found = [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+    assert len(found) >= 2  # numpy's and scipy's
+    return set(found)
+
+
+@pytest.fixture
+def two_threads() -> Iterator[None]:
+    """Give linear algebra two threads, whatever the environment says."""
+    with one_thread:
+        pass  # loads scipy's library too
+    before = threadpool_limits(2, user_api="blas")
+    with threadpool_limits():
+        pass  # leaves it to other threads to set the number
+    yield
+    before.restore_original_limits()
+
+
+@pytest.mark.usefixtures("two_threads")
+def test_an_analysis_runs_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pool has one thread while a record is analysed or smoothed, and the two it had before afterwards."""
+    seen: list[set[int]] = []
+    for name in ("condition", "smooth"):
+        _watch(monkeypatch, name, seen)
+    analyse(Track.from_arrays(T, Y)).smoothed()
+    assert seen == [{1}, {1}]
+    assert pools() == {2}
+
+
+def _watch(monkeypatch: pytest.MonkeyPatch, name: str, seen: list[set[int]]) -> None:
+    stage = getattr(pipeline.analyse, name)
+
+    def watched(*args: object) -> object:
+        seen.append(pools())
+        return stage(*args)
+
+    monkeypatch.setattr(pipeline.analyse, name, watched)
+
+
+@pytest.mark.usefixtures("two_threads")
+def test_the_pool_is_put_back_after_an_error() -> None:
+    """A record that is refused leaves the pool as it was."""
+    with pytest.raises(AnalysisError):
+        analyse(Track.from_arrays(T, np.full(T.size, np.nan)))
+    assert pools() == {2}
+
+
+@pytest.mark.usefixtures("two_threads")
+def test_the_last_analysis_to_end_puts_the_pool_back() -> None:
+    """Of two analyses side by side, the first to end does not free the other's pool, and the last restores it."""
+    begun, may_end = threading.Event(), threading.Event()
+
+    @one_thread
+    def other() -> None:
+        begun.set()
+        may_end.wait()
+
+    thread = threading.Thread(target=other)
+    with one_thread:
+        thread.start()
+        begun.wait()
+    assert pools() == {1}
+    may_end.set()
+    thread.join()
+    assert pools() == {2}
