@@ -185,17 +185,19 @@ def beside_busy_loops(path: Path, said: Mapping[str, str], rounds: int) -> tuple
 def in_a_process(path: Path, said: Mapping[str, str], rounds: int) -> float:
     """Return the least seconds of an analysis, s, with whatever number of threads its libraries choose."""
     command = [sys.executable, "-c", CHILD, str(path), str(rounds), json.dumps(said)]
-    return float(subprocess.run(command, check=True, capture_output=True, env=any_threads()).stdout)
+    return float(subprocess.run(command, check=True, capture_output=True, env=plain()).stdout)
 
 
-def any_threads() -> dict[str, str]:
-    """Return the environment without a say in the number of threads."""
-    return {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+def plain() -> dict[str, str]:
+    """Return the environment of a user: nothing said of threads, and modules compiled once and not at every start."""
+    kept = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    kept.pop("PYTHONDONTWRITEBYTECODE", None)
+    return kept
 
 
 def process(*command: str) -> Callable[[], object]:
     """Return a call that runs a command to its end."""
-    return lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=any_threads())
+    return lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=plain())
 
 
 def pair(
