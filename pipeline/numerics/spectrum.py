@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.linear_model import LinearModel
 from pipeline.track import F8
 
 __all__ = [
@@ -174,16 +175,14 @@ def _trials(inside: NDArray[np.bool_], spacing_hz: float, blocks: Blocks) -> flo
     return max(CONTINUUM * float(np.count_nonzero(inside)) * spacing_hz * blocks.seconds, 1.0)
 
 
-def strongest(blocks: Blocks, residual: F8, basis: F8, band: Band) -> Peak | None:
+def strongest(blocks: Blocks, model: LinearModel, band: Band) -> Peak | None:
     """Find the strongest line and say how likely noise alone shows one like it.
 
     Parameters
     ----------
     blocks : Blocks
-    residual : (b,) float64, m
-        What the model leaves in each block.
-    basis : (b, p) float64
-        Orthonormal columns of the model, rows multiplied by the weights: what a line shares with them does not count.
+    model : LinearModel
+        Of the blocks' values, rows multiplied by the weights: what a line shares with its columns does not count.
     band : Band
 
     Returns
@@ -204,28 +203,24 @@ def strongest(blocks: Blocks, residual: F8, basis: F8, band: Band) -> Peak | Non
     .. [1] D. J. Thomson, "Spectrum estimation and harmonic analysis", Proc. IEEE 70 (1982) 1055,
        doi:10.1109/PROC.1982.12433.
     """
+    residual = blocks.unweighted(model.left)
     frequency, power = spectrum(blocks, residual)
     inside = band.inside(frequency)
     if np.count_nonzero(inside) < 4:
         return None
     coefficients, variance = _autoregression(residual, 1)
     shaped = np.where(inside, power / _density(coefficients, variance, frequency * blocks.step), 0.0)
-    peak = int(np.argmax(shaped))
-    f = float(frequency[peak])
+    f = float(frequency[int(np.argmax(shaped))])
     pair = np.stack([np.cos(2.0 * math.pi * f * blocks.t), np.sin(2.0 * math.pi * f * blocks.t)], axis=1)
     # The line itself first; then what it may vary by, which must not pass for noise beside it.
     powers = np.polynomial.legendre.legvander(2.0 * blocks.t / blocks.seconds - 1.0, VARYING)
-    columns = (powers[:, :, None] * pair[:, None, :]).reshape(blocks.t.size, -1)
-    weighted = columns * blocks.weight[:, None]
-    beyond = weighted - basis @ (basis.T @ weighted)
-    q, r = np.linalg.qr(beyond / np.linalg.norm(weighted, axis=0))
-    if np.min(np.abs(np.diagonal(r)[:2])) < 0.2:  # the model holds it already
+    columns = (powers[:, :, None] * pair[:, None, :]).reshape(blocks.t.size, -1) * blocks.weight[:, None]
+    line = model.terms(columns / np.linalg.norm(columns, axis=0))
+    if np.min(np.abs(np.diagonal(line.r)[:2])) < 0.2:  # the model holds it already
         return None
-    share = q.T @ (residual * blocks.weight)
-    left = residual - blocks.unweighted(q @ share)
-    density = spectral_density(blocks, left, f, band)
+    density = spectral_density(blocks, blocks.unweighted(model.left - line.q @ line.share), f, band)
     # Rows are weighted by samples, the density is one full block's.
-    evidence = 0.5 * float(share[:2] @ share[:2]) / (density * blocks.samples)
+    evidence = 0.5 * line.first(2).fall / (density * blocks.samples)
     return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
 
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
 
-__all__ = ["Carrier"]
+__all__ = ["C16", "Carrier", "rotating"]
+
+C16 = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,9 +70,18 @@ class Carrier:
         """Return the oscillation about the rest position at t (n,), m."""
         return np.asarray(np.interp(t, self.t, self.amplitude) * np.cos(self.phase(t)))
 
-    def relative(self, t: F8) -> F8:
-        """Return the amplitude at t (n,) over its largest value."""
-        return np.asarray(np.interp(t, self.t, self.amplitude) / float(np.max(self.amplitude)))
+    def wave(self, t: F8) -> C16:
+        """Return the oscillation at t (n,) as :math:`e^{i\\varphi}` times the amplitude over its largest value."""
+        relative = np.interp(t, self.t, self.amplitude / float(np.max(self.amplitude)))
+        return rotating(relative, self.phase(t))
+
+
+def rotating(size: F8, angle: F8) -> C16:
+    """Return size (n,) times :math:`e^{i\\,\\mathrm{angle}}`: a fourth of the time of numpy's complex exponential."""
+    wave = np.empty(angle.shape, np.complex128)
+    np.multiply(size, np.cos(angle), out=wave.real)
+    np.multiply(size, np.sin(angle), out=wave.imag)
+    return wave
 
 
 def _smooth(powers: F8, y: F8) -> F8:

@@ -154,8 +154,8 @@ def _price(sideways: Sideways) -> float:
     assert carrier is not None
     start, end = carrier.t[0], carrier.t[-1]
     t = np.linspace(start, end, int(12 * (end - start) * carrier.angular_frequency / (2.0 * math.pi)))
-    phase, x = carrier.phase(t), (t - start) / (end - start) - 0.5
-    pair = carrier.relative(t) * np.array([np.cos(phase), np.sin(phase)])
+    wave, x = carrier.wave(t), (t - start) / (end - start) - 0.5
+    pair = np.array([wave.real, wave.imag])
     main = np.concatenate([np.ones((1, t.size)), pair, x * pair])
     both = np.concatenate([main, sideways.columns(t).T])
     both /= np.linalg.norm(both, axis=1)[:, None]

@@ -3,93 +3,86 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.carrier import Carrier
+from pipeline.oscillation.carrier import C16, Carrier, rotating
 from pipeline.track import F8
 
-__all__ = ["Mode", "Sideways"]
+__all__ = ["Mode", "Sideways", "whole_wave"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mode:
-    """One oscillation beside the main one: :math:`\\mathrm{Re}\\,E(t) e^{i\\theta(t)}`.
+    """One oscillation beside the main one: :math:`\\mathrm{Re}\\,E(t) w(t)`.
+
+    The envelope E is a polynomial in time, the wave w turns: at the mode's own frequency, with an exponential decay; or
+    as the power :math:`b` of the main oscillation's and :math:`a` of the first mode's.
 
     Parameters
     ----------
-    kind : {"mode", "harmonic", "product"}
-        Of its own frequency; a multiple of the main one's; or a sum or difference of turns of both.
     turns : (int, int)
-        Of the first mode and of the main oscillation; (1, 0) is a mode by itself.
+        a and b, of the first mode and of the main oscillation; (1, 0) is a mode by itself.
     frequency : Estimate
         Mean, Hz.
     amplitude : Estimate
-        Root mean square of the envelope :math:`|E|` over the record, m.
+        Root mean square of :math:`|E w|` over the record, m.
     decay : Estimate
-        Logarithmic rate of the envelope, 1/s; 0 for harmonics and products.
+        Logarithmic rate of a mode's own wave, 1/s; 0 for harmonics and products.
     false_alarm : float
         Probability that a record without it shows it.
-    carrier : Carrier
-    base : Mode or None
-        The mode that a product is made of.
-    degree : int
-        Of the polynomial that the envelope is beside its exponential.
-    coefficients : (2 (degree + 1),) float64, m
-        Of :meth:`columns`.
+    span : (float, float)
+        First and last time used, s. Beyond it envelope and decay stay as they are there.
+    coefficients : (degree + 1,) complex128, m
+        Of the envelope, in Legendre polynomials over ``span``.
     """
 
-    kind: Literal["mode", "harmonic", "product"]
     turns: tuple[int, int]
     frequency: Estimate
     amplitude: Estimate
     decay: Estimate
     false_alarm: float
-    carrier: Carrier
-    base: Mode | None
-    degree: int
-    coefficients: F8
+    span: tuple[float, float]
+    coefficients: C16
 
-    def columns(self, t: F8) -> F8:
-        """Return the basis (n, 2 (degree + 1)) at times t (n,): cosines, then sines, times the envelope's powers."""
+    @property
+    def kind(self) -> Literal["mode", "harmonic", "product"]:
+        """Of its own frequency; a multiple of the main one's; or a sum or difference of turns of both."""
+        if self.turns == (1, 0):
+            return "mode"
+        return "product" if self.turns[0] else "harmonic"
+
+    @property
+    def degree(self) -> int:
+        """Of the envelope's polynomial."""
+        return self.coefficients.size - 1
+
+    def wave(self, t: F8, main: C16, first: C16 | None) -> C16:
+        """Return w at times t (n,), given the waves (n,) of the main oscillation and of the first mode."""
         a, b = self.turns
         if self.kind == "mode":
-            angle, shape = self.angle(t), self.fall(t)
-        else:
-            angle, shape = b * self.carrier.phase(t), self.carrier.relative(t) ** abs(b)
-            if self.base is not None:
-                envelope = self.base.envelope(t)
-                angle = angle + a * np.angle(envelope) + a * self.base.angle(t)
-                shape = shape * (np.abs(envelope) / self.base.amplitude.value) ** abs(a)
-        powers = np.polynomial.legendre.legvander(self._x(t), self.degree) * shape[:, None]
-        return np.concatenate([powers * np.cos(angle)[:, None], powers * np.sin(angle)[:, None]], axis=1)
+            reach = np.clip(t, *self.span) - 0.5 * (self.span[0] + self.span[1])
+            return rotating(
+                np.exp(-self.decay.value * reach), 2.0 * math.pi * self.frequency.value * (t - self.span[0])
+            )
+        factors = [main if b > 0 else np.conj(main)] * abs(b) + ([] if first is None else [first] * a)
+        return np.asarray(math.prod(factors[1:], start=factors[0]))
 
-    def position(self, t: F8) -> F8:
-        """Return what the mode adds to the distance at t (n,), m."""
-        return np.asarray(self.columns(t) @ self.coefficients)
+    def envelope(self, t: F8) -> C16:
+        """Return E at times t (n,), m."""
+        return np.asarray(np.polynomial.legendre.legval(self._x(t), self.coefficients))
 
-    def angle(self, t: F8) -> F8:
-        """Return the phase of a mode of its own at t (n,) less its envelope's, rad."""
-        return np.asarray(2.0 * math.pi * self.frequency.value * (t - self.carrier.t[0]))
-
-    def fall(self, t: F8) -> F8:
-        """Return the exponential that a mode of its own follows, 1 in the middle of the record."""
-        middle = 0.5 * (self.carrier.t[0] + self.carrier.t[-1])
-        reach = np.clip(t, self.carrier.t[0], self.carrier.t[-1]) - middle
-        return np.asarray(np.exp(-self.decay.value * reach))
-
-    def envelope(self, t: F8) -> NDArray[np.complex128]:
-        """Return the complex envelope E at t (n,), m."""
-        powers = np.polynomial.legendre.legvander(self._x(t), self.degree) * self.fall(t)[:, None]
-        half = self.degree + 1
-        return np.asarray(powers @ (self.coefficients[:half] - 1j * self.coefficients[half:]))
+    def columns(self, t: F8, wave: C16) -> F8:
+        """Return (n, 2 (degree + 1)): what real and imaginary parts of the coefficients are multiplied by."""
+        turning = np.polynomial.legendre.legvander(self._x(t), self.degree) * np.conj(wave)[:, None]
+        return np.ascontiguousarray(turning).view(np.float64)  # Re (x + iy) w = x Re w - y Im w
 
     def _x(self, t: F8) -> F8:
-        start, end = self.carrier.t[0], self.carrier.t[-1]
+        start, end = self.span
         return np.asarray(np.clip(2.0 * (t - start) / (end - start) - 1.0, -1.0, 1.0))
 
 
@@ -102,21 +95,38 @@ class Sideways:
     modes : tuple of Mode
     carrier : Carrier or None
         None where the record is too short to look.
+    first : Mode or None
+        The mode that products are made of, as it was when they were sought.
     """
 
     modes: tuple[Mode, ...]
     carrier: Carrier | None
+    first: Mode | None = None
 
     def __bool__(self) -> bool:
         return bool(self.modes)
 
     def columns(self, t: F8) -> F8:
         """Return the basis (n, k) of all modes at times t (n,) for a fit that is linear in them."""
-        return np.concatenate([np.empty((t.size, 0)), *(mode.columns(t) for mode in self.modes)], axis=1)
+        columns = (mode.columns(t, wave) for mode, wave in self._waves(t))
+        return np.concatenate([np.empty((t.size, 0)), *columns], axis=1)
 
     def position(self, t: F8) -> F8:
         """Return what all modes add to the distance at t (n,), m."""
         total = np.zeros(t.size)
-        for mode in self.modes:
-            total += mode.position(t)
+        for mode, wave in self._waves(t):
+            total += (mode.envelope(t) * wave).real
         return total
+
+    def _waves(self, t: F8) -> Iterator[tuple[Mode, C16]]:
+        if self.carrier is None or not self.modes:
+            return
+        main = self.carrier.wave(t)
+        first = None if self.first is None else whole_wave(self.first, t, main)
+        for mode in self.modes:
+            yield mode, mode.wave(t, main, first)
+
+
+def whole_wave(first: Mode, t: F8, main: C16) -> C16:
+    """Return the wave that a mode's products are made of: with its envelope, over its amplitude."""
+    return np.asarray(first.wave(t, main, None) * first.envelope(t) / first.amplitude.value)

@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.linear_model import LinearModel, Terms
 from pipeline.numerics.robust import mad_sigma
 from pipeline.numerics.spectrum import Band, Blocks, Peak, false_alarm, spectral_density, strongest, worth_a_look
-from pipeline.oscillation.carrier import Carrier
+from pipeline.oscillation.carrier import C16, Carrier, rotating
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.modes import Mode, Sideways
+from pipeline.oscillation.modes import Mode, Sideways, whole_wave
 from pipeline.track import F8, UNUSABLE
 
 __all__ = ["Params", "find_sideways", "without"]
@@ -22,6 +23,7 @@ __all__ = ["Params", "find_sideways", "without"]
 # Turns of (sideways mode, main oscillation) at which a range measured along a slant shows a product of both.
 PRODUCTS = ((2, 0), (1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2), (3, 0))
 HARMONICS = ((0, 2), (0, 3))
+NO_MODE = Estimate(0.0, 0.0, "Hz")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +91,7 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
     multiples = tuple(turns[1] * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
     if not worth_a_look(blocks, band, multiples, 0.5 * params.false_alarm):
         return Sideways((), carrier)
-    return Sideways(_Search(carrier, blocks, band, params).run(), carrier)
+    return _Search(carrier, blocks, band, params).run()
 
 
 def without(conditioned: Conditioned, sideways: Sideways) -> Conditioned:
@@ -108,157 +110,129 @@ class _Search:
     """The model of the blocks as it grows, mode by mode."""
 
     def __init__(self, carrier: Carrier, blocks: Blocks, band: Band, params: Params) -> None:
-        self.carrier, self.blocks, self.params = carrier, blocks, params
-        self.band = band
+        self.carrier, self.blocks, self.band, self.params = carrier, blocks, band, params
         self.t = blocks.t + blocks.origin
-        self.main = _main_columns(carrier, self.t) * blocks.weight[:, None]
-        self.columns = self.main
-        self.settle()
+        self.main = carrier.wave(self.t)
+        self.first: C16 | None = None
+        self.main_hz = carrier.angular_frequency / (2.0 * math.pi)
+        self.model = LinearModel(blocks.y * blocks.weight, _main_columns(carrier, self.t) * blocks.weight[:, None])
+        self.found = list[Mode]()
 
-    def settle(self) -> None:
-        """Fit what the model holds now."""
-        self.basis = np.linalg.qr(self.columns)[0]
-        target = self.blocks.y * self.blocks.weight
-        left = target - self.basis @ (self.basis.T @ target)
-        self.residual = self.blocks.unweighted(left)
-
-    def run(self) -> tuple[Mode, ...]:
+    def run(self) -> Sideways:
         """Return modes, the strongest first, with their products, then harmonics; all fitted together."""
-        harmonics = list(self.locked(HARMONICS, None))
-        main, width = self.carrier.angular_frequency / (2.0 * math.pi), 2.0 / self.blocks.seconds
-        self.hole(*((turns[1] * main, width) for turns in HARMONICS))
-        own, products = list[Mode](), list[Mode]()
+        self.locked(HARMONICS, NO_MODE)
+        width = 2.0 / self.blocks.seconds
+        self.hole(*((b * self.main_hz, width) for _, b in HARMONICS))
+        first: Mode | None = None
         for _ in range(self.params.most):
-            peak = strongest(self.blocks, self.residual, self.basis, self.band)
+            peak = strongest(self.blocks, self.model, self.band)
             if peak is None or peak.false_alarm > 0.5 * self.params.false_alarm:
                 break
-            mode = self.free(peak)
+            mode, terms = self.free(peak)
             if not self.band.inside(np.array([mode.frequency.value]))[0]:
                 break  # it ran away into what the model holds already
-            self.add(mode)
+            self.add(mode, terms)
             self.hole((mode.frequency.value, width))
-            own.append(mode)
-            if len(own) == 1:
-                products.extend(self.locked(PRODUCTS, mode))
-        return self.together((*own, *products, *harmonics))
+            if first is None:
+                first, self.first = mode, whole_wave(mode, self.t, self.main)
+                self.locked(PRODUCTS, mode.frequency)
+        order = ("mode", "product", "harmonic")
+        return Sideways(tuple(sorted(self.together(), key=lambda mode: order.index(mode.kind))), self.carrier, first)
 
-    def together(self, modes: tuple[Mode, ...]) -> tuple[Mode, ...]:
+    def together(self) -> Iterator[Mode]:
         """Fit the coefficients of all modes at once: each was found before the later ones were known."""
-        if not modes:
-            return modes
-        columns = np.concatenate([self.main, *(self.weighted(mode) for mode in modes)], axis=1)
-        values = np.linalg.lstsq(columns, self.blocks.y * self.blocks.weight, rcond=None)[0][self.main.shape[1] :]
-        ends = np.cumsum([mode.coefficients.size for mode in modes])
-        return tuple(
-            self.sized(replace(mode, coefficients=part))
-            for mode, part in zip(modes, np.split(values, ends[:-1]), strict=True)
-        )
+        ends = np.cumsum([0, *(mode.coefficients.size for mode in self.found)])
+        values = self.model.coefficients()
+        envelopes: C16 = values[values.size - 2 * ends[-1] :].view(np.complex128)
+        for mode, start, end in zip(self.found, ends[:-1], ends[1:], strict=True):
+            refitted = replace(mode, coefficients=envelopes[start:end])
+            yield replace(refitted, amplitude=replace(mode.amplitude, value=self.size(refitted)))
 
-    def sized(self, mode: Mode) -> Mode:
-        """Return the mode with the amplitude that its coefficients give."""
-        half = mode.degree + 1
-        quadrature = np.concatenate([mode.coefficients[half:], -mode.coefficients[:half]])
-        columns = mode.columns(self.t)
-        size = math.sqrt(float(np.mean((columns @ mode.coefficients) ** 2 + (columns @ quadrature) ** 2)))
-        return replace(mode, amplitude=replace(mode.amplitude, value=size))
+    def size(self, mode: Mode) -> float:
+        """Root mean square of the mode's amplitude over the record, m."""
+        return _rms(mode.envelope(self.t) * self.wave(mode))
+
+    def wave(self, mode: Mode) -> C16:
+        return mode.wave(self.t, self.main, self.first)
 
     def hole(self, *holes: tuple[float, float]) -> None:
         self.band = replace(self.band, holes=(*self.band.holes, *holes))
 
-    def add(self, mode: Mode) -> None:
-        self.columns = np.concatenate([self.columns, self.weighted(mode)], axis=1)
-        self.settle()
+    def add(self, mode: Mode, terms: Terms) -> None:
+        self.model.add(terms)
+        self.found.append(mode)
 
-    def weighted(self, mode: Mode) -> F8:
+    def terms(self, mode: Mode) -> Terms:
         fade = self.blocks.attenuation(mode.frequency.value)
-        return mode.columns(self.t) * (fade * self.blocks.weight[:, None])
+        return self.model.terms(mode.columns(self.t, self.wave(mode)) * (fade * self.blocks.weight)[:, None])
 
-    def fitted(self, columns: F8) -> tuple[F8, F8, float]:
-        """Coefficients of columns beyond the model, their cofactors, and half the fall of chi-square."""
-        beyond = columns - self.basis @ (self.basis.T @ columns)
-        q, r = np.linalg.qr(beyond)
-        inverse = np.linalg.pinv(r)
-        share = q.T @ (self.residual * self.blocks.weight)
-        return inverse @ share, inverse @ inverse.T, 0.5 * float(share @ share)
+    def fitted(self, mode: Mode, terms: Terms, unit: float) -> Mode:
+        """Return the mode with the coefficients and the amplitude that its terms have; ``unit`` is the variance."""
+        values, cofactors = terms.fitted()
+        mode = replace(mode, coefficients=values.view(np.complex128))
+        u = math.sqrt(0.5 * unit * float(cofactors[0, 0] + cofactors[1, 1])) * _rms(self.wave(mode))
+        return replace(mode, amplitude=Estimate(self.size(mode), u, "m"))
 
-    def locked(self, orders: tuple[tuple[int, int], ...], base: Mode | None) -> Iterator[Mode]:
-        """Test what turns with the main oscillation and a mode together: no frequency is free."""
-        main = self.carrier.angular_frequency / (2.0 * math.pi)
-        nothing = Estimate(0.0, 0.0, "1/s")
-        for turns in orders:
-            f = turns[1] * main + (turns[0] * base.frequency.value if base else 0.0)
-            if not 0.1 * main < abs(f) < 0.4 / self.blocks.step or any(
-                abs(abs(f) - centre) < half for centre, half in self.band.holes
+    def locked(self, orders: tuple[tuple[int, int], ...], base: Estimate) -> None:
+        """Test what turns with the main oscillation and a mode of frequency ``base`` together: none is free."""
+        for a, b in orders:
+            f = abs(a * base.value + b * self.main_hz)
+            if not 0.1 * self.main_hz < f < 0.4 / self.blocks.step or any(
+                abs(f - centre) < half for centre, half in self.band.holes
             ):
                 continue
-            trial = Mode(
-                "harmonic" if base is None else "product",
-                turns,
-                Estimate(abs(f), base.frequency.u * abs(turns[0]) if base else 0.0, "Hz"),
-                Estimate(0.0, 0.0, "m"),
-                nothing,
-                1.0,
-                self.carrier,
-                base,
-                0,
-                np.zeros(2),
-            )
-            columns = self.weighted(trial)
-            values, cofactors, gain = self.fitted(columns)
-            left = self.residual - self.blocks.unweighted(columns @ values)
-            unit = spectral_density(self.blocks, left, abs(f), self.band) * self.blocks.samples
-            chance = false_alarm(gain / unit, len(orders))
-            if chance > 0.5 * self.params.false_alarm:
-                continue
-            shape = math.sqrt(float(np.mean(trial.columns(self.t)[:, 0] ** 2 + trial.columns(self.t)[:, 1] ** 2)))
-            u = math.sqrt(max(float(np.mean(np.diag(cofactors))) * unit, 0.0)) * shape
-            amplitude = Estimate(float(np.hypot(*values)) * shape, u, "m")
-            mode = replace(trial, amplitude=amplitude, false_alarm=chance, coefficients=values)
-            self.add(mode)
-            yield mode
+            trial = self.blank((a, b), Estimate(f, abs(a) * base.u, "Hz"))
+            terms = self.terms(trial)
+            left = self.blocks.unweighted(self.model.left - terms.q @ terms.share)
+            unit = spectral_density(self.blocks, left, f, self.band) * self.blocks.samples
+            chance = false_alarm(0.5 * terms.fall / unit, len(orders))
+            if chance <= 0.5 * self.params.false_alarm:
+                self.add(self.fitted(replace(trial, false_alarm=chance), terms, unit), terms)
 
-    def free(self, peak: Peak) -> Mode:
-        """Refine a peak's frequency, see whether it decays, and choose how far its envelope varies besides."""
+    def blank(self, turns: tuple[int, int], frequency: Estimate) -> Mode:
+        """Return a mode that is still to be fitted."""
+        span, unknown = (float(self.carrier.t[0]), float(self.carrier.t[-1])), Estimate(0.0, 0.0, "m")
+        return Mode(turns, frequency, unknown, Estimate(0.0, 0.0, "1/s"), 1.0, span, np.zeros(1, np.complex128))
+
+    def free(self, peak: Peak) -> tuple[Mode, Terms]:
+        """Refine a peak's frequency, see whether it decays, and choose how far its envelope varies besides.
+
+        Gauss-Newton in frequency and decay: with columns w and :math:`\\tau w`, the ratio of the second's complex
+        coefficient to the first's is :math:`-\\delta + 2\\pi i\\,\\Delta f`.
+        """
         unit = peak.density * self.blocks.samples
         f, rate, u_rate = peak.frequency_hz, 0.0, math.inf
-        middle = 0.5 * self.blocks.seconds
-        tau = self.blocks.t - middle
+        tau = self.blocks.t - 0.5 * self.blocks.seconds
+        longest = 0.5 / self.blocks.seconds
         for _ in range(4):
-            angle = 2.0 * math.pi * f * tau
-            pair = np.stack([np.cos(angle), np.sin(angle)], axis=1) * self.blocks.weight[:, None]
-            values, cofactors, _ = self.fitted(np.concatenate([pair, pair * tau[:, None]], axis=1))
-            z, slope = complex(values[0], -values[1]), complex(values[2], -values[3])
+            pair = rotating(self.blocks.weight, -2.0 * math.pi * f * tau)
+            both = np.stack([pair, pair * tau], axis=1).view(np.float64)
+            values, cofactors = self.model.terms(both).fitted()
+            z, slope = values.view(np.complex128).tolist()
             ratio = slope / z
             rate, u_rate = -ratio.real, math.sqrt(max(cofactors[2, 2] * unit, 0.0)) / abs(z)
-            step = float(np.clip(ratio.imag / (2.0 * math.pi), -0.5 / self.blocks.seconds, 0.5 / self.blocks.seconds))
+            step = min(max(ratio.imag / (2.0 * math.pi), -longest), longest)
             f += step
-            if abs(step) < 1e-3 / self.blocks.seconds:
+            if abs(step) < 2e-3 * longest:
                 break
-        trial = Mode(
-            "mode",
-            (1, 0),
-            Estimate(f, u_rate / (2.0 * math.pi), "Hz"),
-            Estimate(0.0, 0.0, "m"),
-            Estimate(rate if abs(rate) > 3.0 * u_rate else 0.0, u_rate, "1/s"),
-            peak.false_alarm,
-            self.carrier,
-            None,
-            0,
-            np.zeros(2),
-        )
-        best: tuple[float, Mode] | None = None
         # A mode that varies reaches further; it must not reach what the main oscillation may vary by.
-        main = self.carrier.angular_frequency / (2.0 * math.pi)
-        room = int(2.0 * (abs(f - main) * self.blocks.seconds - 1.0) - self.carrier.degree)
-        for degree in range(min(self.params.envelope, max(room, 0)) + 1):
-            trial = replace(trial, degree=degree)
-            values, cofactors, gain = self.fitted(self.weighted(trial))
-            criterion = -2.0 * gain / unit + 2.0 * (degree + 1) * math.log(self.blocks.t.size)
-            if best is None or criterion < best[0]:
-                u = math.sqrt(max(cofactors[0, 0] * unit, 0.0))
-                best = (criterion, self.sized(replace(trial, coefficients=values, amplitude=Estimate(0.0, u, "m"))))
-        assert best is not None
-        return best[1]
+        room = int(2.0 * (abs(f - self.main_hz) * self.blocks.seconds - 1.0) - self.carrier.degree)
+        degrees = np.arange(min(self.params.envelope, max(room, 0)) + 1)
+        trial = replace(
+            self.blank((1, 0), Estimate(f, u_rate / (2.0 * math.pi), "Hz")),
+            decay=Estimate(rate if abs(rate) > 3.0 * u_rate else 0.0, u_rate, "1/s"),
+            false_alarm=peak.false_alarm,
+            coefficients=np.zeros(degrees.size, np.complex128),
+        )
+        terms = self.terms(trial)
+        falls = np.cumsum(terms.share**2)[1::2]
+        criterion = -falls / unit + 2.0 * (degrees + 1) * math.log(self.blocks.t.size)
+        terms = terms.first(2 * (int(np.argmin(criterion)) + 1))
+        return self.fitted(trial, terms, unit), terms
+
+
+def _rms(wave: C16) -> float:
+    return float(np.linalg.norm(wave)) / math.sqrt(wave.size)
 
 
 def _main_columns(carrier: Carrier, t: F8) -> F8:
