@@ -247,6 +247,7 @@ def _add_trade(parser: argparse.ArgumentParser) -> None:
         "--damping", type=_not_negative, metavar="G", help="their linear damping, 1/s (default 0.01463)"
     )
     parser.add_argument("--echoes", type=_echo_share, metavar="X", help="share of false echoes, 0 to 0.4 (default 0)")
+    parser.add_argument("--hostile", action="store_true", help="measure the accuracies on records that are not simple")
     parser.add_argument("--integrators", action="store_true", help="measure trajectories instead: error against time")
     parser.add_argument("--out", metavar="DIR", help="folder for trade.svg, trade.pdf and trade.json")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")

@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from springmass import __version__
 from springmass.commands import completions
@@ -27,13 +27,12 @@ def run(options: argparse.Namespace) -> int:
     """Measure estimators on simulated records, or put one record before all of them."""
     if options.integrators:
         return _integrators(options)
+    if options.hostile:
+        return _hostile(options)
     if options.input is None:
         return _simulated(options)
-    given = [
-        name for name in ("seeds", "noise_m", "seconds", "damping", "echoes") if getattr(options, name) is not None
-    ]
-    if given or options.out is not None:
-        flags = ", ".join("--" + name.replace("_", "-") for name in [*given, *(["out"] if options.out else [])])
+    if given := _given(options, SIMULATED):
+        flags = ", ".join(f"--{name}" for name in given)
         raise ProgramError(
             f"{flags}: describes simulated records, got the record {options.input}; give one of both", USAGE
         )
@@ -75,10 +74,32 @@ def _simulated(options: argparse.Namespace) -> int:
     return OK
 
 
+def _given(options: argparse.Namespace, names: Sequence[str]) -> list[str]:
+    """Return which of some options were given, as they are spelt."""
+    return [name.replace("_", "-") for name in names if getattr(options, name) is not None]
+
+
+def _hostile(options: argparse.Namespace) -> int:
+    if given := _given(options, ("input", *SIMULATED[1:])):
+        raise ProgramError(
+            f"--hostile measures records of its own and takes only --seeds and --json; got {', '.join(given)}", USAGE
+        )
+    from springmass.trade.measure import measure
+    from springmass.trade.methods import presets
+    from springmass.trade.summary import hostile_json, hostile_text
+    from springmass.trade.truth import HOSTILE
+
+    seeds = 20 if options.seeds is None else options.seeds
+    trades = {}
+    for name, truth in HOSTILE.items():
+        trades[name] = measure(truth, presets(), seeds, timer=time.perf_counter, progress=_progress(seeds, name))
+    print(json.dumps(hostile_json(trades, __version__)) if options.json else hostile_text(trades))
+    return OK
+
+
 def _integrators(options: argparse.Namespace) -> int:
-    given = [name for name in ("input", *SIMULATED[:-1]) if getattr(options, name) is not None]
-    if given:
-        names = ", ".join(name.replace("_", "-") for name in given)
+    if given := _given(options, ("input", *SIMULATED[:-1])):
+        names = ", ".join(given)
         raise ProgramError(f"--integrators measures trajectories and takes only --out and --json; got {names}", USAGE)
     from springmass.trade.integrators import integrators_figure, integrators_json, integrators_text, measure_integrators
 
@@ -115,12 +136,12 @@ def _own(options: argparse.Namespace) -> int:
     return OK
 
 
-def _progress(total: int) -> Callable[[int], None]:
+def _progress(total: int, what: str = "trade") -> Callable[[int], None]:
     """Return a counter on a terminal's stderr, silent where stderr is a file."""
 
     def tell(done: int) -> None:
         if sys.stderr.isatty():
             end = "\r" if done < total else "\n"
-            print(f"trade: record {done} of {total}", end=end, file=sys.stderr, flush=True)
+            print(f"{what}: record {done} of {total}", end=end, file=sys.stderr, flush=True)
 
     return tell

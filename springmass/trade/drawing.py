@@ -176,9 +176,6 @@ class _Names:
             va="center",
             fontsize=8,
             color=VERMILLION if point.group == "tier" else "#000000",
-            # A name that stands off points to its mark.
-            arrowprops={"arrowstyle": "-", "lw": 0.5, "color": GREY, "shrinkA": 0, "shrinkB": 3}
-            if abs(up) > 8
-            else None,
+            arrowprops=_POINTER if abs(up) > 8 else None,
             annotation_clip=False,
         )

@@ -67,6 +67,10 @@ class Trade:
     bound: Mapping[str, float]
     rows: tuple[Row, ...]
 
+    def over_least(self, row: Row) -> dict[str, float]:
+        """Return a row's errors over the least that any row has in the same quantity."""
+        return {q: error / min(other.error.get(q, math.inf) for other in self.rows) for q, error in row.error.items()}
+
     def points(self, quantity: str) -> list[Point]:
         """Return time and error over the bound of every method that estimates a quantity."""
         return [
@@ -127,7 +131,7 @@ def measure(
         Deterministic but for its times.
     """
     t, bound = truth.times, bounds(truth)
-    true = {"frequency": truth.frequency_hz, "amplitude": truth.amplitude_m, "damping_rate": truth.damping_per_s}
+    true = {"frequency": truth.frequency_hz, "amplitude": truth.amplitude_m, "damping_rate": truth.damping_rate}
     errors: list[list[dict[str, float]]] = [[] for _ in methods]
     times: list[list[float]] = [[] for _ in methods]
     for seed in range(-1, seeds):

@@ -1,7 +1,8 @@
 """Reference methods: how such a record is evaluated elsewhere, each as its textbook has it.
 
 They stand here to be compared with; none is used by an analysis. They demand evenly sampled distances, so gaps of a
-track are bridged by straight lines before; tiers get the track as it is.
+track are bridged by straight lines before; tiers get the track as it is. What scipy has is scipy's. Kept by hand are
+the zero crossings, Jacobsen's interpolation of a line and the matrix pencil, which it lacks.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
 from pipeline.track import F8, Track
 
-__all__ = ["UNITS", "Method", "Unavailable", "methods"]
+__all__ = ["UNITS", "Method", "Unavailable", "methods", "presets"]
 
 UNITS = {"frequency": "Hz", "amplitude": "m", "damping_rate": "1/s"}
 Found = Mapping[str, Estimate]
@@ -70,17 +71,15 @@ def methods() -> tuple[list[Method], list[Unavailable]]:
         Method("hilbert", "Hilbert phase", "reference", _bridged(hilbert)),
         Method("matrix_pencil", "matrix pencil", "reference", _bridged(matrix_pencil)),
     ]
-    absent = []
-    for name, label, package, fit in (
-        ("lmfit", "lmfit damped sine", "lmfit", _lmfit),
-        ("scipy", "scipy damped sine", "scipy", _scipy),
-    ):
-        if find_spec(package) is None:
-            absent.append(Unavailable(name, package))
-        else:
-            found.append(Method(name, label, "reference", _bridged(fit)))
-            break
-    return found, absent
+    if find_spec("lmfit") is None:
+        found.append(Method("scipy", "scipy damped sine", "reference", _bridged(_scipy)))
+        return found, [Unavailable("lmfit", "lmfit")]
+    return [*found, Method("lmfit", "lmfit damped sine", "reference", _bridged(_lmfit))], []
+
+
+def presets() -> list[Method]:
+    """Return the tiers with the damping rate that they print, of whichever law they chose."""
+    return [Method(tier, f"springmass {tier}", "tier", _tier(tier, printed=True)) for tier in TIERS]
 
 
 def _bridged(estimate: Callable[[F8, F8], Found]) -> Callable[[Track], Found]:
@@ -94,7 +93,7 @@ def _bridged(estimate: Callable[[F8, F8], Found]) -> Callable[[Track], Found]:
     return run
 
 
-def _tier(name: str) -> Callable[[Track], Found]:
+def _tier(name: str, *, printed: bool = False) -> Callable[[Track], Found]:
     """Return a tier of the analysis, everything from the track to the findings included."""
     params = params_for(name)
 
@@ -102,6 +101,8 @@ def _tier(name: str) -> Callable[[Track], Found]:
         analysis = analyse(track, params=params)
         if not isinstance(analysis.motion, Motion):
             raise AnalysisError(analysis.motion.why)
+        if printed:
+            return {key: analysis.estimates[key] for key in UNITS if key in analysis.estimates}
         found = {key: analysis.estimates[key] for key in ("frequency", "amplitude")}
         # Comparable with methods that take the exponential for granted; the printed rate holds the choice of a law.
         linear = analysis.motion.damping.fits.get("linear")
@@ -123,6 +124,8 @@ def zero_crossings(t: F8, y: F8) -> Found:
     A crossing counts after the signal was an eighth of its range below the mean. Where a swing stays under that, the
     count goes on by the time that passed. The slope's uncertainty is the regression's own.
     """
+    from scipy.stats import linregress
+
     low, high = np.quantile(y, (0.02, 0.98))
     centred, reach = y - y.mean(), 0.125 * (high - low)
     state = np.where(centred > reach, 1, np.where(centred < -reach, -1, 0))
@@ -138,8 +141,8 @@ def zero_crossings(t: F8, y: F8) -> Found:
         raise AnalysisError(f"zero crossings need three upward crossings, got {len(times)}")
     steps = np.diff(times)
     number = np.concatenate([[0.0], np.cumsum(np.round(steps / np.median(steps)))])
-    slope, u_slope, _ = _line(number, np.array(times))
-    return {"frequency": Estimate(1.0 / slope, u_slope / slope**2, "Hz")}
+    line = linregress(number, np.array(times))
+    return {"frequency": Estimate(1.0 / line.slope, line.stderr / line.slope**2, "Hz")}
 
 
 def fft_peak(t: F8, y: F8) -> Found:
@@ -170,20 +173,17 @@ def _peak(t: F8, y: F8) -> tuple[float, float, float]:
 
 def hilbert(t: F8, y: F8) -> Found:
     """Regress phase and log-amplitude of the analytic signal on time, a twentieth left out at either end."""
-    n = y.size
-    lines = np.fft.fft(y - y.mean())
-    lines[1 : (n + 1) // 2] *= 2.0
-    lines[n // 2 + 1 :] = 0.0
-    analytic = np.fft.ifft(lines)
-    inner = slice(n // 20, n - n // 20)
-    at = t[inner]
-    slope, u_slope, _ = _line(at, np.unwrap(np.angle(analytic[inner])))
-    decay, u_decay, level = _line(at, np.log(np.maximum(np.abs(analytic[inner]), 1e-300)))
-    start = math.exp(level + decay * float(t[0]))
+    from scipy.signal import hilbert as analytic_signal
+    from scipy.stats import linregress
+
+    inner = slice(y.size // 20, y.size - y.size // 20)
+    analytic = analytic_signal(y - y.mean())[inner]
+    turns = linregress(t[inner], np.unwrap(np.angle(analytic)) / (2 * math.pi))
+    decay = linregress(t[inner], np.log(np.maximum(np.abs(analytic), 1e-300)))
     return {
-        "frequency": Estimate(slope / (2 * math.pi), u_slope / (2 * math.pi), "Hz"),
-        "amplitude": Estimate(start, math.nan, "m"),
-        "damping_rate": Estimate(-decay, u_decay, "1/s"),
+        "frequency": Estimate(float(turns.slope), float(turns.stderr), "Hz"),
+        "amplitude": Estimate(math.exp(decay.intercept + decay.slope * float(t[0])), math.nan, "m"),
+        "damping_rate": Estimate(-float(decay.slope), float(decay.stderr), "1/s"),
     }
 
 
@@ -273,14 +273,3 @@ def _fitted(values: Mapping[str, Any]) -> Found:
     amplitude = found["amplitude"]
     # A negative amplitude is the same motion half a turn on.
     return {**found, "amplitude": Estimate(abs(amplitude.value), amplitude.u, "m")}
-
-
-def _line(x: F8, y: F8) -> tuple[float, float, float]:
-    """Slope, its uncertainty from the scatter, and level at x = 0 of a least-squares line."""
-    middle = float(x.mean())
-    centred = x - middle
-    power = float(centred @ centred)
-    slope = float(centred @ y) / power
-    level = float(y.mean()) - slope * middle
-    left = y - level - slope * x
-    return slope, math.sqrt(float(left @ left) / max(x.size - 2, 1) / power), level

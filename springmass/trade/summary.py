@@ -10,7 +10,7 @@ from pipeline.numerics.estimate import Estimate
 from springmass.trade.measure import Trade
 from springmass.trade.methods import UNITS, Method, Unavailable
 
-__all__ = ["own_json", "own_text", "ratio", "trade_json", "trade_text"]
+__all__ = ["hostile_json", "hostile_text", "own_json", "own_text", "ratio", "trade_json", "trade_text"]
 
 HEADS = {"frequency": "frequency", "amplitude": "amplitude", "damping_rate": "damping"}
 
@@ -73,6 +73,46 @@ def trade_json(trade: Trade, absent: Sequence[Unavailable], version: str) -> dic
         "recommended": trade.recommended,
         "version": version,
     }
+
+
+def hostile_text(trades: Mapping[str, Trade]) -> str:
+    """Return a line a kind of record: what every tier errs, over the least of them, and its time over the quickest."""
+    methods = [row.method for row in next(iter(trades.values())).rows]
+    body = [["record", *(f"{method.name}: f, A, damping; time" for method in methods), ""]]
+    for name, trade in trades.items():
+        least_s = min(row.seconds for row in trade.rows)
+        cells = []
+        for row in trade.rows:
+            over = trade.over_least(row)
+            failed = f" ({row.failed} failed)" if row.failed else ""
+            errors = ", ".join(ratio(over[q]) if q in over else "-" for q in UNITS)
+            cells.append(f"{errors}; {row.seconds / least_s:.1f}{failed}")
+        body.append([name, *cells, ""])
+    seeds = next(iter(trades.values())).seeds
+    head = f"{seeds} simulated records of each kind: root mean square errors over the least, time over the quickest"
+    return "\n".join([head, "", *_aligned(body)])
+
+
+def hostile_json(trades: Mapping[str, Trade], version: str) -> dict[str, Any]:
+    """Return the same as a JSON object."""
+    records = [
+        {
+            "record": name,
+            "seeds": trade.seeds,
+            "methods": [
+                {
+                    "name": row.method.name,
+                    "time_s": row.seconds,
+                    "error": {q: error * trade.bound[q] for q, error in row.error.items()},
+                    "error_over_least": trade.over_least(row),
+                    "failed": row.failed,
+                }
+                for row in trade.rows
+            ],
+        }
+        for name, trade in trades.items()
+    ]
+    return {"schema": 1, "kind": "simulated", "records": records, "version": version}
 
 
 Own = Sequence[tuple[Method, Mapping[str, Estimate] | str, float]]

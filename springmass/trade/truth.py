@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Truth", "bounds", "record"]
+__all__ = ["HOSTILE", "Truth", "bounds", "record"]
 
 F8 = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """A free oscillation with linear drag, in white noise: :math:`y = o + A e^{-\\gamma t}\\cos(2\\pi f t + \\varphi)`.
+    """A free oscillation in white noise, :math:`y = o + A(t)\\cos(2\\pi f t + \\varphi)`, and what spoils it.
+
+    With linear drag :math:`A(t) = A e^{-\\gamma t}`; with quadratic drag too, :math:`dA/dt = -\\gamma A - \\beta A^2`,
+    the amplitude is :math:`A e^{-\\gamma t} / (1 + \\beta A (1 - e^{-\\gamma t}) / \\gamma)`.
 
     Parameters
     ----------
@@ -25,6 +28,16 @@ class Truth:
     frequency_hz, amplitude_m, damping_per_s, offset_m : float
     echoes : float
         Share of samples that are false echoes: anywhere up to 2 m.
+    quadratic_per_m_s : float
+        Quadratic drag, 1/(m s).
+    clip_m : float
+        Displacement beyond which crests are cut off, m.
+    drift_m : float
+        By how much the rest position moves within the record, m.
+    sideways_m : float
+        Amplitude of a second mode at six tenths of the frequency, m.
+    quantum_m : float
+        Smallest step of a distance, m; 0 for none.
     """
 
     seconds: float = 120.0
@@ -35,6 +48,16 @@ class Truth:
     damping_per_s: float = 0.01463
     offset_m: float = 0.22
     echoes: float = 0.0
+    quadratic_per_m_s: float = 0.0
+    clip_m: float = math.inf
+    drift_m: float = 0.0
+    sideways_m: float = 0.0
+    quantum_m: float = 0.0
+
+    @property
+    def damping_rate(self) -> float:
+        """Logarithmic rate of the amplitude at the start, 1/s."""
+        return self.damping_per_s + self.quadratic_per_m_s * self.amplitude_m
 
     @property
     def times(self) -> F8:
@@ -42,12 +65,39 @@ class Truth:
         return np.arange(round(self.seconds * self.rate_hz)) / self.rate_hz
 
 
+HOSTILE = {
+    "clean, one exponential": Truth(seconds=60.0),
+    "1.6 periods": Truth(seconds=1.2),
+    "3 periods": Truth(seconds=2.3),
+    "-10 dB": Truth(seconds=60.0, noise_m=0.05 / math.sqrt(2.0) * 10**0.5),
+    "5 % false echoes": Truth(seconds=60.0, echoes=0.05),
+    "20 % false echoes": Truth(seconds=60.0, echoes=0.2),
+    "crests clipped at 80 %": Truth(seconds=60.0, clip_m=0.04),
+    "quantised to 1 mm": Truth(seconds=60.0, quantum_m=1e-3),
+    "rest drifts by 2 mm": Truth(seconds=60.0, drift_m=2e-3),
+    "sideways mode of 1 mm": Truth(seconds=60.0, sideways_m=1e-3),
+    "linear and quadratic drag": Truth(seconds=60.0, damping_per_s=0.0073, quadratic_per_m_s=0.235),
+}
+"""Kinds of records that are not so simple, by name, and the simple one to compare with."""
+
+
 def record(truth: Truth, rng: np.random.Generator) -> F8:
     """Return one record at ``truth.times``, (n,) float64, m; its phase is drawn too."""
     t = truth.times
     phase = rng.uniform(-math.pi, math.pi)
-    swing = truth.amplitude_m * np.exp(-truth.damping_per_s * t) * np.cos(2 * math.pi * truth.frequency_hz * t + phase)
-    y = truth.offset_m + swing + truth.noise_m * rng.standard_normal(t.size)
+    decay = np.exp(-truth.damping_per_s * t)
+    if truth.quadratic_per_m_s:
+        growing = t if truth.damping_per_s == 0 else (1.0 - decay) / truth.damping_per_s
+        decay = decay / (1.0 + truth.quadratic_per_m_s * truth.amplitude_m * growing)
+    angle = 2 * math.pi * truth.frequency_hz * t
+    swing = truth.amplitude_m * decay * np.cos(angle + phase) + truth.noise_m * rng.standard_normal(t.size)
+    y = truth.offset_m + swing
+    if truth.sideways_m:
+        y = y + truth.sideways_m * np.cos(0.6 * angle + rng.uniform(-math.pi, math.pi))
+    y = np.minimum(y, truth.offset_m + truth.clip_m)
+    y = y + truth.drift_m * np.sin(0.5 * math.pi * t / t[-1])
+    if truth.quantum_m:
+        y = np.round(y / truth.quantum_m) * truth.quantum_m
     false = rng.random(t.size) < truth.echoes
     y[false] = rng.uniform(0.0, 2.0, np.count_nonzero(false))
     return np.asarray(y)

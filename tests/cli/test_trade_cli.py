@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from springmass.commands import trade as command
+from springmass.trade.truth import HOSTILE
 
 Cli = Callable[..., Any]
 SHORT = ("--seeds", "3", "--seconds", "8")
@@ -76,6 +77,22 @@ def test_a_record_goes_before_every_method(cli: Cli, recording: Path) -> None:
     assert all(value == pytest.approx(periods["best"], rel=0.01) for value in periods.values())
 
 
+def test_the_tiers_go_through_what_spoils_a_record(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    """--hostile: a line a kind of record, every tier with its errors over the least; the same as JSON."""
+    kinds = {name: HOSTILE[name] for name in ("3 periods", "20 % false echoes")}
+    monkeypatch.setattr("springmass.trade.truth.HOSTILE", kinds)
+    done = cli("trade", "--hostile", "--seeds", "2")
+    assert (done.code, done.err) == (0, "")
+    assert done.out.startswith("2 simulated records of each kind")
+    assert [sum(line.startswith(name) for line in done.out.splitlines()) for name in kinds] == [1, 1]
+    (result,) = cli("trade", "--hostile", "--seeds", "2", "--json").results
+    assert [each["record"] for each in result["records"]] == list(kinds)
+    for each in result["records"]:
+        assert [method["name"] for method in each["methods"]] == ["fast", "standard", "best"]
+        assert min(method["error_over_least"]["frequency"] for method in each["methods"]) == 1.0
+        assert all(method["failed"] == 0 and method["error"]["frequency"] < 0.1 for method in each["methods"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -84,6 +101,8 @@ def test_a_record_goes_before_every_method(cli: Cli, recording: Path) -> None:
         (("--echoes", "0.9"), "between 0 and 0.4"),
         (("--damping", "-0.1"), "must not be negative"),
         (("--seconds", "1"), "two periods"),
+        (("--hostile", "--echoes", "0.1"), "only --seeds and --json; got echoes"),
+        (("--integrators", "--seeds", "3"), "only --out and --json; got seeds"),
     ],
 )
 def test_what_cannot_be_measured_is_refused(cli: Cli, arguments: tuple[str, ...], words: str) -> None:
@@ -104,15 +123,10 @@ def test_a_missing_package_is_said(cli: Cli, monkeypatch: pytest.MonkeyPatch) ->
     """Without lmfit scipy's fit stands in, and the table says what was not measured."""
     import springmass.trade.methods as methods
 
-    found = methods.find_spec
-    monkeypatch.setattr(methods, "find_spec", lambda name: None if name == "lmfit" else found(name))
+    monkeypatch.setattr(methods, "find_spec", lambda _: None)
     out = cli("trade", *SHORT).out
     assert "scipy damped sine" in out
     assert "Not measured: lmfit, lmfit is not installed." in out
-    monkeypatch.setattr(methods, "find_spec", lambda _: None)
-    out = cli("trade", *SHORT).out
-    assert "scipy, scipy is not installed" in out
-    assert "springmass best" in out
 
 
 def test_ctrl_c_ends_with_130(cli: Cli, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

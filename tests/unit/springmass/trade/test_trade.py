@@ -16,7 +16,7 @@ from springmass.trade.drawing import trade_figure
 from springmass.trade.front import Point, front
 from springmass.trade.measure import Row, Trade, measure, own_record
 from springmass.trade.methods import Method, fft_peak, hilbert, matrix_pencil, methods, zero_crossings
-from springmass.trade.truth import Truth, bounds, record
+from springmass.trade.truth import HOSTILE, Truth, bounds, record
 
 
 def clean(damping: float, seconds: float = 30.0) -> tuple[np.ndarray, np.ndarray, Truth]:
@@ -59,6 +59,35 @@ def test_records_are_as_described() -> None:
     away = np.abs(y - truth.offset_m) > truth.amplitude_m + 6e-3
     assert np.mean(away) == pytest.approx(0.094, abs=0.01)  # the rest of the echoes lies within the swing
     assert np.sqrt(2 * np.var(y[~away])) == pytest.approx(truth.amplitude_m, rel=0.02)
+
+
+@pytest.mark.parametrize("linear", [0.0, 0.0073])
+def test_mixed_drag_follows_its_equation(linear: float) -> None:
+    """The crests' rate of decay is linear plus quadratic times amplitude, and at the start what the truth says."""
+    truth = Truth(seconds=200.0, noise_m=1e-9, damping_per_s=linear, quadratic_per_m_s=0.235)
+    y = record(truth, np.random.default_rng(3)) - truth.offset_m
+    turns = y[: y.size // 76 * 76].reshape(-1, 76)  # a period each, but for a thousandth
+    amplitude, t = np.sqrt(2.0) * turns.std(axis=1), truth.times[: turns.size].reshape(turns.shape).mean(axis=1)
+    rate = -np.gradient(np.log(amplitude), t)
+    assert rate[1:-1] == pytest.approx(linear + 0.235 * amplitude[1:-1], rel=0.05)
+    assert truth.damping_rate == linear + 0.235 * 0.05
+
+
+def test_records_are_spoilt_as_described() -> None:
+    """Crests end where they are clipped, steps are those asked for, the rest position ends where it drifted to, and a
+    second line of its amplitude stands in the spectrum."""
+    calm = {"noise_m": 1e-9, "damping_per_s": 0.0, "seconds": 60.0}
+    rng = np.random.default_rng(8)
+    assert record(Truth(**calm, clip_m=0.04), rng).max() == pytest.approx(0.26, abs=1e-12)
+    steps = record(Truth(**calm, quantum_m=1e-3), rng) / 1e-3
+    assert steps == pytest.approx(np.round(steps), abs=1e-9)
+    drift = np.subtract(*(record(Truth(**calm, drift_m=by), np.random.default_rng(8)) for by in (2e-3, 0.0)))
+    assert (drift[0], drift[-1]) == (0.0, pytest.approx(2e-3))
+    t = Truth(**calm).times
+    sideways = record(Truth(**calm, sideways_m=1e-3), rng) - 0.22
+    wave = np.exp(-2j * math.pi * 0.6 * 1.3183 * t) * np.hanning(t.size)
+    assert 4 * abs(wave @ sideways) / t.size == pytest.approx(1e-3, rel=0.02)
+    assert set(HOSTILE) > {"1.6 periods", "20 % false echoes", "sideways mode of 1 mm"}
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.01463])
