@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import chain
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition.block import F8, I8, U8, Flag
 
-__all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "ReadingColumns", "Readings", "join"]
+__all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "Readings", "join"]
 
 NAN = math.nan
 
@@ -48,9 +48,6 @@ class Reading(NamedTuple):
     distance_m: float = NAN
     temperature_c: float = NAN
 
-
-ReadingColumns = tuple[Sequence[int], Sequence[int], Sequence[int], Sequence[float], Sequence[float], Sequence[float]]
-"""Many readings by columns, in the order of the fields of :class:`Reading`."""
 
 COLUMNS = (*Reading._fields, "flags")
 """The columns that readings have."""

@@ -16,9 +16,11 @@ def test_a_short_measurement_keeps_every_reading():
     done = subprocess.run(
         [sys.executable, str(SCRIPT), "--short", "1", "--long", "2"], capture_output=True, text=True, timeout=120
     )
-    assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert len(lines) == 4
+    assert len(lines) == 4, done.stderr
+    # With timing off: over a single second the share may come out above its limit, and then the exit code says so.
+    over = [float(line.split(" of its limit")[0].split()[-1]) > 1.0 for line in lines[1::2]]
+    assert done.returncode == int(any(over)), done.stderr
     for samples, cpu in (lines[:2], lines[2:]):
         assert 195 <= int(samples.split()[1]) <= 206
         assert " 0 gaps" in samples

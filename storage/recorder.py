@@ -1,15 +1,9 @@
 """The recorder: takes what the reading thread brings, and sees that it reaches the disk.
 
-Three threads share the work. The reading thread only puts records into a queue. A second takes them out and appends
-them to the wire log at once, so that a killed process loses no more than the read in flight. A third calls fdatasync
-once a second: that may take as long as the disk likes, and neither of the others waits for it.
-
-The second thread is woken when the reading thread has nothing else to do (:meth:`Recorder.take`,
-:meth:`Recorder.wake`): woken earlier, the two would contend for the interpreter while ports wait.
-
-Where it harms nobody that a write may wait for the disk, the reading thread appends by itself and past the queue
-(``own_clocks``): that costs less than waking another thread. It does so only while nothing is queued and no sync has
-the file, and goes by the queue for a while once a write took long.
+Three threads share the work. The reading thread only puts records into a queue, the one way to the log for every
+sensor. A second takes them out and appends them to the wire log at once, so that a killed process loses no more than
+the read in flight. A third calls fdatasync once a second: that may take as long as the disk likes, and neither of the
+others waits for it.
 """
 
 from __future__ import annotations
@@ -33,12 +27,7 @@ from storage.wire_log.records import HEAD_BYTES, event_payload
 __all__ = ["DiskNearlyFull", "Recorder", "RecorderStatus", "check_disk"]
 
 QUEUE_BYTES = 16 << 20
-"""Three quarters of an hour of one sensor at 100 Hz, four seconds of 200 ports in a flood at 115200 baud."""
-
-SLOW_NS = 50_000_000
-"""A write that takes longer waited for the disk, and not for its turn on a busy machine."""
-PATIENCE_NS = 10_000_000_000
-"""After a slow write the reading thread writes nothing for so long."""
+"""Half an hour of one sensor at 100 Hz, two minutes of 16 of them."""
 
 _DATA = Kind.DATA  # looked up once: each look-up of an enumeration's member costs more than the checksum of a reading
 
@@ -102,9 +91,6 @@ class Recorder:
         Between syncs, s.
     queue_bytes : int
         Bound of the queue. What comes while it is full is counted, and told by an event in the log.
-    own_clocks : bool
-        Whether every sensor sends the time of its readings by a clock of its own. A late stamp of the host's does no
-        harm then, and :meth:`take` may write on the thread that calls it.
     open_file : callable
         Makes the log's file: the seam for tests.
 
@@ -122,7 +108,6 @@ class Recorder:
         *,
         sync_every_s: float = 1.0,
         queue_bytes: int = QUEUE_BYTES,
-        own_clocks: bool = False,
         open_file: Callable[[Path], LogFile] = open_log_file,
     ) -> None:
         self._log = WireLogWriter(path, header, open_file=open_file)
@@ -130,21 +115,15 @@ class Recorder:
         self._clock = clock
         self._sync_every_ns = int(sync_every_s * 1e9)
         self._limit = queue_bytes
-        self._own_clocks = own_clocks
-        self._hands_over_until_ns = clock.now_ns()
         self._lock = threading.Lock()
+        self._come = threading.Condition(self._lock)
         self._done = threading.Condition(self._lock)
-        # Held while the appender may rest. A lock costs a third of a condition's wake-up, of which there is one a read.
-        self._rest = threading.Lock()
-        # Held by whoever takes records out of the queue until they are in the log: they stand there in their order.
-        self._order = threading.Lock()
         self._queue: list[Item] = []
         self._queued_bytes = 0
         self._appending = False
         self._overflows: dict[int, _Overflow] = {}
         self._dropped_records = self._dropped_bytes = 0
         self._error: WriteFailed | None = None
-        self._stopped = False
         self._closing = self._closed = False
         self._stop_sync = threading.Event()
         self._appender = threading.Thread(target=self._append_all, name="springmass-log", daemon=True)
@@ -174,39 +153,23 @@ class Recorder:
 
     def reads(self, reads: Sequence[Read]) -> None:
         """Take what was read of ports; never waits for the disk, never raises for its sake."""
-        self.take(reads)
-        self.wake()
+        self._offer(_DATA, reads)
 
     def put(self, channel: int, host_ns: int, data: bytes) -> None:
         """Take the bytes of one read of a port."""
         self.reads(((channel, host_ns, data),))
 
-    def take(self, reads: Sequence[Read]) -> None:
-        """Take what was read as :meth:`reads` does; where it is queued, :meth:`wake` has it appended."""
-        if not (self._own_clocks and self._append_here(reads)):
-            self._offer(_DATA, reads)
-
-    def wake(self) -> None:
-        """Have what is queued appended by another thread; costs nothing where there is nothing."""
-        if self._queue or self._overflows or self._closing:
-            with self._lock:
-                if self._rest.locked():
-                    self._rest.release()
-
     def mark(self, text: str, *, host_ns: int | None = None, channel: int = 0) -> None:
         """Take a mark."""
         now = self._clock.now_ns() if host_ns is None else host_ns
         self._offer(Kind.MARK, ((channel, now, text.encode("utf-8", "replace")),))
-        self.wake()
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Take "lost", "reopened", "timeout", "trigger", "calibration" or another event, with facts about it."""
         self._offer(Kind.EVENT, ((channel, host_ns, event_payload(kind, facts)),))
-        self.wake()
 
     def drain(self, *, sync: bool = False) -> RecorderStatus:
         """Return when all that was put before is in the log, with ``sync`` on the disk; or the recording stopped."""
-        self.wake()
         with self._done:
             self._done.wait_for(lambda: self._error or not (self._queue or self._appending))
         if sync:
@@ -225,13 +188,12 @@ class Recorder:
             if self._closing:
                 return
             self._closing = True
-        self.wake()
+            self._come.notify()
         self._appender.join()
         self._stop_sync.set()
         self._syncer.join()
         if self._error is None:
-            with self._order:  # no read is on its way past the queue
-                self._guarded(self._append_end)
+            self._guarded(self._append_end)
         self._sync()
         self._guarded(self._log.close)
         with self._lock:
@@ -259,63 +221,30 @@ class Recorder:
                     lost.last_ns = mono_ns
                     lost.records += 1
                     lost.bytes += len(payload)
-
-    def _append_here(self, reads: Sequence[Read]) -> bool:
-        """Append on the caller's thread; False where that must go by the queue."""
-        began_ns = self._clock.now_ns()
-        if self._log.syncing or began_ns < self._hands_over_until_ns or not self._order.acquire(False):
-            return False
-        try:
-            # What was queued comes first; and a recording that has ended or stopped counts what still comes.
-            if self._queue or self._overflows or self._closing or self._error:
-                return False
-            self._extend([(_DATA, *read) for read in reads])
-        finally:
-            self._order.release()
-        ended_ns = self._clock.now_ns()
-        if ended_ns - began_ns > SLOW_NS:
-            self._hands_over_until_ns = ended_ns + PATIENCE_NS
-        return True
+            self._come.notify()
 
     def _append_all(self) -> None:
-        while not self._stopped:
-            with self._order:
-                appended = self._append_queued()
-            if appended:
-                continue
-            with self._lock:
-                if self._closing and not (self._queue or self._overflows):
-                    return
-            # Whoever queues or closes releases it after that, so nothing since the look just now is slept over.
-            self._rest.acquire()
+        while taken := self._take_queued():
+            try:
+                self._log.extend(taken)
+            except Exception as error:  # a defect, too, must stop the recording and not look like one
+                self._stop(self._one_line(error), taken[self._log.extended :])
+                return
 
-    def _append_queued(self) -> bool:
-        """Append all that is queued, False where there was nothing; the caller holds ``_order``.
+    def _take_queued(self) -> list[Item]:
+        """Wait for records and return all of them; none where the recording is closing and all are in the log.
 
         What overflowed came after everything queued and before everything to come: its events stand in its place.
         """
-        if self._stopped:  # by the other thread, while this one waited for its turn
-            return False
-        with self._lock:
-            taken, self._queue, self._queued_bytes = self._queue, [], 0
-            if self._overflows:
-                taken += [lost.event(channel) for channel, lost in self._overflows.items()]
-                self._overflows.clear()
-            self._appending = bool(taken)
-        if not taken:
-            return False
-        self._extend(taken)
         with self._lock:
             self._appending = False
             self._done.notify_all()
-        return True
-
-    def _extend(self, items: list[Item]) -> None:
-        """Append; the caller holds ``_order``."""
-        try:
-            self._log.extend(items)
-        except Exception as error:  # a defect, too, must stop the recording and not look like one
-            self._stop(self._one_line(error), items[self._log.extended :])
+            self._come.wait_for(lambda: self._queue or self._overflows or self._closing)
+            taken, self._queue, self._queued_bytes = self._queue, [], 0
+            taken += [lost.event(channel) for channel, lost in self._overflows.items()]
+            self._overflows.clear()
+            self._appending = bool(taken)
+            return taken
 
     def _one_line(self, error: Exception) -> WriteFailed:
         if isinstance(error, WriteFailed):
@@ -326,7 +255,6 @@ class Recorder:
         """Keep what there is: what was appended can still be synced, though no more can be appended."""
         with self._lock:
             self._error = self._error or error
-            self._stopped = True
             left += self._queue
             self._queue = []
             self._queued_bytes = 0

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from acquisition.errors import SensorError
-from acquisition.readings import ReadingColumns, Readings
+from acquisition.readings import Readings
 
 __all__ = ["Decoder", "Encoder", "Family", "Poll", "Polled"]
 
@@ -109,11 +109,6 @@ class Family:
         Options of the decoder by name, with one line each (column, unit, ...).
     has_device_time : bool
         Whether readings carry the device's clock or counter.
-    whole : callable or None
-        Decodes reads of several ports at once where that costs less: takes the decoders of the ports, the reads' host
-        stamps in ns and their bytes, one for each read, and returns the readings by columns, one for each read. None,
-        unless every read is one sound frame and every decoder stands between two: the decoders need not hear of such a
-        frame.
     self_framing : bool
         Whether a mark or checksum tells a frame from noise; without one, bytes alone never show the family.
     source : str
@@ -132,7 +127,6 @@ class Family:
     poll: Poll | None = None
     options: Mapping[str, str] = field(default_factory=dict)
     has_device_time: bool = False
-    whole: Callable[[Sequence[Any], Sequence[int], Sequence[bytes]], ReadingColumns | None] | None = None
     self_framing: bool = True
     source: str = ""
 

@@ -19,14 +19,9 @@ class LineSplitter:
     skip_first : bool
         Whether the first line after the start or a flush is dropped and counted as ``partial_line``: reading may
         have begun midway, and half a number looks like a number.
-
-    Attributes
-    ----------
-    between : bool
-        Whether the next byte begins a line, and one that is not to be dropped.
     """
 
-    __slots__ = ("_end", "_faults", "_held", "_limit", "_overlong", "_skip", "_skip_first", "between")
+    __slots__ = ("_end", "_faults", "_held", "_limit", "_overlong", "_skip", "_skip_first")
 
     def __init__(self, end: bytes, limit: int, faults: dict[str, int], *, skip_first: bool = False) -> None:
         self._end = end
@@ -36,7 +31,6 @@ class LineSplitter:
         self._skip = skip_first
         self._overlong = False
         self._held = b""
-        self.between = not skip_first
 
     @property
     def pending(self) -> int:
@@ -60,7 +54,6 @@ class LineSplitter:
                 if len(line) > self._limit:
                     self._drop(line, "bad_frame")
             lines = [line for line in lines if len(line) <= self._limit]
-        self.between = not (self._held or self._overlong or self._skip)
         return lines
 
     def flush(self) -> None:
@@ -71,7 +64,6 @@ class LineSplitter:
         self._held = b""
         self._overlong = False
         self._skip = self._skip_first
-        self.between = not self._skip_first
 
     def _drop(self, line: bytes, why: str) -> None:
         self._faults["garbage_bytes"] += len(line) + 1

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from acquisition.block import F8, I8
+from acquisition.block import F8
 from acquisition.errors import CalibrationError
 
 __all__ = ["Calibration", "StillPoint", "against_ruler", "from_still"]
@@ -51,18 +52,10 @@ class Calibration:
         if not (math.isfinite(self.scale) and self.scale > 0 and math.isfinite(self.offset_m)):
             raise CalibrationError(f"scale must be positive and offset finite, got {self.scale:g}, {self.offset_m:g} m")
 
-    def distance(self, echo_us: float, distance_m: float) -> float:
-        """Return the distance in m of an echo time, or of a stated distance where there is none; NaN for neither."""
-        raw = 0.5e-6 * self.speed_of_sound_m_per_s * echo_us if math.isfinite(echo_us) else distance_m
-        return self.scale * raw + self.offset_m
-
-    @staticmethod
-    def distances(calibrations: Sequence[Calibration], readings: I8, echo_us: F8, distance_m: F8) -> F8:
-        """Return what :meth:`distance` returns, of several sensors' readings one after the other, so many of each."""
-        numbers = np.array([(each.speed_of_sound_m_per_s, each.scale, each.offset_m) for each in calibrations])
-        speed, scale, offset_m = np.repeat(numbers, readings, axis=0).T
-        raw = np.where(np.isfinite(echo_us), 0.5e-6 * speed * echo_us, distance_m)
-        return np.asarray(scale * raw + offset_m)
+    def distance(self, echo_us: ArrayLike, distance_m: ArrayLike) -> F8:
+        """Return distances in m of echo times in us, or of stated ones in m where there are none; NaN for neither."""
+        raw = np.where(np.isfinite(echo_us), 0.5e-6 * self.speed_of_sound_m_per_s * np.asarray(echo_us), distance_m)
+        return np.asarray(self.scale * raw + self.offset_m)
 
     def restated(self, point: StillPoint, before: Calibration) -> StillPoint:
         """Return a rest position that was measured with ``before``, another scale and offset, as this one states it."""

@@ -6,17 +6,16 @@ reported with its time and opened again when it comes back; the run goes on.
 
 from __future__ import annotations
 
-import contextlib
 import os
+import selectors
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from acquisition.clock import Clock
 from acquisition.decoders.base import Poll, Polled
 from acquisition.errors import PortError
-from acquisition.live.ready import Ready
 from acquisition.live.serial_port import READ_BYTES
 from acquisition.readings import Read
 
@@ -26,8 +25,6 @@ REOPEN_EVERY_NS = 500_000_000
 IDLE_WAIT_S = 0.5
 BLOCKING_WAIT_S = 0.25
 POLLED_WAIT_S = 0.01
-CADENCE_NS = 900_000
-"""Where several ports keep the reader busy it looks at them so often; alone, a port is read as soon as it speaks."""
 
 
 class Transport(Protocol):
@@ -85,7 +82,7 @@ class Sink(Protocol):
     """Who keeps the bytes; called on the I/O thread, so it must not block."""
 
     def reads(self, reads: Sequence[Read]) -> None:
-        """Take what one wake-up read, of each port its bytes."""
+        """Take what one wake-up read, of each port its bytes; called by several threads where lines may block."""
         ...
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
@@ -103,15 +100,15 @@ class Line:
     channel : int
         Number of the sensor within the run.
     poll : Poll or None
-    decoder : Polled or None
-        A polled sensor's decoder, where the sink feeds it within ``data`` and flushes it at "timeout": then it says
-        what to ask next, and a reply that came short counts as timed out before the next request.
+    decoder : callable or None
+        Returns a polled sensor's decoder, where the sink feeds it within ``reads`` and flushes it at "timeout": then
+        that says what to ask next, and a reply that came short counts as timed out before the next request.
     """
 
     transport: Transport
     channel: int = 0
     poll: Poll | None = None
-    decoder: Polled | None = None
+    decoder: Callable[[], Polled] | None = None
     _lost_ns: int | None = field(default=None, init=False)
     _retry_ns: int = field(default=0, init=False)
     _ask_ns: int = field(default=0, init=False)
@@ -131,34 +128,12 @@ class PortReader:
     sink : Sink
     clock : Clock
         The system's: real ports know no other.
-    decode : callable, optional
-        Called on the reading thread when every port that had something was read, its bytes were handed on and what was
-        due to be asked was asked: time for work that may wait until then. It does a bounded piece and returns whether
-        more is to be done at once.
-    cadence_ns : int
-        Least time between two looks at several busy ports, ns; 0 reads each as soon as it speaks.
-
-    Notes
-    -----
-    A wake-up costs more than the read that it is for. Where several ports speak so fast that one wake-up follows
-    another, the reader therefore rests until the cadence is over and then reads all that came meanwhile.
-    benchmarks/ports.py measures what that costs in delay and saves in processor time.
     """
 
-    def __init__(
-        self,
-        lines: Sequence[Line],
-        sink: Sink,
-        clock: Clock,
-        *,
-        decode: Callable[[], bool] | None = None,
-        cadence_ns: int = CADENCE_NS,
-    ) -> None:
+    def __init__(self, lines: Sequence[Line], sink: Sink, clock: Clock) -> None:
         self._lines = list(lines)
         self._sink = sink
         self._clock = clock
-        self._decode = decode
-        self._cadence_ns = cadence_ns
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
         self._failure: BaseException | None = None
@@ -203,36 +178,20 @@ class PortReader:
             self._failure = error
 
     def _select_loop(self, lines: list[Line]) -> None:
-        with contextlib.closing(Ready[Line | None]()) as waiting:
-            waiting.add(self._wake_read, None)
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._wake_read, selectors.EVENT_READ)
             for line in lines:
-                waiting.add(line.transport.fileno(), line)
-            # The many lines that only send need no look at each wake-up.
-            polled = [line for line in lines if line.poll is not None]
-            lost: list[Line] = []
-            cadence_ns = self._cadence_ns if len(lines) > 1 else 0
-            behind, woke_ns = False, 0
+                selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
             while not self._stop.is_set():
-                # Without an end where nothing can be due: the pipe wakes it, and a timer costs a tenth of a wake-up.
-                wait_s = 0.0 if behind else self._wait_s([*polled, *lost]) if polled or lost else None
-                ready = waiting.wait(wait_s)
-                before_ns, woke_ns = woke_ns, self._clock.now_ns()
-                for line in self._read(ready, woke_ns):
-                    waiting.remove(line.transport.fileno())
-                    line.transport.close()
-                    lost.append(line)
-                if lost:
-                    for line in [line for line in lost if self._tries_again(line)]:
-                        waiting.add(line.transport.fileno(), line)
-                        lost.remove(line)
-                for line in polled:
-                    if line.poll is not None and line._lost_ns is None and not self._ask(line, line.poll):
-                        waiting.remove(line.transport.fileno())
-                        line.transport.close()
-                        lost.append(line)
-                behind = self._decode is not None and self._decode()  # last: it may wake another thread
-                if not behind and woke_ns - before_ns < 2 * cadence_ns:
-                    self._clock.sleep_until_ns(woke_ns + cadence_ns)
+                ready = [key.data for key, _ in selector.select(self._wait_s(lines)) if key.data is not None]
+                for line in self._read(ready, self._clock.now_ns()):
+                    _leave(selector, line)
+                for line in lines:
+                    if line._lost_ns is not None:
+                        if self._tries_again(line):
+                            selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
+                    elif line.poll is not None and not self._ask(line, line.poll):
+                        _leave(selector, line)
 
     def _blocking_loop(self, lines: list[Line]) -> None:
         (line,) = lines
@@ -248,8 +207,6 @@ class PortReader:
             wait_s = BLOCKING_WAIT_S if line.poll is None else POLLED_WAIT_S
             if not self._wait_for(line, wait_s):
                 line.transport.close()
-            if self._decode is not None:
-                self._decode()
 
     def _wait_s(self, lines: list[Line]) -> float:
         """How long nothing can be due."""
@@ -262,17 +219,13 @@ class PortReader:
                 wait = min(wait, (line._ask_ns - now) * 1e-9)
         return max(wait, 0.0)
 
-    def _read(self, ready: Iterable[tuple[int, Line | None]], now_ns: int) -> list[Line]:
+    def _read(self, ready: Sequence[Line], now_ns: int) -> list[Line]:
         """Read the ports that have something and hand it on; return those that are gone."""
         reads: list[Read] = []
         gone: list[tuple[Line, str]] = []
-        read = os.read
-        for descriptor, line in ready:
-            if line is None:
-                continue
+        for line in ready:
             try:
-                # Not a call of the transport's: at 200 ports a call for each read is a fifth of what reading costs.
-                data = read(descriptor, READ_BYTES)
+                data = os.read(line.transport.fileno(), READ_BYTES)
             except BlockingIOError:
                 continue
             except OSError as error:
@@ -282,13 +235,12 @@ class PortReader:
                 reads.append((line.channel, now_ns, data))
             else:
                 gone.append((line, "end of file"))
-            if line.poll is not None:
-                line._answer_by_ns = None
+            line._answer_by_ns = None
         if reads:
             self._sink.reads(reads)
         for line, why in gone:
             self._gone(line, f"{line.transport.name}: the port has gone ({why})")
-        return [line for line, _ in gone] if gone else []
+        return [line for line, _ in gone]
 
     def _wait_for(self, line: Line, wait_s: float) -> bool:
         """Hand on what comes within that time; False where the port is gone."""
@@ -308,14 +260,15 @@ class PortReader:
         if now < line._ask_ns:
             return True
         try:
-            short = line.decoder is not None and line._answer_by_ns is None and line.decoder.pending > 0
+            decoder = None if line.decoder is None else line.decoder()
+            short = decoder is not None and line._answer_by_ns is None and decoder.pending > 0
             if short or (line._answer_by_ns is not None and now >= line._answer_by_ns):
                 # Without header and checksum the rest of a late reply would be read as the next one.
                 line.transport.discard_input()
                 self._sink.event(line.channel, now, "timeout", {"after_s": poll.timeout_s})
                 line._answer_by_ns = None
             if line._answer_by_ns is None:
-                line.transport.write(poll.request if line.decoder is None else line.decoder.request)
+                line.transport.write(poll.request if decoder is None else decoder.request)
                 line._answer_by_ns = now + int(poll.timeout_s * 1e9)
         except PortError as error:
             self._gone(line, str(error))
@@ -349,3 +302,9 @@ class PortReader:
 
 def _may_block(line: Line) -> bool:
     return line.transport.fileno() < 0 or "://" in line.transport.name
+
+
+def _leave(selector: selectors.BaseSelector, line: Line) -> None:
+    """Wait no more on a port that is gone, and close what is left of it."""
+    selector.unregister(line.transport.fileno())
+    line.transport.close()

@@ -7,16 +7,15 @@ is used wherever it is sent, and the host clock is regressed on it to find the c
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.block import B1, F8, I8, Flag
+from acquisition.block import F8, I8, Flag
 from acquisition.readings import Reading
 from acquisition.source import ClockKind
 
-__all__ = ["ClockFit", "Gap", "Timebase", "fit_clock", "steady_times"]
+__all__ = ["ClockFit", "Gap", "Timebase", "fit_clock"]
 
 WRAP_US = 1 << 32
 WRAP_S = WRAP_US * 1e-6
@@ -182,59 +181,6 @@ class Timebase:
                 return True
         self._ticks += difference
         return False
-
-
-def steady_times(timebases: Sequence[Timebase], readings: I8, host_ns: I8, device_us: I8) -> tuple[F8, B1]:
-    """Give readings of several sensors their times at once, where nothing about them is unusual.
-
-    Parameters
-    ----------
-    timebases : sequence of Timebase
-        Of n sensors.
-    readings : (n,) int64
-        How many each has, at least one.
-    host_ns, device_us : int64
-        Of the first sensor's readings, then of the second's, and so on.
-
-    Returns
-    -------
-    t : float64, s
-        Times as :meth:`Timebase.push` gives them.
-    steady : (n,) bool
-        Which sensors have a clock of their own and neither gap, repeat, step back nor wrap. Those timebases have
-        counted on; of the others the times are not to be used, and their timebases know nothing of the readings.
-    """
-    ends = np.cumsum(readings)
-    starts = ends - readings
-    begun = np.array([base._last_raw is not None for base in timebases])
-    last_raw = np.array([base._last_raw or 0 for base in timebases])
-    state = np.array([(base._anchor_s, base._latest_s, base._longest_s) for base in timebases])
-    anchor_s, latest_s, longest_s = state.T
-    ticks = np.array([base._ticks for base in timebases])
-    # From the reading before, of the first ones from the sensor's last one.
-    difference = np.diff(device_us, prepend=0)
-    difference[starts] = device_us[starts] - last_raw
-    t = np.repeat(anchor_s, readings) + (np.repeat(ticks - last_raw, readings) + device_us) * 1e-6
-    step = np.diff(t, prepend=0.0)
-    step[starts] = t[starts] - latest_s
-    longest_s = np.repeat(longest_s, readings)
-    usual = (difference > 0) & (difference * 1e-6 <= longest_s) & (step > 0.0) & (step <= longest_s)
-    steady = begun & np.logical_and.reduceat(usual & (device_us >= 0), starts)
-    last = ends - 1
-    for base, is_steady, count, raw, stamp_ns, latest in zip(
-        timebases,
-        steady.tolist(),
-        readings.tolist(),
-        device_us[last].tolist(),
-        host_ns[last].tolist(),
-        t[last].tolist(),
-        strict=True,
-    ):
-        if is_steady:
-            base._ticks += raw - base._last_raw
-            base._last_raw, base._last_host_ns, base._latest_s = raw, stamp_ns, latest
-            base._count += count
-    return t, steady
 
 
 def fit_clock(t: F8, host_ns: I8) -> ClockFit:

@@ -40,8 +40,6 @@ class Progress:
         Left on the disk that the log lies on; None before there is a log.
     waiting : bool
         Whether the trigger has not come yet.
-    skipped_bytes : int
-        Recorded and not decoded live, because more came than the decoders could do; the run file holds them decoded.
     """
 
     seconds: float
@@ -53,7 +51,6 @@ class Progress:
     status: RecorderStatus | None
     disk_free_bytes: int | None
     waiting: bool
-    skipped_bytes: int = 0
 
 
 class Shown:

@@ -14,16 +14,14 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from acquisition.block import Block
 from acquisition.clock import Clock
-from acquisition.decoders.base import Polled
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
-from acquisition.live.decoding import Chains
-from acquisition.live.reader import Line, PortReader
+from acquisition.live.reader import PortReader
 from springmass import __version__
 from springmass.errors import SENSOR, USAGE, ProgramError
 from springmass.session.progress import SECOND_NS, Progress, Shown
@@ -69,15 +67,10 @@ class Session:
         self._kind = kind
         self._scene = scene
         self._title = title
-        self._askers = {
-            i: cast(Polled, sensor.family.decoder(**sensor.options))
-            for i, sensor in enumerate(self.sensors)
-            if sensor.family.poll is not None
-        }
-        self._chains = Chains([sensor.chain() for sensor in self.sensors])
-        self._tee = Tee(self._chains, self._askers)
+        self._chains = [sensor.chain() for sensor in self.sensors]
+        self._tee = Tee(self._chains)
         self._reader: PortReader | None = None
-        self._shown = Shown(self._chains.each[0].timebase.rate_hz)
+        self._shown = Shown(self._chains[0].timebase.rate_hz)
 
     def listen(self) -> None:
         """Start reading, and return when every sensor has been heard.
@@ -87,14 +80,12 @@ class Session:
         ProgramError
             With exit code 4 after three seconds: silence, or bytes of another kind (it says what they look like).
         """
-        lines = [
-            Line(sensor.transport, i, sensor.family.poll, self._askers.get(i)) for i, sensor in enumerate(self.sensors)
-        ]
-        self._reader = PortReader(lines, self._tee, self._clock, decode=self._tee.decode)
+        lines = [self._tee.line(channel, sensor) for channel, sensor in enumerate(self.sensors)]
+        self._reader = PortReader(lines, self._tee, self._clock)
         self._reader.start()
         heard = [0] * len(self.sensors)
         # A slow sensor takes several of its own periods to be told from silence.
-        slowest = min(chain.timebase.rate_hz for chain in self._chains.each)
+        slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
         while not all(count >= 3 for count in heard):
             if self._clock.now_ns() > deadline:
@@ -122,7 +113,7 @@ class Session:
         before = self.sensors[0].calibration
         calibration = against_ruler(tuple(points), tuple(known_m), u_known_m, before)
         self.sensors[0] = replace(self.sensors[0], calibration=calibration)
-        self._chains.each[0].calibration = calibration
+        self._chains[0].calibration = calibration
         self.poll(0.0)  # what was decoded with the calibration before
         return calibration.restated(points[-1], before)
 
@@ -166,10 +157,9 @@ class Session:
             )
         since_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, progress)
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
-        self._chains = Chains([sensor.chain() for sensor in self.sensors])
+        self._chains = [sensor.chain() for sensor in self.sensors]
         self._shown.clear()
-        own_clocks = all(sensor.family.has_device_time for sensor in self.sensors)
-        recorder = Recorder(log, self._header(), self._clock, own_clocks=own_clocks)
+        recorder = Recorder(log, self._header(), self._clock)
         start_ns = self._clock.now_ns()
         try:
             self._tee.start(recorder, self._chains, since_ns)
@@ -265,13 +255,12 @@ class Session:
             seconds,
             shown.samples,
             shown.missing,
-            sum(len(chain.timebase.gaps) for chain in self._chains.each),
+            sum(len(chain.timebase.gaps) for chain in self._chains),
             shown.rate_hz(self._clock.now_ns()),
             partial(shown.motion, self._clock.now_ns()),
             None if recorder is None else recorder.status,
             None if recorder is None else shutil.disk_usage(recorder.path.parent).free,
             recorder is None,
-            self._tee.skipped_bytes,
         )
 
     def _header(self) -> LogHeader:

@@ -306,11 +306,6 @@ class WireLogWriter:
             self.synced = reached
         return reached
 
-    @property
-    def syncing(self) -> bool:
-        """Whether a sync is under way: what is written meanwhile may wait for it."""
-        return self._syncing.locked()
-
     def close(self) -> None:
         """Close the file without syncing it; call once.
 

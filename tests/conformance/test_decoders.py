@@ -18,7 +18,7 @@ from acquisition.block import Flag
 from acquisition.decoders.base import Decoder, Family, Polled
 from acquisition.decoders.example import FAMILY as EXAMPLE
 from acquisition.decoders.registry import families, get_family
-from acquisition.readings import COLUMNS, Reading, Readings, join
+from acquisition.readings import COLUMNS, Readings, join
 
 N = 24
 _I = np.arange(N)
@@ -421,28 +421,6 @@ def test_what_it_gave_does_not_change_when_it_goes_on(case: Case) -> None:
 
 
 POLLED = [case for case in CASES if case.member.poll is not None]
-
-
-@of([case for case in CASES if case.member.whole is not None])
-def test_whole_frames_of_several_ports_are_what_each_decoder_makes_of_them(case: Case) -> None:
-    """One of each port, several of one: the same readings; a cut, doubled, spoilt or missing frame among them: none."""
-    whole, frames = case.member.whole, case.frames()
-    assert whole is not None
-    stamps = tuple(range(1_000, 1_000 + N))
-    alone = [reading for i, frame in enumerate(frames) for reading in case.decoder().feed(stamps[i], frame)]
-    for decoders in ([case.decoder() for _ in frames], [case.decoder()] * N):
-        together = whole(decoders, stamps, tuple(frames))
-        assert together is not None
-        assert repr([Reading(*row) for row in zip(*together, strict=True)]) == repr(alone)  # NaN equals NaN in print
-        assert not any(decoder.pending or any(decoder.faults.values()) for decoder in decoders)
-    spoilt = bytearray(frames[7])
-    spoilt[len(spoilt) // 2] ^= 1
-    for other in (frames[7][:-1], frames[7][1:], frames[7] + frames[8], b"x" + frames[7], bytes(spoilt), b""):
-        reads = (*frames[:7], other, *frames[8:])
-        assert whole([case.decoder() for _ in reads], stamps, reads) is None
-    busy = [case.decoder() for _ in frames]
-    busy[3].feed(0, frames[3][:5])
-    assert whole(busy, stamps, tuple(frames)) is None
 
 
 def conversation(case: Case, lost: frozenset[int]) -> Iterator[tuple[bytes, Readings]]:

@@ -20,7 +20,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
-from acquisition.live.decoding import Chains, SensorChain
+from acquisition.live.decoding import SensorChain
 from springmass.session.reads import Tee
 from storage.recorder import Recorder
 from storage.wire_log.appending import Kind, LogHeader, SensorEntry, read_log
@@ -30,18 +30,16 @@ PACKET = 64
 HEADER = LogHeader(sensors=(SensorEntry(0, "line"),), mono_ns=0, unix_ns=0)
 
 
-def record(port: int, log: str, mode: str, appender: str) -> None:
+def record(port: int, log: str, mode: str) -> None:
     """Record a port until the process is killed; say after each read how far the log has come."""
     clock = SystemClock()
-    recorder = Recorder(log, HEADER, clock, sync_every_s=0.003, own_clocks=appender == "reader")
-    chains = Chains([SensorChain(get_family("line-protocol"))])
-    tee = Tee(chains, {})
+    recorder = Recorder(log, HEADER, clock, sync_every_s=0.003)
+    chains = [SensorChain(get_family("line-protocol"))]
+    tee = Tee(chains)
     tee.start(recorder, chains, 0)
     os.write(1, struct.pack("<II", 0, 0))
     while data := os.read(port, PACKET):
-        # As the reading thread does: all that was read is put away, then decoded, and last the appending is asked for.
-        tee.reads([(0, clock.now_ns(), data)])
-        tee.decode()
+        tee.reads([(0, clock.now_ns(), data)])  # as the reading thread does: put away, then decoded
         status = recorder.drain() if mode == "paced" else recorder.status
         os.write(1, struct.pack("<II", status.records, status.synced_records))
 
@@ -61,10 +59,10 @@ def packet(number: int) -> bytes:
     return struct.pack("<Q", number) + bytes([number % 256]) * (PACKET - 8)
 
 
-def trial(log: Path, mode: str, appender: str, rng: np.random.Generator) -> Outcome:
+def trial(log: Path, mode: str, rng: np.random.Generator) -> Outcome:
     """Feed a recording child and kill it at a random moment."""
     port, feed = os.pipe()
-    command = [sys.executable, "-B", __file__, str(port), str(log), mode, appender]
+    command = [sys.executable, "-B", __file__, str(port), str(log), mode]
     with subprocess.Popen(command, stdout=subprocess.PIPE, pass_fds=[port]) as child:
         assert child.stdout is not None
         said = child.stdout.read(8)
@@ -90,18 +88,14 @@ def trial(log: Path, mode: str, appender: str, rng: np.random.Generator) -> Outc
 
 @pytest.mark.trials
 @pytest.mark.parametrize(("mode", "kills"), [("paced", KILLS), ("flood", -(-KILLS // 3))])
-@pytest.mark.parametrize("appender", ["reader", "appender"])
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no kill -9")
-def test_a_killed_recording_keeps_every_committed_record(mode: str, kills: int, appender: str, tmp_path: Path) -> None:
-    """Every log opens with the reads from the first on, at the bench's pace all but the one in flight.
-
-    Sensors with clocks of their own are appended by the reading thread, the others by one of its own.
-    """
+def test_a_killed_recording_keeps_every_committed_record(mode: str, kills: int, tmp_path: Path) -> None:
+    """Every log opens with the reads from the first on, at the bench's pace all but the one in flight."""
     rng = np.random.default_rng(kills)
     lost = []
     for number in range(kills):
         log = tmp_path / f"{number}.wire"
-        outcome = trial(log, mode, appender, rng)
+        outcome = trial(log, mode, rng)
         contents = read_log(log)
         reads = [record.payload for record in contents if record.kind is Kind.DATA]
         assert reads == [packet(n) for n in range(len(reads))], "a wrong record"
@@ -111,7 +105,7 @@ def test_a_killed_recording_keeps_every_committed_record(mode: str, kills: int, 
         lost.append(outcome.taken - len(reads))
     assert mode == "flood" or max(lost) <= 1, lost
     assert min(lost) >= 0
-    print(f"kill -9, {mode}, by the {appender}: {kills} trials, reads lost in flight: {sum(lost)}, at most {max(lost)}")
+    print(f"kill -9, {mode}: {kills} trials, reads lost in flight: {sum(lost)}, at most {max(lost)}")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ import serial
 
 from acquisition.block import Block, Flag, concatenate
 from acquisition.clock import SystemClock
-from acquisition.decoders.base import Poll
+from acquisition.decoders.base import Poll, Polled
 from acquisition.decoders.registry import families, get_family
 from acquisition.errors import PortError
 from acquisition.live import reader as wired
@@ -156,7 +156,7 @@ def run(
         line = Line(SerialPort(port.path, family.baud), 3)
         if family.poll is not None:
             line.poll = dataclasses.replace(family.poll, interval_s=0.003, timeout_s=timeout_s)
-            line.decoder = chain.decoder if informed else None  # type: ignore[assignment]
+            line.decoder = (lambda: cast(Polled, chain.decoder)) if informed else None
         reader = PortReader([line], keeper, CLOCK)
         reader.start()
         try:

@@ -6,16 +6,16 @@ was synced and does what it likes with every page after that.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.block import F8, I8, Block
-from acquisition.readings import Read
-from acquisition.source import SourceInfo
+from acquisition.decoders.registry import get_family
+from acquisition.live.decoding import SensorChain
+from acquisition.readings import Reading, Readings
 from storage.wire_log.appending import Kind, LogHeader, SensorEntry, WireLogWriter, parse_log
 from storage.wire_log.wire_samples import decode_log
 
@@ -49,38 +49,32 @@ class Disk:
 
 
 class Frames:
-    """Chains of a sensor that sends ``R1234\\r``: no checksum, so that halves of two frames would make a value."""
+    """Decodes a sensor that sends ``R1234\\r``: no checksum, so that halves of two frames would make a value."""
 
     def __init__(self) -> None:
-        self.each = (self,)
+        self.faults: dict[str, int] = {}
         self._held = b""
-        self._blocks: list[tuple[int, Block]] = []
-        self._next = 0
 
-    def take(self, reads: Sequence[Read]) -> None:
-        """Make samples of the frames that each read completes."""
-        for number, host_ns, data in reads:
-            # After a break half a frame is forgotten; what is left of it on the other side has no R.
-            *lines, self._held = (self._held + data).split(b"\r") if data else [b""]
-            values = [int(line[1:]) for line in lines if len(line) == 5 and line[:1] == b"R"]
-            n = len(values)
-            t = np.arange(self._next, self._next + n) / 100
-            distance, flags = np.array(values, np.float64), np.zeros(n, np.uint8)
-            self._blocks.append((number, Block(self._next, t, distance, flags, np.full(n, host_ns))))
-            self._next += n
+    @property
+    def pending(self) -> int:
+        """Bytes held."""
+        return len(self._held)
 
-    def blocks(self) -> list[tuple[int, Block]]:
-        """Return the samples since the last call."""
-        blocks, self._blocks = self._blocks, []
-        return blocks
+    def feed(self, host_ns: int, data: bytes) -> Readings:
+        """Make readings of the frames that a read completes."""
+        *lines, self._held = (self._held + data).split(b"\r")
+        values = [int(line[1:]) for line in lines if len(line) == 5 and line[:1] == b"R"]
+        return Readings(Reading(host_ns, distance_m=value) for value in values)
 
-    def info(self, name: str, kind: str = "live") -> SourceInfo:
-        """Return what is known."""
-        return SourceInfo("simulated", name, 100.0)
+    def flush(self) -> None:
+        """Forget half a frame; what is left of it on the other side of a break has no R."""
+        self._held = b""
 
-    def report(self, t: F8, host_ns: I8) -> Mapping[str, Any]:
-        """Return nothing of note."""
-        return {}
+
+def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
+    """Return a chain of such a sensor for each."""
+    family = dataclasses.replace(get_family("maxbotix-hr"), decoder=Frames)
+    return [SensorChain(family) for _ in sensors]
 
 
 def recording(seed: int, log: int) -> tuple[Disk, dict[int, list[float]]]:
@@ -137,7 +131,7 @@ def test_power_loss_gives_no_wrong_value(seed: int) -> None:
         synced = {number for number, record in whole.items() if record.offset < safe}
         assert synced <= {record.sequence for record in read}
         assert contents.header == HEADER
-        (decoded,) = decode_log(contents, [SENSOR], lambda _: Frames())
+        (decoded,) = decode_log(contents, [SENSOR], chains_of)
         samples = decoded.samples
         host_ns = np.empty(0, np.int64) if samples.host_ns is None else samples.host_ns
         for moment in np.unique(host_ns):

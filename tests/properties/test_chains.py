@@ -1,4 +1,4 @@
-"""Many sensors' reads decoded together, and their samples made together, are what each chain alone gives."""
+"""Samples are the same whether they are asked for after each read or many reads later, and whoever else sends."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from acquisition.block import Block, Flag, concatenate
 from acquisition.decoders.line_protocol import LineProtocolEncoder, frame
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
-from acquisition.live.decoding import FEW, MANY, Chains, SensorChain
-from acquisition.readings import Read, Readings
+from acquisition.live.decoding import SensorChain
+from acquisition.readings import Read
+from springmass.session.reads import Tee
 
 SENSORS = 7
+MANY = 32
 STEP_US, STEP_NS = 10_000, 10_000_000
 WRAP_US = 1 << 32
 COLUMNS = ("t", "distance", "flags", "host_ns")
@@ -51,7 +53,7 @@ def chains(family: str = "line-protocol") -> list[SensorChain]:
 
 
 def alone(reads: Sequence[Read], each: Sequence[SensorChain]) -> list[Block]:
-    """Feed every read to its chain by itself."""
+    """Feed every read to its chain, and take its samples at once."""
     parts: list[list[Block]] = [[] for _ in each]
     for channel, host_ns, data in reads:
         if data:
@@ -61,17 +63,24 @@ def alone(reads: Sequence[Read], each: Sequence[SensorChain]) -> list[Block]:
     return [concatenate(blocks) for blocks in parts]
 
 
-def assert_same(together: Chains, rounds: Sequence[Sequence[Read]], each: Sequence[SensorChain]) -> list[Block]:
-    """Feed rounds to both, compare all that comes of it bit by bit; return the samples."""
+def assert_same(
+    held: Sequence[SensorChain], rounds: Sequence[Sequence[Read]], each: Sequence[SensorChain]
+) -> list[Block]:
+    """Take the samples of a tee once a round, compare all that comes of it bit by bit; return the samples."""
     parts: list[list[Block]] = [[] for _ in each]
+    tee = Tee(held)
     for reads in rounds:
-        together.take(reads)
-        for channel, block in together.blocks():
+        for channel, host_ns, data in reads:
+            if data:
+                tee.reads([(channel, host_ns, data)])
+            else:
+                tee.event(channel, host_ns, "lost", {})
+        for channel, block in tee.blocks():
             assert len(block)
             parts[channel].append(block)
     expected = alone([read for reads in rounds for read in reads], each)
     found = [concatenate(blocks) for blocks in parts]
-    for got, want, chain, other in zip(found, expected, together.each, each, strict=True):
+    for got, want, chain, other in zip(found, expected, held, each, strict=True):
         for name in COLUMNS:
             if len(want):
                 assert getattr(got, name).tobytes() == getattr(want, name).tobytes(), name
@@ -114,63 +123,32 @@ def recordings(draw: st.DrawFn) -> list[list[Read]]:
 
 
 @given(recordings())
-def test_together_is_as_alone(rounds: list[list[Read]]) -> None:
+def test_held_is_as_taken_at_once(rounds: list[list[Read]]) -> None:
     """Samples, gaps, restarts and faults are the same bit by bit, whatever comes between sound lines."""
-    assert_same(Chains(chains()), rounds, chains())
-
-
-def test_sound_lines_are_decoded_together_and_make_samples_together() -> None:
-    """Of steady sensors no chain is asked by itself, but for their first samples and for few."""
-
-    class Alone(SensorChain):
-        """Counts what it is asked by itself."""
-
-        def __init__(self) -> None:
-            super().__init__(get_family("line-protocol"), rate_hz=100.0)
-            self.taken = self.blocked = 0
-
-        def decode(self, host_ns: int, data: bytes) -> Readings:
-            """Count."""
-            self.taken += 1
-            return super().decode(host_ns, data)
-
-        def block(self) -> Block:
-            """Count."""
-            self.blocked += 1
-            return super().block()
-
-    each = [Alone() for _ in range(MANY)]
-    together = Chains(each)
-    for k in range(5):
-        together.take([(i, k * STEP_NS, line(k, k * STEP_US)) for i in range(MANY)])
-        assert len(together.blocks()) == MANY
-    assert {(chain.taken, chain.blocked) for chain in each} == {(0, 1)}
-    together.take([(i, 5 * STEP_NS, line(5, 5 * STEP_US)) for i in range(FEW - 1)])
-    assert len(together.blocks()) == FEW - 1
-    assert [(chain.taken, chain.blocked) for chain in each[:FEW]] == [(1, 2)] * (FEW - 1) + [(0, 1)]
+    assert_same(chains(), rounds, chains())
 
 
 def test_half_lines_of_two_ports_make_no_line() -> None:
     """What one port's read begins and another's would end is no reading of either."""
     text = line(1, STEP_US)
     reads = [(0, 0, text[:9]), (1, 0, text[9:]), (2, 0, text + text), (3, 0, text), (4, 0, b"x" + text)]
-    found = assert_same(Chains(chains()), [reads, [(0, 1, text[9:])]], chains())
+    found = assert_same(chains(), [reads, [(0, 1, text[9:])]], chains())
     assert [len(block) for block in found] == [1, 0, 2, 1, 1, 0, 0]
 
 
-def test_a_port_that_went_away_flags_the_next_sample_made_together() -> None:
+def test_a_port_that_went_away_flags_the_next_sample() -> None:
     """Also where the next sample comes in a later block."""
     rounds = [[(i, k * STEP_NS, line(k, k * STEP_US)) for k in range(MANY) for i in range(2)]]
     rounds[0].insert(21, (1, 10 * STEP_NS, b""))
     rounds[0].append((0, MANY * STEP_NS, b""))
     rounds.append([(i, k * STEP_NS, line(k, k * STEP_US)) for k in range(MANY, 2 * MANY) for i in range(2)])
-    found = assert_same(Chains(chains()), rounds, chains())
+    found = assert_same(chains(), rounds, chains())
     gap = int(Flag.GAP_BEFORE)
     assert [np.flatnonzero(block.flags == gap).tolist() for block in found[:2]] == [[MANY], [10]]
 
 
 def test_sensors_of_other_families_go_through_their_own_decoders() -> None:
-    """Lines of text beside the line protocol, neither disturbed by the other."""
+    """Lines of text between those of the line protocol, neither disturbed by the other."""
 
     other = get_family("maxbotix-hr")
     encoder = other.encoder()
@@ -185,5 +163,5 @@ def test_sensors_of_other_families_go_through_their_own_decoders() -> None:
         )
 
     rounds = [[(i, k * STEP_NS, text(k) if i % 2 else line(k, k * STEP_US)) for k in range(20) for i in range(6)]]
-    found = assert_same(Chains(mixed()), rounds, mixed())
+    found = assert_same(mixed(), rounds, mixed())
     assert [len(block) for block in found] == [20] * 6

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from acquisition.clock import Clock, VirtualClock
+from acquisition.clock import VirtualClock
 from acquisition.live.reader import Sink
 from storage.disk import DiskNearlyFull
 from storage.errors import RunExists, WriteFailed
@@ -73,17 +73,14 @@ def recorder(
     *,
     sync_every_s: float = HOUR_S,
     queue_bytes: int = 1 << 20,
-    own_clocks: bool = False,
-    clock: Clock | None = None,
 ) -> Recorder:
     """Return a recorder to a file in memory."""
     return Recorder(
         "run.wire",
         HEADER,
-        clock or VirtualClock(7),
+        VirtualClock(7),
         sync_every_s=sync_every_s,
         queue_bytes=queue_bytes,
-        own_clocks=own_clocks,
         open_file=disk,
     )
 
@@ -136,26 +133,13 @@ def test_putting_never_waits_for_the_disk() -> None:
     assert disk.threads["write"] == {"MainThread", "springmass-log"}  # the header and the end; all else
 
 
-def test_what_is_enqueued_is_appended_when_the_log_is_woken() -> None:
-    """The reading thread says when: many reads are then one write; closing leaves none behind."""
+def test_what_waits_is_appended_with_one_write() -> None:
+    """Records that came while a write hung go to the disk together, and a mark among them keeps its place."""
     disk = Disk()
     recording = recorder(disk)
-    recording.drain()
-    before = len(disk.data)
-    for number in range(10):
-        recording.take([(0, number, b"x")])
-    assert (recording.status.queued_records, recording.status.records, len(disk.data)) == (10, 1, before)
-    recording.wake()
-    assert recording.drain().records == 11
-    recording.take([(0, 10, b"last")])
-    recording.close()
-    assert [record.payload for record in parse_log(bytes(disk.data)) if record.kind is Kind.DATA][-1] == b"last"
-
-
-def test_what_needs_no_host_stamp_is_appended_by_the_thread_that_asks() -> None:
-    """Where sensors have clocks of their own all records of a call are in the log when it returns, in one write."""
-    disk = Disk()
-    recording = recorder(disk, own_clocks=True)
+    disk.writes_pass.clear()
+    recording.put(0, 0, b"first")
+    assert disk.held.wait(WAIT_S)
     writes = 0
 
     def count() -> None:
@@ -163,97 +147,15 @@ def test_what_needs_no_host_stamp_is_appended_by_the_thread_that_asks() -> None:
         writes += 1
 
     disk.takes = count
-    recording.take([(0, number, b"x") for number in range(10)])
-    assert (recording.status.queued_records, recording.status.records, writes) == (0, 11, 1)
-    recording.close()
-    assert disk.threads["write"] == {"MainThread"}
-
-
-def test_what_is_queued_comes_before_what_could_be_appended_at_once() -> None:
-    """A mark that waits for another thread stands before a read that came after it."""
-    disk = Disk()
-    recording = recorder(disk, own_clocks=True)
-    disk.writes_pass.clear()
+    recording.reads([(0, number, b"x") for number in range(10)])
     recording.mark("let go")
-    assert disk.held.wait(WAIT_S)
-    recording.mark("held")
-    recording.take([(0, 1, b"x")])
-    assert recording.status.queued_records == 2
+    recording.put(0, 10, b"last")
     disk.writes_pass.set()
-    recording.wake()
     recording.drain()
+    assert writes == 2  # the one that hung, and all that waited
     recording.close()
     kinds = [record.kind for record in parse_log(bytes(disk.data))]
-    assert kinds == [Kind.HEADER, Kind.MARK, Kind.MARK, Kind.DATA, Kind.END]
-
-
-def test_the_thread_that_asks_does_not_wait_for_a_sync() -> None:
-    """While fdatasync has the file, another thread appends."""
-    disk = Disk()
-    recording = recorder(disk, own_clocks=True, sync_every_s=1e-4)
-    disk.syncs_pass.clear()
-    recording.take([(0, 0, b"first")])
-    recording.wake()
-    assert disk.held.wait(WAIT_S)
-    disk.writes_pass.clear()
-    recording.take([(0, 1, b"second")])
-    recording.wake()
-    assert recording.status.queued_records + recording.status.records >= 2
-    disk.writes_pass.set()
-    assert recording.drain().records == 3
-    assert disk.threads["write"] == {"MainThread", "springmass-log"}
-    disk.syncs_pass.set()
-    recording.close()
-
-
-def test_after_a_slow_write_another_thread_appends_for_a_while() -> None:
-    """A write that took 60 ms hands the next ten seconds over; then the thread that asks appends again."""
-    disk, clock = Disk(), VirtualClock()
-    recording = recorder(disk, own_clocks=True, clock=clock)
-
-    def threads_of(seconds: float) -> set[str]:
-        """Append one record that takes so long, and tell on which thread."""
-        disk.threads["write"].clear()
-        disk.takes = lambda: clock.sleep_until_ns(clock.now_ns() + round(seconds * 1e9))
-        recording.take([(0, 0, b"x")])
-        recording.wake()
-        recording.drain()
-        return disk.threads["write"]
-
-    assert threads_of(0.04) == {"MainThread"}
-    assert threads_of(0.06) == {"MainThread"}
-    assert threads_of(9.99) == {"springmass-log"}
-    assert threads_of(0.011) == {"springmass-log"}
-    assert threads_of(0.0) == {"MainThread"}
-    recording.close()
-
-
-def test_records_stand_in_their_order_whichever_thread_appends(tmp_path: Path) -> None:
-    """A mark wakes the other thread while the reading thread appends: the log keeps the queue's order."""
-    recording = Recorder(tmp_path / "run.wire", HEADER, VirtualClock(), own_clocks=True, sync_every_s=1e-4)
-    for number in range(3000):
-        recording.take([(0, number, b"%d" % number)])
-        if number % 3 == 0:
-            recording.mark(str(number), host_ns=number)
-        recording.wake()
-    recording.close()
-    records = [r for r in read_log(tmp_path / "run.wire") if r.kind in (Kind.DATA, Kind.MARK)]
-    assert [r.mono_ns for r in records] == sorted(r.mono_ns for r in records)
-    assert [int(r.payload) for r in records if r.kind is Kind.DATA] == list(range(3000))
-
-
-def test_a_full_disk_stops_the_appending_of_the_thread_that_asks() -> None:
-    """It is told by the status and by closing, and never raised to the thread that reads ports."""
-    disk = Disk()
-    recording = recorder(disk, own_clocks=True)
-    disk.room = len(disk.data) + 50
-    for number in range(5):
-        recording.take([(0, number, b"R%04d\r" % number)])
-        recording.wake()
-    assert "No space left on device" in recording.status.error
-    assert (recording.status.queued_records, recording.status.records + recording.status.dropped_records) == (0, 6)
-    with pytest.raises(WriteFailed, match="could not be written further"):
-        recording.close()
+    assert kinds == [Kind.HEADER, *[Kind.DATA] * 11, Kind.MARK, Kind.DATA, Kind.END]
 
 
 def test_a_slow_sync_holds_up_no_write() -> None:
@@ -323,11 +225,10 @@ def test_an_overflow_is_told_where_it_happened() -> None:
     assert records[16].json()["dropped_records"] == 88
 
 
-@pytest.mark.parametrize("own_clocks", [False, True])
-def test_a_full_disk_stops_the_recording_and_says_so(own_clocks: bool) -> None:
+def test_a_full_disk_stops_the_recording_and_says_so() -> None:
     """The status shows the error at once, putting goes on harmlessly, closing raises it, and the log is whole."""
     disk = Disk()
-    recording = recorder(disk, own_clocks=own_clocks)
+    recording = recorder(disk)
     disk.room = len(disk.data) + 1000
     for number in range(200):
         recording.put(0, number, b"R%04d\r" % number)
@@ -359,11 +260,10 @@ def test_what_a_full_disk_took_is_synced_at_once() -> None:
         recording.close()
 
 
-@pytest.mark.parametrize("own_clocks", [False, True])
-def test_a_failed_sync_stops_the_recording(own_clocks: bool) -> None:
+def test_a_failed_sync_stops_the_recording() -> None:
     """Records that may never reach the disk must not look safe."""
     disk = Disk()
-    recording = recorder(disk, own_clocks=own_clocks)
+    recording = recorder(disk)
     recording.put(0, 0, b"x")
     assert recording.drain(sync=True).synced_records == 2
     disk.sync_trouble = OSError(errno.EIO, "Input/output error")
@@ -376,10 +276,9 @@ def test_a_failed_sync_stops_the_recording(own_clocks: bool) -> None:
     assert recording.status.synced_records == 2
 
 
-@pytest.mark.parametrize("own_clocks", [False, True])
-def test_a_defect_does_not_pass_for_a_recording(own_clocks: bool) -> None:
+def test_a_defect_does_not_pass_for_a_recording() -> None:
     """A record that cannot be laid out stops the recording with a line, not a thread without a word."""
-    recording = recorder(Disk(), own_clocks=own_clocks)
+    recording = recorder(Disk())
     recording.put(0, 1 << 70, b"x")
     with pytest.raises(WriteFailed, match="a record could not be appended"):
         recording.close()
@@ -391,11 +290,10 @@ def test_a_channel_is_a_byte() -> None:
         recording.put(256, 0, b"x")
 
 
-@pytest.mark.parametrize("own_clocks", [False, True])
-def test_putting_after_the_end_is_counted(own_clocks: bool) -> None:
+def test_putting_after_the_end_is_counted() -> None:
     """A reading thread that outlives the recording harms nothing and is not forgotten."""
     disk = Disk()
-    recording = recorder(disk, own_clocks=own_clocks)
+    recording = recorder(disk)
     recording.close()
     recording.put(0, 0, b"late")
     assert (recording.status.dropped_records, recording.status.dropped_bytes) == (1, 4)

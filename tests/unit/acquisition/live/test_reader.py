@@ -1,18 +1,15 @@
-"""The reading thread: how often it looks, and when it decodes."""
+"""The reading thread: what it hands on, and what may not hold it up."""
 
 from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import Any
-
-import pytest
 
 from acquisition.clock import VirtualClock
 from acquisition.errors import PortError
-from acquisition.live.reader import CADENCE_NS, Line, PortReader
+from acquisition.live.reader import Line, PortReader
 from acquisition.readings import Read
 
 WAIT_S = 10.0
@@ -50,68 +47,35 @@ class Pipe:
         os.close(self.end)
 
 
-class Order:
-    """A sink and its decoding, that notes what was called in which order."""
+class Heard:
+    """A sink that notes what was handed on, each wake-up's reads together, and what happened."""
 
-    def __init__(self, pieces: int = 1) -> None:
-        self.calls: list[str] = []
-        self.decoded = threading.Event()
-        self._pieces = pieces
-        self._left = 0
+    def __init__(self) -> None:
+        self.reads_of: list[list[int]] = []
+        self.events: list[str] = []
+        self.came = threading.Event()
 
     def reads(self, reads: Sequence[Read]) -> None:
         """Note what was read."""
-        self.calls += [f"read {channel}" for channel, _, _ in reads]
-        self._left = self._pieces
+        self.reads_of.append(sorted(channel for channel, _, _ in reads))
+        self.came.set()
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Refuse: nothing is lost here."""
-        raise AssertionError(kind)
-
-    def decode(self) -> bool:
-        """Note a piece of decoding."""
-        if self._left:
-            self._left -= 1
-            self.calls.append("decode")
-            if not self._left:
-                self.decoded.set()
-        return self._left > 0
+        """Note an event."""
+        self.events.append(f"{kind} {channel}")
 
 
-@contextmanager
-def reading(ports: int, sink: Order) -> Iterator[tuple[list[Pipe], VirtualClock]]:
-    """Read pipes, into each of which something was written before."""
-    pipes, clock = [Pipe() for _ in range(ports)], VirtualClock(1_000_000_000)
+def test_what_came_on_all_ports_is_handed_on_together() -> None:
+    """Five ports that have something at one wake-up are read, each once, before any of it is handed on."""
+    pipes, sink = [Pipe() for _ in range(5)], Heard()
     for pipe in pipes:
         os.write(pipe.end, b"x")
-    reader = PortReader([Line(pipe, i) for i, pipe in enumerate(pipes)], sink, clock, decode=sink.decode)
+    reader = PortReader([Line(pipe, i) for i, pipe in enumerate(pipes)], sink, VirtualClock())
     reader.start()
-    try:
-        assert sink.decoded.wait(WAIT_S)
-        yield pipes, clock
-    finally:
-        reader.stop()
-
-
-def test_every_port_is_read_before_anything_is_decoded() -> None:
-    """What came on all ports is handed on first; then decoding goes on piece by piece until none is left."""
-    sink = Order(pieces=3)
-    with reading(5, sink):
-        assert sorted(sink.calls[:5]) == [f"read {i}" for i in range(5)]
-        assert sink.calls[5:] == ["decode"] * 3
-
-
-@pytest.mark.parametrize("ports", [1, 2])
-def test_only_several_busy_ports_are_looked_at_in_turns(ports: int) -> None:
-    """A port alone is read as soon as it speaks; of several, one wake-up soon after another is put off."""
-    sink = Order()
-    with reading(ports, sink) as (pipes, clock):
-        for _ in range(3):  # the clock stands still but for rests: the next wake-up comes at once
-            sink.decoded.clear()
-            os.write(pipes[0].end, b"x")
-            assert sink.decoded.wait(WAIT_S)
-        rested_ns = clock.now_ns() - 1_000_000_000
-    assert rested_ns == 0 if ports == 1 else rested_ns >= CADENCE_NS
+    assert sink.came.wait(WAIT_S)
+    reader.stop()
+    assert sink.reads_of == [[0, 1, 2, 3, 4]]
+    assert sink.events == []
 
 
 class Remote(Pipe):
@@ -138,26 +102,9 @@ class Remote(Pipe):
         """Keep the end that is read, which the test closes."""
 
 
-class Lossy(Order):
-    """A sink that expects losses."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.came = threading.Event()
-
-    def reads(self, reads: Sequence[Read]) -> None:
-        """Note what was read."""
-        super().reads(reads)
-        self.came.set()
-
-    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Note an event."""
-        self.calls.append(f"{kind} {channel}")
-
-
 def test_a_network_port_that_is_slow_to_open_holds_up_no_other() -> None:
     """While one address is being opened again, the ports on cables are read."""
-    cable, remote, sink = Pipe(), Remote(), Lossy()
+    cable, remote, sink = Pipe(), Remote(), Heard()
     clock = VirtualClock()
     reader = PortReader([Line(cable, 0), Line(remote, 1)], sink, clock)
     reader.start()
@@ -166,8 +113,8 @@ def test_a_network_port_that_is_slow_to_open_holds_up_no_other() -> None:
         clock.sleep_until_ns(clock.now_ns() + 500_000_000)
     os.write(cable.end, b"y")
     assert sink.came.wait(WAIT_S)
-    assert sink.calls[0] == "lost 1"
-    assert "read 0" in sink.calls
+    assert sink.events == ["lost 1"]
+    assert sink.reads_of == [[0]]
     remote.answer.set()
     reader.stop()
     os.close(remote.fileno())

@@ -5,17 +5,21 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from acquisition.block import Flag, concatenate
+from acquisition.block import Block, concatenate
 from acquisition.decoders.registry import get_family
-from acquisition.live.decoding import Chains, SensorChain
-from acquisition.readings import Read
+from acquisition.live.decoding import SensorChain
+from acquisition.live.reader import Transport
+from acquisition.readings import Read, Readings
 from springmass.session import reads
 from springmass.session.reads import Tee
+from springmass.session.sensors import Sensor
 from storage.recorder import Recorder
 
 STEP_NS = 10_000_000
@@ -27,17 +31,10 @@ class Log:
     def __init__(self) -> None:
         self.taken: list[Read] = []
         self.events: list[str] = []
-        self.awake = 0
 
-    def take(self, reads: Sequence[Read]) -> None:
+    def reads(self, reads: Sequence[Read]) -> None:
         """Remember reads."""
         self.taken += reads
-
-    reads = take
-
-    def wake(self) -> None:
-        """Remember up to where it was to be appended."""
-        self.awake = len(self.taken)
 
     def event(self, channel: int, host_ns: int, kind: str, facts: dict[str, Any]) -> None:
         """Remember an event."""
@@ -61,7 +58,7 @@ def frame(i: int) -> bytes:
 def started(tee: Tee, chains: Sequence[SensorChain], since_ns: int) -> Log:
     """Record from here on."""
     log = Log()
-    tee.start(cast(Recorder, log), Chains(chains), since_ns)
+    tee.start(cast(Recorder, log), chains, since_ns)
     return log
 
 
@@ -69,7 +66,7 @@ def test_what_is_recorded_decodes_to_what_was_shown() -> None:
     """Cut anywhere, with a break in between, the chain fed one read at a time gives the same bits as the tee."""
     data = b"".join(map(frame, range(40)))
     cuts = [0, *np.sort(np.random.default_rng(2).integers(1, len(data), 25)).tolist(), len(data)]
-    tee = Tee(Chains([chain()]), {})
+    tee = Tee([chain()])
     log = started(tee, [chain()], 0)
     other = chain()
     expected = []
@@ -79,8 +76,6 @@ def test_what_is_recorded_decodes_to_what_was_shown() -> None:
             other.lost()
         tee.reads([(0, n * STEP_NS, data[a:b])])
         expected.append(other.feed(n * STEP_NS, data[a:b]))
-    assert tee.blocks() == []
-    assert tee.decode() is False
     ((channel, block),) = tee.blocks()
     whole = concatenate(expected)
     assert channel == 0
@@ -93,108 +88,66 @@ def test_what_is_recorded_decodes_to_what_was_shown() -> None:
     assert tee.gone == {0: "cable"}
 
 
-def test_the_recorder_is_woken_after_each_piece() -> None:
-    """What was read waits for the appending no longer than one piece of decoding takes, in a flood too."""
-    tee = Tee(Chains([chain()]), {})
-    log = started(tee, [chain()], 0)
+def test_what_is_asked_for_is_all_that_was_read() -> None:
+    """Asked for after each read, or once for many, and the same bits."""
+    often, seldom = Tee([chain()]), Tee([chain()])
+    found: list[list[Block]] = [[], []]
     for i in range(1000):
-        tee.reads([(0, i * STEP_NS, frame(i))])
-    assert log.awake == 0
-    assert tee.decode()
-    assert log.awake == 1000
-    tee.reads([(0, 1000 * STEP_NS, frame(1000))])
-    tee.decode()
-    assert log.awake == 1001
-
-
-def test_samples_asked_for_once_a_second_are_decoded_then() -> None:
-    """Nothing is decoded in between but a whole piece; what is asked for is all that was read, and the same bits."""
-    tee, other = Tee(Chains([chain()]), {}), chain()
-    expected, found, untouched = [], [], 0
-    for i in range(1000):
-        tee.reads([(0, i * STEP_NS, frame(i))])
-        before = len(tee._chains)
-        assert not tee.decode()
-        untouched += len(tee._chains) == before
-        expected.append(other.feed(i * STEP_NS, frame(i)))
-        if i % 100 == 99:
-            found += [block for _, block in tee.blocks()]
-            assert sum(map(len, found)) == i + 1
-    assert untouched > 800
-    whole, parts = concatenate(expected), concatenate(found)
+        for tee, blocks in zip((often, seldom), found, strict=True):
+            tee.reads([(0, i * STEP_NS, frame(i))])
+            if tee is often or i % 100 == 99:
+                blocks += [block for _, block in tee.blocks()]
+                assert sum(map(len, blocks)) == i + 1
+    whole, parts = (concatenate(blocks) for blocks in found)
     for name in ("t", "distance", "flags", "host_ns"):
         assert getattr(parts, name).tobytes() == getattr(whole, name).tobytes()
 
 
-def test_samples_asked_for_often_are_decoded_as_they_come() -> None:
-    """Ten times a second is often, also after a time in which nobody asked."""
-    tee = Tee(Chains([chain()]), {})
-    for i in range(300):
-        tee.reads([(0, i * STEP_NS, frame(i))])
-        tee.decode()
-        if i == 100 or (i > 200 and i % 10 == 0):
-            tee.blocks()
-        elif i > 220:
-            assert len(tee._chains) == i % 10
+def test_a_defect_of_a_decoder_costs_no_byte(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was read is recorded before it is decoded."""
+    tee, each = Tee([chain()]), chain()
+    log = started(tee, [each], 0)
+
+    def break_down(host_ns: int, data: bytes) -> Readings:
+        raise RuntimeError(host_ns)
+
+    monkeypatch.setattr(each, "decoder", SimpleNamespace(feed=break_down))
+    with pytest.raises(RuntimeError):
+        tee.reads([(0, 7, b"x")])
+    assert log.taken == [(0, 7, b"x")]
 
 
-def test_a_flood_is_decoded_piece_by_piece_though_nobody_asks() -> None:
-    """Less than a piece waits until somebody asks."""
-    tee = Tee(Chains([chain()]), {})
-    tee.reads([(0, 0, frame(0))])
-    tee.blocks()
-    tee.reads([(0, 1000 * STEP_NS, frame(1))])
-    tee.blocks()
-    for i in range(2, 1000):
-        tee.reads([(0, (1000 + i) * STEP_NS, frame(i))])
-    while tee.decode():
-        pass
-    assert 1000 - len(tee._chains) < reads.ROUND_BYTES / len(frame(0)) + 1
-    assert sum(len(block) for _, block in tee.blocks()) == 1000
-
-
-def test_decoding_stops_after_a_piece_and_goes_on_later() -> None:
-    """A flood does not keep the reader from its ports."""
-    tee = Tee(Chains([chain()]), {})
-    for i in range(1000):
-        tee.reads([(0, i * STEP_NS, frame(i))])
-    rounds = 1
-    while tee.decode():
-        rounds += 1
-    assert rounds == -(-sum(len(frame(i)) for i in range(1000)) // reads.ROUND_BYTES)
-    assert len(tee.blocks()[0][1]) == 1000
-
-
-def test_more_than_the_decoders_can_do_is_recorded_counted_and_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The oldest reads are skipped, the log has all, and the first sample after them is flagged."""
-    monkeypatch.setattr(reads, "HELD_BYTES", 4000)
-    tee = Tee(Chains([chain()]), {})
-    log = started(tee, [chain()], 0)
-    for i in range(200):
-        tee.reads([(0, i * STEP_NS, frame(i))])
-    while tee.decode():
-        pass
-    ((_, block),) = tee.blocks()
-    assert len(log.taken) == 200
-    assert tee.skipped_bytes == sum(len(frame(i)) for i in range(200 - len(block)))
-    assert 0 < len(block) < 200
-    assert block.flags[0] == Flag.GAP_BEFORE
-    assert not block.flags[1:].any()
+def test_a_polled_sensor_is_asked_by_the_decoder_that_hears_its_replies() -> None:
+    """The one of the chain in use, also after a recording has begun with another; a sensor that sends is not asked."""
+    family = get_family("us100")
+    first, second = (SensorChain(family, options={"temperature_every": 1}) for _ in range(2))
+    tee = Tee([first, chain()])
+    sensor = Sensor(family, cast(Transport, SimpleNamespace(name="port")))
+    line = tee.line(0, sensor)
+    assert line.poll is family.poll
+    assert line.decoder is not None
+    assert line.decoder() is first.decoder
+    tee.reads([(0, 1, bytes([1, 44]))])
+    assert line.decoder().request == b"\x50"
+    started(tee, [second, chain()], 0)
+    assert line.decoder() is second.decoder
+    assert line.decoder().request == b"\x55"
+    assert tee.line(1, replace(sensor, family=get_family("ffhls"))).decoder is None
 
 
 def test_a_run_begins_with_the_reads_kept_from_before() -> None:
     """From the moment asked for on, each once, whether or not it was decoded before; breaks are no bytes."""
-    tee = Tee(Chains([chain()]), {})
+    tee = Tee([chain()])
     tee.reads([(0, 0, frame(0))])
     tee.keep()
     for i in range(1, 20):
         tee.reads([(0, i * STEP_NS, frame(i))])
         if i == 10:
-            tee.decode()
+            tee.event(0, i * STEP_NS, "timeout", {})
+            tee.blocks()
     tee.forget(3 * STEP_NS)
     log = started(tee, [chain()], 5 * STEP_NS)
     tee.reads([(0, 20 * STEP_NS, frame(20))])
-    tee.decode()
     ((_, block),) = tee.blocks()
     assert [host_ns // STEP_NS for _, host_ns, _ in log.taken] == list(range(5, 21))
     np.testing.assert_allclose(block.t, np.arange(16) * 0.01, atol=1e-12)
@@ -203,10 +156,9 @@ def test_a_run_begins_with_the_reads_kept_from_before() -> None:
 
 def test_the_first_bytes_are_kept_until_the_sensor_is_known() -> None:
     """So that silence or garbage can be described; not for ever."""
-    tee = Tee(Chains([chain()]), {})
+    tee = Tee([chain()])
     for _ in range(200):
         tee.reads([(0, 0, b"x" * 100)])
-        tee.decode()
     assert tee.heard(0) == b"x" * reads.HEARD_BYTES
     tee.heard_enough()
     assert tee.heard(0) == b""
