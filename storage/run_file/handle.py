@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 
 from storage.errors import NotARun, RunClosed, damaged, one_line, reading
 from storage.run_file import layout
 from storage.run_file.header import SCHEMA, Header
-from storage.run_file.implied import values_of
 
 __all__ = ["Contents", "open_contents"]
 
@@ -30,11 +28,14 @@ class Contents:
         The same, open.
     header : Header
         Its header, its own digest checked.
+    sha256 : str
+        That digest.
     """
 
     path: Path
     handle: Any
     header: Header
+    sha256: str
 
     def file(self) -> Any:
         """Return the file, if it is open.
@@ -63,17 +64,6 @@ class Contents:
             raise damaged(self.path, what, f"type and shape {demanded} were written, got {is_}")
         return found
 
-    def implied(self, name: str) -> Any:
-        """Return a column that the header says a formula for, calculated.
-
-        Raises
-        ------
-        RunClosed
-        """
-        self.file()
-        dtype = next(np.dtype(column.dtype) for column in layout.COLUMNS if column.name == name)
-        return values_of(self.header.implied[name], 0, self.header.samples, dtype)
-
     def check(self, name: str, sha256: str) -> None:
         """Hold a column's digest against the one written.
 
@@ -98,13 +88,13 @@ def open_contents(path: Path) -> Contents:
     with reading(path, "the file"):
         file = h5py.File(path, "r")
     try:
-        return Contents(path, file, _read_header(path, file))
+        return Contents(path, file, *_read_header(path, file))
     except BaseException:
         file.close()
         raise
 
 
-def _read_header(path: Path, file: Any) -> Header:
+def _read_header(path: Path, file: Any) -> tuple[Header, str]:
     what = "the header"
     with reading(path, what):
         if layout.HEADER not in file:
@@ -115,7 +105,7 @@ def _read_header(path: Path, file: Any) -> Header:
     if hashlib.sha256(text).hexdigest() != sha256:
         raise damaged(path, what, "its SHA-256 differs")
     try:
-        return Header.decode(text)
+        return Header.decode(text), sha256
     except (KeyError, TypeError, ValueError) as error:
         demand = f"a run file of schema {SCHEMA} was demanded, got another ({one_line(error)})"
         raise NotARun(path, demand, "read it with the version of springmass that wrote it") from error

@@ -39,8 +39,6 @@ class Header:
         Index of the first sample, and how many there are.
     columns : mapping of str to str
         SHA-256 of every column that the file holds, by name.
-    implied : mapping of str to mapping
-        The formula of every column that one gives bit for bit, by name; see :mod:`storage.run_file.implied`.
     originals : tuple of FileEntry
         The original files.
     title, channel, format : str
@@ -60,7 +58,6 @@ class Header:
     first: int
     samples: int
     columns: Mapping[str, str]
-    implied: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
     originals: tuple[FileEntry, ...] = ()
     title: str = ""
     channel: str = "distance"
@@ -81,8 +78,6 @@ class Header:
             If the scene or the provenance holds what JSON cannot: an object, NaN, an infinity.
         """
         content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        if not self.quantity:
-            del content["quantity"], content["unit"]  # an older file's text, and digest, come back as they were
         return json_text({"schema": SCHEMA, **content}).encode("ascii")
 
     @classmethod
@@ -97,6 +92,7 @@ class Header:
         content = json.loads(text)
         if (schema := content.pop("schema")) != SCHEMA:
             raise ValueError(f"schema {SCHEMA} demanded, got {schema!r}")
+        content.pop("implied", None)  # formulas of columns, which some files hold besides the columns
         content["info"] = SourceInfo(**content["info"])
         content["originals"] = tuple(FileEntry(**entry) for entry in content["originals"])
         content["traps"] = tuple(Trap(**trap) for trap in content["traps"])

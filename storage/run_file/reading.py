@@ -171,7 +171,7 @@ class Run:
 
         Two files of the same content have the same, whatever their bytes.
         """
-        return hashlib.sha256(self._contents.header.encode()).hexdigest()
+        return self._contents.sha256
 
     def blocks(self, size: int = 1024) -> Iterable[Block]:
         """Return the samples in blocks, read as they are asked for.
@@ -206,8 +206,7 @@ class Run:
         digests : bool
             Whether the columns are held against their SHA-256. Where they are not, damage of what is read is an
             error all the same, by the chunks' checksums, but an array that someone rewrote is not; :meth:`check`
-            finds it later. Columns that the header gives a formula for are then calculated and not read: they are
-            what was written, whatever became of the array.
+            finds it later.
 
         Raises
         ------
@@ -215,12 +214,8 @@ class Run:
             If they are not what was written.
         """
         header = self._contents.header
-        implied = {} if digests else header.implied
         values = {}
         for name in (name for name in _BLOCK_COLUMNS if name in header.columns):
-            if name in implied:
-                values[name] = self._contents.implied(name)
-                continue
             column = self._contents.column(name)
             with reading(self.path, f"the column {name!r} from sample 0"):
                 values[name] = column[:]

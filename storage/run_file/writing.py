@@ -30,7 +30,6 @@ from storage.atomic import whole_h5, writing_h5
 from storage.errors import WriteFailed
 from storage.run_file import layout
 from storage.run_file.header import FileEntry, Header
-from storage.run_file.implied import Implied
 from storage.run_file.layout import CHUNK
 from storage.run_file.values import stored
 
@@ -106,7 +105,6 @@ def write_run(
             first=columns.first or 0,
             samples=columns.rows,
             columns={name: digest.hexdigest() for name, digest in columns.digests.items()},
-            implied=columns.implied.kept(),
             originals=tuple(FileEntry(o.name, len(o.data), o.sha256) for o in originals),
             title=title,
             channel=channel,
@@ -129,7 +127,6 @@ class _Columns:
 
     def __init__(self, path: Path, file: Any, info: SourceInfo) -> None:
         self.path, self.file, self.sigma_m = path, file, info.sigma_m
-        self.implied = Implied(info.rate_hz)
         self.first: int | None = None
         self.quantity = "length"
         self.rows = 0
@@ -195,7 +192,6 @@ class _Columns:
             _create(self.file, column.path, column.dtype, None if growing else len(values))
             for start in range(0, self._written, CHUNK):  # a column that comes late
                 self._extend(column, start, np.full(CHUNK, column.fill, column.dtype))
-        self.implied.see(column.name, self._written, values)
         self._extend(column, self._written, values)
 
     def _extend(self, column: layout.Column, start: int, values: NDArray[Any]) -> None:
