@@ -90,15 +90,6 @@ def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable
             15,
         ),
         (
-            f"a trajectory of {MEMBERS} together, with friction",
-            "one alone",
-            0.05,
-            1.0 / MEMBERS,
-            lambda: strang.run(with_friction(ensemble, 1e-3), STEP_S, SHORT, every=100),
-            lambda: strang.run(with_friction(MIXED, 1e-3), STEP_S, SHORT, every=100),
-            7,
-        ),
-        (
             f"choosing for {len(scenes)} scenes",
             "running what is chosen",
             2.0,
@@ -108,14 +99,6 @@ def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable
             5,
         ),
     ]
-
-
-def with_friction(problem: Problem, mu_m_per_s: float) -> Problem:
-    """Return the problem with the friction that takes so much amplitude a second."""
-    eq = problem.equation
-    return replace(
-        problem, equation=replace(eq, friction_m_per_s2=0.5 * np.pi * eq.angular_frequency_per_s * mu_m_per_s)
-    )
 
 
 def spread_scenes(number: int) -> list[Scene]:

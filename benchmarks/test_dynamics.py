@@ -42,9 +42,6 @@ def test_every_ratio_can_be_taken(dynamics):
     together, alone = found["a trajectory of 4096 together"]
     assert together.y.shape == (13, 4096)
     assert alone.y.shape == (13,)
-    together, alone = found["a trajectory of 4096 together, with friction"]
-    assert together.y.shape == (13, 4096)
-    assert alone.y.shape == (13,)
     choices, runs = found["choosing for 60 scenes"]
     assert [choice.integrator.name in ("exact", "averaged", "strang", "taylor", "rk4") for choice in choices] == [
         True

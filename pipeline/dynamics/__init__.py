@@ -1,5 +1,9 @@
 """The equation of motion, the integrators that solve it, their limits, and the cheapest one for a tolerance.
 
+In comes a scene or an equation with a start; out goes a trajectory, with the error to expect of it beforehand. A
+newcomer adds an integrator: one file in ``integrators``, one entry in ``INTEGRATORS``, and it must pass
+tests/conformance/test_integrators.py by its name; a sixth that ``auto`` may take needs its cost in ``choose`` too.
+
 Examples
 --------
 >>> from pipeline.dynamics import Equation, Problem, get_integrator
@@ -11,7 +15,7 @@ Examples
 
 from __future__ import annotations
 
-from pipeline.dynamics.equation import Equation, Problem, effective_mass_kg
+from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrator import Integrator, Trajectory
 from pipeline.dynamics.integrators.averaged import AVERAGED
 from pipeline.dynamics.integrators.euler import FORWARD_EULER, SYMPLECTIC_EULER
@@ -21,6 +25,7 @@ from pipeline.dynamics.integrators.solve_ivp import DOP853, LSODA
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.integrators.taylor import TAYLOR
 from pipeline.dynamics.integrators.verlet import VERLET, YOSHIDA4
+from pipeline.dynamics.problem import Problem, effective_mass_kg
 from pipeline.errors import DynamicsError
 
 __all__ = [

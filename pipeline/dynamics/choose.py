@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from pipeline.dynamics.equation import Equation, Problem
+from pipeline.dynamics.amplitude import stopping_time
+from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
-from pipeline.dynamics.integrators.averaged import AVERAGED, stopping_time
-from pipeline.dynamics.integrators.exact import EXACT, rounding_error
+from pipeline.dynamics.integrators.averaged import AVERAGED
+from pipeline.dynamics.integrators.exact import EXACT
 from pipeline.dynamics.integrators.runge_kutta import RK4
 from pipeline.dynamics.integrators.solve_ivp import SolveIvp
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
 from pipeline.dynamics.pilot import fine_step, in_own_units, predicted_by_pilot
+from pipeline.dynamics.predict import rounding_error
+from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
 
@@ -149,7 +152,7 @@ def _may_pay(problem: Problem, spacing_s: float, count: int, tolerance: float, m
     if _LIMIT_NS + _STEP_NS["rk4"] * seconds / fine_step(in_own_units(problem)) >= most_ns:
         return False  # the pilot alone costs more
     parts = math.floor((most_ns - _RUN_NS) / (_STEP_NS["rk4"] * count))
-    return parts > 0 and predicted_by_pilot(RK4, problem, spacing_s / parts, seconds, pilots=1) <= tolerance
+    return parts > 0 and predicted_by_pilot(RK4, STRANG, problem, spacing_s / parts, seconds, pilots=1) <= tolerance
 
 
 def demand_tolerance(problem: Problem, seconds: float, tolerance: float) -> None:
@@ -227,7 +230,7 @@ def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, se
     if name in _STATE_NS:
         return _RUN_NS + _AVERAGED_NS * (name == "averaged") + _STATE_NS[name] * count
     # Once friction holds the bob nothing more is solved by those who see it.
-    moving = min(seconds, float(stopping_time(problem.amplitude_m(), *eq.laws()))) if friction else seconds
+    moving = min(seconds, stopping_time(problem.amplitude_m(), *eq.laws())) if friction else seconds
     radians = float(eq.angular_frequency_per_s * moving)
     if isinstance(integrator, Taylor):
         a_radian = _taylor_ns(eq, integrator.order_of(problem, seconds))

@@ -9,7 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from pipeline.dynamics.equation import Problem, Real
+from pipeline.dynamics.equation import Equation, Real
+from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
@@ -17,14 +18,13 @@ __all__ = [
     "Integrator",
     "March",
     "Step",
+    "StepMaker",
     "Trajectory",
     "demand_run",
     "demand_times",
-    "every_member",
     "integrate",
-    "march_steps",
+    "one_by_one",
     "solved",
-    "worst_error",
 ]
 
 SHORTEST_S, LONGEST_S = 1e-100, 1e100
@@ -34,6 +34,9 @@ Step = Callable[[Real, Real], tuple[Real, Real]]
 
 March = Callable[[Problem, float, int, int], tuple[F8, F8]]
 """A run of a scaled problem: step, number of steps, every which is kept; to displacements and velocities (n, ...)."""
+
+StepMaker = Callable[[Equation, Real], Step]
+"""Equation and step, s, to the function of one step; of many steps, (n,) float64, it is a step of each."""
 
 
 class Integrator(Protocol):
@@ -184,15 +187,34 @@ def _energy(problem: Problem, y: F8, v: F8) -> F8:
 
 
 def integrate(
-    integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int, march: March
+    integrator: Integrator,
+    problem: Problem,
+    step_s: float,
+    steps: int,
+    every: int,
+    march: March,
+    together: March | None = None,
 ) -> Trajectory:
     """Check what is asked, run the march in units of the amplitude, and check what came.
+
+    Parameters
+    ----------
+    integrator, problem, step_s, steps, every
+        As in :meth:`Integrator.run`.
+    march : callable
+        Of one trajectory.
+    together : callable, optional
+        Of all members of an ensemble at once; without it they are run one by one.
 
     Raises
     ------
     DynamicsError
     """
     demand_run(integrator, problem, step_s, steps, every)
+    if problem.is_ensemble:
+        if together is None:
+            return one_by_one(problem, lambda one: integrate(integrator, one, step_s, steps, every, march))
+        march = together
     scaled, unit = problem.scaled()
     with np.errstate(all="ignore"):
         try:
@@ -206,6 +228,13 @@ def integrate(
     return solved(integrator, problem, step_s * every, y, v)
 
 
+def one_by_one(problem: Problem, run: Callable[[Problem], Trajectory]) -> Trajectory:
+    """Return the trajectories of an ensemble's members, each run alone, as one."""
+    runs = [run(one) for one in problem.members()]
+    y, v = (np.stack([getattr(each, name) for each in runs], axis=1) for name in ("y", "v"))
+    return Trajectory(problem, runs[0].spacing_s, y, v)
+
+
 def demand_run(integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int) -> None:
     """Refuse a run that cannot be.
 
@@ -214,6 +243,8 @@ def demand_run(integrator: Integrator, problem: Problem, step_s: float, steps: i
     DynamicsError
     """
     demand_times(step_s, step_s * steps)
+    if not problem.size:
+        raise DynamicsError("an ensemble has at least one member, got none")
     if steps < 1 or every < 1 or steps % every:
         raise DynamicsError(
             f"the number of steps must be a positive multiple of {max(every, 1)}, of which one is kept, got {steps}"
@@ -253,58 +284,6 @@ def solved(integrator: Integrator, problem: Problem, spacing_s: float, y: F8, v:
                 f"{integrator.name} ran beyond the range of numbers by t = {first:g} s; {_remedy(integrator, problem)}"
             )
     return Trajectory(problem, spacing_s, y, v)
-
-
-def worst_error(problem: Problem, step_s: float, seconds: float, of: Callable[[Problem], float]) -> float:
-    """Return the largest predicted error of an ensemble's members, inf where the prediction runs beyond all numbers.
-
-    Raises
-    ------
-    DynamicsError
-        If there is no member, or step or duration are none.
-    """
-    demand_times(step_s, seconds)
-
-    def bounded(one: Problem) -> float:
-        try:
-            error = of(one)
-        except (OverflowError, ZeroDivisionError):
-            return math.inf
-        return math.inf if math.isnan(error) else error
-
-    with np.errstate(all="ignore"):
-        return every_member(problem, bounded, max)
-
-
-def every_member(problem: Problem, of: Callable[[Problem], float], worst: Callable[..., float]) -> float:
-    """Return the worst of a number over an ensemble's members.
-
-    Raises
-    ------
-    DynamicsError
-        If there is no member.
-    """
-    if not problem.size:
-        raise DynamicsError("an ensemble has at least one member, got none")
-    return worst(of(one) for one in problem.members())
-
-
-def march_steps(make: Callable[[Problem, float], Step]) -> March:
-    """Return the march that applies one step again and again."""
-
-    def march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        step = make(problem, step_s)
-        y, v = problem.displacement_m, problem.velocity_m_per_s
-        ys = np.empty((steps // every + 1, *np.shape(y)))
-        vs = np.empty_like(ys)
-        ys[0], vs[0] = y, v
-        for row in range(1, len(ys)):
-            for _ in range(every):
-                y, v = step(y, v)
-            ys[row], vs[row] = y, v
-        return ys, vs
-
-    return march
 
 
 def _remedy(integrator: Integrator, problem: Problem) -> str:

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.dynamics.equation import Equation, Problem
-from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.dynamics.equation import Equation
+from pipeline.dynamics.integrator import Integrator
+from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
-
-if TYPE_CHECKING:
-    from pipeline.dynamics.integrator import Integrator
 
 __all__ = ["fine_step", "in_own_units", "predicted_by_pilot"]
 
@@ -28,7 +25,7 @@ MOST_STEPS = 2_000_000  # of a truth in many parts
 
 
 def predicted_by_pilot(
-    integrator: Integrator, problem: Problem, step_s: float, seconds: float, pilots: int = 3
+    integrator: Integrator, solver: Integrator, problem: Problem, step_s: float, seconds: float, pilots: int = 3
 ) -> float:
     """Return the expected largest error of the displacement over the starting amplitude.
 
@@ -36,6 +33,8 @@ def predicted_by_pilot(
     ----------
     integrator : Integrator
         Whose error is asked for.
+    solver : Integrator
+        Strang splitting, which makes the truth.
     problem : Problem
         Of one trajectory.
     step_s, seconds : float
@@ -64,19 +63,20 @@ def predicted_by_pilot(
     pilot = max(step_s, min(longest, seconds / 4.0))
     # The kink of drag at a turning point keeps a high order from what its power promises.
     order = min(integrator.order, 3) if _kinked(problem.equation) else integrator.order
-    if integrator is not STRANG and integrator.order and omega * pilot * MOST_STIFF_STEPS < 2.0 * math.pi:
+    if integrator is not solver and integrator.order and omega * pilot * MOST_STIFF_STEPS < 2.0 * math.pi:
         return math.inf  # far too stiff for a method with a limit
     if fine * omega < FINE / STIFF and pilot < seconds / MOST_STIFF_STEPS:
         pilot, order = seconds / MOST_STIFF_STEPS, min(order, 1)
     parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
     if parts > FEW_PARTS and seconds / pilot * parts > MOST_STEPS:
         return math.inf  # so coarse that to see its error takes many times the run
-    shares = PLAIN_SHARES[:pilots] if order and integrator is not STRANG and pilot > step_s else (1.0,)
+    shares = PLAIN_SHARES[:pilots] if order and integrator is not solver and pilot > step_s else (1.0,)
     error = max(
-        float((step_s / (share * pilot)) ** order) * _largest_error(integrator, problem, share * pilot, parts, seconds)
+        float((step_s / (share * pilot)) ** order)
+        * _largest_error(integrator, solver, problem, share * pilot, parts, seconds)
         for share in shares
     ) / float(start)
-    return error + _resonance(problem, step_s, seconds) if integrator is STRANG else error
+    return error + _resonance(problem, step_s, seconds) if integrator is solver else error
 
 
 @functools.lru_cache(maxsize=8)
@@ -119,10 +119,12 @@ def fine_step(problem: Problem) -> float:
 
 
 @functools.lru_cache(maxsize=8)
-def _largest_error(integrator: Integrator, problem: Problem, pilot: float, parts: int, seconds: float) -> float:
+def _largest_error(
+    integrator: Integrator, solver: Integrator, problem: Problem, pilot: float, parts: int, seconds: float
+) -> float:
     """Return the largest error of a run in steps of the pilot, m."""
-    coarse, truth = _truth(problem, pilot, parts, seconds)
-    if integrator is STRANG and coarse is not None:
+    coarse, truth = _truth(solver, problem, pilot, parts, seconds)
+    if integrator is solver and coarse is not None:
         found = coarse
     else:
         try:
@@ -143,11 +145,11 @@ def _peak(error: F8) -> float:
 
 
 @functools.lru_cache(maxsize=4)
-def _truth(problem: Problem, pilot: float, parts: int, seconds: float) -> tuple[F8 | None, F8]:
+def _truth(solver: Integrator, problem: Problem, pilot: float, parts: int, seconds: float) -> tuple[F8 | None, F8]:
     """Return the displacement in steps of the pilot, if these are fine, and the extrapolated one at the same times.
 
     Remembered, as every finer step and the next method ask for it again.
     """
     steps = max(1, round(seconds / pilot))
-    once, twice = (STRANG.run(problem, pilot / k, steps * k, every=k).y for k in (parts, 2 * parts))
+    once, twice = (solver.run(problem, pilot / k, steps * k, every=k).y for k in (parts, 2 * parts))
     return once if parts == 1 else None, twice + (twice - once) / 3.0

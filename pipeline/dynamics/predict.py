@@ -1,31 +1,90 @@
-"""What error to expect of a method that repeats one step, before it runs."""
+"""What error to expect of a run before it is made: by rounding, by a repeated step, of an ensemble's worst member."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.equation import Problem
+from pipeline.dynamics.amplitude import amplitude
 from pipeline.dynamics.flow import flows
-from pipeline.dynamics.integrators.averaged import amplitude
-from pipeline.dynamics.integrators.exact import rounding_error
-from pipeline.dynamics.pilot import predicted_by_pilot
+from pipeline.dynamics.integrator import Integrator, StepMaker, demand_times
+from pipeline.dynamics.pilot import in_own_units, predicted_by_pilot
+from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.stability import step_matrix
+from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
-if TYPE_CHECKING:
-    from pipeline.dynamics.integrators.one_step import OneStep
-
-__all__ = ["predicted_by_average"]
+__all__ = ["every_member", "predicted_by_average", "rounding_error", "worst_error"]
 
 POINTS = 1500
 STRONG = 0.02  # damping a radian, or cubic spring, beyond which the linear oscillator is no measure of the error
 
 
-def predicted_by_average(method: OneStep, problem: Problem, step_s: float, seconds: float) -> float:
+def rounding_error(problem: Problem, seconds: float, steps: float = 0.0) -> float:
+    """Return the error over the amplitude that rounding leaves at best: of the phase, and of steps that repeat.
+
+    Notes
+    -----
+    The phase :math:`\\omega t` is a product of rounded numbers: its error is its own size times the relative rounding.
+    A step that is repeated repeats the rounding of its coefficients: a fifth of the relative rounding each.
+    """
+    phase = float(np.max(problem.equation.angular_frequency_per_s)) * seconds
+    return float(np.finfo(np.float64).eps) * (4.0 + phase + 0.2 * steps)
+
+
+def worst_error(problem: Problem, step_s: float, seconds: float, of: Callable[[Problem], float]) -> float:
+    """Return the largest predicted error of an ensemble's members, inf where the prediction runs beyond all numbers.
+
+    Raises
+    ------
+    DynamicsError
+        If there is no member, or step or duration are none.
+    """
+    demand_times(step_s, seconds)
+
+    def bounded(one: Problem) -> float:
+        try:
+            error = of(one)
+        except (OverflowError, ZeroDivisionError):
+            return math.inf
+        return math.inf if math.isnan(error) else error
+
+    with np.errstate(all="ignore"):
+        return every_member(problem, bounded, max)
+
+
+def every_member(problem: Problem, of: Callable[[Problem], float], worst: Callable[..., float]) -> float:
+    """Return the worst of a number over an ensemble's members.
+
+    Raises
+    ------
+    DynamicsError
+        If there is no member.
+    """
+    if not problem.size:
+        raise DynamicsError("an ensemble has at least one member, got none")
+    return worst(of(one) for one in problem.members())
+
+
+def predicted_by_average(
+    method: Integrator, make: StepMaker, solver: Integrator, problem: Problem, step_s: float, seconds: float
+) -> float:
     """Return the expected largest error of the displacement over the starting amplitude.
+
+    Parameters
+    ----------
+    method : Integrator
+        Which repeats the step that ``make`` makes.
+    make : callable
+        Equation and step to the function of one step.
+    solver : Integrator
+        For the truth of a pilot, where damping is too strong for averages.
+    problem : Problem
+        Of one trajectory.
+    step_s, seconds : float
+        Of the run that is planned, s.
 
     Notes
     -----
@@ -37,26 +96,28 @@ def predicted_by_average(method: OneStep, problem: Problem, step_s: float, secon
     start = problem.amplitude_m()
     if start == 0.0:
         return 0.0
-    problem, _ = problem.scaled()
+    problem = in_own_units(problem)
     steps = max(1, round(seconds / step_s))
     floor = rounding_error(problem, seconds, steps)
-    whole = _linear if problem.equation.is_linear else _averaged
-    error = whole(method, problem, step_s, steps)
+    if problem.equation.is_linear:
+        error = _linear(make, problem, step_s, steps)
+    else:
+        error = _averaged(method, make, solver, problem, step_s, steps)
     return error + floor if math.isfinite(error) else math.inf
 
 
-def _linear(method: OneStep, problem: Problem, h: float, steps: int) -> float:
+def _linear(make: StepMaker, problem: Problem, h: float, steps: int) -> float:
     """Largest difference between powers of the step's matrix and the flow, on a grid of times."""
     stride = max(1, steps // POINTS)
-    grown = _orbit(method, problem, h, stride, steps // stride)
+    grown = _orbit(make, problem, h, stride, steps // stride)
     exact = _exact(problem, h * stride * np.arange(steps // stride + 1, dtype=np.float64))
     return float(np.max(np.abs(grown - exact)) / problem.amplitude_m())
 
 
-def _orbit(method: OneStep, problem: Problem, h: float, stride: int, count: int) -> F8:
+def _orbit(make: StepMaker, problem: Problem, h: float, stride: int, count: int) -> F8:
     """Displacements after multiples of a stride of steps."""
     omega = problem.equation.angular_frequency_per_s
-    matrix = step_matrix(method, omega * h, problem.equation.gamma_per_s / omega)
+    matrix = step_matrix(make, omega * h, problem.equation.gamma_per_s / omega)
     (a, b), (c, d) = np.linalg.matrix_power(matrix, stride).tolist()
     y, v = problem.displacement_m, problem.velocity_m_per_s / omega
     found = [y]
@@ -71,7 +132,7 @@ def _exact(problem: Problem, t: F8) -> F8:
     return np.asarray(a * problem.displacement_m + b * problem.velocity_m_per_s)
 
 
-def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
+def _averaged(method: Integrator, make: StepMaker, solver: Integrator, problem: Problem, h: float, steps: int) -> float:
     eq, start = problem.equation, problem.amplitude_m()
     gamma, beta, mu = eq.laws()
     omega = eq.angular_frequency_per_s
@@ -82,8 +143,8 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     if gamma + beta * start + bent > STRONG * omega:
         if h > method.stable_step(problem):
             return math.inf
-        return predicted_by_pilot(method, problem, h, h * steps) + float(friction)
-    matrix = step_matrix(method, omega * h, gamma / omega)
+        return predicted_by_pilot(method, solver, problem, h, h * steps) + float(friction)
+    matrix = step_matrix(make, omega * h, gamma / omega)
     if not np.all(np.isfinite(matrix)):
         return math.inf
     values = np.linalg.eigvals(matrix.astype(np.complex128))
@@ -94,11 +155,14 @@ def _averaged(method: OneStep, problem: Problem, h: float, steps: int) -> float:
     t = np.linspace(0.0, h * steps, POINTS)
     true, grown = (amplitude(start, rate, beta, mu, t) for rate in (gamma, -turning.real))
     bend = 0.375 * eq.cubic_per_m2_s2 / omega
-    squares = grown**2 - true**2
-    phase = late * t + bend * np.concatenate([[0.0], np.cumsum(0.5 * (squares[1:] + squares[:-1]) * t[1])])
+    phase = late * t
+    if bend:
+        from scipy.integrate import cumulative_trapezoid
+
+        phase += bend * cumulative_trapezoid(grown**2 - true**2, t, initial=0.0)
     secular = float(np.max(np.abs(grown * np.exp(1j * phase) - true))) / start
     # Within a cycle: the linear oscillator's error beyond what a cycle accumulates.
     cycle = max(1, min(steps, math.ceil(2.0 * math.pi / (omega * h))))
-    short = _linear(method, problem, h, cycle)
+    short = _linear(make, problem, h, cycle)
     within = max(0.0, short - abs(np.expm1((turning + gamma - 1j * math.sqrt(omega**2 - gamma**2)) * h * cycle)))
     return float(secular + within + friction)

@@ -8,29 +8,30 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipeline.dynamics.equation import Equation
+from pipeline.dynamics.integrator import Integrator, StepMaker
+from pipeline.dynamics.problem import Problem
+from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
-if TYPE_CHECKING:
-    from pipeline.dynamics.integrators.one_step import OneStep
+__all__ = ["growth_per_step", "limit_by_search", "limits", "runs_bounded", "step_matrix"]
 
-__all__ = ["growth_per_step", "limit_by_search", "step_matrix"]
-
+RUN_STEPS = 4000
 GREATEST = 20.0  # largest x that is looked at
 LOOKS, REFINEMENTS = 250, 6  # each narrows the bracket 249-fold
 _ROUNDING = 1e-12
 
 
-def step_matrix(method: OneStep, x: float | F8, ratio: float) -> F8:
+def step_matrix(make: StepMaker, x: float | F8, ratio: float) -> F8:
     """Return the (2, 2) matrix of one step of x = omega h on (y, v / omega) at a damping ratio.
 
     Parameters
     ----------
-    method : OneStep
+    make : callable
+        Equation and step to the function of one step.
     x : float or (n,) float64
         Step in radians; of several the matrices come as (n, 2, 2).
     ratio : float
@@ -39,25 +40,25 @@ def step_matrix(method: OneStep, x: float | F8, ratio: float) -> F8:
     Examples
     --------
     >>> from pipeline.dynamics.integrators.euler import FORWARD_EULER
-    >>> step_matrix(FORWARD_EULER, 0.5, 0.0)
+    >>> step_matrix(FORWARD_EULER.make, 0.5, 0.0)
     array([[ 1. ,  0.5],
            [-0.5,  1. ]])
     """
     with np.errstate(all="ignore"):
-        step = method.make(Equation(angular_frequency_per_s=1.0, gamma_per_s=ratio), x)
+        step = make(Equation(angular_frequency_per_s=1.0, gamma_per_s=ratio), x)
         return np.array([step(1.0, 0.0), step(0.0, 1.0)]).T
 
 
-def growth_per_step(method: OneStep, x: float, ratio: float) -> float:
+def growth_per_step(make: StepMaker, x: float, ratio: float) -> float:
     """Return the spectral radius of a step: above 1 the motion grows.
 
     Examples
     --------
     >>> from pipeline.dynamics.integrators.euler import FORWARD_EULER
-    >>> growth_per_step(FORWARD_EULER, 0.75, 0.0)
+    >>> growth_per_step(FORWARD_EULER.make, 0.75, 0.0)
     1.25
     """
-    return float(_growths(step_matrix(method, x, ratio)))
+    return float(_growths(step_matrix(make, x, ratio)))
 
 
 def _growths(matrices: F8) -> F8:
@@ -71,20 +72,20 @@ def _growths(matrices: F8) -> F8:
 
 
 @functools.lru_cache(maxsize=4096)
-def limit_by_search(method: OneStep, ratio: float) -> float:
+def limit_by_search(make: StepMaker, ratio: float) -> float:
     """Return the largest stable x = omega h at a damping ratio: the end of the first stable interval.
 
     Examples
     --------
     >>> from pipeline.dynamics.integrators.runge_kutta import RK4
-    >>> round(limit_by_search(RK4, 0.0), 4)
+    >>> round(limit_by_search(RK4.make, 0.0), 4)
     2.8284
     """
 
     steps = np.geomspace(1e-3 / max(ratio, 1.0), GREATEST, LOOKS)
     low, high = 0.0, math.inf
     for _ in range(REFINEMENTS):
-        grows = _growths(step_matrix(method, steps, ratio)) > 1.0 + _ROUNDING
+        grows = _growths(step_matrix(make, steps, ratio)) > 1.0 + _ROUNDING
         bad = int(np.argmax(grows))
         if not grows[bad]:
             # The end of a finer look is the step that grew in the coarser.
@@ -92,3 +93,30 @@ def limit_by_search(method: OneStep, ratio: float) -> float:
         low, high = (float(steps[bad - 1]) if bad else low), float(steps[bad])
         steps = np.linspace(low, high, LOOKS)
     return low
+
+
+def limits(integrator: Integrator, ratios: F8) -> F8:
+    """Return the largest stable omega h at each damping ratio gamma / omega, (n,) float64; inf where there is none.
+
+    Examples
+    --------
+    >>> from pipeline.dynamics.integrators.euler import SYMPLECTIC_EULER
+    >>> limits(SYMPLECTIC_EULER, np.array([0.0, 1.0])).round(3)
+    array([2.   , 0.828])
+    """
+    problems = [Problem(Equation(angular_frequency_per_s=1.0, gamma_per_s=float(ratio)), 1.0) for ratio in ratios]
+    return np.array([integrator.stable_step(problem) for problem in problems])
+
+
+def runs_bounded(integrator: Integrator, x: float, ratio: float) -> bool:
+    """Return whether a run of many steps of x = omega h ends with no more energy than it began with.
+
+    A step just inside the limit may swell before it settles, so the energy is looked at after the first half only.
+    """
+    problem = Problem(Equation(angular_frequency_per_s=1.0, gamma_per_s=ratio), 1.0)
+    try:
+        run = integrator.run(problem, x, RUN_STEPS, every=RUN_STEPS // 2)
+        middle, end = run.relative_energy()[1:]
+    except DynamicsError:
+        return False
+    return bool(end <= middle * (1.0 + 1e-9) and math.isfinite(end))

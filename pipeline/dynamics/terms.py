@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.dynamics.equation import Problem
+from pipeline.dynamics.problem import Problem
 
 __all__ = ["SHARE", "Term", "required"]
 

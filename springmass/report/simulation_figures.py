@@ -222,7 +222,7 @@ def stability_figure() -> Figure:
     ValueError
         If a run contradicts its line.
     """
-    from pipeline.dynamics.stability_map import limits, runs_bounded
+    from pipeline.dynamics.stability import limits, runs_bounded
 
     ratios = np.geomspace(0.01, 100.0, 161)
     asked = np.geomspace(0.02, 60.0, 8)

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 
 from pipeline.bench.scene import Scene
-from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.dynamics.problem import Problem
 
 __all__ = ["REST_M", "bench_position"]
 

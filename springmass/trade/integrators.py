@@ -193,7 +193,7 @@ def _within(error: float) -> float:
 def _settings(problem: Problem) -> list[tuple[Integrator, int, str]]:
     found: list[tuple[Integrator, int, str]] = []
     for integrator in INTEGRATORS.values():
-        if integrator.refusal(problem):  # of another kind of scene, or of a package that is not installed
+        if integrator.refusal(problem):  # of another kind of scene
             continue
         if integrator.order:
             found += [(integrator, parts, f"step {SPACING_S / parts:.3g} s") for parts in PARTS]

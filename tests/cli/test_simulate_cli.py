@@ -105,6 +105,15 @@ def test_a_method_by_name_takes_the_step_its_tolerance_needs(cli: Callable, scen
     assert found["measured_error"] <= 1e-7
 
 
+@pytest.mark.parametrize("name", ["lsoda", "dop853"])
+def test_scipy_solves_a_scene(cli: Callable, scene: Path, name: str) -> None:
+    """scipy's methods run as they are, at a local tolerance that aims at 1e-6 of the amplitude."""
+    (found,) = cli("simulate", "--scene", scene, "--method", name, "--json").results
+    assert found["method"] == name
+    assert 0.0 < found["measured_error"] < 1e-5
+    assert found["predicted_error"] == pytest.approx(1e-6, rel=1e-3)
+
+
 def test_a_prediction_is_laid_over_a_run(cli: Callable, scene: Path, tmp_path: Path) -> None:
     """The start is the run's, what the scene leaves out its analysis's; what is left is small, and drawn."""
     assert cli("simulate", "--scene", scene, "--seconds", "20", "--out", tmp_path).code == 0

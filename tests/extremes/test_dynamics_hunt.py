@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem, get_integrator
+from pipeline.dynamics.amplitude import amplitude, stopping_time
 from pipeline.dynamics.choose import choose, cost_ns, fit_step, least_tolerance
 from pipeline.dynamics.integrators import solve_ivp, taylor
-from pipeline.dynamics.integrators.averaged import amplitude, stopping_time
 from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
 

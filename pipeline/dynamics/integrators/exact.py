@@ -7,26 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.flow import flows
-from pipeline.dynamics.integrator import Trajectory, demand_run, demand_times, solved
+from pipeline.dynamics.integrator import Trajectory, demand_run, demand_times, one_by_one, solved
+from pipeline.dynamics.predict import rounding_error
+from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 
-__all__ = ["EXACT", "Exact", "rounding_error"]
+__all__ = ["EXACT", "Exact"]
 
 BLOCK = 128  # states of a block from its first by one matrix each; a block's first by the closed form
-
-
-def rounding_error(problem: Problem, seconds: float, steps: float = 0.0) -> float:
-    """Return the error over the amplitude that rounding leaves at best: of the phase, and of steps that repeat.
-
-    Notes
-    -----
-    The phase :math:`\\omega t` is a product of rounded numbers: its error is its own size times the relative rounding.
-    A step that is repeated repeats the rounding of its coefficients: a fifth of the relative rounding each.
-    """
-    phase = float(np.max(problem.equation.angular_frequency_per_s)) * seconds
-    return float(np.finfo(np.float64).eps) * (4.0 + phase + 0.2 * steps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +35,8 @@ class Exact:
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
         """Evaluate the solution at every kept time; see :class:`Integrator`."""
         demand_run(self, problem, step_s, steps, every)
+        if problem.is_ensemble:
+            return one_by_one(problem, lambda one: self.run(one, step_s, steps, every=every))
         with np.errstate(all="ignore"):  # rates beyond all bounds end at rest
             y, v = _states(problem, step_s * every, steps // every + 1)
         return solved(self, problem, step_s * every, y, v)
@@ -64,21 +55,15 @@ EXACT = Exact()
 
 
 def _states(problem: Problem, apart: float, count: int) -> tuple[F8, F8]:
-    omega, gamma = problem.equation.angular_frequency_per_s, problem.equation.gamma_per_s
+    """States at multiples of a time apart: half as long as the closed form at each, and as long as scipy's lfilter."""
     blocks = -(-count // BLOCK)
-    shape = np.shape(problem.displacement_m)
-    # One call for the first states of all blocks and for the matrices within one; times first, members after.
-    number = np.empty((blocks + BLOCK, *(1,) * len(shape)))
-    number[:blocks, ...] = np.arange(0, blocks * BLOCK, BLOCK).reshape(-1, *(1,) * len(shape))
-    number[blocks:, ...] = np.arange(BLOCK).reshape(-1, *(1,) * len(shape))
-    number *= apart
-    a, b, c, d = flows(omega, gamma, number)
+    # One call for the first states of all blocks and for the matrices within one.
+    times = apart * np.concatenate([np.arange(0.0, blocks * BLOCK, BLOCK), np.arange(float(BLOCK))])
+    a, b, c, d = flows(problem.equation.angular_frequency_per_s, problem.equation.gamma_per_s, times)
     y = a[:blocks] * problem.displacement_m + b[:blocks] * problem.velocity_m_per_s
     v = c[:blocks] * problem.displacement_m + d[:blocks] * problem.velocity_m_per_s
-    a, b, c, d = (entry[blocks:] for entry in (a, b, c, d))
-    if not shape:
-        starts = np.array([y, v]).T
-        return (starts @ np.array([a, b])).ravel()[:count], (starts @ np.array([c, d])).ravel()[:count]
-    ys = a[None] * y[:, None] + b[None] * v[:, None]
-    vs = c[None] * y[:, None] + d[None] * v[:, None]
-    return ys.reshape(-1, *shape)[:count], vs.reshape(-1, *shape)[:count]
+    starts = np.array([y, v]).T
+    return (
+        (starts @ np.array([a[blocks:], b[blocks:]])).ravel()[:count],
+        (starts @ np.array([c[blocks:], d[blocks:]])).ravel()[:count],
+    )

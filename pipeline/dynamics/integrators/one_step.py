@@ -7,12 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.dynamics.equation import Equation, Problem, Real
-from pipeline.dynamics.integrator import Step, Trajectory, every_member, integrate, march_steps, worst_error
-from pipeline.dynamics.predict import predicted_by_average
+from pipeline.dynamics.equation import Equation, Real
+from pipeline.dynamics.integrator import StepMaker, Trajectory, integrate
+from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.dynamics.predict import every_member, predicted_by_average, worst_error
+from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.stability import limit_by_search
+from pipeline.track import F8
 
-__all__ = ["OneStep", "acceleration", "drag_force"]
+__all__ = ["OneStep", "acceleration"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +35,7 @@ class OneStep:
     name: str
     words: str
     order: int
-    make: Callable[[Equation, Real], Step] = field(repr=False)
+    make: StepMaker = field(repr=False)
     closed_limit: Callable[[float, float], float] | None = field(default=None, repr=False)
 
     def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - every integrator has the same signature
@@ -41,8 +44,7 @@ class OneStep:
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
         """Repeat the step; see :class:`Integrator`."""
-        march = march_steps(lambda scaled, h: self.make(scaled.equation, h))
-        return integrate(self, problem, step_s, steps, every, march)
+        return integrate(self, problem, step_s, steps, every, self._march)
 
     def stable_step(self, problem: Problem) -> float:
         """Return the largest step at which neither a small nor the starting motion grows, s."""
@@ -50,7 +52,22 @@ class OneStep:
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the error of phase and damping that the step makes, and what friction adds; see Notes of predict."""
-        return worst_error(problem, step_s, seconds, lambda one: predicted_by_average(self, one, step_s, seconds))
+
+        def of(one: Problem) -> float:
+            return predicted_by_average(self, self.make, STRANG, one, step_s, seconds)
+
+        return worst_error(problem, step_s, seconds, of)
+
+    def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        step = self.make(problem.equation, step_s)
+        y, v = problem.displacement_m, problem.velocity_m_per_s
+        ys, vs = np.empty((2, steps // every + 1))
+        ys[0], vs[0] = y, v
+        for row in range(1, len(ys)):
+            for _ in range(every):
+                y, v = step(y, v)
+            ys[row], vs[row] = y, v
+        return ys, vs
 
     def _limit(self, problem: Problem) -> float:
         eq = problem.equation
@@ -64,25 +81,22 @@ class OneStep:
             return 0.0
         if self.closed_limit is not None:
             return min(self.closed_limit(omega, gamma) for omega, gamma in pairs)
-        return float(min(limit_by_search(self, gamma / omega) / omega for omega, gamma in pairs))
-
-
-def drag_force(eq: Equation) -> Callable[[Real], Real]:
-    """Return drag and friction per mass as a function of velocity, m/s^2; terms that are 0 are left out."""
-    viscous, drag, friction = 2.0 * eq.gamma_per_s, eq.drag_per_m, eq.friction_m_per_s2
-    with_drag = bool(np.any(drag))
-    if eq.has_friction:
-        if np.ndim(friction):
-            return lambda v: (viscous + drag * abs(v)) * v + friction * np.sign(v)
-        return lambda v: (viscous + drag * abs(v)) * v + (friction if v > 0 else -friction if v < 0 else 0.0)
-    if with_drag:
-        return lambda v: (viscous + drag * abs(v)) * v
-    return lambda v: viscous * v
+        return float(min(limit_by_search(self.make, gamma / omega) / omega for omega, gamma in pairs))
 
 
 def acceleration(eq: Equation) -> Callable[[Real, Real], Real]:
-    """Return the acceleration as a function of displacement and velocity, m/s^2."""
-    stiffness, cubic, force = eq.angular_frequency_per_s**2, eq.cubic_per_m2_s2, drag_force(eq)
-    if np.any(cubic):
+    """Return the acceleration as a function of displacement and velocity, m/s^2; terms that are 0 are left out."""
+    stiffness, cubic, force = eq.angular_frequency_per_s**2, eq.cubic_per_m2_s2, _drag_force(eq)
+    if cubic:
         return lambda y, v: -(stiffness + cubic * y * y) * y - force(v)
     return lambda y, v: -stiffness * y - force(v)
+
+
+def _drag_force(eq: Equation) -> Callable[[Real], Real]:
+    """Drag and friction per mass as a function of velocity, m/s^2."""
+    viscous, drag, friction = 2.0 * eq.gamma_per_s, eq.drag_per_m, eq.friction_m_per_s2
+    if friction:
+        return lambda v: (viscous + drag * abs(v)) * v + (friction if v > 0 else -friction if v < 0 else 0.0)
+    if drag:
+        return lambda v: (viscous + drag * abs(v)) * v
+    return lambda v: viscous * v

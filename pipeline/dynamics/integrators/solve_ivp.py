@@ -1,8 +1,7 @@
-"""scipy's solve_ivp behind the interface of the other integrators, to compare against."""
+"""scipy's solve_ivp behind the interface of the other integrators, by its LSODA and DOP853."""
 
 from __future__ import annotations
 
-import importlib.util
 import itertools
 import math
 import warnings
@@ -12,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics.equation import Equation, Problem
-from pipeline.dynamics.integrator import Trajectory, integrate, worst_error
-from pipeline.dynamics.integrators.exact import rounding_error
+from pipeline.dynamics.equation import Equation
+from pipeline.dynamics.integrator import Trajectory, integrate
+from pipeline.dynamics.predict import rounding_error, worst_error
+from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
@@ -48,13 +48,11 @@ class SolveIvp:
     order: int = 0
 
     def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - every integrator has the same signature
-        """Return why not, where scipy is not installed: nothing else here needs it."""
-        if importlib.util.find_spec("scipy") is None:
-            return "scipy is not installed; install it (pip install scipy), or take strang, taylor or auto"
+        """Return nothing: it takes every problem, and gives up where that takes too long."""
         return ""
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem, an ensemble member by member; see :class:`Integrator`."""
+        """Solve a problem; see :class:`Integrator`."""
         return integrate(self, problem, step_s, steps, every, self._march)
 
     def stable_step(self, problem: Problem) -> float:  # noqa: ARG002
@@ -72,7 +70,7 @@ class SolveIvp:
 
     def rtol(self, problem: Problem, seconds: float) -> float:
         """Return the local tolerance that leads to the one at the end."""
-        radians = 1.0 + float(np.max(problem.equation.angular_frequency_per_s)) * seconds
+        radians = 1.0 + problem.equation.angular_frequency_per_s * seconds
         return float(min(max(self.tolerance / (self.grows * radians), LEAST_RTOL), 1e-2))
 
     def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
@@ -81,12 +79,10 @@ class SolveIvp:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of a failure that solve_ivp reports as well
             try:
-                solved = [self._solve(one, t, rtol) for one in problem.members()]
+                y, v = self._solve(problem, t, rtol)
             except (ValueError, np.linalg.LinAlgError) as error:  # scipy's, where its numbers end
                 raise DynamicsError(f"{self.name} gave up: {error}; take strang, taylor or auto") from error
-        if not problem.is_ensemble:
-            return solved[0][0], solved[0][1]
-        return np.stack([y for y, _ in solved], axis=1), np.stack([v for _, v in solved], axis=1)
+        return y, v
 
     def _solve(self, problem: Problem, t: F8, rtol: float) -> F8:
         """Return displacement and velocity (2, n); with friction from turning point to turning point."""

@@ -14,15 +14,18 @@ from __future__ import annotations
 
 import math
 from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics.equation import Problem, Real
-from pipeline.dynamics.flow import flow, flows
-from pipeline.dynamics.integrator import Trajectory, integrate, worst_error
-from pipeline.dynamics.integrators.exact import rounding_error
-from pipeline.dynamics.integrators.turning import Friction, Frictions
+from pipeline.dynamics.equation import Real
+from pipeline.dynamics.flow import flow
+from pipeline.dynamics.integrator import Trajectory, integrate
+from pipeline.dynamics.integrators.turning import Friction
+from pipeline.dynamics.pilot import predicted_by_pilot
+from pipeline.dynamics.predict import rounding_error, worst_error
+from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
@@ -48,7 +51,8 @@ class Strang:
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
         """Solve a problem; see :class:`Integrator`."""
-        return integrate(self, problem, step_s, steps, every, _march)
+        together = None if problem.equation.has_friction else _march_ensemble
+        return integrate(self, problem, step_s, steps, every, _march, together)
 
     def stable_step(self, problem: Problem) -> float:
         """Return inf, as both sub-flows only lose energy; with a cubic term, whose kick can add some, its limit, s."""
@@ -61,11 +65,11 @@ class Strang:
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what a pilot run in coarser steps shows, and the rounding."""
-        from pipeline.dynamics.pilot import predicted_by_pilot
 
         def of(one: Problem) -> float:
             rounding = rounding_error(one, seconds, seconds / step_s)
-            return rounding if one.equation.is_linear else rounding + predicted_by_pilot(self, one, step_s, seconds)
+            splitting = 0.0 if one.equation.is_linear else predicted_by_pilot(self, self, one, step_s, seconds)
+            return rounding + splitting
 
         return worst_error(problem, step_s, seconds, of)
 
@@ -74,8 +78,6 @@ def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8,
     eq = problem.equation
     if eq.has_friction:
         return _march_with_friction(problem, step_s, steps, every)
-    if problem.is_ensemble:
-        return _march_ensemble(problem, step_s, steps, every)
     _, b, _, _ = flow(eq.angular_frequency_per_s, eq.gamma_per_s, step_s)
     short = b * eq.angular_frequency_per_s < SHORT or b < 0.1 * step_s
     if not (short or (every > 1 and steps > MOST_KEPT)):
@@ -144,8 +146,10 @@ def _march_kicked(problem: Problem, h: float, steps: int, every: int) -> tuple[F
 def _march_ensemble(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
     """Every member at once, in place: no array is made within a step."""
     eq = problem.equation
-    half = flows(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
-    a, b, c, d = flows(eq.angular_frequency_per_s, eq.gamma_per_s, h)
+    half, (a, b, c, d) = (
+        np.array([flow(*each, t) for each in zip(eq.angular_frequency_per_s, eq.gamma_per_s, strict=True)]).T
+        for t in (0.5 * h, h)
+    )
     slow, kick = eq.drag_per_m * h, 0.5 * h * eq.cubic_per_m2_s2
     with_cubic = bool(np.any(kick))
     ys = np.empty((steps // every, problem.size))
@@ -177,21 +181,18 @@ def _march_ensemble(problem: Problem, h: float, steps: int, every: int) -> tuple
 
 def _march_with_friction(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
     # Within a step a bob may turn once: no step longer than a radian.
-    radians = float(np.max(problem.equation.angular_frequency_per_s)) * h
+    radians = problem.equation.angular_frequency_per_s * h
     if radians > LONGEST_WITH_FRICTION:
         raise DynamicsError(
             f"with friction a step of strang is at most {LONGEST_WITH_FRICTION:g} radians, as each of them is looked "
             f"at for turning points, got {radians:.3g}; take a shorter step"
         )
     parts = max(1, math.ceil(radians))
-    if problem.is_ensemble:
-        ys, vs = Frictions(problem, h / parts).run(steps * parts, every * parts)
-        return _with_start(problem, ys, vs)
     states = Friction(problem, h / parts).run(steps * parts)[every * parts - 1 :: every * parts]
     return _with_start(problem, states[:, 0], states[:, 1])
 
 
-def _turned(matrix: tuple[Real, Real, Real, Real], y: Real, v: Real) -> tuple[Real, Real]:
+def _turned(matrix: Sequence[Real] | F8, y: Real, v: Real) -> tuple[Real, Real]:
     a, b, c, d = matrix
     return a * y + b * v, c * y + d * v
 

@@ -17,9 +17,10 @@ from operator import mul
 
 import numpy as np
 
-from pipeline.dynamics.equation import Equation, Problem
-from pipeline.dynamics.integrator import Trajectory, integrate, worst_error
-from pipeline.dynamics.integrators.exact import rounding_error
+from pipeline.dynamics.equation import Equation
+from pipeline.dynamics.integrator import Trajectory, integrate
+from pipeline.dynamics.predict import rounding_error, worst_error
+from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
@@ -53,7 +54,7 @@ class Taylor:
         return ""
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem, an ensemble member by member; see :class:`Integrator`."""
+        """Solve a problem; see :class:`Integrator`."""
         return integrate(self, problem, step_s, steps, every, self._march)
 
     def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - every integrator has the same signature
@@ -79,12 +80,8 @@ class Taylor:
         return _order(_local(problem, seconds, self.tolerance))
 
     def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        count = steps // every + 1
-        solved = [_solve(one, step_s * every, count, self.tolerance) for one in problem.members()]
-        if not problem.is_ensemble:
-            return solved[0][:, 0], solved[0][:, 1]
-        states = np.stack(solved, axis=1)
-        return states[..., 0], states[..., 1]
+        states = _solve(problem, step_s * every, steps // every + 1, self.tolerance)
+        return states[:, 0], states[:, 1]
 
 
 TAYLOR = Taylor()

@@ -36,19 +36,16 @@ def _verlet(eq: Equation, h: float) -> Step:
 def _yoshida(eq: Equation, h: float) -> Step:
     parts = [_symmetric(eq, weight * h) for weight in _WEIGHTS]
 
-    sign = np.sign if np.ndim(eq.friction_m_per_s2) else _sign
+    friction = eq.friction_m_per_s2
 
     def step(y: Real, v: Real) -> tuple[Real, Real]:
-        way = sign(v)  # one direction of friction a step: its parts go forth, back and forth
+        # One direction of friction a step: its parts go forth, back and forth.
+        way = (v > 0) - (v < 0) if friction else 0
         for part in parts:
             y, v = part(y, v, way)
         return y, v
 
     return step
-
-
-def _sign(v: float) -> float:
-    return 1.0 if v > 0 else -1.0 if v < 0 else 0.0
 
 
 def _symmetric(eq: Equation, h: float) -> Callable[[Real, Real, Real], tuple[Real, Real]]:

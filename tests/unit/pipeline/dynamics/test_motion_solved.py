@@ -10,9 +10,9 @@ import pytest
 from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import INTEGRATORS, Equation, Problem, effective_mass_kg, get_integrator
+from pipeline.dynamics.amplitude import amplitude, stopping_time
 from pipeline.dynamics.choose import AUTO, choose, fit_step, least_tolerance
-from pipeline.dynamics.integrators.averaged import amplitude, stopping_time
-from pipeline.dynamics.stability_map import limits, runs_bounded
+from pipeline.dynamics.stability import limits, runs_bounded
 from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError, SceneError
 from springmass.session.simulated_bench import REST_M, bench_position
@@ -168,15 +168,3 @@ def test_a_trajectory_between_its_states() -> None:
     coarse, fine = (get_integrator("exact").run(problem, h, round(2 / h)) for h in (0.01, 0.0007))
     np.testing.assert_allclose(coarse.at(fine.t[:2000]), fine.y[:2000], rtol=0, atol=0.05e-6)
     assert coarse.at(np.array([-1.0, 99.0])).tolist() == [coarse.y[0], coarse.y[-1]]
-
-
-def test_without_scipy_its_methods_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One line that names the package and what runs without it; everything else runs."""
-    import importlib.util
-
-    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
-    problem = Problem(Equation.from_laws(8.66, beta_per_m_s=0.2), 0.05)
-    for name in ("lsoda", "dop853"):
-        with pytest.raises(DynamicsError, match="scipy is not installed"):
-            get_integrator(name).run(problem, 0.01, 10)
-    assert choose(problem, 0.01, 1000, 1e-6).integrator.name == "strang"
