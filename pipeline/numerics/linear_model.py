@@ -1,7 +1,8 @@
-"""A linear model that grows by columns: fits of a search that adds one term after another to a long record.
+"""A linear model that grows by columns: the fits of a search that adds one term after another to a long record.
 
 ``numpy.linalg.lstsq`` or ``qr`` of all columns at each trial took 0.1 s of the 0.13 s of a two-minute recording's
-analysis. Here the columns known so far are kept as an orthonormal basis, so that a trial costs its own columns only.
+analysis. Here the columns known so far are kept as an orthonormal basis, so that a trial costs the sums of its own few
+columns: the normal equations of what these hold beyond the basis.
 """
 
 from __future__ import annotations
@@ -14,41 +15,43 @@ from pipeline.track import F8
 
 __all__ = ["LinearModel", "Terms"]
 
+RIDGE = 1e-12  # of a column's square: far below what is measured, far above what rounding leaves of it
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terms:
-    """Columns that may enter a model, as it sees them.
+    """Columns C that may enter a model, and the normal equations of what they hold beyond its basis Q.
 
     Parameters
     ----------
+    columns : (n, k) float64
     along : (p, k) float64
-        Their projections on the model's basis.
-    q : (n, k) float64
-        Orthonormal columns of what lies beyond the basis.
-    r : (k, k) float64
-        Upper triangular: columns = basis @ along + q @ r.
-    share : (k,) float64
-        Of what the model leaves, along q: its squares sum to the fall of chi-square that the terms bring.
+        :math:`Q^T C`.
+    normal : (k, k) float64
+        :math:`C^T C - (Q^T C)^T Q^T C`.
+    right : (k,) float64
+        :math:`C^T` times what the model leaves.
     """
 
+    columns: F8
     along: F8
-    q: F8
-    r: F8
-    share: F8
+    normal: F8
+    right: F8
 
     def first(self, count: int) -> Terms:
         """Return the first ``count`` of the terms alone."""
-        return Terms(self.along[:, :count], self.q[:, :count], self.r[:count, :count], self.share[:count])
+        return Terms(self.columns[:, :count], self.along[:, :count], self.normal[:count, :count], self.right[:count])
 
-    @property
-    def fall(self) -> float:
-        """By how much the terms lower chi-square."""
-        return float(self.share @ self.share)
+    def fitted(self) -> tuple[F8, F8, float]:
+        """Return the terms' coefficients (k,), their cofactors (k, k) and by how much they lower chi-square.
 
-    def fitted(self) -> tuple[F8, F8]:
-        """Return the terms' coefficients (k,) and their cofactors (k, k): covariance for data of unit variance."""
-        inverse = np.linalg.pinv(self.r)
-        return inverse @ self.share, inverse @ inverse.T
+        Cofactors are the covariance for data of unit variance. A trace of ridge lets a column that the model holds
+        already come out as nothing.
+        """
+        ridge = RIDGE * (np.einsum("nk,nk->k", self.columns, self.columns) + 1e-300)
+        cofactors: F8 = np.asarray(np.linalg.inv(self.normal + np.diag(ridge)), np.float64)
+        values = cofactors @ self.right
+        return values, cofactors, float(values @ self.right)
 
 
 class LinearModel:
@@ -77,25 +80,27 @@ class LinearModel:
     """
 
     def __init__(self, data: F8, columns: F8) -> None:
-        self.basis = np.empty((data.size, 0))
-        self.left = data
-        self._factor, self._share = np.empty((0, 0)), np.empty(0)
-        self.add(self.terms(columns))
+        self.basis, self._factor = np.linalg.qr(columns)
+        self._share = self.basis.T @ data
+        self.left = data - self.basis @ self._share
 
     def terms(self, columns: F8) -> Terms:
         """Return what columns (n, k) would add."""
         along = self.basis.T @ columns
-        q, r = np.linalg.qr(columns - self.basis @ along)
-        return Terms(along, q, r, q.T @ self.left)
+        return Terms(columns, along, columns.T @ columns - along.T @ along, columns.T @ self.left)
+
+    def left_by(self, terms: Terms, values: F8) -> F8:
+        """Return what the model leaves (n,) together with terms of coefficients (k,)."""
+        return self.left - terms.columns @ values + self.basis @ (terms.along @ values)
 
     def add(self, terms: Terms) -> None:
         """Take terms in, made by :meth:`terms` of the model as it is."""
+        beyond = terms.columns - self.basis @ terms.along
         # A second projection takes out what rounding left of the basis where columns nearly lie in it.
-        more = self.basis.T @ terms.q
-        q, r = np.linalg.qr(terms.q - self.basis @ more)
+        more = self.basis.T @ beyond
+        q, r = np.linalg.qr(beyond - self.basis @ more)
         share = q.T @ self.left
-        corner = np.zeros((q.shape[1], self.basis.shape[1]))
-        self._factor = np.block([[self._factor, terms.along + more @ terms.r], [corner, r @ terms.r]])
+        self._factor = np.block([[self._factor, terms.along + more], [np.zeros((r.shape[0], self._share.size)), r]])
         self._share = np.concatenate([self._share, share])
         self.basis = np.concatenate([self.basis, q], axis=1)
         self.left = self.left - q @ share

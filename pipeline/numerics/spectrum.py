@@ -47,6 +47,8 @@ class Blocks:
     samples : float
         Per full block.
     origin : float, s
+    taper : (b,) float64
+        Hann's window times the share of samples used, scaled so that white noise keeps its variance per block.
     """
 
     t: F8
@@ -55,6 +57,7 @@ class Blocks:
     step: float
     samples: float
     origin: float
+    taper: F8
 
     def unweighted(self, rows: F8) -> F8:
         """Divide rows (b,) that were multiplied by the weights by them; 0 where a block holds no sample."""
@@ -73,7 +76,10 @@ class Blocks:
         safe = np.maximum(count, 1.0)
         away = np.bincount(index, weights=t - origin - middle[index], minlength=size) / safe
         mean = np.bincount(index, weights=y, minlength=size) / safe
-        return cls(middle + away, mean, np.sqrt(count), step, float(samples), origin)
+        weight = np.sqrt(count)
+        tapered = np.hanning(size + 2)[1:-1] * weight
+        taper = tapered * weight / math.sqrt(samples * float(tapered @ tapered))
+        return cls(middle + away, mean, weight, step, float(samples), origin, taper)
 
     @property
     def seconds(self) -> float:
@@ -132,14 +138,10 @@ class Peak:
 
 def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
     """Return frequencies (k,), Hz, and power (k,), m^2: the expectation for white noise is its variance per block."""
-    taper = np.hanning(y.size + 2)[1:-1]
-    there = blocks.weight / math.sqrt(blocks.samples)
     size = 1 << (OVERSAMPLING * y.size - 1).bit_length()
-    tapered = taper * there
-    lines = np.fft.rfft(tapered * there * y, size)
-    power = (lines.real**2 + lines.imag**2) / float(tapered @ tapered)
+    lines = np.fft.rfft(blocks.taper * y, size)
     frequency = np.asarray(np.fft.rfftfreq(size, blocks.step), np.float64)
-    return frequency, np.asarray(power, np.float64)
+    return frequency, np.asarray(lines.real**2 + lines.imag**2, np.float64)
 
 
 def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance: float) -> bool:
@@ -216,11 +218,11 @@ def strongest(blocks: Blocks, model: LinearModel, band: Band) -> Peak | None:
     powers = np.polynomial.legendre.legvander(2.0 * blocks.t / blocks.seconds - 1.0, VARYING)
     columns = (powers[:, :, None] * pair[:, None, :]).reshape(blocks.t.size, -1) * blocks.weight[:, None]
     line = model.terms(columns / np.linalg.norm(columns, axis=0))
-    if np.min(np.abs(np.diagonal(line.r)[:2])) < 0.2:  # the model holds it already
+    if np.linalg.eigvalsh(line.normal[:2, :2])[0] < 0.04:  # the model holds it already
         return None
-    density = spectral_density(blocks, blocks.unweighted(model.left - line.q @ line.share), f, band)
+    density = spectral_density(blocks, blocks.unweighted(model.left_by(line, line.fitted()[0])), f, band)
     # Rows are weighted by samples, the density is one full block's.
-    evidence = 0.5 * line.first(2).fall / (density * blocks.samples)
+    evidence = 0.5 * line.first(2).fitted()[2] / (density * blocks.samples)
     return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
 
 
@@ -270,9 +272,10 @@ def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band) -> 
     """
     smooth = smooth_density(y, frequency_hz * blocks.step)
     frequency, power = spectrum(blocks, y)
-    away = np.abs(frequency - frequency_hz) * blocks.seconds
-    near = (away >= NEAR) & (away <= FAR) & band.inside(frequency)
-    local = float(np.mean(power[near])) if np.count_nonzero(near) >= 4 * OVERSAMPLING else 0.0
+    reach = FAR / blocks.seconds
+    around = slice(*np.searchsorted(frequency, [frequency_hz - reach, frequency_hz + reach]))
+    near = band.inside(frequency[around]) & (np.abs(frequency[around] - frequency_hz) * blocks.seconds >= NEAR)
+    local = float(np.mean(power[around][near])) if np.count_nonzero(near) >= 4 * OVERSAMPLING else 0.0
     return max(smooth, local, 1e-300)
 
 

@@ -168,7 +168,7 @@ class _Search:
 
     def fitted(self, mode: Mode, terms: Terms, unit: float) -> Mode:
         """Return the mode with the coefficients and the amplitude that its terms have; ``unit`` is the variance."""
-        values, cofactors = terms.fitted()
+        values, cofactors, _ = terms.fitted()
         mode = replace(mode, coefficients=values.view(np.complex128))
         u = math.sqrt(0.5 * unit * float(cofactors[0, 0] + cofactors[1, 1])) * _rms(self.wave(mode))
         return replace(mode, amplitude=Estimate(self.size(mode), u, "m"))
@@ -183,9 +183,10 @@ class _Search:
                 continue
             trial = self.blank((a, b), Estimate(f, abs(a) * base.u, "Hz"))
             terms = self.terms(trial)
-            left = self.blocks.unweighted(self.model.left - terms.q @ terms.share)
+            values, _, fall = terms.fitted()
+            left = self.blocks.unweighted(self.model.left_by(terms, values))
             unit = spectral_density(self.blocks, left, f, self.band) * self.blocks.samples
-            chance = false_alarm(0.5 * terms.fall / unit, len(orders))
+            chance = false_alarm(0.5 * fall / unit, len(orders))
             if chance <= 0.5 * self.params.false_alarm:
                 self.add(self.fitted(replace(trial, false_alarm=chance), terms, unit), terms)
 
@@ -207,7 +208,7 @@ class _Search:
         for _ in range(4):
             pair = rotating(self.blocks.weight, -2.0 * math.pi * f * tau)
             both = np.stack([pair, pair * tau], axis=1).view(np.float64)
-            values, cofactors = self.model.terms(both).fitted()
+            values, cofactors, _ = self.model.terms(both).fitted()
             z, slope = values.view(np.complex128).tolist()
             ratio = slope / z
             rate, u_rate = -ratio.real, math.sqrt(max(cofactors[2, 2] * unit, 0.0)) / abs(z)
@@ -225,7 +226,7 @@ class _Search:
             coefficients=np.zeros(degrees.size, np.complex128),
         )
         terms = self.terms(trial)
-        falls = np.cumsum(terms.share**2)[1::2]
+        falls = np.array([terms.first(2 * count).fitted()[2] for count in range(1, degrees.size + 1)])
         criterion = -falls / unit + 2.0 * (degrees + 1) * math.log(self.blocks.t.size)
         terms = terms.first(2 * (int(np.argmin(criterion)) + 1))
         return self.fitted(trial, terms, unit), terms
