@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.numerics.robust import MAD_TO_SIGMA
+from pipeline.numerics.robust import MAD_TO_SIGMA, mad_sigma
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.tuning import Tuning, retune, unwrap
-from pipeline.oscillation.windows import Solution, Windows, ranked, solve
+from pipeline.oscillation.windows import Solution, Windows, quantile, solve
 from pipeline.track import F8, U8, Quality
 
 __all__ = ["Demodulated", "Params", "demodulate", "polar"]
 
 WEAK = 7.0  # standard uncertainties of an amplitude under which its phase is known to 0.14 rad and less well
-THIRD_TO_SIGMA = 0.3853204664075677  # 0.3-quantile of |x| for a standard normal x
+HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, and their quantiles of a normal |x|
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,41 +121,35 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     params = params or Params()
     windows = Windows.cut(conditioned, cycles.bounds)
     tuning = Tuning.constant(2.0 * math.pi * cycles.frequency_hz, len(windows.y))
-    basis = tuning.basis(windows)
-    rough = retune(windows, solve(windows, basis, windows.usable), tuning, degree=1)
-    basis = rough.decayed(windows, basis)
+    basis = windows.basis(tuning.turning, tuning.decay)
+    rough = retune(windows, solve(basis, windows.usable), tuning.angular_frequency, degree=1)
+    basis = windows.decaying(basis, rough.decay)
     solution = _let_go(windows, basis, conditioned.noise_m, params)
-    solution = _rescue(windows, basis, solution, tuning, params)
+    _rescue(windows, basis, solution, tuning, params)
     solution, weights = _clip(windows, basis, solution, params)
     if conditioned.clipped_from_m:
-        crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, _level(windows, solution))
+        level = _typical(_spread(windows, solution), windows, solution)
+        crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
         windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
         weights = np.where(crest, 0.0, weights)
     # Once more in a basis that turns and decays in each window as the record does there.
-    tuning = retune(windows, solution, tuning)
-    basis = tuning.basis(windows)
-    solution, weights = _clip(windows, basis, solve(windows, basis, weights), params)
+    tuning = retune(windows, solution, tuning.angular_frequency)
+    basis = windows.basis(tuning.turning, tuning.decay)
+    solution, weights = _clip(windows, basis, solve(basis, weights), params)
     return _finish(conditioned, windows, solution, weights, tuning)
 
 
 def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> Solution:
     """Fit every window; those that scatter more than noise does, with weights that let go of clusters of echoes."""
-    solution = solve(windows, basis, windows.usable)
-    spread = MAD_TO_SIGMA * ranked(np.abs(solution.residual), windows.usable, 0.5)
-    odd = np.flatnonzero(spread > 1.3 * noise_m)
-    if not odd.size:
-        return solution
-    some, part = windows.take(odd), basis[odd]
-    size, spread = np.abs(solution.residual[odd]), spread[odd]
-    for _ in range(params.rounds):
-        ratio = size / np.maximum(spread, noise_m + windows.tiny)[:, None]
-        trial = solve(some, part, some.usable / (1.0 + ratio**2) ** 2)
-        size = np.abs(trial.residual)
-        spread = MAD_TO_SIGMA * ranked(size, some.usable, 0.5)
-    return solution.replaced(odd, trial, np.ones(odd.size, np.bool_))
+    solution = solve(basis, windows.usable)
+    odd = np.flatnonzero(_spread(windows, solution) > 1.3 * noise_m)
+    if odd.size:
+        size, least = np.abs(solution.residual[odd]), noise_m + windows.tiny
+        solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, HALF, least, params.rounds))
+    return solution
 
 
-def _rescue(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, params: Params) -> Solution:
+def _rescue(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, params: Params) -> None:
     """Fit windows that disagree with their neighbours again, starting from what the neighbours predict.
 
     Where false echoes hold half of a window its own fit may have settled on them; the amplitude, phase and rest
@@ -163,34 +157,42 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, par
     """
     n = len(windows.y)
     if n < 5:
-        return solution
-    z = solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]
+        return
     # Turned back to one instant, so that medians are taken of slow quantities.
     turning = np.exp(1j * tuning.angular_frequency * (windows.centre - windows.centre[0]))
-    steady = z / turning
-    around = _neighbours(n)
-    expected = np.empty_like(solution.coefficients)
-    expected[:, 0] = np.median(solution.coefficients[around, 0], axis=1)
-    smooth = (np.median(steady.real[around], axis=1) + 1j * np.median(steady.imag[around], axis=1)) * turning
-    expected[:, 1], expected[:, 2] = smooth.real, smooth.imag
+    steady = (solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]) / turning
+    slow = np.stack([solution.coefficients[:, 0], steady.real, steady.imag], axis=1)
+    rest, *pair = np.median(slow[_neighbours(n)], axis=1).T
+    smooth = (pair[0] + 1j * pair[1]) * turning
+    expected = np.stack([rest, smooth.real, smooth.imag], axis=1)
     away = np.abs(solution.coefficients - expected).max(axis=1)
-    level = _level(windows, solution)
+    level = _typical(_spread(windows, solution), windows, solution)
     bound = params.clip_sigmas * level
     before = np.sum((np.abs(solution.residual) <= bound) * windows.usable, axis=1)
     few = before < 0.7 * windows.usable.sum(axis=1)
-    odd = np.flatnonzero((away > 5.0 * MAD_TO_SIGMA * float(np.median(away))) | few | ~solution.good)
+    odd = np.flatnonzero((away > 5.0 * mad_sigma(away)) | few | ~solution.good)
     if not odd.size:
-        return solution
-    some, part = windows.take(odd), basis[odd]
-    size = np.abs(some.y - (expected[odd, None, :] @ part[:, :3])[:, 0, :])
-    for _ in range(params.rounds):
-        # A third of the samples is believed at first, so that echoes may hold more than half of a window.
-        spread = np.maximum(ranked(size, some.usable, 0.3) / THIRD_TO_SIGMA, level)
-        trial = solve(some, part, some.usable / (1.0 + (size / spread[:, None]) ** 2) ** 2)
-        size = np.abs(trial.residual)
-    after = np.sum((size <= bound) * some.usable, axis=1)
+        return
+    part, usable = basis[odd], windows.usable[odd]
+    size = np.abs(part[:, 3] - (expected[odd, None, :] @ part[:, :3])[:, 0])
+    # A third of the samples is believed at first, so that echoes may hold more than half of a window.
+    trial = _reweighted(part, usable, size, THIRD, level, params.rounds)
+    after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
     better = trial.good & ((after > before[odd]) | ~solution.good[odd])
-    return solution.replaced(odd[better], trial, better)
+    solution.put(odd[better], trial.part(better))
+
+
+def _reweighted(basis: F8, usable: F8, size: F8, believed: tuple[float, float], least: float, rounds: int) -> Solution:
+    """Fit windows with weights of Cauchy's form, :math:`(1 + (r/s)^2)^{-2}`, from residuals of a given size (w, l).
+
+    The scale s is that of the share of samples which is believed, with its quantile of a normal |x|; ``least`` at
+    least.
+    """
+    for _ in range(rounds):
+        spread = np.maximum(quantile(size, usable, believed[0]) / believed[1], least)
+        solution = solve(basis, usable / (1.0 + (size / spread[:, None]) ** 2) ** 2)
+        size = np.abs(solution.residual)
+    return solution
 
 
 def _neighbours(n: int) -> NDArray[np.int64]:
@@ -202,21 +204,24 @@ def _neighbours(n: int) -> NDArray[np.int64]:
     return others
 
 
-def _level(windows: Windows, solution: Solution) -> float:
-    """Spread of the samples about their windows' fits, typical of the record."""
-    spread = MAD_TO_SIGMA * ranked(np.abs(solution.residual), windows.usable, 0.5)
-    return max(float(np.median(spread[solution.good])), windows.tiny) if solution.good.any() else windows.tiny
+def _spread(windows: Windows, solution: Solution) -> F8:
+    """(w,): standard deviation of each window's samples about its fit, from their median."""
+    return quantile(np.abs(solution.residual), windows.usable, HALF[0]) / HALF[1]
+
+
+def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
+    """The spread that is typical of the record's windows."""
+    return max(float(np.median(spread[solution.good])) if solution.good.any() else 0.0, windows.tiny)
 
 
 def _clip(windows: Windows, basis: F8, solution: Solution, params: Params) -> tuple[Solution, F8]:
     """Take residuals beyond the clip out and fit again."""
-    size = np.abs(solution.residual)
-    spread = MAD_TO_SIGMA * ranked(size, windows.usable, 0.5)
-    level = max(float(np.median(spread[solution.good])) if solution.good.any() else 0.0, windows.tiny)
+    spread = _spread(windows, solution)
+    level = _typical(spread, windows, solution)
     # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
     bound = params.clip_sigmas * np.clip(spread, 0.75 * level, 2.0 * level)
-    weights = np.where(size <= bound[:, None], windows.usable, 0.0)
-    return solve(windows, basis, weights), weights
+    weights = np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0)
+    return solve(basis, weights), weights
 
 
 def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, weights: F8, tuning: Tuning) -> Demodulated:
@@ -239,12 +244,13 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, weig
     expected = None if tuning.amplitude is None else tuning.amplitude[good]
     amplitude, phase, covariance = polar(a, b, solution.inverse[good] * shrunk[:, None, None], smooth, expected)
     flags = conditioned.flags.copy()
-    inside = windows.inside & good[:, None]
+    inside = windows.placed & good[:, None]
     echoes = inside & (windows.usable > 0) & (weights == 0)
     flags[windows.rows[echoes]] |= np.uint8(Quality.FALSE_ECHO)
     crests = inside & (windows.usable == 0) & (flags[windows.rows] == 0)
     flags[windows.rows[crests]] |= np.uint8(Quality.CLIPPED)
-    residual = _residual_of_all(conditioned, windows, solution, tuning)
+    residual = np.full(len(conditioned.track), np.nan)
+    residual[windows.rows[inside]] = solution.residual[inside]
     return Demodulated(
         t,
         amplitude,
@@ -294,61 +300,22 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     """
     size = np.maximum(np.hypot(a, b), 1e-150)
     along, scale = np.arctan2(b, a), size
-    weak, any_weak = np.zeros(a.size, np.bool_), False
-    turned = along - smooth_phase
-    turned -= 2.0 * math.pi * np.rint(turned / (2.0 * math.pi))
+    weak = np.zeros(a.size, np.bool_)
     if smooth_amplitude is not None:
         u = np.sqrt(0.5 * (covariance[:, 1, 1] + covariance[:, 2, 2]))
         weak = smooth_amplitude < WEAK * u
-        any_weak = bool(weak.any())
-    if turned.max() - turned.min() > math.pi:
-        turned[~weak] = np.unwrap(turned[~weak])
-    if smooth_amplitude is not None and any_weak:
         along = np.where(weak, smooth_phase, along)
         scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
-        cosine, sine = np.cos(along), np.sin(along)
-        turned = np.where(weak, (b * cosine - a * sine) / scale, turned)
-    else:
-        cosine, sine = np.cos(along), np.sin(along)
-    turned_into = _turned(covariance, cosine, sine, scale)
-    amplitude = size * (1.0 - 0.5 * turned_into[:, 1, 1])
-    if any_weak:
-        amplitude = np.where(weak, a * cosine + b * sine, amplitude)
+    cosine, sine = np.cos(along), np.sin(along)
+    turned = np.remainder(along - smooth_phase + math.pi, 2.0 * math.pi) - math.pi
+    if np.ptp(turned) > math.pi:
+        turned[~weak] = np.unwrap(turned[~weak])
+    turned = np.where(weak, (b * cosine - a * sine) / scale, turned)
+    # Derivatives of (amplitude, phase, offset) by (offset, a, b): along the phase, and across it over the amplitude.
+    slope = np.zeros_like(covariance)
+    slope[:, 0, 1], slope[:, 0, 2] = cosine, sine
+    slope[:, 1, 1], slope[:, 1, 2] = -sine / scale, cosine / scale
+    slope[:, 2, 0] = 1.0
+    turned_into = slope @ covariance @ slope.transpose(0, 2, 1)
+    amplitude = np.where(weak, a * cosine + b * sine, size * (1.0 - 0.5 * turned_into[:, 1, 1]))
     return amplitude, smooth_phase + turned, turned_into
-
-
-def _turned(covariance: F8, cosine: F8, sine: F8, scale: F8) -> F8:
-    """Covariances (w, 3, 3) of (offset, a, b) as those of (amplitude, phase, offset)."""
-    oo, oa, ob = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 0, 2]
-    aa, ab, bb = covariance[:, 1, 1], covariance[:, 1, 2], covariance[:, 2, 2]
-    # Products with the two directions: along the phase, and across it over the amplitude.
-    over, under = cosine / scale, sine / scale
-    along_a, along_b = aa * cosine + ab * sine, ab * cosine + bb * sine
-    across_a, across_b = ab * over - aa * under, bb * over - ab * under
-    found = np.empty_like(covariance)
-    found[:, 0, 0] = along_a * cosine + along_b * sine
-    found[:, 0, 1] = found[:, 1, 0] = along_b * over - along_a * under
-    found[:, 0, 2] = found[:, 2, 0] = oa * cosine + ob * sine
-    found[:, 1, 1] = across_b * over - across_a * under
-    found[:, 1, 2] = found[:, 2, 1] = ob * over - oa * under
-    found[:, 2, 2] = oo
-    return found
-
-
-def _residual_of_all(conditioned: Conditioned, windows: Windows, solution: Solution, tuning: Tuning) -> F8:
-    """Residuals of flagged samples too, so that a report can show what was left out."""
-    residual = np.full(len(conditioned.track), np.nan)
-    known = windows.inside & (windows.usable > 0) & solution.good[:, None]
-    residual[windows.rows[known]] = solution.residual[known]
-    track = conditioned.track
-    window = np.searchsorted(windows.rows[:, 0], np.arange(len(track)), side="right") - 1
-    left = np.flatnonzero(np.isnan(residual) & np.isfinite(track.y) & np.isfinite(track.t) & (window >= 0))
-    left = left[solution.good[window[left]]]
-    if left.size:
-        w = window[left]
-        tau = track.t[left] - windows.centre[w]
-        angle = (tuning.angular_frequency + tuning.detuning[w]) * tau
-        offset, a, b = solution.coefficients[w].T
-        swing = np.exp(-tuning.decay[w] * tau) * (a * np.cos(angle) - b * np.sin(angle))
-        residual[left] = track.y[left] - windows.level - offset - swing
-    return residual
