@@ -14,12 +14,30 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["U_DENSITY", "U_SOUND", "U_VISCOSITY", "air_density", "air_viscosity", "speed_of_sound"]
+from pipeline.numerics.estimate import Estimate
+
+__all__ = [
+    "TYPICAL_HUMIDITY",
+    "TYPICAL_PRESSURE",
+    "TYPICAL_TEMPERATURE",
+    "U_DENSITY",
+    "U_SOUND",
+    "U_VISCOSITY",
+    "air_density",
+    "air_viscosity",
+    "saturation_pressure",
+    "speed_of_sound",
+]
 
 # Relative standard uncertainties of the three formulas at room conditions: what they leave out.
 U_DENSITY = 5e-4  # compressibility and enhancement factor, 0.04 % together [1]_
 U_VISCOSITY = 5e-3  # Sutherland's two constants 0.3 % below measured air at 20 degC; humidity up to 0.3 %
 U_SOUND = 4e-4  # ideal gas: 0.04 % below 331.45 m/s at 0 degC
+
+# What a laboratory's air may be where the scene does not say.
+TYPICAL_TEMPERATURE = Estimate(20.0, 3.0, "degC")
+TYPICAL_PRESSURE = Estimate(101325.0, 1500.0, "Pa")
+TYPICAL_HUMIDITY = Estimate(0.5, 0.2, "")
 
 GAS_CONSTANT = 8.314462618  # J/(mol K)
 MOLAR_MASS_DRY_KG = 28.96546e-3
@@ -27,9 +45,14 @@ MOLAR_MASS_WATER_KG = 18.01528e-3
 ZERO_CELSIUS_K = 273.15
 
 
+def saturation_pressure(temperature_c: float) -> float:
+    """Return the pressure of saturated water vapour, Pa, by Magnus' formula [2]_."""
+    return 610.94 * math.exp(17.625 * temperature_c / (temperature_c + 243.04))
+
+
 def _vapour_fraction(temperature_c: float, pressure_pa: float, relative_humidity: float) -> float:
-    saturation_pa = 610.94 * math.exp(17.625 * temperature_c / (temperature_c + 243.04))
-    return relative_humidity * saturation_pa / pressure_pa
+    # All of it at most: an uncertain humidity may reach beyond what the pressure holds.
+    return min(relative_humidity * saturation_pressure(temperature_c) / pressure_pa, 1.0)
 
 
 def air_density(temperature_c: float, pressure_pa: float = 101325.0, relative_humidity: float = 0.0) -> float:

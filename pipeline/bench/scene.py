@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
+from pipeline.bench.air import TYPICAL_HUMIDITY, TYPICAL_PRESSURE, TYPICAL_TEMPERATURE, saturation_pressure
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
 
@@ -14,24 +15,43 @@ __all__ = ["Scene"]
 
 POSITIONS = ("below", "above")
 
-# (table, key) -> (attribute, unit, least allowed value, "exclusive" where the least is not itself allowed)
-_QUANTITIES: dict[tuple[str, str], tuple[str, str, float, bool]] = {
-    ("bob", "mass_kg"): ("bob_mass_kg", "kg", 0.0, True),
-    ("spring", "mass_kg"): ("spring_mass_kg", "kg", 0.0, False),
-    ("spring", "constant_n_per_m"): ("spring_constant_n_per_m", "N/m", 0.0, True),
-    ("spring", "cubic_n_per_m3"): ("spring_cubic_n_per_m3", "N/m3", -math.inf, False),
-    ("disc", "diameter_m"): ("disc_diameter_m", "m", 0.0, True),
-    ("air", "temperature_c"): ("air_temperature_c", "degC", -273.15, True),
-    ("air", "pressure_pa"): ("air_pressure_pa", "Pa", 0.0, True),
-    ("air", "relative_humidity"): ("air_relative_humidity", "", 0.0, False),
-    ("sensor", "sigma_m"): ("sensor_sigma_m", "m", 0.0, True),
-    ("start", "displacement_m"): ("start_displacement_m", "m", -math.inf, False),
-    ("start", "velocity_m_per_s"): ("start_velocity_m_per_s", "m/s", -math.inf, False),
-    ("damping", "gamma_per_s"): ("gamma_per_s", "1/s", 0.0, False),
-    ("damping", "beta_per_m_s"): ("beta_per_m_s", "1/(m s)", 0.0, False),
-    ("damping", "mu_m_per_s"): ("mu_m_per_s", "m/s", 0.0, False),
+
+class _Quantity(NamedTuple):
+    """One key of a scene file: the attribute that it becomes, its unit, and its range, both ends allowed.
+
+    The ends lie far beyond any bench: they are where the arithmetic behind is known to hold, so that whatever lies
+    between gives a number or a finding, and what was typed with a wrong exponent is refused at once.
+    """
+
+    attribute: str
+    unit: str
+    least: float
+    greatest: float
+
+    def allowed(self) -> str:
+        """Return the range in words."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.least > 0.0:
+            return f"more than 0{unit}, from {self.least:g} to {self.greatest:g}"
+        return f"at least {self.least:g}{unit} and at most {self.greatest:g}"
+
+
+_QUANTITIES: dict[tuple[str, str], _Quantity] = {
+    ("bob", "mass_kg"): _Quantity("bob_mass_kg", "kg", 1e-12, 1e6),
+    ("spring", "mass_kg"): _Quantity("spring_mass_kg", "kg", 0.0, 1e6),
+    ("spring", "constant_n_per_m"): _Quantity("spring_constant_n_per_m", "N/m", 1e-12, 1e12),
+    ("spring", "cubic_n_per_m3"): _Quantity("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18),
+    ("disc", "diameter_m"): _Quantity("disc_diameter_m", "m", 1e-6, 1e3),
+    ("air", "temperature_c"): _Quantity("air_temperature_c", "degC", -100.0, 200.0),
+    ("air", "pressure_pa"): _Quantity("air_pressure_pa", "Pa", 1e-3, 1e7),
+    ("air", "relative_humidity"): _Quantity("air_relative_humidity", "", 0.0, 1.0),
+    ("sensor", "sigma_m"): _Quantity("sensor_sigma_m", "m", 1e-12, 1e3),
+    ("start", "displacement_m"): _Quantity("start_displacement_m", "m", -1e6, 1e6),
+    ("start", "velocity_m_per_s"): _Quantity("start_velocity_m_per_s", "m/s", -1e6, 1e6),
+    ("damping", "gamma_per_s"): _Quantity("gamma_per_s", "1/s", 0.0, 1e12),
+    ("damping", "beta_per_m_s"): _Quantity("beta_per_m_s", "1/(m s)", 0.0, 1e12),
+    ("damping", "mu_m_per_s"): _Quantity("mu_m_per_s", "m/s", 0.0, 1e12),
 }
-_GREATEST = {("air", "relative_humidity"): 1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,25 +108,30 @@ class Scene:
                 allowed.append("position")
             if not allowed:
                 names = ", ".join(dict.fromkeys(name for name, _ in _QUANTITIES))
-                raise SceneError(f"{where}: unknown table [{table}]; allowed are {names}")
+                raise SceneError(f"{where}: unknown table [{_short(table)[1:-1]}]; allowed are {names}")
             if not isinstance(content, Mapping):
-                raise SceneError(f"{where}: {table} must be a table, got {content!r}; write [{table}] above its keys")
+                raise SceneError(
+                    f"{where}: {table} must be a table, got {_short(content)}; write [{table}] above its keys"
+                )
             for key, value in content.items():
                 if key not in allowed:
                     raise SceneError(
-                        f"{where}: unknown key {key!r} in [{table}] (value {value!r}); allowed are {', '.join(allowed)}"
+                        f"{where}: unknown key {_short(key)} in [{table}] (value {_short(value)}); "
+                        f"allowed are {', '.join(allowed)}"
                     )
                 if (table, key) == ("sensor", "position"):
                     known["sensor_position"] = _position(value, where)
                 else:
-                    known[_QUANTITIES[table, key][0]] = _quantity(table, key, value, where)
-        return cls(**known)
+                    known[_QUANTITIES[table, key].attribute] = _quantity(table, key, value, where)
+        scene = cls(**known)
+        _check_vapour(scene, where)
+        return scene
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
         """Return the tables again, unknown quantities left out; the inverse of :meth:`from_mapping`."""
         tables: dict[str, dict[str, Any]] = {}
-        for (table, key), (attribute, *_) in _QUANTITIES.items():
-            estimate: Estimate | None = getattr(self, attribute)
+        for (table, key), quantity in _QUANTITIES.items():
+            estimate: Estimate | None = getattr(self, quantity.attribute)
             if estimate is not None:
                 plain = estimate.u == 0
                 tables.setdefault(table, {})[key] = (
@@ -122,35 +147,69 @@ class Scene:
         return all(getattr(self, f.name) is None for f in fields(self))
 
 
+def _check_vapour(scene: Scene, where: str) -> None:
+    """Refuse air that holds more vapour than its pressure allows: each value alone may be possible."""
+    if scene.air_temperature_c is scene.air_pressure_pa is scene.air_relative_humidity is None:
+        return
+    celsius, pascal, humidity = (
+        (value or typical).value
+        for value, typical in (
+            (scene.air_temperature_c, TYPICAL_TEMPERATURE),
+            (scene.air_pressure_pa, TYPICAL_PRESSURE),
+            (scene.air_relative_humidity, TYPICAL_HUMIDITY),
+        )
+    )
+    vapour_pa = humidity * saturation_pressure(celsius)
+    if vapour_pa > pascal:
+        raise SceneError(
+            f"{where}: [air] relative_humidity {humidity:g} at temperature_c {celsius:g} must leave a vapour pressure "
+            f"of at most pressure_pa {pascal:g}, got {vapour_pa:.3g} Pa; state all three, one of them is wrong"
+        )
+
+
 def _position(value: object, where: str) -> str:
     if value not in POSITIONS:
-        raise SceneError(f"{where}: [sensor] position must be one of {', '.join(POSITIONS)}, got {value!r}")
+        raise SceneError(f"{where}: [sensor] position must be one of {', '.join(POSITIONS)}, got {_short(value)}")
     return str(value)
 
 
 def _quantity(table: str, key: str, given: object, where: str) -> Estimate:
-    _, unit, least, exclusive = _QUANTITIES[table, key]
-    greatest = _GREATEST.get((table, key), math.inf)
+    quantity = _QUANTITIES[table, key]
     name = f"{where}: [{table}] {key}"
     value: object = given
     u: object = 0.0
     if isinstance(given, Mapping):
         unknown = sorted(set(given) - {"value", "u"})
         if unknown or "value" not in given:
-            raise SceneError(f"{name} must be a number or {{ value = ..., u = ... }}, got {dict(given)!r}")
+            raise SceneError(f"{name} must be a number or {{ value = ..., u = ... }}, got {_short(dict(given))}")
         value, u = given["value"], given.get("u", 0.0)
     number, spread = _number(value, name), _number(u, f"{name}, its u")
-    below: Callable[[float], bool] = (lambda x: x <= least) if exclusive else (lambda x: x < least)
-    if below(number) or number > greatest:
-        bound = f"{'more than' if exclusive else 'at least'} {least:g} {unit}".rstrip()
-        upper = "" if math.isinf(greatest) else f" and at most {greatest:g}"
-        raise SceneError(f"{name} must be {bound}{upper}, got {number:g}")
+    if not quantity.least <= number <= quantity.greatest:
+        raise SceneError(f"{name} must be {quantity.allowed()}, got {number:g}")
     if spread < 0:
         raise SceneError(f"{name}: its u must not be negative, got {spread:g}")
-    return Estimate(number, spread, unit)
+    if spread > quantity.greatest:
+        raise SceneError(
+            f"{name}: its u must be at most {quantity.greatest:g} {quantity.unit}, got {spread:g}".rstrip()
+        )
+    return Estimate(number, spread, quantity.unit)
 
 
 def _number(value: object, name: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise SceneError(f"{name} must be a finite number, got {value!r}")
-    return float(value)
+    if not isinstance(value, bool) and isinstance(value, int | float):
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf  # an integer of more than 308 digits
+        if math.isfinite(number):
+            return number
+    raise SceneError(f"{name} must be a finite number, got {_short(value)}")
+
+
+def _short(value: object) -> str:
+    """Return a value as Python writes it, cut where it is long."""
+    try:
+        words = repr(value)
+    except ValueError:
+        return "an integer of thousands of digits"  # Python refuses to print it
+    return words if len(words) <= 60 else f"{words[:57]}..."

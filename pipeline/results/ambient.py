@@ -6,18 +6,23 @@ import math
 from functools import cached_property
 from typing import Any
 
-from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
+from pipeline.bench.air import (
+    TYPICAL_HUMIDITY,
+    TYPICAL_PRESSURE,
+    TYPICAL_TEMPERATURE,
+    U_DENSITY,
+    U_SOUND,
+    U_VISCOSITY,
+    air_density,
+    air_viscosity,
+    speed_of_sound,
+)
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.budget import Inputs, estimate_of, function, linear, product
 
 __all__ = ["Ambient"]
-
-# What a laboratory's air may be where the scene does not say.
-TYPICAL_TEMPERATURE = Estimate(20.0, 3.0, "degC")
-TYPICAL_PRESSURE = Estimate(101325.0, 1500.0, "Pa")
-TYPICAL_HUMIDITY = Estimate(0.5, 0.2, "")
 
 
 class Ambient:
