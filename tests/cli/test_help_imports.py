@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -51,6 +52,19 @@ def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
     assert imported & HEAVY == set()
     assert "springmass.cli" in imported
     assert done.stdout
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "standard", "best"])
+@pytest.mark.parametrize("name", ["damped", "undamped"])
+def test_an_analysis_imports_no_slow_library(data: Path, accuracy: str, name: str) -> None:
+    """On the way to JSON no pandas, scipy.signal or scipy.stats, 0.2 to 0.5 s each, nor what a report needs."""
+    command = ["analyse", "--json", "--accuracy", accuracy, str(data / f"{name}_simulated_position.txt")]
+    done = subprocess.run([sys.executable, "-c", CODE, *command], capture_output=True, text=True, check=True)
+    imported = set(done.stderr.split())
+    assert (
+        imported & {"pandas", "scipy.signal", "scipy.stats", "matplotlib", "jinja2", "h5py", "xarray", "lmfit"} == set()
+    )
+    assert "pipeline.analyse" in imported
 
 
 def test_importing_the_package_imports_nothing_heavy() -> None:
