@@ -1,5 +1,8 @@
 """springmass: from a rangefinder's samples to period, spring constant and damping law.
 
+The program puts acquisition, pipeline and storage together: `cli` takes a line apart, `commands` do the work by `runs`,
+`session`, `report` and `trade`. These names are what scripts may rely on; everything else may move.
+
 Examples
 --------
 >>> import springmass

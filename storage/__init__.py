@@ -1,11 +1,6 @@
-"""The run file: written whole, opened lazily.
+"""What stays on the disk: wire logs while recording, run files afterwards, each never half there.
 
-Importing this package costs nothing; the modules are named where they are used:
-
-- :mod:`storage.run_file.writing` writes a run file (imports h5py);
-- :mod:`storage.run_file.reading` opens one (imports h5py; xarray only where a dataset is asked for);
-- :mod:`storage.run_file.layout` is the file's layout, in one place, and :mod:`storage.run_file.header` what it
-  believes;
-- :mod:`storage.atomic` writes any file whole or not at all;
-- :mod:`storage.errors` is the error tree.
+In: blocks, raw bytes as they came, descriptions. Out: files, and from them the same again or a one-line error of
+:mod:`storage.errors`. Free to change: the rooms `run_file` and `wire_log`, each behind its format's page in
+docs/reference; :mod:`storage.atomic` writes any file whole or not at all. Importing this package costs nothing.
 """
