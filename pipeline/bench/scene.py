@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
-from pipeline.bench.air import TYPICAL_HUMIDITY, TYPICAL_PRESSURE, TYPICAL_TEMPERATURE, saturation_pressure
+from pipeline.bench.air import saturation_pressure
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
 
@@ -149,21 +149,14 @@ class Scene:
 
 def _check_vapour(scene: Scene, where: str) -> None:
     """Refuse air that holds more vapour than its pressure allows: each value alone may be possible."""
-    if scene.air_temperature_c is scene.air_pressure_pa is scene.air_relative_humidity is None:
+    celsius, pascal, humidity = scene.air_temperature_c, scene.air_pressure_pa, scene.air_relative_humidity
+    if celsius is None or pascal is None or humidity is None:
         return
-    celsius, pascal, humidity = (
-        (value or typical).value
-        for value, typical in (
-            (scene.air_temperature_c, TYPICAL_TEMPERATURE),
-            (scene.air_pressure_pa, TYPICAL_PRESSURE),
-            (scene.air_relative_humidity, TYPICAL_HUMIDITY),
-        )
-    )
-    vapour_pa = humidity * saturation_pressure(celsius)
-    if vapour_pa > pascal:
+    vapour_pa = humidity.value * saturation_pressure(celsius.value)
+    if vapour_pa > pascal.value:
         raise SceneError(
-            f"{where}: [air] relative_humidity {humidity:g} at temperature_c {celsius:g} must leave a vapour pressure "
-            f"of at most pressure_pa {pascal:g}, got {vapour_pa:.3g} Pa; state all three, one of them is wrong"
+            f"{where}: [air] relative_humidity {humidity.value:g} at temperature_c {celsius.value:g} must leave a vapour pressure "
+            f"of at most pressure_pa {pascal.value:g}, got {vapour_pa:.3g} Pa; one of the three is wrong"
         )
 
 
