@@ -155,8 +155,9 @@ def _check_vapour(scene: Scene, where: str) -> None:
     vapour_pa = humidity.value * saturation_pressure(celsius.value)
     if vapour_pa > pascal.value:
         raise SceneError(
-            f"{where}: [air] relative_humidity {humidity.value:g} at temperature_c {celsius.value:g} must leave a vapour pressure "
-            f"of at most pressure_pa {pascal.value:g}, got {vapour_pa:.3g} Pa; one of the three is wrong"
+            f"{where}: [air] relative_humidity {humidity.value:g} at temperature_c {celsius.value:g} must leave "
+            f"a vapour pressure of at most pressure_pa {pascal.value:g}, got {vapour_pa:.3g} Pa; "
+            "one of the three is wrong"
         )
 
 
