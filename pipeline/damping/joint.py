@@ -9,14 +9,14 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.damping.fitted_law import rates_of
-from pipeline.damping.law_fit import covariance_or_infinite
+from pipeline.damping.evidence import NEGATIVE, choose
+from pipeline.damping.law_fit import rates_of
 from pipeline.damping.laws import LAWS, Law
-from pipeline.damping.select import NEGATIVE, Damping, Params, choose
+from pipeline.damping.select import Damping, Params
 from pipeline.errors import AnalysisError
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.numerics.regression import chi2_quantile
+from pipeline.numerics.regression import chi2_quantile, covariance_of
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
 
@@ -168,7 +168,7 @@ def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params |
     if not fits:
         raise AnalysisError("no damping law could be fitted to the runs together; fit them one by one")
     ends = points.t
-    selected, admissible = choose(fits, params, lambda name: fits[name].span(ends))
+    selected, admissible = choose(fits, params.evidence, lambda name: fits[name].span(ends))
     names = tuple(name for name, _, _ in runs)
     return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
 
@@ -218,7 +218,7 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
     )
     values = _scaled(law, end.values, 1.0 / length, count)
     with np.errstate(all="ignore"):
-        covariance = covariance_or_infinite((_slopes(law, points, values) / points.u[:, None]).T)
+        covariance = covariance_of(_slopes(law, points, values) / points.u[:, None])
     chi2 = end.cost
     size = sum(float(t.size) / damping.scatter.correlation for t, (_, _, damping) in zip(points.t, runs, strict=True))
     dof = max(size - values.size, 0.0)

@@ -1,278 +1,144 @@
-"""Fit several damping laws to the same points at once: one Levenberg-Marquardt, many rows."""
+"""One damping law on one record: its parameters, and what follows from them with their uncertainty."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.damping.laws import Drag, Law
-from pipeline.damping.laws.drag import guesses, jacobians_of
+from pipeline.damping.laws.drag import POWERS
+from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
 
-__all__ = ["Fitted", "covariance_or_infinite", "fit_laws"]
+__all__ = ["LawFit", "Rejection", "mean_squared_rate", "rates_of"]
 
-STEPS = 40
-PATIENCE, IDLE = 10, 0.01  # steps after which a fit that gains less than this in chi-square a step is given up
-# Gain in chi-square that a hundredth of a standard uncertainty brings: steps shrink quadratically, so far less is left.
-NEGLIGIBLE = 1e-4
-SLOTS = 4  # parameters of the richest law of drag
+Rejection = Literal["", "misfit", "negative", "not converged"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
-    """Where the fit of one law ended.
+class LawFit:
+    """One law on one record.
 
     Parameters
     ----------
-    theta : (p,) float64
-    covariance : (p, p) float64
-        :math:`(J^T J)^{-1}` from the points' standard uncertainties.
-    chi2 : float
+    law : Law
+    joint : Joint
+        Parameters, the amplitude at the first sample used in front.
+    reduced_chi2 : float
+        Against noise and excess scatter.
+    dof : float
+        Degrees of freedom after correlation between points.
+    bic : float
+        Bayesian information criterion, up to a constant that all laws share, of the law at its best without a
+        coefficient below zero.
     converged : bool
+    rejection : {"", "misfit", "negative", "not converged"}
+        Why the law is rejected, if it is: chi-square is improbable, a coefficient is negative beyond three standard
+        uncertainties, or the fit did not converge.
     tried : str
-        What was tried, for a fit that did not converge.
+        What was tried where the fit did not converge.
+    widening : float
+        Factor on the covariance, of what a law that chi-square rejects leaves over what was expected.
     """
 
-    theta: F8
-    covariance: F8
-    chi2: float
+    law: Law
+    joint: Joint
+    reduced_chi2: float
+    dof: float
+    bic: float
     converged: bool
-    tried: str
+    rejection: Rejection
+    tried: str = ""
+    widening: float = 1.0
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the record contradicts the law."""
+        return self.rejection != ""
+
+    @property
+    def name(self) -> str:
+        """The law's name."""
+        return self.law.name
+
+    def amplitude(self, t: F8) -> F8:
+        """Return (n,) float64, m, at times since the first sample used, s."""
+        return self.law.amplitude(t, self.joint.values)
+
+    def u_amplitude(self, t: F8) -> F8:
+        """Return the standard uncertainty of :meth:`amplitude`, (n,) float64, m."""
+        jacobian = self.law.jacobian(t, self.joint.values)
+        variance = np.einsum("ni,ij,nj->n", jacobian, self.joint.covariance, jacobian)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+    def rates(self, amplitude: F8) -> tuple[F8, F8]:
+        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
+        return rates_of(self.law, amplitude, self.joint.values, self.joint.covariance)
+
+    def rate_at_start(self) -> float:
+        """Return the logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
+        return _relative_rate(self.law, self.joint.values)
+
+    def slopes_of_rate(self) -> F8:
+        """Return the derivatives (p,) of :meth:`rate_at_start` by the parameters.
+
+        In closed form for laws of drag; else central differences over a thousandth of each parameter's uncertainty, so
+        that their error is far below it.
+        """
+        theta = self.joint.values
+        if isinstance(self.law, Drag) and theta[0] > 0.0:
+            start, terms = _terms(self.law, theta)
+            by_start = sum(c * power * size for c, power, size in terms) / start
+            return np.array([by_start, *(size for _, _, size in terms)])
+        slopes = np.empty(theta.size)
+        variances = self.joint.covariance.diagonal().tolist()
+        for k, (value, variance) in enumerate(zip(theta.tolist(), variances, strict=True)):
+            step = max(1e-3 * math.sqrt(max(variance, 0.0)), 1e-7 * max(abs(value), 1e-9))
+            above, below = theta.copy(), theta.copy()
+            above[k] += step
+            below[k] -= step
+            slopes[k] = (_relative_rate(self.law, above) - _relative_rate(self.law, below)) / (2.0 * step)
+        return slopes
+
+    def damping_rate(self) -> Estimate:
+        """Return :meth:`rate_at_start` with its uncertainty."""
+        slopes = self.slopes_of_rate()
+        variance = float(slopes @ self.joint.covariance @ slopes)
+        return Estimate(self.rate_at_start(), math.sqrt(max(variance, 0.0)), "1/s")
 
 
-class _Batch:
-    """Amplitudes and derivatives of several laws, each row one law; laws of drag share one evaluation.
-
-    ``free`` is (k, width) bool: which parameters a row has.
-    """
-
-    def __init__(self, laws: Sequence[Law], t: F8) -> None:
-        self.laws, self.t = laws, t
-        self.width = max(SLOTS, *(len(law.parameters) for law in laws))
-        self.drag = np.array([isinstance(law, Drag) for law in laws])
-        self.free = np.zeros((len(laws), self.width), np.bool_)
-        self.slots: list[list[int]] = []
-        for row, law in enumerate(laws):
-            slots = list(law.slots) if isinstance(law, Drag) else list(range(len(law.parameters)))
-            self.free[row, slots] = True
-            self.slots.append(slots)
-
-    def guess(self, y: F8) -> F8:
-        """Return start values, (k, width)."""
-        theta = np.zeros(self.free.shape)
-        drags = np.flatnonzero(self.drag)
-        if drags.size:
-            theta[drags, :SLOTS] = guesses(self.t, y, [law for law in self.laws if isinstance(law, Drag)])
-        for row in np.flatnonzero(~self.drag).tolist():
-            theta[row, self.slots[row]] = self.laws[row].guess(self.t, y)
-        return theta
-
-    def evaluate(self, rows: NDArray[np.int64], theta: F8) -> tuple[F8, F8]:
-        """Return amplitudes (k, n) and their derivatives (k, width, n) of some rows."""
-        drags = self.drag[rows]
-        if drags.all() and self.width == SLOTS:
-            return jacobians_of(self.t, theta)
-        amplitude = np.empty((rows.size, self.t.size))
-        jacobian = np.zeros((rows.size, self.width, self.t.size))
-        if drags.any():
-            amplitude[drags], jacobian[drags, :SLOTS] = jacobians_of(self.t, theta[drags, :SLOTS])
-        for k, row in enumerate(rows.tolist()):
-            if drags[k]:
-                continue
-            slots = self.slots[row]
-            amplitude[k], by = self.laws[row].both(self.t, theta[k, slots])
-            jacobian[k, slots] = by.T
-        return amplitude, jacobian
+def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
+    """Return a law's -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
+    steps = 1e-6 * np.maximum(np.abs(theta[1:]), 1e-9)
+    gradient = np.zeros((theta.size, amplitude.size))
+    for k, step in enumerate(steps.tolist(), start=1):
+        shift = np.zeros(theta.size)
+        shift[k] = step
+        gradient[k] = (law.rate(amplitude, theta + shift) - law.rate(amplitude, theta - shift)) / (2.0 * step)
+    variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
+    return law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def fit_laws(laws: Sequence[Law], t: F8, y: F8, u: F8) -> list[Fitted]:
-    """Fit each law to the points by weighted least squares.
-
-    Parameters
-    ----------
-    laws : sequence of Law
-        Each with no more parameters than there are points.
-    t, y, u : (n,) float64
-        Times in s in ascending order, amplitudes and their standard uncertainties in m.
-
-    Returns
-    -------
-    list of Fitted
-        In the order of ``laws``; not finite where a law's numbers ran out of range.
-
-    Notes
-    -----
-    Levenberg and Marquardt's method with analytic derivatives, at most forty steps, on amplitudes in units of their
-    root mean square, so that no power of a metre disturbs it. A row leaves the batch when it has converged: when its
-    step was a hundredth of a standard uncertainty (which a bad fit has larger), in whatever direction.
-    """
-    length = float(np.sqrt(np.mean(y * y))) or 1.0
-    batch = _Batch(laws, t)
-    scaled, weight = y / length, length / u
-    end = _minimise(batch, scaled, weight, batch.guess(scaled))
-    covariances = _covariances(end.jacobian, batch.free)
-    fitted = []
-    for row, law in enumerate(laws):
-        slots = batch.slots[row]
-        theta = end.theta[row, slots]
-        values = law.rescaled(theta, 1.0 / length)
-        covariance = _rescaled_covariance(law, theta, covariances[row][slots][:, slots], length)
-        note = (
-            "" if end.converged[row] else f"{int(end.steps[row])} steps of Levenberg-Marquardt from the law's own guess"
-        )
-        fitted.append(Fitted(values, covariance, float(end.chi2[row]), bool(end.converged[row]), note))
-    return fitted
+def _relative_rate(law: Law, theta: F8) -> float:
+    """-dA/dt over A at the first amplitude, 1/s."""
+    if isinstance(law, Drag) and theta[0] > 0.0:
+        return float(sum(c * size for c, _, size in _terms(law, theta)[1]))
+    return float(law.rate(theta[:1], theta)[0] / theta[0])
 
 
-def _covariances(jacobian: F8, free: NDArray[np.bool_]) -> F8:
-    """Return the rows' covariances (k, p, p), infinite where the points do not determine every parameter."""
-    with np.errstate(all="ignore"):
-        scale = np.sqrt(np.einsum("kpn,kpn->kp", jacobian, jacobian))
-        scale[~free] = 1.0
-        normal = (jacobian @ jacobian.transpose(0, 2, 1)) / (scale[:, :, None] * scale[:, None, :])
-        normal += np.eye(free.shape[1]) * ~free[:, :, None]
-        sound = np.isfinite(normal).all(axis=(1, 2)) & scale.all(axis=1)
-        normal[~sound] = np.eye(free.shape[1])
-        # Where the determinant is that small the inverse would lose half of its digits: see below.
-        sound &= np.linalg.det(normal) > 1e-8
-        normal[~sound] = np.eye(free.shape[1])
-        found = np.linalg.inv(normal) / (scale[:, :, None] * scale[:, None, :])
-    for row in np.flatnonzero(~sound).tolist():
-        slots = np.flatnonzero(free[row])
-        found[row][np.ix_(slots, slots)] = covariance_or_infinite(jacobian[row, slots])
-    return np.asarray(found)
+def _terms(law: Drag, theta: F8) -> tuple[float, list[tuple[float, int, float]]]:
+    """The first amplitude A, and each coefficient of -dA/dt over A with its power of A and that power's value."""
+    start, *coefficients = theta.tolist()
+    values = {-1: 1.0 / start, 0: 1.0, 1: start}
+    powers = (POWERS[name] - 1 for name in law.parameters[1:])
+    return start, [(c, power, values[power]) for c, power in zip(coefficients, powers, strict=True)]
 
 
-def _rescaled_covariance(law: Law, theta: F8, covariance: F8, length: float) -> F8:
-    """The covariance that belongs to ``law.rescaled(theta, 1 / length)``."""
-    if isinstance(law, Drag):
-        factor = law.rescaled(np.ones(theta.size), 1.0 / length)
-        return np.asarray(covariance * np.outer(factor, factor))
-    steps = 1e-5 * np.maximum(np.abs(theta), 1e-3)
-    with np.errstate(all="ignore"):
-        by = np.stack(
-            [
-                (law.rescaled(theta + d, 1.0 / length) - law.rescaled(theta - d, 1.0 / length)) / (2.0 * step)
-                for d, step in zip(np.diag(steps), steps, strict=True)
-            ],
-            axis=1,
-        )
-        return np.asarray(by @ covariance @ by.T)
-
-
-def covariance_or_infinite(jacobian: F8) -> F8:
-    """Return :math:`(J J^T)^{-1}`.
-
-    Parameters
-    ----------
-    jacobian : (p, n) float64
-        Each column divided by its point's standard uncertainty.
-
-    Returns
-    -------
-    (p, p) float64
-        Infinite where the points do not determine every parameter: a pseudo-inverse would call it known.
-
-    Notes
-    -----
-    By QR of rows scaled to unit length.
-    """
-    with np.errstate(all="ignore"):
-        scale = np.sqrt(np.einsum("pn,pn->p", jacobian, jacobian))
-    unknown = np.full((scale.size, scale.size), np.inf)
-    if not np.isfinite(scale).all() or not scale.all() or jacobian.shape[1] < scale.size:
-        return unknown
-    unit = jacobian / scale[:, None]
-    r: F8 = np.asarray(np.linalg.qr(unit.T, mode="r"))
-    if np.abs(np.diagonal(r)).min() <= 1e-13:
-        return unknown
-    triangle = np.linalg.inv(r) / scale[:, None]
-    with np.errstate(over="ignore", invalid="ignore"):  # infinite where the points say nothing
-        return np.asarray(triangle @ triangle.T)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Minimum:
-    """Where :func:`_minimise` ended.
-
-    Parameters
-    ----------
-    theta : (k, p) float64
-    chi2 : (k,) float64
-    jacobian : (k, p, n) float64
-        At theta, divided by the points' standard uncertainties; zero for parameters that a row has not.
-    steps : (k,) int64
-    converged : (k,) bool
-    """
-
-    theta: F8
-    chi2: F8
-    jacobian: F8
-    steps: NDArray[np.int64]
-    converged: NDArray[np.bool_]
-
-
-def _minimise(model: _Batch, y: F8, weight: F8, theta: F8) -> _Minimum:
-    """Minimise every row's chi-square by Levenberg and Marquardt's method.
-
-    Parameters
-    ----------
-    model : _Batch
-    y, weight : (n,) float64
-        Points and reciprocals of their standard uncertainties.
-    theta : (k, p) float64
-        Start values.
-    """
-    count, width = theta.shape
-    theta = theta.copy()
-    identity = np.eye(width)
-    active = np.arange(count)
-    damping = np.full(count, 1e-6)
-    steps, converged = np.zeros(count, np.int64), np.zeros(count, np.bool_)
-    with np.errstate(all="ignore"):
-        residual, jacobian, chi2 = _linearised(model, active, theta, y, weight)
-        while active.size:
-            here, rest = jacobian[active], residual[active]
-            norm = np.sqrt(np.einsum("kpn,kpn->kp", here, here))
-            norm[norm == 0.0] = 1.0
-            normal = (here @ here.transpose(0, 2, 1)) / (norm[:, :, None] * norm[:, None, :])
-            right = (here @ rest[:, :, None])[:, :, 0] / norm
-            sound = np.isfinite(right).all(axis=1) & np.isfinite(normal).all(axis=(1, 2))
-            normal[~sound], right[~sound] = identity, 0.0
-            # A parameter that a row has not keeps a row of zeros: one on its diagonal leaves it where it is.
-            lever = damping[active, None] + ~model.free[active]
-            step = np.linalg.solve(normal + identity * lever[:, None, :], right[:, :, None])[:, :, 0]
-            steps[active] += 1
-            trial = theta[active] + step / norm
-            new_residual, new_jacobian, new_chi2 = _linearised(model, active, trial, y, weight)
-            promised = np.einsum("kp,kp->k", step, right)
-            gain = chi2[active] - new_chi2
-            better = gain >= 0.0
-            rows = active[better]
-            theta[rows], chi2[rows] = trial[better], new_chi2[better]
-            residual[rows], jacobian[rows] = new_residual[better], new_jacobian[better]
-            # A small gain means the end only where no lever has shortened the step.
-            negligible = np.where(damping[active] <= 1e-3, NEGLIGIBLE, 1e-10)
-            level = promised <= negligible * np.maximum(1.0, chi2[active] / y.size)
-            done = sound & np.where(better, level | (gain <= 1e-12 * chi2[active]), level)
-            damping[active] *= np.where(better, 0.1, 10.0)
-            np.maximum(damping, 1e-12, out=damping)
-            converged[active[done]] = True
-            # In a valley without a floor, where no gain counts, more steps find nothing.
-            idle = better & (steps[active] >= PATIENCE) & (gain < IDLE * np.maximum(1.0, chi2[active] / y.size))
-            active = active[~done & ~idle & sound & (damping[active] <= 1e10) & (steps[active] < STEPS)]
-    return _Minimum(theta, chi2, jacobian, steps, converged)
-
-
-def _linearised(model: _Batch, rows: NDArray[np.int64], theta: F8, y: F8, weight: F8) -> tuple[F8, F8, F8]:
-    """Weighted residuals (k, n), derivatives of the law (k, width, n) with fixed parameters zero, and chi-square."""
-    amplitude, jacobian = model.evaluate(rows, theta)
-    residual = (y - amplitude) * weight
-    jacobian *= weight
-    jacobian *= model.free[rows][:, :, None]
-    chi2 = np.einsum("kn,kn->k", residual, residual)
-    chi2[~np.isfinite(chi2)] = np.inf
-    return residual, jacobian, chi2
+def mean_squared_rate(fit: LawFit, amplitude: F8) -> float:
+    """Return the mean of :math:`(\\dot A/A)^2` at a law's amplitudes (n,) m, weighted by :math:`A^2`, 1/s^2."""
+    power = float(amplitude @ amplitude)
+    rate = fit.law.rate(amplitude, fit.joint.values)
+    return float(rate @ rate) / power if power > 0.0 else 0.0

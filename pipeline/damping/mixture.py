@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from pipeline.damping.evidence import NEGATIVE
 from pipeline.damping.laws import Drag
-from pipeline.damping.select import NEGATIVE, Damping, LawFit
+from pipeline.damping.select import Damping, LawFit
 
 __all__ = ["MixedDrag", "Params", "find_mixed"]
 

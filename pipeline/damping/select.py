@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
-from pipeline.damping.fitted_law import LawFit, Rejection, mean_squared_rate
-from pipeline.damping.law_fit import Fitted, fit_laws
+from pipeline.damping.evidence import choose, least_chi2, weigh
+from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import LAWS, Law
+from pipeline.damping.minimum import Minimum, minima_of
 from pipeline.errors import AnalysisError
-from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.regression import Scatter, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
@@ -22,10 +22,6 @@ from pipeline.track import F8
 __all__ = ["Damping", "LawFit", "Params", "fit_damping"]
 
 TINY = 1e-100  # stands for zero where something is divided by an uncertainty
-BARE_MENTION = 2.0  # difference of BIC below which evidence is none
-ALIKE = 0.1  # share of the damping that two laws may differ by and still say the same
-SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # of the first amplitude, to which at most and at least it is compared
-NEGATIVE = 3.0  # standard uncertainties below zero at which a coefficient speaks against its law
 LOOSEST_POWER = 3.0  # standard uncertainty of a power that still says anything: known ones lie between 0 and 2
 
 
@@ -179,7 +175,9 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
         fits = _fit_all(laws, t, amplitude, spread, params, unfitted)
     if not fits:
         raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
-    selected, admissible = choose(fits, params, lambda name: fits[name].amplitude(np.array([0.0, float(t[-1])])))
+    selected, admissible = choose(
+        fits, params.evidence, lambda name: fits[name].amplitude(np.array([0.0, float(t[-1])]))
+    )
     if not admissible and params.otherwise:
         return fit_damping(demodulated, t0, replace(params, laws=params.otherwise, otherwise=()))
     return Damping(t0, fits, selected, admissible, spread, unfitted)
@@ -203,7 +201,7 @@ def _fit_all(
     if not laws:
         return {}
     t, y, u = t[spread.kept], amplitude[spread.kept], spread.u[spread.kept]
-    found = {law.name: fit for law, fit in zip(laws, fit_laws(laws, t, y, u), strict=True)}
+    found = {law.name: fit for law, fit in zip(laws, minima_of(laws, t, y, u), strict=True)}
     sound = {}
     for law in laws:
         if (why := _astray(law, found[law.name], t, y)) is None:
@@ -214,7 +212,7 @@ def _fit_all(
     least = least_chi2(sound)
     weighed = {}
     for name, fit in sound.items():
-        weighed[name] = weigh(LAWS[name], fit, least[name], y.size, spread.correlation, params)
+        weighed[name] = weigh(LAWS[name], fit, least[name], y.size, spread.correlation, params.rejection)
         if weighed[name].rejection == "misfit":
             weighed[name] = _widened(weighed[name], (y - weighed[name].amplitude(t)) / u, spread.correlation)
     return weighed
@@ -228,7 +226,7 @@ def _widened(fit: LawFit, residual: F8, correlation: float) -> LawFit:
     return replace(fit, joint=replace(fit.joint, covariance=widening * fit.joint.covariance), widening=widening)
 
 
-def _astray(law: Law, fit: Fitted, t: F8, y: F8) -> str | None:
+def _astray(law: Law, fit: Minimum, t: F8, y: F8) -> str | None:
     """Why a fit's numbers are of no use."""
     top = float(np.max(y))
     if not 1e-3 * top <= fit.theta[0] <= 1e3 * top or not math.isfinite(fit.chi2):
@@ -239,43 +237,13 @@ def _astray(law: Law, fit: Fitted, t: F8, y: F8) -> str | None:
         return "the windows do not determine its power"
     if fit.theta.min() >= 0.0:
         return None
+    # Samples reach half a window beyond the last centre.
+    end = t[-1:] + 0.5 * np.max(np.diff(t), initial=0.0)
     with np.errstate(all="ignore"):
         growth = -law.rate(y, fit.theta) * (t[-1] - t[0])
-    # A growth that outruns the record by e^20 is a fit gone astray.
-    return "its numbers ran out of range" if np.any(growth > 20.0 * top) else None
-
-
-def least_chi2(fits: Mapping[str, Fitted]) -> dict[str, float]:
-    """Each law's chi-square at its best without negative coefficients, which is a special case's or its own."""
-    least: dict[str, float] = {}
-    for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
-        fit = fits[name]
-        least[name] = fit.chi2
-        if fit.theta.min() < 0.0:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                below = np.minimum(fit.theta, 0.0) ** 2 / np.diag(fit.covariance)
-            cases = [least[case] for case in LAWS[name].cases if case in least]
-            # Without its special cases at hand: what the worst coefficient costs to be zero.
-            least[name] = min(cases) if cases else fit.chi2 + float(np.max(below))
-    return least
-
-
-def weigh(law: Law, fit: Fitted, least_chi2: float, points: int, correlation: float, params: Params) -> LawFit:
-    count = len(law.parameters)
-    covariance = correlation * fit.covariance
-    free = points - count
-    dof = max(free / correlation, 1.0) if free > 0 else 0.0
-    reduced = fit.chi2 / free if free > 0 else math.nan
-    bic = least_chi2 / correlation + count * math.log(max(points / correlation, 2.0))
-    rejection: Rejection = ""
-    if dof > 0 and reduced * dof > chi2_quantile(1.0 - params.rejection, dof):
-        rejection = "misfit"
-    elif np.any(fit.theta < -NEGATIVE * np.sqrt(np.diag(covariance))):
-        rejection = "negative"
-    elif not fit.converged:
-        rejection = "not converged"
-    joint = Joint(law.parameters, fit.theta, covariance, law.units)
-    return LawFit(law, joint, reduced, dof, bic, fit.converged, rejection, fit.tried)
+        # A growth that outruns the record by e^20 is a fit gone astray, and so is a pole within it.
+        astray = np.any(growth > 20.0 * top) or not np.isfinite(law.amplitude(end, fit.theta)[0])
+    return "its numbers ran out of range" if astray else None
 
 
 def _corner(fits: Mapping[str, LawFit], t: F8, amplitude: F8, noise: F8, spread: Scatter) -> Scatter | None:
@@ -292,79 +260,3 @@ def _corner(fits: Mapping[str, LawFit], t: F8, amplitude: F8, noise: F8, spread:
     if np.count_nonzero(kept) < 0.8 * kept.size:
         return None
     return Scatter(u, excess, kept, correlation_length(residual[kept] / u[kept]))
-
-
-class Weighed(Protocol):
-    """A fit that takes part in the choice among laws: of one run, or of several together."""
-
-    @property
-    def law(self) -> Law:
-        """Which law."""
-        ...
-
-    @property
-    def bic(self) -> float:
-        """Bayesian information criterion."""
-        ...
-
-    @property
-    def rejection(self) -> str:
-        """Why the law is rejected, empty where it is not."""
-        ...
-
-    @property
-    def rejected(self) -> bool:
-        """Whether the points contradict the law."""
-        ...
-
-    @property
-    def reduced_chi2(self) -> float:
-        """Chi-square by degrees of freedom."""
-        ...
-
-    def rates(self, amplitude: F8) -> tuple[F8, F8]:
-        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
-        ...
-
-
-def choose(fits: Mapping[str, Weighed], params: Params, span: Callable[[str], F8]) -> tuple[str, tuple[str, ...]]:
-    """Return the selected law and the admissible ones, best first; of rejected laws the one that fits best.
-
-    Parameters
-    ----------
-    fits : mapping of str to fit
-    params : Params
-    span : callable
-        Gives the greatest and the least amplitude, m, that a law shows over the points.
-
-    Notes
-    -----
-    A law that holds the selected one as a special case is no other answer where its further coefficient gains it
-    nothing (its BIC is higher by more than 2) and where the damping it tells is, with twice its uncertainty, within a
-    tenth of the simpler law's at both ends of the span, which is taken to a third of the greatest amplitude where the
-    record ends before. It is left out. Where the record cannot exclude a tenth, it stays.
-    """
-    allowed = [name for name in fits if not fits[name].rejected]
-    count = {name: len(fit.law.parameters) for name, fit in fits.items()}
-    if not allowed:
-        # A law of damping that does not fit is better than one that fits by driving the motion, if any damps.
-        damping = [name for name, fit in fits.items() if fit.rejection != "negative" and count[name] > 1]
-        least = min(fits.values(), key=lambda fit: fit.bic).bic
-        tolerable = [name for name in damping if fits[name].bic == least]
-        return (tolerable or [min(fits, key=lambda name: (fits[name].reduced_chi2, count[name]))])[0], ()
-    least = min(fits[name].bic for name in allowed)
-    ties = [name for name in allowed if fits[name].bic - least < BARE_MENTION]
-    selected = min(ties, key=lambda name: (count[name], list(fits).index(name)))
-    best = fits[selected]
-    order = sorted(allowed, key=lambda name: (name != selected, fits[name].bic))
-    reach = [name for name in order if fits[name].bic - least <= params.evidence]
-    idle = {n for n in reach if selected in fits[n].law.cases and fits[n].bic - best.bic > BARE_MENTION}
-    if idle:
-        most, least_m = span(selected)
-        amplitudes = most * np.array([1.0, min(max(least_m / most, SMALLEST_SHARE), LARGEST_SHARE)])
-        alone, _ = best.rates(amplitudes)
-        for name in sorted(idle):
-            rate, u = fits[name].rates(amplitudes)
-            if not np.all(np.abs(rate - alone) + 2.0 * u <= ALIKE * alone):
-                idle.remove(name)
-    return selected, tuple(name for name in reach if name not in idle)

@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.damping.law_fit import Fitted
+from pipeline.damping.evidence import choose, least_chi2, weigh
 from pipeline.damping.laws import LAWS, Drag
-from pipeline.damping.select import Damping, LawFit, choose, least_chi2, weigh
+from pipeline.damping.minimum import Minimum
+from pipeline.damping.select import Damping, LawFit
 from pipeline.damping.select import Params as DampingParams
 from pipeline.motion.equation_model import COEFFICIENTS, STATE, STEP, FreeMotion
 from pipeline.numerics import least_squares
@@ -251,7 +252,9 @@ class Search:
         if not weighed:
             return None
         last = float(np.max(self.elapsed))
-        selected, admissible = choose(weighed, laws, lambda name: weighed[name].amplitude(np.array([0.0, last])))
+        selected, admissible = choose(
+            weighed, laws.evidence, lambda name: weighed[name].amplitude(np.array([0.0, last]))
+        )
         scatter = replace(self.damping.scatter, correlation=self.correlation)
         damping = Damping(self.damping.t0, weighed, selected, admissible, scatter, unfitted)
         return damping, fits[selected]
@@ -276,7 +279,7 @@ class Search:
             turn[0, 1:4] = np.array([y, v / omega**2, -(v**2) / omega**3]) / first
             turn[1:, len(STATE) :] = np.eye(len(LAWS[name].parameters) - 1)
             theta = np.concatenate([[first], fit.values[len(STATE) :]])
-            found[name] = Fitted(theta, turn @ fit.covariance @ turn.T, fit.cost, fit.converged, fit.tried)
+            found[name] = Minimum(theta, turn @ fit.covariance @ turn.T, fit.cost, fit.converged, fit.tried)
         least = least_chi2(found)
         points = int(np.count_nonzero(self.used)) - len(STATE) + 1
-        return {n: weigh(LAWS[n], fit, least[n], points, self.correlation, laws) for n, fit in found.items()}
+        return {n: weigh(LAWS[n], fit, least[n], points, self.correlation, laws.rejection) for n, fit in found.items()}

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.damping.evidence import BARE_MENTION
 from pipeline.damping.laws import LAWS
-from pipeline.damping.select import BARE_MENTION, Damping, LawFit
+from pipeline.damping.select import Damping, LawFit
 from pipeline.motion.phase import PhaseFit, amplitude_integral
 from pipeline.motion.rest import Rest
 from pipeline.motion.waveform import Waveform

@@ -16,9 +16,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pipeline.numerics.regression import pseudo_inverse
 from pipeline.track import F8
 
-__all__ = ["Fit", "Params", "minimise"]
+__all__ = ["Fit", "Params", "evaluated_once", "minimise"]
 
 EPS = float(np.finfo(np.float64).eps)
 CENTRAL_STEP = EPS ** (1.0 / 3.0)  # a central difference errs least here
@@ -80,7 +81,11 @@ class Fit:
 
 
 class _NoDerivativeError(ArithmeticError):
-    """The model has no finite derivative where the search arrived."""
+    """The model has no finite derivative at ``theta``, where the search arrived."""
+
+    def __init__(self, theta: F8) -> None:
+        super().__init__(f"no finite derivative at {_shown(theta)}")
+        self.theta = theta
 
 
 def minimise(
@@ -148,6 +153,25 @@ def minimise(
     return replace(better, tried=tried, steps=first.steps + second.steps)
 
 
+def evaluated_once(both: Callable[[F8], tuple[F8, F8]]) -> tuple[Callable[[F8], F8], Callable[[F8], F8]]:
+    """Return residuals and their Jacobian as two functions, where one evaluation gives both.
+
+    Parameters
+    ----------
+    both : callable
+        (p,) to (n,) and (n, p). What it gave for the last parameters is kept.
+    """
+    last: list[tuple[bytes, tuple[F8, F8]]] = [(b"", (np.empty(0), np.empty(0)))]
+
+    def at(theta: F8) -> tuple[F8, F8]:
+        key = theta.tobytes()
+        if last[0][0] != key:
+            last[0] = key, both(theta)
+        return last[0][1]
+
+    return lambda theta: at(theta)[0], lambda theta: at(theta)[1]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Search:
     """The functions of one problem."""
@@ -165,7 +189,7 @@ class _Search:
         def slopes(at: F8) -> F8:
             slope = np.asarray(self.jacobian(at), np.float64)
             if not np.all(np.isfinite(slope)):
-                raise _NoDerivativeError(f"no finite derivative at {_shown(at)}")
+                raise _NoDerivativeError(at.copy())
             np.maximum(largest, np.linalg.norm(slope, axis=0), out=largest)
             return slope
 
@@ -183,7 +207,7 @@ class _Search:
                 max_nfev=self.params.steps,
             )
         except _NoDerivativeError as error:
-            return _failed(theta, residual, str(error), 1)
+            return _failed(error.theta, np.asarray(self.residuals(error.theta), np.float64), str(error), 1)
         return self.judged(end.x, end.fun, end.jac, largest, end.nfev, stopped=end.status > 0)
 
     def judged(self, values: F8, residual: F8, slope: F8, largest: F8, steps: int, *, stopped: bool) -> Fit:
@@ -193,10 +217,8 @@ class _Search:
         noise = np.sqrt(cost * count / max(residual.size - count, 1))
         rounding = 8.0 * EPS * float(np.linalg.norm(norms * values))
         lost = np.flatnonzero(norms <= LOST * largest)
-        scale = np.where(norms > 0.0, norms, 1.0)
-        left, singular, right = np.linalg.svd(slope / scale, full_matrices=False)
-        seen = singular > DEPENDENT * singular[0]
-        offset = float(np.linalg.norm(left[:, seen].T @ residual))
+        inverse, independent = pseudo_inverse(slope, DEPENDENT)
+        offset = float(np.linalg.norm(slope @ (inverse @ residual)))
         precision = max(self.params.precision, STALLED) if stopped else self.params.precision
         converged = offset <= max(precision * noise, rounding)
         if not converged:
@@ -204,11 +226,10 @@ class _Search:
         elif lost.size:
             names = ", ".join(str(i + 1) for i in lost)
             ended = f"a minimum after {steps} steps, but there the data do not determine parameter {names}"
-        elif not seen.all():
+        elif not independent:
             ended = f"a minimum after {steps} steps, but there parameters depend on each other"
         else:
-            root = right.T / singular / scale[:, None]
-            return Fit(values, root @ root.T, residual, cost, True, f"a minimum after {steps} steps", steps)
+            return Fit(values, inverse @ inverse.T, residual, cost, True, f"a minimum after {steps} steps", steps)
         return _failed(values, residual, f"{ended}: {_shown(values)}", steps)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.bench.added_mass import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
-from pipeline.damping.fitted_law import mean_squared_rate
+from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.rest import Rest

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipeline.damping import select as damping
-from pipeline.damping.laws import LAWS, Law, drag
-from pipeline.damping.laws.drag import Drag, amplitudes, fading, jacobians_of
+from pipeline.damping.laws import LAWS, Drag, Law
+from pipeline.damping.laws.drag import amplitudes
 from pipeline.oscillation.demodulate import Demodulated
 
 # Rows of coefficients; a law takes those that its parameters name.
@@ -96,30 +96,6 @@ def test_rate_is_the_equation(law: Law, bench: dict[str, float]) -> None:
     assert rate.shape == a.shape
     assert rate[0] == 0.0
     np.testing.assert_allclose(rate[1:], np.broadcast_to(fall(law, bench)(a), a.shape)[1:], rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("gamma", "beta"),
-    [(0.0, 0.0), (1e-12, 0.3), (8e-6, 0.2), (9e-6, 0.2), (0.0146, 0.0), (0.0065, 0.2), (9.0, 1e3)],
-)
-def test_the_short_form_without_friction_is_the_closed_form(gamma: float, beta: float) -> None:
-    """Amplitude and derivatives of a motion that only fades are those of the form that holds for every sign."""
-    t = np.linspace(0.0, 120.0, 50)
-    amplitude, by = fading(t, 0.05, gamma, beta)
-    whole, derivatives = jacobians_of(t, np.array([[0.05, 0.0, gamma, beta]]))
-    np.testing.assert_allclose(amplitude, whole[0], rtol=1e-13)
-    np.testing.assert_allclose(by, derivatives[0, [0, 2, 3]], rtol=1e-8, atol=1e-12 * np.abs(by).max())
-
-
-@pytest.mark.parametrize("parameters", list(drag.FADING))
-def test_a_lone_coefficients_form_is_the_short_form_at_zero(parameters: tuple[str, ...]) -> None:
-    """Without damping, with linear and with quadratic drag alone: the mixture's form with the others zero."""
-    t = np.linspace(0.0, 120.0, 50)
-    theta = {"A0": 0.05, "gamma": 0.0146, "beta": 0.5}
-    amplitude, by = drag.FADING[parameters](t, *(theta[name] for name in parameters))
-    whole, derivatives = fading(t, *(theta[name] if name in parameters else 0.0 for name in theta))
-    np.testing.assert_allclose(amplitude, whole, rtol=1e-13)
-    np.testing.assert_allclose(by, derivatives[[list(theta).index(name) for name in parameters]], rtol=1e-13)
 
 
 @pytest.mark.parametrize("bench", [*BENCHES, *STOPPING])
@@ -306,14 +282,11 @@ def test_growing_amplitudes_end_at_a_pole() -> None:
     assert np.isinf(LAWS["power"].amplitude(t, np.array([0.05, -0.5, 2.0]))[-1])
 
 
-def test_laws_in_one_batch_are_the_laws_alone() -> None:
-    """Fits evaluate many laws at once: each row is, to rounding, what the law gives by itself."""
+def test_several_motions_are_each_what_its_law_gives() -> None:
+    """Amplitudes of many rows of coefficients at once: each row is its law's own, to rounding."""
     drags = [law for law in LAWS.values() if isinstance(law, Drag)]
     for bench in (*BENCHES, *STOPPING):
-        full = np.concatenate([law.full(theta_of(law, bench)) for law in drags])
-        values, slopes = jacobians_of(T, full)
-        np.testing.assert_array_equal(values, amplitudes(T, full))
-        for row, law in enumerate(drags):
-            alone, by = law.both(T, theta_of(law, bench))
-            np.testing.assert_allclose(values[row], alone, rtol=1e-13)
-            np.testing.assert_allclose(slopes[row][list(law.slots)].T, by, rtol=1e-12)
+        rows = [[bench[n] if n in law.parameters else 0.0 for n in ("A0", "mu", "gamma", "beta")] for law in drags]
+        values = amplitudes(T, np.array(rows))
+        for row, law in zip(values, drags, strict=True):
+            np.testing.assert_allclose(row, law.amplitude(T, theta_of(law, bench)), rtol=1e-13)

@@ -1,5 +1,8 @@
 """Friction, linear and quadratic drag, alone and together: one closed form for all eight laws.
 
+Kept by hand: no library has it. An adaptive integrator (scipy's DOP853 at a relative 1e-10) takes ninety times as
+long for the amplitudes of 160 windows, and gives no derivatives.
+
 Notes
 -----
 :math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)` is a Riccati equation, so its flow is a Moebius map. With
@@ -25,16 +28,15 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.track import F8
 
-__all__ = ["FADING", "Drag", "amplitudes", "fading", "guesses", "jacobians_of"]
+__all__ = ["DRAGS", "POWERS", "Drag", "amplitudes"]
 
 UNITS = {"A0": "m", "mu": "m/s", "gamma": "1/s", "beta": "1/(m s)"}
 POWERS = {"mu": 0, "gamma": 1, "beta": 2}
@@ -69,22 +71,13 @@ class Drag:
         return tuple(law.name for law in DRAGS if set(law.parameters) < mine)
 
     @property
-    def slots(self) -> tuple[int, ...]:
+    def slots(self) -> list[int]:
         """Places of the parameters in the full set (A0, mu, gamma, beta)."""
-        return tuple(SLOTS.index(name) for name in self.parameters)
-
-    def full(self, theta: F8) -> F8:
-        """Return (1, 4) float64: the full set, absent coefficients zero."""
-        whole = np.zeros((1, 4))
-        whole[0, list(self.slots)] = theta
-        return whole
+        return [SLOTS.index(name) for name in self.parameters]
 
     def amplitude(self, t: F8, theta: F8) -> F8:
-        """Return the closed form."""
-        if self._fades(t, theta):
-            start, _, gamma, beta = self.full(theta)[0].tolist()
-            return _faded(t, start, gamma, beta)
-        return np.asarray(amplitudes(t, self.full(theta))[0])
+        """Return the closed form; 0 after friction has stopped the motion, infinite beyond a growing one's pole."""
+        return _flow(t, *self._full(theta)).amplitude
 
     def jacobian(self, t: F8, theta: F8) -> F8:
         """Return the derivatives by A0 and the coefficients."""
@@ -92,15 +85,9 @@ class Drag:
 
     def both(self, t: F8, theta: F8) -> tuple[F8, F8]:
         """Return amplitude and jacobian, which share most of their work."""
-        if self._fades(t, theta):
-            amplitude, by = FADING[self.parameters](t, *theta.tolist())
-            return amplitude, np.ascontiguousarray(by.T)
-        amplitudes, by = jacobians_of(t, self.full(theta))
-        return amplitudes[0], np.ascontiguousarray(by[0, list(self.slots)].T)
-
-    def _fades(self, t: F8, theta: F8) -> bool:
-        """Whether the amplitude only falls, and never to a stop: no friction, and nothing negative."""
-        return "mu" not in self.parameters and bool(theta.min() >= 0.0) and bool(t.min(initial=0.0) >= 0.0)
+        full = self._full(theta)
+        flow = _flow(t, *full)
+        return flow.amplitude, _slopes(t, flow, *full)[:, self.slots]
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
         """Return mu + gamma A + beta A^2; nothing where there is no amplitude left."""
@@ -110,266 +97,141 @@ class Drag:
         return np.asarray(np.where(amplitude > 0.0, rate, 0.0))
 
     def guess(self, t: F8, amplitude: F8) -> F8:
-        """Return the coefficients of a line through integrals of the amplitudes."""
-        return guesses(t, amplitude, (self,))[0, list(self.slots)]
+        """Return start values (p,) from points in the order of time, at least one.
+
+        Notes
+        -----
+        The equation integrated once, :math:`A = A_0 - \\mu t - \\gamma\\int A - \\beta\\int A^2`, is linear in all
+        parameters; integrals of noisy points are far less noisy than their differences.
+        """
+        level = float(amplitude.max())
+        found = np.zeros(len(self.parameters))
+        found[0] = max(float(amplitude.mean()), FLOOR * level)
+        if amplitude.size < 2 or not t[-1] > t[0]:
+            return found
+        y, span = amplitude / level, float(t[-1])
+        columns = [np.ones(t.size)]
+        for name in self.parameters[1:]:
+            power = y ** POWERS[name]
+            # Up to the first point the fall is taken as flat; it is a part of a period.
+            fallen = np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(t))
+            columns.append(-(power[0] * t[0] + np.concatenate([[0.0], fallen])) / span)
+        values = np.linalg.lstsq(np.stack(columns, axis=1), y, rcond=1e-12)[0]
+        if np.all(np.isfinite(values)) and values[0] > 0.0:
+            found[0] = values[0] * level
+            found[1:] = [
+                x * level ** (1 - POWERS[name]) / span
+                for name, x in zip(self.parameters[1:], values[1:].tolist(), strict=True)
+            ]
+        return found
 
     def rescaled(self, theta: F8, length_m: float) -> F8:
         """Return theta with lengths divided by ``length_m``."""
         powers = {"A0": -1.0, "mu": -1.0, "gamma": 0.0, "beta": 1.0}
         return np.asarray(theta * length_m ** np.array([powers[name] for name in self.parameters]))
 
+    def _full(self, theta: F8) -> tuple[float, float, float, float]:
+        """A0, mu, gamma and beta, absent ones zero."""
+        values = dict(zip(self.parameters, theta.tolist(), strict=True))
+        return values["A0"], values.get("mu", 0.0), values.get("gamma", 0.0), values.get("beta", 0.0)
+
 
 class _Flow(NamedTuple):
-    """The parts of the closed form, all (k, n): N and D times e^(-st), and what the derivatives need."""
+    """The parts of the closed form, all (n,): D, C and S times e^(-st), and what the derivatives need."""
 
-    time: F8
-    numerator: F8
+    amplitude: F8
     denominator: F8
     cosh: F8
     sinh: F8
     fall: F8  # e^(-2st), 1 where s is imaginary
-    square: F8  # s^2, (k, 1)
-    ends: NDArray[np.float64] | None  # 0 where friction has stopped the motion, infinite beyond a pole, else NaN
+    square: float  # s^2
+    ends: F8 | None  # 0 where friction has stopped the motion, infinite beyond a pole, else NaN
 
 
-def _flow(t: F8, theta: F8) -> _Flow:
-    start, mu, gamma, beta = theta.T[:, :, None]
+def _flow(t: F8, start: float, mu: float, gamma: float, beta: float) -> _Flow:
     square = 0.25 * gamma * gamma - beta * mu
-    root = np.sqrt(np.maximum(square, 0.0))
-    growing = gamma < 0.0
-    # The greater root of x^2 - gamma x + beta mu in size is safe, the lesser is their product over it.
-    greater = 0.5 * gamma + np.where(growing, -root, root)
-    lesser = np.divide(beta * mu, greater, out=np.zeros_like(greater), where=greater != 0.0)
-    twice = 2.0 * root
-    power = twice * -t
-    fall = np.exp(power)
-    sinh = np.expm1(power, out=power)
-    sinh /= np.where(twice > 0.0, -twice, -1.0)
-    sinh[twice[:, 0] == 0.0] = t
-    cosh = 0.5 * fall
-    cosh += 0.5
-    numerator = start * fall
-    numerator -= (mu + lesser * start) * sinh
-    denominator = (lesser + beta * start) * sinh
-    if growing.any():
-        rows = growing[:, 0]
-        numerator[rows] += start[rows] * (1.0 - fall[rows])
-        denominator[rows] += fall[rows]
-        denominator[~rows] += 1.0
-    else:
-        denominator += 1.0
-    turning = np.flatnonzero(square[:, 0] < 0.0)
-    if turning.size:
-        pace = np.sqrt(-square[turning])
+    if square < 0.0:
+        pace = math.sqrt(-square)
         angle = np.minimum(pace * t, np.pi)
-        cosh[turning], sinh[turning], fall[turning] = np.cos(angle), np.sin(angle) / pace, 1.0
-        c, s, a = cosh[turning], sinh[turning], start[turning]
-        numerator[turning] = a * c - (mu[turning] + 0.5 * gamma[turning] * a) * s
-        denominator[turning] = c + (beta[turning] * a + 0.5 * gamma[turning]) * s
-    ends = None
-    if turning.size or min(numerator.min(), denominator.min()) <= 0.0:
-        ends = _ends(t, theta, numerator, denominator, square)
-    return _Flow(t, numerator, denominator, cosh, sinh, fall, square, ends)
-
-
-def _ends(t: F8, theta: F8, numerator: F8, denominator: F8, square: F8) -> NDArray[np.float64]:
-    """What becomes of amplitudes that have an end: at rest, or beyond a pole."""
-    start, mu, gamma, beta = theta.T[:, :, None]
-    # Zero is reached before a pole where beta is not negative, for a pole is then on the side of negative amplitudes.
-    lost = (denominator <= 0.0) & (beta < 0.0)
-    ends = np.where(lost, np.inf, np.where((numerator <= 0.0) | (denominator <= 0.0), 0.0, np.nan))
-    turning = np.flatnonzero(square[:, 0] < 0.0)
-    if turning.size:
-        a, m, g, b = start[turning], mu[turning], gamma[turning], beta[turning]
-        pace = np.sqrt(-square[turning])
-        # Both coefficients have one sign: positive ones end in rest, negative ones at a pole.
-        rest = np.arctan2(pace * a, m + 0.5 * g * a)
-        pole = np.arctan2(pace, -b * a - 0.5 * g)
-        over = pace * t >= np.where(b > 0.0, rest, pole)
-        ends[turning] = np.where(over, np.where(b > 0.0, 0.0, np.inf), np.nan)
-    return ends
-
-
-def fading(t: F8, start: float, gamma: float, beta: float) -> tuple[F8, F8]:
-    """Return amplitudes (n,) and their derivatives by A0, gamma and beta (3, n) of a motion without friction.
-
-    .. math:: A = \\frac{A_0 e^{-\\gamma t}}{1 + \\beta A_0 R},\\quad R = (1 - e^{-\\gamma t})/\\gamma
-
-    A quarter of the work of the closed form with friction. True where the denominator has no zero; for coefficients
-    that are not negative it has none.
-    """
-    turn = gamma * t
-    fall = np.exp(-turn)
-    reach = _reach(t, turn, gamma)
-    if _slight(turn):
-        bend = t * t * (turn * (1.0 / 3.0 - turn * (0.125 - turn / 30.0)) - 0.5)
+        cosh, sinh, fall = np.cos(angle), np.sin(angle) / pace, np.ones(t.size)
+        numerator = start * cosh - (mu + 0.5 * gamma * start) * sinh
+        denominator = cosh + (beta * start + 0.5 * gamma) * sinh
+        ends = _turning_ends(pace, pace * t, start, mu, gamma, beta)
     else:
-        bend = (t * fall - reach) / gamma
-    rise = beta * start
-    below = 1.0 + rise * reach
-    share = fall / below
-    amplitude = start * share
-    by = np.empty((3, t.size))
-    np.divide(share, below, out=by[0])
-    np.multiply(-amplitude, t + rise * bend / below, out=by[1])
-    np.multiply(-amplitude * start, reach / below, out=by[2])
-    return amplitude, by
+        root = math.sqrt(square)
+        # The greater root of x^2 - gamma x + beta mu in size is safe, the lesser is their product over it.
+        greater = 0.5 * gamma + math.copysign(root, gamma)
+        lesser = beta * mu / greater if greater != 0.0 else 0.0
+        fall = np.exp(-2.0 * root * t)
+        sinh = np.expm1(-2.0 * root * t) / (-2.0 * root) if root > 0.0 else 1.0 * t
+        cosh = 0.5 * fall + 0.5
+        numerator = (start if gamma < 0.0 else start * fall) - (mu + lesser * start) * sinh
+        denominator = (fall if gamma < 0.0 else 1.0) + (lesser + beta * start) * sinh
+        # Zero is reached before a pole where beta is not negative: a pole is then on the side of negative amplitudes.
+        lost = (denominator <= 0.0) & (beta < 0.0)
+        ends = np.where(lost, np.inf, np.where((numerator <= 0.0) | (denominator <= 0.0), 0.0, np.nan))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        amplitude = numerator / denominator
+    if np.isnan(ends).all():
+        return _Flow(amplitude, denominator, cosh, sinh, fall, square, None)
+    return _Flow(np.where(np.isnan(ends), amplitude, ends), denominator, cosh, sinh, fall, square, ends)
 
 
-def _faded(t: F8, start: float, gamma: float, beta: float) -> F8:
-    """The amplitudes of :func:`fading` alone."""
-    turn = gamma * t
-    fall = start * np.exp(-turn)
-    return fall / (1.0 + beta * start * _reach(t, turn, gamma)) if beta else fall
+def _turning_ends(pace: float, angle: F8, start: float, mu: float, gamma: float, beta: float) -> F8:
+    """What becomes of amplitudes at angles |s|t (n,) where s is imaginary: mu and beta have one sign."""
+    if beta > 0.0:
+        return np.where(angle >= math.atan2(pace * start, mu + 0.5 * gamma * start), 0.0, np.nan)
+    return np.where(angle >= math.atan2(pace, -beta * start - 0.5 * gamma), np.inf, np.nan)
 
 
-def _reach(t: F8, turn: F8, gamma: float) -> F8:
-    """R, which is t where there is no linear drag."""
-    if _slight(turn):
-        return np.asarray(t * (1.0 - turn * (0.5 - turn * (1.0 / 6.0 - turn / 24.0))))
-    return np.asarray(np.expm1(-turn) / -gamma)
+def _slopes(t: F8, flow: _Flow, start: float, mu: float, gamma: float, beta: float) -> F8:
+    """Derivatives (n, 4) of the amplitude by A0, mu, gamma and beta."""
+    # Everything below carries the factor e^(-2st) that D^-2 brings along.
+    elapsed = flow.fall * t
+    squares = _integral_of_squares(t, flow, elapsed)
+    cosines = elapsed + flow.square * squares
+    mixed = 0.5 * flow.sinh * flow.sinh
+    pull, push = mu + 0.5 * gamma * start, beta * start + 0.5 * gamma
+    slopes = np.empty((t.size, 4))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        over = -1.0 / (flow.denominator * flow.denominator)
+        slopes[:, 0] = -over * flow.fall
+        slopes[:, 1] = over * (cosines + push * (2.0 * mixed + push * squares))
+        slopes[:, 2] = over * (start * cosines + (start * push - pull) * mixed - pull * push * squares)
+        slopes[:, 3] = over * (start * start * cosines - pull * (2.0 * start * mixed - pull * squares))
+    if flow.ends is not None:
+        # After the stop nothing depends on anything; beyond a pole there is nothing to depend.
+        slopes = np.where(np.isnan(flow.ends)[:, None], slopes, flow.ends[:, None])
+    return slopes
 
 
-def _slight(turn: F8) -> bool:
-    """Whether the next terms of the series in gamma t are below 1e-14."""
-    return float(np.abs(turn).max(initial=0.0)) < 1e-3
-
-
-def _constant(t: F8, start: float) -> tuple[F8, F8]:
-    return np.full(t.size, start), np.ones((1, t.size))
-
-
-def _exponential(t: F8, start: float, gamma: float) -> tuple[F8, F8]:
-    by = np.empty((2, t.size))
-    fall = np.exp(-gamma * t, out=by[0])
-    amplitude = start * fall
-    np.multiply(amplitude, -t, out=by[1])
-    return amplitude, by
-
-
-def _hyperbola(t: F8, start: float, beta: float) -> tuple[F8, F8]:
-    by = np.empty((2, t.size))
-    share = 1.0 / (1.0 + (beta * start) * t)
-    amplitude = start * share
-    np.multiply(share, share, out=by[0])
-    np.multiply(amplitude * amplitude, -t, out=by[1])
-    return amplitude, by
-
-
-FADING: dict[tuple[str, ...], Callable[..., tuple[F8, F8]]] = {
-    ("A0",): _constant,
-    ("A0", "gamma"): _exponential,
-    ("A0", "beta"): _hyperbola,
-    ("A0", "gamma", "beta"): fading,
-}
-"""Of each law without friction: amplitudes (n,) and derivatives (p, n) from times (n,) and the p parameters.
-
-What :func:`fading` becomes where a coefficient is zero, without the work that then comes to nothing.
-"""
+def _integral_of_squares(t: F8, flow: _Flow, elapsed: F8) -> F8:
+    """e^(-2st) times the integral of S^2 from 0 to t; a series where the closed form would cancel."""
+    z = flow.square * t * t
+    small = np.abs(z) < 0.05
+    series = 1.0 / 3.0 + z * (1.0 / 15.0 + z * (2.0 / 315.0 + z * (1.0 / 2835.0 + z * 2.0 / 155925.0)))
+    if small.all():
+        return np.asarray(elapsed * t * t * series)
+    with np.errstate(over="ignore", invalid="ignore"):
+        closed = (flow.sinh * flow.cosh - elapsed) / (2.0 * flow.square)
+        return np.asarray(np.where(small, elapsed * t * t * series, closed))
 
 
 def amplitudes(t: F8, theta: F8) -> F8:
-    """Return the amplitudes of several laws at once.
+    """Return the amplitudes of several motions.
 
     Parameters
     ----------
     t : (n,) float64, s
     theta : (k, 4) float64
-        A0, mu, gamma, beta of each law, zero where a law has none.
+        A0, mu, gamma, beta of each.
 
     Returns
     -------
     (k, n) float64, m
         Zero after friction has stopped the motion; infinite beyond the pole of an amplitude that grows.
     """
-    return _amplitudes(_flow(t, theta))
-
-
-def _amplitudes(flow: _Flow) -> F8:
-    if flow.ends is None:
-        return flow.numerator / flow.denominator
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        values = flow.numerator / flow.denominator
-    return np.where(np.isnan(flow.ends), values, flow.ends)
-
-
-def jacobians_of(t: F8, theta: F8) -> tuple[F8, F8]:
-    """Return :func:`amplitudes` and their derivatives (k, 4, n) by A0, mu, gamma and beta, which share much work."""
-    flow = _flow(t, theta)
-    start, mu, gamma, beta = theta.T[:, :, None]
-    # Everything below carries the factor e^(-2st) that D^-2 brings along.
-    elapsed = flow.fall * t
-    both = flow.sinh * flow.cosh
-    squares = _integral_of_squares(flow, both, elapsed)
-    cosines = elapsed + flow.square * squares
-    mixed = 0.5 * flow.sinh * flow.sinh
-    pull, push = mu + 0.5 * gamma * start, beta * start + 0.5 * gamma
-    jacobian = np.empty((theta.shape[0], 4, t.size))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        over = -1.0 / (flow.denominator * flow.denominator)
-        jacobian[:, 0] = -over * flow.fall
-        jacobian[:, 1] = over * (cosines + push * (2.0 * mixed + push * squares))
-        jacobian[:, 2] = over * (start * cosines + (start * push - pull) * mixed - pull * push * squares)
-        jacobian[:, 3] = over * (start * start * cosines - pull * (2.0 * start * mixed - pull * squares))
-    if flow.ends is not None:
-        # After the stop nothing depends on anything; beyond a pole there is nothing to depend.
-        jacobian = np.where(np.isnan(flow.ends)[:, None, :], jacobian, flow.ends[:, None, :])
-    return _amplitudes(flow), jacobian
-
-
-def _integral_of_squares(flow: _Flow, both: F8, elapsed: F8) -> F8:
-    """e^(-2st) times the integral of S^2 from 0 to t."""
-    z = flow.square * flow.time**2
-    small = np.abs(z) < 0.05
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        closed = (both - elapsed) / (2.0 * flow.square)
-    series = 1.0 / 3.0 + z * (1.0 / 15.0 + z * (2.0 / 315.0 + z * (1.0 / 2835.0 + z * 2.0 / 155925.0)))
-    return np.asarray(np.where(small, elapsed * flow.time**2 * series, closed))
-
-
-def guesses(t: F8, amplitude: F8, laws: Sequence[Drag]) -> F8:
-    """Return start values of several laws from one set of sums.
-
-    Parameters
-    ----------
-    t, amplitude : (n,) float64
-        At least one point, in the order of time.
-    laws : sequence of Drag
-
-    Returns
-    -------
-    (k, 4) float64
-
-    Notes
-    -----
-    The equation integrated once, :math:`A = A_0 - \\mu t - \\gamma\\int A - \\beta\\int A^2`, is linear in all
-    parameters; integrals of noisy points are far less noisy than their differences.
-    """
-    found = np.zeros((len(laws), 4))
-    found[:, 0] = max(float(amplitude.mean()), FLOOR * float(amplitude.max()))
-    if amplitude.size < 2 or not t[-1] > t[0]:
-        return found
-    level = float(amplitude.max())
-    y, span = amplitude / level, float(t[-1])
-    step = np.diff(t) / span
-    columns = np.empty((4, t.size))
-    columns[0], columns[1] = 1.0, -t / span
-    for row, power in ((2, y), (3, y * y)):
-        # Up to the first point the fall is taken as flat; it is a part of a period.
-        columns[row, 0] = -power[0] * t[0] / span
-        columns[row, 1:] = columns[row, 0] - np.cumsum(0.5 * (power[1:] + power[:-1]) * step)
-    units = np.array([level, level / span, 1.0 / span, 1.0 / (level * span)])
-    absent = np.ones((len(laws), 4), np.bool_)
-    for row, law in enumerate(laws):
-        absent[row, list(law.slots)] = False
-    gram = np.where(absent[:, :, None] | absent[:, None, :], 0.0, columns @ columns.T)
-    diagonal = np.arange(4)
-    gram[:, diagonal, diagonal] = np.where(absent, 1.0, gram[:, diagonal, diagonal] * (1.0 + 1e-12))
-    right = np.where(absent, 0.0, columns @ y)
-    values = np.linalg.solve(gram, right[:, :, None])[:, :, 0]
-    usable = np.isfinite(values).all(axis=1) & (values[:, 0] > 0.0)
-    found[usable] = values[usable] * units
-    return found
+    return np.array([_flow(t, *row).amplitude for row in theta.tolist()])
 
 
 DRAGS: tuple[Drag, ...] = (

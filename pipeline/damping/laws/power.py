@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.damping.laws.drag import DRAGS, guesses
+from pipeline.damping.laws.drag import DRAGS
 from pipeline.track import F8
 
 __all__ = ["Power"]
@@ -64,7 +64,7 @@ class Power:
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return the power that linear and quadratic drag together have in the middle of the points."""
         level = max(float(amplitude.mean()), 1e-3 * float(amplitude.max()), 1e-300)
-        start, _, gamma, beta = guesses(t, amplitude, (_MIXED,))[0].tolist()
+        start, gamma, beta = _MIXED.guess(t, amplitude).tolist()
         rate = gamma + beta * level
         if not rate > 0.0:
             return np.array([start, 0.0, 1.0])

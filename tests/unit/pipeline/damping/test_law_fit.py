@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.damping.fitted_law import LawFit
+from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import LAWS
 from pipeline.numerics.estimate import Joint
 
