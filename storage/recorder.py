@@ -29,8 +29,6 @@ __all__ = ["DiskNearlyFull", "Recorder", "RecorderStatus", "check_disk"]
 QUEUE_BYTES = 16 << 20
 """Half an hour of one sensor at 100 Hz, two minutes of 16 of them."""
 
-_DATA = Kind.DATA  # looked up once: each look-up of an enumeration's member costs more than the checksum of a reading
-
 
 @dataclass(frozen=True, slots=True)
 class RecorderStatus:
@@ -90,7 +88,7 @@ class Recorder:
     sync_every_s : float
         Between syncs, s.
     queue_bytes : int
-        Bound of the queue. What comes while it is full is counted, and told by an event in the log.
+        Bound of the queue. What comes while it is full is counted, and an event in the log says so.
     open_file : callable
         Makes the log's file: the seam for tests.
 
@@ -153,7 +151,7 @@ class Recorder:
 
     def reads(self, reads: Sequence[Read]) -> None:
         """Take what was read of ports; never waits for the disk, never raises for its sake."""
-        self._offer(_DATA, reads)
+        self._offer(Kind.DATA, reads)
 
     def put(self, channel: int, host_ns: int, data: bytes) -> None:
         """Take the bytes of one read of a port."""

@@ -19,6 +19,8 @@ import numpy as np
 from acquisition.block import Block
 from acquisition.recordings.recording import Original, Trap
 from storage.errors import RunDamaged, RunExists, one_line
+from storage.run_file.reading import open_run
+from storage.run_file.writing import write_run
 from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry
 from storage.wire_log.scanning import Damage, LogContents, NotALog, parse_log
 from storage.wire_log.wire_samples import Decoded, decode_log
@@ -98,9 +100,9 @@ class _Log:
     contents: LogContents
     header: LogHeader
 
-    def told(self, kind: Kind) -> list[Record]:
+    def notes(self, kind: Kind) -> list[Record]:
         """Return marks or events."""
-        return [record for record in self.contents.told if record.kind is kind]
+        return [record for record in self.contents.notes if record.kind is kind]
 
 
 def recover(
@@ -150,12 +152,12 @@ def recover(
     if not overwrite:
         _demand_free(paths)
     decoded = decode_log(log.contents, sensors)
-    # What the log tells of is known when it was read; a calibration among it is rare, so only then it is read again.
+    # Events are known when the log was read; a calibration among them is rare, so only then it is read again.
     if (calibrated := _calibrated(log.header.sensors, _calibrations(log), other)) != sensors:
         decoded = decode_log(log.contents, calibrated)
     runs = [_write(path, log, part, provenance or {}, overwrite) for path, part in zip(paths, decoded, strict=True)]
     removed = remove_log and _remove(log_path, len(log.original.data))
-    marks, events = len(log.told(Kind.MARK)), len(log.told(Kind.EVENT))
+    marks, events = len(log.notes(Kind.MARK)), len(log.notes(Kind.EVENT))
     return RecoverReport(log_path, tuple(runs), log.contents.damage, marks, events, removed)
 
 
@@ -176,21 +178,21 @@ def _read(path: Path, stand_in: LogHeader | None) -> _Log:
 
 
 def _calibrations(log: _Log) -> dict[int, Mapping[str, Any]]:
-    """Return the last calibration that the log tells of, by channel."""
-    told = {}
-    for event in log.told(Kind.EVENT):
+    """Return the last calibration that the log notes, by channel."""
+    noted = {}
+    for event in log.notes(Kind.EVENT):
         content = event.json()
         if content.get("kind") == "calibration":
-            told[event.channel] = content.get("facts", {})
-    return told
+            noted[event.channel] = content.get("facts", {})
+    return noted
 
 
 def _calibrated(
-    sensors: Sequence[SensorEntry], told: Mapping[int, Mapping[str, Any]], other: Mapping[str, Any]
+    sensors: Sequence[SensorEntry], noted: Mapping[int, Mapping[str, Any]], other: Mapping[str, Any]
 ) -> tuple[SensorEntry, ...]:
-    """Return the sensors, each with the calibration told of its channel, if any, and other numbers in it."""
+    """Return the sensors, each with the calibration noted for its channel, if any, and other numbers in it."""
     return tuple(
-        dataclasses.replace(sensor, calibration={**told.get(sensor.channel, sensor.calibration), **other})
+        dataclasses.replace(sensor, calibration={**noted.get(sensor.channel, sensor.calibration), **other})
         for sensor in sensors
     )
 
@@ -212,13 +214,9 @@ def _demand_free(paths: Sequence[Path]) -> None:
 
 
 def _write(path: Path, log: _Log, decoded: Decoded, provenance: Mapping[str, Any], overwrite: bool) -> RecoveredRun:
-    # h5py takes longer to import than a short log to read.
-    from storage.run_file.reading import open_run
-    from storage.run_file.writing import write_run
-
     samples, header = decoded.samples, log.header
-    told = dict(decoded.chain.report(samples.t, _host_ns(samples)))
-    faults = {str(name): int(count) for name, count in told.get("faults", {}).items()}
+    decoding = decoded.chain.report(samples.t, _host_ns(samples))
+    faults = decoding["faults"]
     write_run(
         path,
         [samples],
@@ -229,14 +227,14 @@ def _write(path: Path, log: _Log, decoded: Decoded, provenance: Mapping[str, Any
         traps=_traps(log.contents.damage),
         malformed_rows=sum(count for name, count in faults.items() if not name.endswith("bytes")),
         format="wire",
-        provenance={**_provenance(log, decoded), "decoding": told, **provenance},
+        provenance={**_provenance(log, decoded), "decoding": decoding, **provenance},
         overwrite=overwrite,
     )
     with open_run(path) as run:
         run.verify()
         if run.originals() != (log.original,):
             raise RunDamaged(path, "the log inside is not the log that was read", "keep the log and recover it again")
-    return RecoveredRun(decoded.sensor, path, len(samples), faults, told)
+    return RecoveredRun(decoded.sensor, path, len(samples), faults, decoding)
 
 
 def _host_ns(samples: Block) -> Any:
@@ -257,8 +255,8 @@ def _provenance(log: _Log, decoded: Decoded) -> dict[str, Any]:
         "sensor": dataclasses.asdict(decoded.sensor),
         "reads": decoded.reads,
         "log": {"name": log.original.name, "sha256": log.original.sha256, **dataclasses.asdict(damage)},
-        "marks": [{**at(mark), "text": mark.text()} for mark in log.told(Kind.MARK)],
-        "events": [{**at(event), **event.json()} for event in log.told(Kind.EVENT)],
+        "marks": [{**at(mark), "text": mark.text()} for mark in log.notes(Kind.MARK)],
+        "events": [{**at(event), **event.json()} for event in log.notes(Kind.EVENT)],
     }
 
 

@@ -24,7 +24,7 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.decoders.lines import LineSplitter
 from acquisition.decoders.rows import NAN, rows
 from acquisition.readings import Readings

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.decoders.rows import NAN, rows
 from acquisition.decoders.sum_frames import SumFrames, with_sum
 from acquisition.readings import Readings

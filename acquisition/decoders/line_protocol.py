@@ -13,7 +13,7 @@ from binascii import crc_hqx
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.decoders.lines import LineSplitter
 from acquisition.readings import NAN, Reading, Readings
 
@@ -74,27 +74,28 @@ class LineProtocolDecoder:
         """Return the readings whose lines these bytes end."""
         found: list[Reading] = []
         for line in self._lines.split(data):
-            # What stands before the last $ is noise, or a line whose end was lost; the rest may be whole.
-            start = max(line.rfind(b"$"), 0)
-            reading = _reading(host_ns, line, start)
+            reading = _reading(host_ns, line) or self._behind_noise(host_ns, line)
             if reading is not None:
                 found.append(reading)
-                garbage, fault = start, "bad_frame"
-            else:
-                garbage, fault = len(line) + 1, _fault(line, start)
-            if garbage:
-                self._faults[fault] += 1
-                self._faults["garbage_bytes"] += garbage
         return Readings(found)
 
     def flush(self) -> None:
         """Forget a half-received line."""
         self._lines.flush()
 
+    def _behind_noise(self, host_ns: int, line: bytes) -> Reading | None:
+        """Return what a line that is not sound from its beginning carries, and count what is wrong with it."""
+        # What stands before the last $ is noise, or a line whose end was lost; the rest may be whole.
+        start = max(line.rfind(b"$"), 0)
+        reading = _reading(host_ns, line[start:]) if start else None
+        self._faults["bad_frame" if reading else _fault(line, start)] += 1
+        self._faults["garbage_bytes"] += start if reading else len(line) + 1
+        return reading
 
-def _reading(host_ns: int, line: bytes, start: int) -> Reading | None:
+
+def _reading(host_ns: int, line: bytes) -> Reading | None:
     """Return the reading of a line without its line feed, None where anything is wrong with it."""
-    match = _LINE.fullmatch(line, start)
+    match = _LINE.fullmatch(line)
     if match is None:
         return None
     body, sequence, device_us, echo, temperature, status, crc = match.groups()

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.decoders.lines import LineSplitter
 from acquisition.decoders.rows import NAN, rows
 from acquisition.readings import Readings

@@ -1,7 +1,7 @@
 """Which families of rangefinders there are, and which one some bytes look like.
 
 The table holds names only: a family's module is imported when it is asked for. A package elsewhere adds one with an
-entry point in the group ``springmass.sensors`` that names a :class:`acquisition.decoders.base.Family`.
+entry point in the group ``springmass.sensors`` that names a :class:`acquisition.decoders.family.Family`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.errors import SensorError
 
 if TYPE_CHECKING:

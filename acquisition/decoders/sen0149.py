@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from functools import partial
 
-from acquisition.decoders.base import Family, Poll
 from acquisition.decoders.cycle import OPTIONS
+from acquisition.decoders.family import Family, Poll
 from acquisition.decoders.replies import ReplyDecoder, ReplyEncoder, ReplyForm
 from acquisition.decoders.rows import NAN
 from acquisition.decoders.sum_frames import with_sum

@@ -11,8 +11,8 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from acquisition.decoders.base import Family
 from acquisition.decoders.columns import Column, as_column, as_separator, split
+from acquisition.decoders.family import Family
 from acquisition.decoders.lines import LineSplitter
 from acquisition.decoders.rows import NAN, rows
 from acquisition.errors import SensorError

@@ -17,8 +17,8 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from acquisition.decoders.base import Family, Poll
 from acquisition.decoders.cycle import OPTIONS, Cycle
+from acquisition.decoders.family import Family, Poll
 from acquisition.decoders.rows import NAN, rows
 from acquisition.readings import Readings
 

@@ -1,4 +1,4 @@
-"""Calibration: from echo times and stated distances to metres, with what was used kept beside the result."""
+"""Calibration: from echo times and stated distances to metres, with what was used kept with the result."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import F8, I8, Block, Flag
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.live.calibration import Calibration
 from acquisition.live.timebase import Timebase, fit_clock
 from acquisition.readings import NO_READINGS, Reading, Readings

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from acquisition.clock import Clock
-from acquisition.decoders.base import Poll, Polled
+from acquisition.decoders.family import Poll, Polled
 from acquisition.errors import PortError
 from acquisition.live.serial_port import READ_BYTES
 from acquisition.readings import Read
@@ -305,6 +305,6 @@ def _may_block(line: Line) -> bool:
 
 
 def _leave(selector: selectors.BaseSelector, line: Line) -> None:
-    """Wait no more on a port that is gone, and close what is left of it."""
+    """Wait no more on a port that is gone, and close it."""
     selector.unregister(line.transport.fileno())
     line.transport.close()

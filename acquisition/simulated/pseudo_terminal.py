@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.clock import Clock
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.simulated.rangefinder import Shot, VirtualRangefinder
 
 __all__ = ["Faults", "VirtualPort"]

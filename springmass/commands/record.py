@@ -47,8 +47,8 @@ def run(options: argparse.Namespace) -> int:
         raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5", USAGE)
     demand_new(out, len(options.port))
     _demand_sense(options)
-    told = options.scene or options.simulate
-    scene = None if told is None else read_scene(told)
+    scene_path = options.scene or options.simulate
+    scene = None if scene_path is None else read_scene(scene_path)
     with _sensors(options, scene) as (sensors, kind):
         rate = sum(sensor.rate_hz or sensor.family.rate_hz for sensor in sensors)
         check_disk(out, int(BYTES_PER_READ * rate * (options.seconds or UNLIMITED_S)) + 1_000_000)
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         )
         log = out.with_suffix(".wire")
         try:
-            with _told_to_end():
+            with _signals_as_ctrl_c():
                 stopped = _record(session, options, log)
         finally:
             session.stop()
@@ -86,7 +86,7 @@ def _demand_sense(options: argparse.Namespace) -> None:
 
 
 @contextlib.contextmanager
-def _told_to_end() -> Iterator[None]:
+def _signals_as_ctrl_c() -> Iterator[None]:
     """Take the end of a terminal or a service (SIGTERM, SIGHUP) for Ctrl-C, so that it closes the run as cleanly.
 
     What was ignored before stays ignored: under ``nohup`` a recording outlives its terminal.
@@ -109,7 +109,7 @@ def _record(session: Session, options: argparse.Namespace, log: Path) -> bool:
     session.listen()
     rest = None if options.still is None else _rest(session, options.still, options.ruler)
     trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
-    show = _Line()
+    show = _ProgressLine()
     try:
         session.record(
             log,
@@ -164,7 +164,7 @@ def _ask(demand: str) -> None:
         )
 
 
-class _Line:
+class _ProgressLine:
     """The progress line on stderr: rewritten in place on a terminal; elsewhere after 1, 10, 40, 70 s and so on."""
 
     def __init__(self) -> None:

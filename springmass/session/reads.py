@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any, cast
 
 from acquisition.block import Block
-from acquisition.decoders.base import Polled
+from acquisition.decoders.family import Polled
 from acquisition.live.decoding import SensorChain
 from acquisition.live.reader import Line
 from acquisition.readings import Read

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain

@@ -84,7 +84,7 @@ class Session:
         self._reader = PortReader(lines, self._tee, self._clock)
         self._reader.start()
         heard = [0] * len(self.sensors)
-        # A slow sensor takes several of its own periods to be told from silence.
+        # A slow sensor takes several of its own periods to be distinguished from silence.
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
         while not all(count >= 3 for count in heard):
@@ -198,7 +198,7 @@ class Session:
         marks: queue.SimpleQueue[str] | None,
     ) -> None:
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
-        # Without marks a turn a second will do: the samples are told of once a second, and an error of the disk stands.
+        # Without marks a turn a second will do: the samples are shown once a second, and an error of the disk stands.
         turn_s = 1.0 if marks is None else LOOK_FOR_MARKS_S
         for _ in self._turns(turn_s, progress, recorder, start_ns, end_ns):
             if recorder.status.error:
@@ -234,7 +234,7 @@ class Session:
         start_ns: int,
         end_ns: int | None,
     ) -> Iterator[list[tuple[int, Block]]]:
-        """Wait in turns until the end, if there is one, and once a second tell of the progress.
+        """Wait in turns until the end, if there is one, and show the progress once a second.
 
         Gives the samples of each turn; while recording those of each second, for nobody needs them before.
         """

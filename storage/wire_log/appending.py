@@ -1,8 +1,7 @@
 """The wire log: the exact bytes off the wire, each read a record with a checksum, appended and never changed.
 
 :class:`WireLogWriter` appends; :func:`read_log` (of :mod:`storage.wire_log.scanning`) reads whatever is left of a
-log. The
-layout of a record is that of :mod:`storage.wire_log.records`.
+log. The layout of a record is that of :mod:`storage.wire_log.records`.
 
 Examples
 --------
@@ -32,7 +31,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from storage.errors import RunExists, WriteFailed, one_line
-from storage.wire_log.records import HEAD_BYTES, MAX_PAYLOAD, Kind, LogHeader, SensorEntry, ends_item, frame, frames
+from storage.wire_log.records import Kind, LogHeader, SensorEntry, ends_item, frames
 from storage.wire_log.scanning import Damage, LogContents, NotALog, Record, parse_log, read_log
 
 __all__ = [
@@ -152,9 +151,7 @@ class WireLogWriter:
         log: int | None = None,
     ) -> None:
         self.path = Path(path)
-        # Two numbers, and a Written only for who asks: to make one costs as much as to write a record.
-        self._written = (0, 0)
-        self.synced = Written()
+        self.written = self.synced = Written()
         self.extended = 0
         self._log = secrets.randbits(32) if log is None else log
         self._next_copy = FIRST_COPY
@@ -227,7 +224,7 @@ class WireLogWriter:
         if error := self._append_error or self._sync_error:
             raise error
         batch: list[bytes] = []
-        laid, end = 0, self._written[1]
+        laid, end = 0, self.written.bytes
         try:
             for kind, channel, mono_ns, payload in items:
                 if end >= self._next_copy:
@@ -238,7 +235,7 @@ class WireLogWriter:
                     end += self._lay(batch, Kind.HEADER, 0, mono_ns, self._header)
                 end += self._lay(batch, kind, channel, mono_ns, payload)
                 laid += 1
-                if end - self._written[1] >= WRITE_BYTES:
+                if end - self.written.bytes >= WRITE_BYTES:
                     whole, batch = batch, []
                     self._write(whole, laid)
                     laid = 0
@@ -249,11 +246,7 @@ class WireLogWriter:
     def _lay(self, batch: list[bytes], kind: Kind, channel: int, mono_ns: int, payload: bytes) -> int:
         """Add an item's records to those that are to be written; return their bytes."""
         before = len(batch)
-        sequence = self._written[0] + before
-        if len(payload) <= MAX_PAYLOAD:
-            # By position: at 100 records a second everything is cold each time, and names cost 5 us.
-            batch.append(frame(kind, payload, sequence, mono_ns, self._log, channel))
-            return HEAD_BYTES + len(payload)
+        sequence = self.written.records + before
         batch += frames(kind, payload, sequence=sequence, mono_ns=mono_ns, log=self._log, channel=channel)
         return sum(map(len, batch[before:]))
 
@@ -276,14 +269,8 @@ class WireLogWriter:
         self._count(len(batch), taken, items)
 
     def _count(self, records: int, size: int, items: int) -> None:
-        records_before, bytes_before = self._written
-        self._written = (records_before + records, bytes_before + size)
+        self.written = Written(self.written.records + records, self.written.bytes + size)
         self.extended += items
-
-    @property
-    def written(self) -> Written:
-        """How far the log has come in the kernel's hands."""
-        return Written(*self._written)
 
     def sync(self) -> Written:
         """Return when everything appended before the call is on the disk, and how much that is.

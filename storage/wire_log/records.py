@@ -62,7 +62,8 @@ MAX_PAYLOAD = 65535
 LOG_VERSION = 1
 _HEAD = struct.Struct("<2sHIqIBBH")
 _CRC = struct.Struct("<I")
-HEAD_BYTES = _HEAD.size + _CRC.size
+_HEAD_AND_CRC = struct.Struct(_HEAD.format + "I")
+HEAD_BYTES = _HEAD_AND_CRC.size
 _WRAP = 1 << 32
 
 
@@ -291,7 +292,7 @@ def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, Kind,
     start = at + HEAD_BYTES
     if start > len(data):
         return None
-    magic, length, sequence, mono_ns, found, code, channel, parts = _HEAD.unpack_from(data, at)
+    magic, length, sequence, mono_ns, found, code, channel, parts, crc = _HEAD_AND_CRC.unpack_from(data, at)
     # The cheap checks first: a search through damage comes here for every magic that chance has put there.
     kind = _KINDS.get(code)
     if magic != MAGIC or kind is None or parts > _ALL_PARTS or start + length > len(data):
@@ -299,7 +300,6 @@ def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, Kind,
     if log is not None and found != log:
         return None
     payload = data[start : start + length]
-    head = data[at : at + _HEAD.size]
-    if _CRC.unpack_from(data, at + _HEAD.size)[0] != zlib.crc32(payload, zlib.crc32(head)):
+    if crc != zlib.crc32(payload, zlib.crc32(data[at : at + _HEAD.size])):
         return None
     return sequence, mono_ns, found, kind, channel, parts, payload

@@ -23,7 +23,7 @@ KEPT_STRETCHES = 100
 _LONGEST = HEAD_BYTES + MAX_PAYLOAD
 _CHUNK = 1 << 20
 _DATA, _END = Kind.DATA, Kind.END  # looked up once, and not for each record
-_TOLD = (Kind.MARK, Kind.EVENT)
+_NOTES = (Kind.MARK, Kind.EVENT)
 
 
 class NotALog(StorageError):
@@ -97,13 +97,13 @@ class LogContents:
 
     def __iter__(self) -> Iterator[Record]:
         scan = _Scan(self.path)
-        told = []
+        notes = []
         with self._opened() as stream:
             for record in scan.records(stream):
-                if record.kind in _TOLD:
-                    told.append(record)
+                if record.kind is not _DATA and record.kind in _NOTES:
+                    notes.append(record)
                 yield record
-        self._found = scan.damage(), tuple(told)
+        self._found = scan.damage(), tuple(notes)
 
     def _known(self) -> tuple[Damage, tuple[Record, ...]]:
         """Return what the last iteration that came to the end found; read the log where there was none."""
@@ -119,7 +119,7 @@ class LogContents:
         return self._known()[0]
 
     @property
-    def told(self) -> tuple[Record, ...]:
+    def notes(self) -> tuple[Record, ...]:
         """Marks and events, of the same iteration."""
         return self._known()[1]
 
@@ -184,7 +184,7 @@ class _Scan:
         self._log: int | None = None
         self._expected = 0
         self._records = self._lost = self._strays = self._skipped = self._tail = 0
-        self._owed = 0  # lost records that the next record delivered has to tell of
+        self._owed = 0  # lost records that the next record delivered will state
         self._stretches: list[tuple[int, int]] = []
         self._parts: list[Record] = []
         self._ended = False
@@ -263,12 +263,12 @@ class _Scan:
         self._lost += missing
         self._owed += missing
         self._ended = kind is _END
-        record = Record(offset, sequence, mono_ns, kind, channel, payload)
         if kind is not _DATA:
-            return self._joined(record, parts, missing)
+            return self._joined(Record(offset, sequence, mono_ns, kind, channel, payload), parts, missing)
         if self._parts:
             self._drop_parts()
-        return self._told(record)
+        owed, self._owed = self._owed, 0
+        return Record(offset, sequence, mono_ns, kind, channel, payload, owed)
 
     def _joined(self, record: Record, parts: int, missing: int) -> Record | None:
         """Return a text whose parts are all there, None before its last one or where one is missing."""
@@ -284,9 +284,9 @@ class _Scan:
             return None
         first, payload = self._parts[0], b"".join(part.payload for part in self._parts)
         self._parts = []
-        return self._told(Record(first.offset, first.sequence, first.mono_ns, first.kind, first.channel, payload))
+        return self._after_loss(Record(first.offset, first.sequence, first.mono_ns, first.kind, first.channel, payload))
 
-    def _told(self, record: Record) -> Record:
+    def _after_loss(self, record: Record) -> Record:
         if not self._owed:
             return record
         owed, self._owed = self._owed, 0

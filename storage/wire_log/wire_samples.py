@@ -13,10 +13,12 @@ from storage.wire_log.records import Kind, Record, SensorEntry
 
 __all__ = ["BREAKS", "Decoded", "chains_of", "decode_log"]
 
+_DATA = Kind.DATA  # looked up once, and not for each record
+
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
 """Events after which the bytes of a channel do not continue those before."""
-HELD_READINGS = 4096
-"""Of so many readings samples are made at a time: a long run would be a heap of small arrays, or of readings."""
+HELD_READS = 4096
+"""Of so many reads samples are made at a time: a long run would be a heap of small arrays, or of readings."""
 
 
 def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
@@ -71,7 +73,7 @@ def decode_log(
                 way.chain.lost()
         if (sensor_way := by_channel.get(record.channel)) is None:
             continue
-        if record.kind is Kind.DATA:
+        if record.kind is _DATA:
             sensor_way.take(record)
         elif record.kind is Kind.EVENT and record.json().get("kind") in BREAKS:
             sensor_way.chain.lost()
@@ -91,7 +93,7 @@ class _Way:
     def take(self, record: Record) -> None:
         self.reads += 1
         self.chain.take(record.mono_ns, record.payload)
-        if len(self.chain) >= HELD_READINGS:
+        if self.reads % HELD_READS == 0:
             self._blocks.append(self.chain.block())
 
     def samples(self) -> Block:

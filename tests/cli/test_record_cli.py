@@ -24,7 +24,7 @@ from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from pipeline.analyse import Motion, analyse
 from pipeline.streaming import NotYet
 from springmass import load
-from springmass.commands.record import _Line
+from springmass.commands.record import _ProgressLine
 from springmass.session.progress import Progress
 from storage.run_file.reading import open_run
 
@@ -439,7 +439,7 @@ def test_off_a_terminal_the_progress_line_comes_now_and_then(capsys: pytest.Capt
 
         return Progress(seconds, 0, 0, 0, 0.0, motion, None, None, waiting=False)
 
-    line = _Line()
+    line = _ProgressLine()
     for second in range(1, 81):
         line(progress(float(second)))
     assert asked == [1.0, 10.0, 40.0, 70.0]

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from acquisition.block import Flag
-from acquisition.decoders.base import Decoder, Family, Polled
 from acquisition.decoders.example import FAMILY as EXAMPLE
+from acquisition.decoders.family import Decoder, Family, Polled
 from acquisition.decoders.registry import families, get_family
 from acquisition.readings import COLUMNS, Readings, join
 

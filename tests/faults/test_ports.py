@@ -21,7 +21,7 @@ import serial
 
 from acquisition.block import Block, Flag, concatenate
 from acquisition.clock import SystemClock
-from acquisition.decoders.base import Poll, Polled
+from acquisition.decoders.family import Poll, Polled
 from acquisition.decoders.registry import families, get_family
 from acquisition.errors import PortError
 from acquisition.live import reader as wired

@@ -21,7 +21,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.readings import COLUMNS, Readings, join
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from acquisition.decoders import registry
-from acquisition.decoders.base import Family
+from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, get_family, probe
 from acquisition.errors import AcquisitionError, SensorError
 
