@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import math
 import sys
@@ -15,8 +16,11 @@ from acquisition.block import Block
 from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem, effective_mass_kg
+from pipeline.dynamics.band import LEVELS, Band, spread, uncertain
 from pipeline.dynamics.choose import Choice
 from pipeline.errors import DynamicsError
+from pipeline.numerics.estimate import Joint
+from pipeline.track import F8
 from springmass import __version__
 from springmass.errors import OK, USAGE, ProgramError
 from springmass.runs.analysing import make_folder, now_utc
@@ -24,8 +28,7 @@ from springmass.runs.loading import load, read_scene
 from springmass.runs.simulation import (
     Against,
     Simulation,
-    compare_with,
-    completed,
+    band_columns,
     count_of,
     demand_stable,
     plan,
@@ -42,13 +45,16 @@ def run(options: argparse.Namespace) -> int:
     if options.dt <= 0:
         raise ProgramError(f"--dt must be more than 0 s, got {options.dt:g}", USAGE)
     count = count_of(options.seconds, options.dt)
-    scene, analysis = read_scene(options.scene), None
+    scene, analysis, measured = read_scene(options.scene), None, None
+    seconds = options.seconds
     if options.against is not None:
         from pipeline.analyse import analyse
+        from springmass.runs.against import completed, duration_s, lay_over
 
         analysis = analyse(load(options.against).track, scene)
-        scene, taken = completed(scene, analysis)
-        print(f"from {options.against}: {', '.join(taken)}", file=sys.stderr)
+        scene, measured = completed(scene, analysis)
+        seconds = max(seconds, duration_s(analysis))
+        print(f"from {options.against}: {', '.join(measured.names)}", file=sys.stderr)
     problem = Problem.from_scene(scene, where=options.scene)
     try:
         choice = plan(problem, options.method, options.dt, count, options.tolerance)
@@ -60,18 +66,37 @@ def run(options: argparse.Namespace) -> int:
     print(_before(choice, count), file=say, flush=True)
     simulation = simulate(problem, choice, options.dt, count)
     print(f"measured error   {simulation.measured_error:.2g} of the amplitude", file=say)
-    against = None if analysis is None else compare_with(analysis, problem)
-    if against is not None:
+    band = _band(scene, seconds, measured)
+    against = None
+    if analysis is not None:
+        against = lay_over(analysis, problem, options.method, options.dt, options.tolerance, band)
         print(
             f"against the run  rms {against.rms_m * 1e3:.3g} mm, noise of a sample {against.noise_m * 1e3:.3g} mm",
             file=say,
         )
     if options.out is not None or not options.json:
-        folder = _write(simulation, against, scene, options)
+        folder = _write(simulation, against, band, scene, options)
         print(f"written          {folder}", file=say)
     if options.json:
-        print(json.dumps(summary(simulation, against)))
+        print(json.dumps(summary(simulation, against, band)))
     return OK
+
+
+def _band(scene: Scene, seconds: float, measured: Joint | None) -> Band | None:
+    """The band of what is uncertain; where there is none, say why."""
+    names = uncertain(scene, measured).names
+    if not names:
+        print("band             none: the scene states no uncertainties", file=sys.stderr)
+        return None
+    try:
+        band = spread(scene, seconds, measured)
+    except DynamicsError as error:
+        print(f"band             none: {error}", file=sys.stderr)
+        return None
+    print(
+        f"band             {band.members} motions drawn from the uncertainties of {', '.join(names)}", file=sys.stderr
+    )
+    return band
 
 
 def _before(choice: Choice, count: int) -> str:
@@ -90,28 +115,50 @@ def _before(choice: Choice, count: int) -> str:
     return "\n".join([*lines, f"predicted error  {error}"])
 
 
-def _write(simulation: Simulation, against: Against | None, scene: Scene, options: argparse.Namespace) -> Path:
-    """Write run file, figures and JSON into NAME.simulated; return the folder."""
+def _write(
+    simulation: Simulation, against: Against | None, band: Band | None, scene: Scene, options: argparse.Namespace
+) -> Path:
+    """Write run file, figures, tables and JSON into NAME.simulated; return the folder."""
     from springmass.report.figures import render
-    from springmass.report.simulation_figures import against_figure, draw_simulation
+    from springmass.report.simulation_figures import against_figure, band_figure, draw_simulation
     from storage.atomic import write_whole
 
     name = Path(options.scene).name.removesuffix(".toml").removesuffix(".scene")
     folder = make_folder(make_folder(options.out or ".") / f"{name}.simulated")
     pictures = make_folder(folder / "figures")
-    told = summary(simulation, against)
+    told = summary(simulation, against, band)
     _write_run(folder / "run.h5", simulation, scene, options, told)
-    figures = draw_simulation(simulation, effective_mass_kg(scene))
+    figures, tables = draw_simulation(simulation, effective_mass_kg(scene)), {}
+    if band is not None:
+        t, y = simulation.trajectory.t, simulation.trajectory.y
+        figures["band"] = band_figure(simulation, band)
+        tables["band"] = {"t_s": t, "displacement_m": y, **band_columns(band, t, y)}
     if against is not None:
         figures["against"] = against_figure(against)
-    else:
-        for kind in ("svg", "pdf"):  # of an earlier simulation, it would pass for one of this
-            (pictures / f"against.{kind}").unlink(missing_ok=True)
+        tables["against"] = {"t_s": against.t, "measured_m": against.measured, "predicted_m": against.predicted}
+        if against.band is not None:
+            around = against.predicted + against.band
+            tables["against"] |= {f"predicted_{level}_m": each for level, each in zip(LEVELS, around, strict=True)}
+    for title in ("against", "band"):
+        if title not in figures:  # of an earlier simulation, it would pass for one of this
+            for old in (pictures / f"{title}.svg", pictures / f"{title}.pdf", folder / f"{title}.csv"):
+                old.unlink(missing_ok=True)
     for title, figure in figures.items():
         for kind in ("svg", "pdf"):
-            write_whole(pictures / f"{title}.{kind}", render(figure, kind))  # type: ignore[arg-type]
+            write_whole(pictures / f"{title}.{kind}", render(figure, kind))
+    for title, columns in tables.items():
+        write_whole(folder / f"{title}.csv", _table(columns))
     write_whole(folder / "simulation.json", json.dumps(told, indent=2) + "\n")
     return folder
+
+
+def _table(columns: dict[str, F8]) -> str:
+    """Columns of equal length as text, their names above."""
+    text = io.StringIO()
+    np.savetxt(
+        text, np.stack(list(columns.values()), axis=1), "%.9g", delimiter=",", header=",".join(columns), comments=""
+    )
+    return text.getvalue()
 
 
 def _write_run(

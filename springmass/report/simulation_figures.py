@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipeline.dynamics import Trajectory, get_integrator
+from pipeline.dynamics.band import Band
+from pipeline.dynamics.stability import limits, runs_bounded
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, style
+from springmass.runs.simulation import Against, Simulation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from springmass.runs.simulation import Against, Simulation
-
-__all__ = ["EULERS", "SIMULATION_FIGURES", "against_figure", "draw_simulation", "stability_figure"]
+__all__ = ["EULERS", "SIMULATION_FIGURES", "against_figure", "band_figure", "draw_simulation", "stability_figure"]
 
 SIMULATION_FIGURES = ("position", "velocity", "energy", "phase", "error")
 EULERS = (("forward-euler", "forward Euler", VERMILLION), ("symplectic-euler", "symplectic Euler", BLUE))
@@ -54,7 +55,7 @@ def draw_simulation(simulation: Simulation, mass_kg: float | None) -> dict[str, 
 
 
 def against_figure(against: Against) -> Figure:
-    """Draw a measured run with the prediction over it, and beneath it what is left.
+    """Draw a measured run with the prediction and its band over it, and beneath it what is left.
 
     Parameters
     ----------
@@ -65,11 +66,15 @@ def against_figure(against: Against) -> Figure:
         above = figure.add_axes((LEFT / WIDTH, 0.42, (WIDTH - LEFT - RIGHT) / WIDTH, 0.47))
         below = figure.add_axes((LEFT / WIDTH, 0.12, (WIDTH - LEFT - RIGHT) / WIDTH, 0.27), sharex=above)
         dense: dict[str, Any] = {"rasterized": against.t.size > POINTS}
+        if against.band is not None:
+            _shade(above, against.t, against.predicted + against.band)
         above.plot(against.t, against.measured * 1e3, ".", ms=2.2, mew=0, color=GREY, label="measured", **dense)
         above.plot(against.t, against.predicted * 1e3, color="#000000", lw=0.6, label="predicted", **dense)
         above.set_ylabel("distance / mm")
         above.tick_params(labelbottom=False)
-        above.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+        above.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
+        if against.band is not None:
+            _shade(below, against.t, against.band)
         left = (against.measured - against.predicted) * 1e3
         below.plot(against.t, left, ".", ms=1.8, mew=0, color=BLUE, **dense)
         below.axhline(0.0, color="#000000", lw=0.8)
@@ -77,6 +82,57 @@ def against_figure(against: Against) -> Figure:
         below.set_xlabel("time / s")
         below.set_xlim(float(against.t[0]), float(against.t[-1]))
         return figure
+
+
+def band_figure(simulation: Simulation, band: Band) -> Figure:
+    """Draw motion and amplitude with the band of the scene's uncertainties, and the band alone beneath them.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    band : Band
+        At least as long.
+    """
+    end = float(simulation.trajectory.t[-1])
+    # Fine enough for a curve through the last periods; amplitude and band over the whole run.
+    last: F8 = np.linspace(max(0.0, end - PERIODS * _periods(simulation)), end, POINTS)
+    whole = band.t[band.t <= end]
+    amplitude, of_amplitude = band.amplitude_at(whole)
+    with style():
+        figure = _blank(WIDTH, 5.6)
+        panels = [
+            figure.add_axes((LEFT / WIDTH, at, (WIDTH - LEFT - RIGHT) / WIDTH, 0.23)) for at in (0.7, 0.385, 0.075)
+        ]
+        motion, course, width = panels
+        middle = simulation.trajectory.at(last)
+        _shade(motion, last, middle + band.displacement_at(last))
+        motion.plot(last, middle * 1e3, color="#000000", lw=0.8, label="the scene's values")
+        motion.set_ylabel("displacement / mm")
+        motion.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+        _shade(course, whole, of_amplitude)
+        course.plot(whole, amplitude * 1e3, color="#000000", lw=0.8)
+        course.set_ylabel("amplitude / mm")
+        _shade(width, whole, band.displacement_at(whole))
+        width.set_ylabel("band / mm")
+        width.set_xlabel("time / s")
+        for panel, t in zip(panels, (last, whole, whole), strict=True):
+            panel.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else float(t[0]) + 1.0)
+        return figure
+
+
+def _shade(panel: Axes, t: F8, levels: F8) -> None:
+    """Fill between the quantiles (4, n), m, of 95 and of 68 %."""
+    for low, high, share, alpha in ((0, 3, 95, 0.25), (1, 2, 68, 0.45)):
+        panel.fill_between(
+            t,
+            levels[low] * 1e3,
+            levels[high] * 1e3,
+            color=ORANGE,
+            alpha=alpha,
+            lw=0.0,
+            label=f"{share} %",
+            rasterized=t.size > POINTS,
+        )
 
 
 def _euler(simulation: Simulation, name: str) -> Trajectory:
@@ -222,8 +278,6 @@ def stability_figure() -> Figure:
     ValueError
         If a run contradicts its line.
     """
-    from pipeline.dynamics.stability import limits, runs_bounded
-
     ratios = np.geomspace(0.01, 100.0, 161)
     asked = np.geomspace(0.02, 60.0, 8)
     looks = (

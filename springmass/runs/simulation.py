@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem, Trajectory, get_integrator
+from pipeline.dynamics.band import LEVELS, Band
 from pipeline.dynamics.choose import SAFETY, Choice, choose, cost_ns, demand_tolerance, fit_step, least_tolerance
 from pipeline.dynamics.integrators.exact import EXACT
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.integrators.taylor import TAYLOR
 from pipeline.errors import DynamicsError
-from pipeline.numerics.estimate import Estimate
 from pipeline.track import F8
-from springmass.errors import UNREADABLE, USAGE, ProgramError
-
-if TYPE_CHECKING:
-    from pipeline.analyse import Analysis
+from springmass.errors import USAGE, ProgramError
 
 __all__ = [
     "Against",
     "Simulation",
-    "compare_with",
-    "completed",
+    "band_columns",
     "count_of",
     "demand_stable",
     "plan",
@@ -76,6 +70,8 @@ class Against:
         Root mean square of measured less predicted, m.
     noise_m : float
         Of one sample, m, as the analysis has it.
+    band : (4, n) float64 or None
+        Quantiles of the prediction less the prediction, m, as in :class:`pipeline.dynamics.band.Band`.
     """
 
     t: F8
@@ -83,6 +79,7 @@ class Against:
     predicted: F8
     rms_m: float
     noise_m: float
+    band: F8 | None = None
 
 
 def count_of(seconds: float, spacing_s: float) -> int:
@@ -197,63 +194,10 @@ def truth(problem: Problem, spacing_s: float, count: int, below: float = math.in
     raise DynamicsError("no integrator solves this scene well enough to measure an error against; take a shorter run")
 
 
-def completed(scene: Scene, analysis: Analysis) -> tuple[Scene, tuple[str, ...]]:
-    """Return a scene in which a run's analysis stands for what is left out, and the names of what it stands for.
-
-    The start is always the run's: nobody releases a bob at the first sample.
-    """
-    from pipeline.analyse import Motion
-
-    motion = analysis.motion
-    if not isinstance(motion, Motion):
-        raise ProgramError(f"{motion.why}: nothing to lay a prediction over; name a run that oscillates", UNREADABLE)
-    first = int(np.flatnonzero(analysis.conditioned.used)[0])
-    taken: dict[str, Any] = {
-        "start_displacement_m": Estimate(
-            float(motion.waveform.position[first] - motion.rest.at(analysis.track.t[first : first + 1])[0]), 0.0, "m"
-        ),
-        "start_velocity_m_per_s": Estimate(float(motion.waveform.velocity[first]), 0.0, "m/s"),
-    }
-    if scene.spring_constant_n_per_m is None and "spring_constant" in analysis.estimates:
-        taken["spring_constant_n_per_m"] = analysis.estimates["spring_constant"]
-    coefficients = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
-    if all(getattr(scene, name) is None for name in coefficients.values()):
-        joint = motion.damping.best.joint
-        for name, attribute in coefficients.items():
-            if name in joint.names:
-                taken[attribute] = replace(joint[name], value=max(joint[name].value, 0.0))
-    return replace(scene, **taken), tuple(taken)
-
-
-def compare_with(analysis: Analysis, problem: Problem) -> Against:
-    """Lay a prediction over a measured run, from the run's first sample on.
-
-    Parameters
-    ----------
-    analysis : Analysis
-        Of the run.
-    problem : Problem
-        As the scene that :func:`completed` returned states it.
-    """
-    from pipeline.analyse import Motion
-
-    motion = analysis.motion
-    assert isinstance(motion, Motion)
-    used = analysis.conditioned.used
-    t, measured = analysis.track.t[used], analysis.track.y[used]
-    spacing = min(0.01, 1.0 / (24.0 * problem.equation.angular_frequency_per_s))
-    count = max(1, math.ceil(float(t[-1] - t[0]) / spacing))
-    trajectory = choose(problem, spacing, count, DEFAULT_TOLERANCE).run(count)
-    predicted = motion.rest.at(t) + trajectory.at(t - t[0])
-    rms = float(np.sqrt(np.mean((measured - predicted) ** 2)))
-    return Against(t, measured, predicted, rms, analysis.estimates["noise"].value)
-
-
-def summary(simulation: Simulation, against: Against | None) -> dict[str, Any]:
+def summary(simulation: Simulation, against: Against | None, band: Band | None) -> dict[str, Any]:
     """Return a simulation as the JSON of ``springmass simulate``."""
     choice, problem = simulation.choice, simulation.problem
     limit = choice.integrator.stable_step(choice.problem)
-    equation: Mapping[str, float] = {name: getattr(problem.equation, name) for name in problem.equation.__slots__}
     return {
         "schema": 1,
         "method": choice.integrator.name,
@@ -265,12 +209,43 @@ def summary(simulation: Simulation, against: Against | None) -> dict[str, Any]:
         "predicted_error": choice.predicted_error if math.isfinite(choice.predicted_error) else None,
         "measured_error": simulation.measured_error,
         "amplitude_m": problem.amplitude_m(),
-        "equation": dict(equation),
+        "equation": {name: getattr(problem.equation, name) for name in problem.equation.__slots__},
         "terms": [
             {"name": term.name, "size": term.size, "included": term.included, "why": term.why} for term in choice.terms
         ],
         "against": None if against is None else {"rms_m": against.rms_m, "noise_m": against.noise_m},
+        "band": None if band is None else _band_summary(band, simulation.trajectory.t),
     }
+
+
+def band_columns(band: Band, t: F8, predicted: F8) -> dict[str, F8]:
+    """Return quantiles of displacement and amplitude as columns (n,), m, by name.
+
+    Parameters
+    ----------
+    band : Band
+    t : (n,) float64, s
+    predicted : (n,) float64, m
+        The displacement, or the distance, of the scene's values.
+    """
+    amplitude, of_amplitude = band.amplitude_at(t)
+    around = predicted + band.displacement_at(t)
+    return {
+        **{f"displacement_{level}_m": each for level, each in zip(LEVELS, around, strict=True)},
+        "amplitude_m": amplitude,
+        **{f"amplitude_{level}_m": each for level, each in zip(LEVELS, of_amplitude, strict=True)},
+    }
+
+
+def _band_summary(band: Band, t: F8) -> dict[str, Any]:
+    """Half widths are the largest over the run."""
+    around, (_, of_amplitude) = band.displacement_at(t), band.amplitude_at(t)
+    widths = {
+        f"{name}_half_width_{share}_m": float(0.5 * np.max(found[high] - found[low]))
+        for name, found in (("displacement", around), ("amplitude", of_amplitude))
+        for share, low, high in ((68, 1, 2), (95, 0, 3))
+    }
+    return {"members": band.members, "seed": band.seed, "quantities": list(band.quantities), **widths}
 
 
 def _rounded_down(limit: float) -> str:

@@ -11,6 +11,7 @@ import pytest
 
 from acquisition.block import Block
 from acquisition.source import SourceInfo
+from pipeline.dynamics import Equation, Problem, get_integrator
 from springmass import analyse, load
 from springmass.runs.loading import read_scene
 from storage.run_file.writing import write_run
@@ -127,6 +128,70 @@ def test_a_prediction_is_laid_over_a_run(cli: Callable, scene: Path, tmp_path: P
     assert (tmp_path / "bare.simulated" / "figures" / "against.svg").is_file()
     assert cli("simulate", "--scene", scene, "--out", tmp_path).code == 0
     assert not (tmp_path / "bench.simulated" / "figures" / "against.svg").exists()
+
+
+def test_the_prediction_is_that_of_the_method_and_step_asked_for(cli: Callable, tmp_path: Path) -> None:
+    """Forward Euler's distance from a run that moves exactly is forward Euler's error, in the step that was given."""
+    path = tmp_path / "linear.toml"
+    path.write_text(LINEAR + "[damping]\ngamma_per_s = 0.1\n")
+    assert cli("simulate", "--scene", path, "--method", "exact", "--out", tmp_path).code == 0
+    run = tmp_path / "linear.simulated" / "run.h5"
+    problem = Problem(Equation(angular_frequency_per_s=10.0, gamma_per_s=0.1), 0.05)
+    truth = get_integrator("exact").run(problem, 0.01, 1000).y
+    found = {}
+    for method, step in (("exact", 0.01), ("auto", 0.01), ("forward-euler", 0.001), ("forward-euler", 0.0005)):
+        arguments = ("--scene", path, "--against", run, "--method", method, "--dt", str(step), "--json")
+        (told,) = cli("simulate", *arguments).results
+        found[method, step] = told["against"]["rms_m"]
+        if method == "forward-euler":
+            every = round(0.01 / step)
+            off = get_integrator(method).run(problem, step, 1000 * every, every=every).y - truth
+            assert found[method, step] == pytest.approx(np.sqrt(np.mean(off**2)), rel=0.05)
+    assert max(found["exact", 0.01], found["auto", 0.01]) < 1e-8
+    assert found["forward-euler", 0.001] > 1.9 * found["forward-euler", 0.0005] > 1e-3
+
+
+def test_uncertainties_of_the_scene_make_a_band(cli: Callable, tmp_path: Path) -> None:
+    """Its width stands in the JSON, its quantiles in the tables and figures; without uncertainties it is said."""
+    path = tmp_path / "vague.toml"
+    path.write_text(MIXED.replace("0.05\n", "{ value = 0.05, u = 0.001 }\n"))
+    done = cli("simulate", "--scene", path, "--out", tmp_path, "--json")
+    assert "300 motions drawn from the uncertainties of start_displacement_m" in done.err
+    band = done.results[0]["band"]
+    assert band["quantities"] == ["start_displacement_m"]
+    assert (band["members"], band["seed"]) == (300, 0)
+    assert band["displacement_half_width_68_m"] == pytest.approx(1e-3, rel=0.02)
+    assert band["amplitude_half_width_95_m"] == pytest.approx(1.96e-3, rel=0.02)
+    folder = tmp_path / "vague.simulated"
+    table = np.genfromtxt(folder / "band.csv", delimiter=",", names=True)
+    assert table.size == 1001
+    levels = [table[f"displacement_{level}_m"][0] for level in ("low_95", "low_68", "high_68", "high_95")]
+    np.testing.assert_allclose(levels, 0.05 + 1e-3 * np.array([-1.96, -1.0, 1.0, 1.96]), atol=2e-5)
+    assert np.all(table["amplitude_low_68_m"] < table["amplitude_m"])
+    assert "amplitude" in (folder / "figures" / "band.svg").read_text(encoding="utf-8")
+    run = folder / "run.h5"
+    done = cli("simulate", "--scene", path, "--against", run, "--out", tmp_path, "--json")
+    assert "start_velocity_m_per_s" in done.results[0]["band"]["quantities"]
+    table = np.genfromtxt(folder / "against.csv", delimiter=",", names=True)
+    assert np.all(table["predicted_low_95_m"] <= table["predicted_high_95_m"])
+    assert np.sqrt(np.mean((table["measured_m"] - table["predicted_m"]) ** 2)) == pytest.approx(
+        done.results[0]["against"]["rms_m"], rel=1e-3
+    )
+    path.write_text(MIXED)
+    done = cli("simulate", "--scene", path, "--out", tmp_path, "--json")
+    assert "band             none: the scene states no uncertainties" in done.err
+    assert done.results[0]["band"] is None
+    assert not any((folder / name).exists() for name in ("band.csv", "against.csv", "figures/band.pdf"))
+
+
+def test_a_scene_too_vague_for_a_band_is_simulated_without(cli: Callable, tmp_path: Path) -> None:
+    """A mass that may be 0 has no band; why is said, and the rest is done."""
+    path = tmp_path / "vague.toml"
+    path.write_text(MIXED.replace("mass_kg = 0.2\n", "mass_kg = { value = 0.2, u = 0.1 }\n"))
+    done = cli("simulate", "--scene", path, "--json")
+    assert done.code == 0
+    assert "band             none: the uncertainty of bob_mass_kg" in done.err
+    assert done.results[0]["band"] is None
 
 
 def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path: Path) -> None:
