@@ -38,18 +38,16 @@ class Terms:
     normal: F8
     right: F8
 
-    def first(self, count: int) -> Terms:
-        """Return the first ``count`` of the terms alone."""
-        return Terms(self.columns[:, :count], self.along[:, :count], self.normal[:count, :count], self.right[:count])
+    def only(self, which: slice | list[int]) -> Terms:
+        """Return some of the terms."""
+        return Terms(self.columns[:, which], self.along[:, which], self.normal[which][:, which], self.right[which])
 
     def fitted(self) -> tuple[F8, F8, float]:
         """Return the terms' coefficients (k,), their cofactors (k, k) and by how much they lower chi-square.
 
-        Cofactors are the covariance for data of unit variance. A trace of ridge lets a column that the model holds
-        already come out as nothing.
+        Cofactors are the covariance for data of unit variance.
         """
-        ridge = RIDGE * (np.einsum("nk,nk->k", self.columns, self.columns) + 1e-300)
-        cofactors: F8 = np.asarray(np.linalg.inv(self.normal + np.diag(ridge)), np.float64)
+        cofactors: F8 = np.asarray(np.linalg.inv(self.normal), np.float64)
         values = cofactors @ self.right
         return values, cofactors, float(values @ self.right)
 
@@ -86,8 +84,10 @@ class LinearModel:
 
     def terms(self, columns: F8) -> Terms:
         """Return what columns (n, k) would add."""
-        along = self.basis.T @ columns
-        return Terms(columns, along, columns.T @ columns - along.T @ along, columns.T @ self.left)
+        along, squares = self.basis.T @ columns, columns.T @ columns
+        # A trace of ridge lets a column that the model holds already come out as nothing.
+        normal = squares - along.T @ along + np.diag(RIDGE * np.diagonal(squares) + 1e-300)
+        return Terms(columns, along, normal, columns.T @ self.left)
 
     def left_by(self, terms: Terms, values: F8) -> F8:
         """Return what the model leaves (n,) together with terms of coefficients (k,)."""

@@ -222,7 +222,7 @@ def strongest(blocks: Blocks, model: LinearModel, band: Band) -> Peak | None:
         return None
     density = spectral_density(blocks, blocks.unweighted(model.left_by(line, line.fitted()[0])), f, band)
     # Rows are weighted by samples, the density is one full block's.
-    evidence = 0.5 * line.first(2).fitted()[2] / (density * blocks.samples)
+    evidence = 0.5 * line.only(slice(2)).fitted()[2] / (density * blocks.samples)
     return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
 
 

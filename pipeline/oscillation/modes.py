@@ -13,7 +13,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.carrier import C16, Carrier, rotating
 from pipeline.track import F8
 
-__all__ = ["Mode", "Sideways", "whole_wave"]
+__all__ = ["Mode", "Sideways"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +76,10 @@ class Mode:
         """Return E at times t (n,), m."""
         return np.asarray(np.polynomial.legendre.legval(self._x(t), self.coefficients))
 
+    def whole(self, t: F8, wave: C16) -> C16:
+        """Return the wave of which products are made: with the envelope, over the amplitude."""
+        return np.asarray(wave * self.envelope(t) / self.amplitude.value)
+
     def columns(self, t: F8, wave: C16) -> F8:
         """Return (n, 2 (degree + 1)): what real and imaginary parts of the coefficients are multiplied by."""
         turning = np.polynomial.legendre.legvander(self._x(t), self.degree) * np.conj(wave)[:, None]
@@ -121,12 +125,9 @@ class Sideways:
     def _waves(self, t: F8) -> Iterator[tuple[Mode, C16]]:
         if self.carrier is None or not self.modes:
             return
-        main = self.carrier.wave(t)
-        first = None if self.first is None else whole_wave(self.first, t, main)
+        main, first = self.carrier.wave(t), None
         for mode in self.modes:
-            yield mode, mode.wave(t, main, first)
-
-
-def whole_wave(first: Mode, t: F8, main: C16) -> C16:
-    """Return the wave that a mode's products are made of: with its envelope, over its amplitude."""
-    return np.asarray(first.wave(t, main, None) * first.envelope(t) / first.amplitude.value)
+            wave = mode.wave(t, main, first)
+            if first is None and self.first is not None:
+                first = self.first.whole(t, wave)  # it stands first among the modes
+            yield mode, wave

@@ -15,7 +15,7 @@ from pipeline.numerics.spectrum import Band, Blocks, Peak, false_alarm, spectral
 from pipeline.oscillation.carrier import C16, Carrier, rotating
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.modes import Mode, Sideways, whole_wave
+from pipeline.oscillation.modes import Mode, Sideways
 from pipeline.track import F8, UNUSABLE
 
 __all__ = ["Params", "find_sideways", "without"]
@@ -131,10 +131,11 @@ class _Search:
             mode, terms = self.free(peak)
             if not self.band.inside(np.array([mode.frequency.value]))[0]:
                 break  # it ran away into what the model holds already
-            self.add(mode, terms)
+            self.model.add(terms)
+            self.found.append(mode)
             self.hole((mode.frequency.value, width))
             if first is None:
-                first, self.first = mode, whole_wave(mode, self.t, self.main)
+                first, self.first = mode, mode.whole(self.t, self.wave(mode))
                 self.locked(PRODUCTS, mode.frequency)
         order = ("mode", "product", "harmonic")
         return Sideways(tuple(sorted(self.together(), key=lambda mode: order.index(mode.kind))), self.carrier, first)
@@ -158,37 +159,49 @@ class _Search:
     def hole(self, *holes: tuple[float, float]) -> None:
         self.band = replace(self.band, holes=(*self.band.holes, *holes))
 
-    def add(self, mode: Mode, terms: Terms) -> None:
-        self.model.add(terms)
-        self.found.append(mode)
+    def terms(self, *modes: Mode) -> Terms:
+        columns = [
+            mode.columns(self.t, self.wave(mode) * self.blocks.attenuation(mode.frequency.value)) for mode in modes
+        ]
+        return self.model.terms(np.concatenate(columns, axis=1) * self.blocks.weight[:, None])
 
-    def terms(self, mode: Mode) -> Terms:
-        fade = self.blocks.attenuation(mode.frequency.value)
-        return self.model.terms(mode.columns(self.t, self.wave(mode)) * (fade * self.blocks.weight)[:, None])
-
-    def fitted(self, mode: Mode, terms: Terms, unit: float) -> Mode:
-        """Return the mode with the coefficients and the amplitude that its terms have; ``unit`` is the variance."""
-        values, cofactors, _ = terms.fitted()
+    def fitted(self, mode: Mode, values: F8, cofactors: F8, unit: float) -> Mode:
+        """Return the mode with its coefficients, and the amplitude of these; ``unit`` is the variance."""
         mode = replace(mode, coefficients=values.view(np.complex128))
         u = math.sqrt(0.5 * unit * float(cofactors[0, 0] + cofactors[1, 1])) * _rms(self.wave(mode))
         return replace(mode, amplitude=Estimate(self.size(mode), u, "m"))
 
     def locked(self, orders: tuple[tuple[int, int], ...], base: Estimate) -> None:
-        """Test what turns with the main oscillation and a mode of frequency ``base`` together: none is free."""
-        for a, b in orders:
-            f = abs(a * base.value + b * self.main_hz)
-            if not 0.1 * self.main_hz < f < 0.4 / self.blocks.step or any(
-                abs(f - centre) < half for centre, half in self.band.holes
-            ):
-                continue
-            trial = self.blank((a, b), Estimate(f, abs(a) * base.u, "Hz"))
-            terms = self.terms(trial)
-            values, _, fall = terms.fitted()
-            left = self.blocks.unweighted(self.model.left_by(terms, values))
-            unit = spectral_density(self.blocks, left, f, self.band) * self.blocks.samples
-            chance = false_alarm(0.5 * fall / unit, len(orders))
+        """Test what turns with the main oscillation and a mode of frequency ``base`` together: none is free.
+
+        One after another, each beyond those that were found before it.
+        """
+        trials = [
+            self.blank((a, b), Estimate(abs(a * base.value + b * self.main_hz), abs(a) * base.u, "Hz"))
+            for a, b in orders
+        ]
+        trials = [trial for trial in trials if self.sought(trial.frequency.value)]
+        if not trials:
+            return
+        terms = self.terms(*trials)
+        taken, fallen = list[int](), 0.0
+        for i, trial in enumerate(trials):
+            both = [*taken, 2 * i, 2 * i + 1]
+            values, cofactors, fall = terms.only(both).fitted()
+            left = self.blocks.unweighted(self.model.left_by(terms.only(both), values))
+            unit = spectral_density(self.blocks, left, trial.frequency.value, self.band) * self.blocks.samples
+            chance = false_alarm(0.5 * (fall - fallen) / unit, len(orders))
             if chance <= 0.5 * self.params.false_alarm:
-                self.add(self.fitted(replace(trial, false_alarm=chance), terms, unit), terms)
+                found = replace(trial, false_alarm=chance)
+                self.found.append(self.fitted(found, values[-2:], cofactors[-2:, -2:], unit))
+                taken, fallen = both, fall
+        if taken:
+            self.model.add(terms.only(taken))
+
+    def sought(self, frequency_hz: float) -> bool:
+        """Whether the blocks show so high a frequency, and the model does not hold it already."""
+        known = any(abs(frequency_hz - centre) < half for centre, half in self.band.holes)
+        return 0.1 * self.main_hz < frequency_hz < 0.4 / self.blocks.step and not known
 
     def blank(self, turns: tuple[int, int], frequency: Estimate) -> Mode:
         """Return a mode that is still to be fitted."""
@@ -226,10 +239,11 @@ class _Search:
             coefficients=np.zeros(degrees.size, np.complex128),
         )
         terms = self.terms(trial)
-        falls = np.array([terms.first(2 * count).fitted()[2] for count in range(1, degrees.size + 1)])
+        falls = np.array([terms.only(slice(2 * count)).fitted()[2] for count in range(1, degrees.size + 1)])
         criterion = -falls / unit + 2.0 * (degrees + 1) * math.log(self.blocks.t.size)
-        terms = terms.first(2 * (int(np.argmin(criterion)) + 1))
-        return self.fitted(trial, terms, unit), terms
+        terms = terms.only(slice(2 * (int(np.argmin(criterion)) + 1)))
+        values, cofactors, _ = terms.fitted()
+        return self.fitted(trial, values, cofactors, unit), terms
 
 
 def _rms(wave: C16) -> float:
