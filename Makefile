@@ -2,13 +2,14 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
+WORKERS ?= 2
 PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
 
 .PHONY: help demo test trials accuracy bench lint docs-figures docs-trade clean
 
 help:
 	@echo "make demo     from two old recordings to Table 1 and a report"
-	@echo "make test     the tests (make trials: thousands of seeds)"
+	@echo "make test     the tests, in two processes (WORKERS=n for others; make trials: thousands of seeds)"
 	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
 	@echo "make bench    speed, as ratios to named references"
 	@echo "make lint     ruff, mypy, import contracts"
@@ -31,7 +32,7 @@ demo: $(VENV)/.installed
 	$(BIN)/springmass demo --out demo-output
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -m "not trials" -n $(WORKERS) --dist loadfile
 
 trials: $(VENV)/.installed-dev
 	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=200 $(BIN)/python -m pytest -m trials -s

@@ -36,6 +36,7 @@ def test_every_part_is_tested(checks: ModuleType) -> None:
     assert tuple(checks.CHECKS) == PARTS
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("part", PARTS)
 def test_requirements_hold_in_short_form(checks: ModuleType, part: str) -> None:
     """With few seeds no limit is exceeded by more than their scatter allows."""
