@@ -5,13 +5,11 @@ from __future__ import annotations
 import shutil
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipeline.analyse import Analysis, Motion
-
-if TYPE_CHECKING:
-    from pipeline.results.classic import Classic
-    from pipeline.results.compare import Comparison
+from pipeline.results.classic import Classic
+from pipeline.results.compare import Comparison
 
 __all__ = ["classic_text", "comparison_text", "findings_text", "wrapped"]
 

@@ -17,6 +17,7 @@ from springmass.report.html import ComparedRuns, ReportRun, render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.tables import results_csv
+from storage.atomic import write_whole
 
 __all__ = ["ReportRun", "write_report"]
 
@@ -66,14 +67,12 @@ def write_report(
 
     Notes
     -----
-    Disturbances the page: ``results.json`` (``summary``, else one object for one run and a list for several; what is no
+    Besides the page: ``results.json`` (``summary``, else one object for one run and a list for several; what is no
     number is null), ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, ``motion.csv`` of each run that
     oscillates, and ``figures/`` with every figure as SVG and PDF. Names of figures and motions begin with their run's
     where there are several.
     The same arguments give the same bytes.
     """
-    from storage.atomic import write_whole
-
     if not runs or len(runs) != len(results):
         raise ValueError(f"a report needs one run at least and one result for each, got {len(runs)} and {len(results)}")
     directory = Path(directory)
@@ -114,8 +113,6 @@ def _write_figures(folder: Path, stem: str, drawn: Mapping[str, Mapping[Literal[
 
 def _put(target: Path, content: bytes | str | None) -> None:
     """Write a file, or take away one that an earlier report left: it would pass for one of this."""
-    from storage.atomic import write_whole
-
     if content is None:
         target.unlink(missing_ok=True)
     else:

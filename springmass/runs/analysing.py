@@ -6,17 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
+from pipeline.results.classic import Classic, classic
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.json_results import result_of
 from springmass.runs.loading import Loaded
-
-if TYPE_CHECKING:
-    from pipeline.results.classic import Classic
 
 __all__ = ["Analysed", "analyse_loaded", "distinct_names", "make_folder", "now_utc"]
 
@@ -72,20 +70,16 @@ def analyse_loaded(
     if scene is None:
         scene = Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
     analysis = analyse(loaded.track, scene, params_for(accuracy))
-    classic = None
-    if with_classic:
-        from pipeline.results.classic import classic as evaluate
-
-        classic = evaluate(loaded.track, scene)
+    by_classic = classic(loaded.track, scene) if with_classic else None
     result = result_of(
         loaded,
         analysis,
         time_utc=time_utc or now_utc(),
         accuracy="classic" if with_classic else accuracy,
         parameters={**parameters, "scene": scene.to_mapping()},
-        classic=classic,
+        classic=by_classic,
     )
-    return Analysed(loaded, analysis, classic, result)
+    return Analysed(loaded, analysis, by_classic, result)
 
 
 def distinct_names(paths: Sequence[str]) -> list[str]:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipeline.analyse import Analysis, Motion
+from pipeline.damping.select import LawFit
+from pipeline.numerics.estimate import Estimate
+from pipeline.results.budget import Contribution
+from pipeline.results.classic import Classic
+from pipeline.results.findings import Finding, by_severity
 from springmass import __version__
-
-if TYPE_CHECKING:
-    from pipeline.analyse import Analysis
-    from pipeline.damping.select import LawFit
-    from pipeline.numerics.estimate import Estimate
-    from pipeline.results.budget import Contribution
-    from pipeline.results.classic import Classic
-    from pipeline.results.findings import Finding
-    from springmass.runs.loading import Loaded
+from springmass.runs.loading import Loaded
 
 __all__ = ["SCHEMA", "all_findings", "estimate_json", "finding_json", "finite", "input_of", "result_of"]
 
@@ -107,8 +105,6 @@ def input_of(loaded: Loaded) -> dict[str, Any]:
 
 def all_findings(loaded: Loaded, analysis: Analysis) -> tuple[Finding, ...]:
     """Return the analysis's findings and those that reading the file gave, the gravest first."""
-    from pipeline.results.findings import Finding, by_severity
-
     findings = list(analysis.findings)
     known = {f.code for f in findings}
     for trap in loaded.traps:
@@ -125,8 +121,6 @@ def _quality(loaded: Loaded, analysis: Analysis) -> dict[str, int]:
 
 
 def _budgets(analysis: Analysis) -> dict[str, Any]:
-    from pipeline.analyse import Motion
-
     if not isinstance(analysis.motion, Motion):
         return {}
     return {
@@ -150,8 +144,6 @@ def _contribution(c: Contribution) -> dict[str, Any]:
 
 
 def _damping(analysis: Analysis) -> dict[str, Any]:
-    from pipeline.analyse import Motion
-
     if not isinstance(analysis.motion, Motion):
         return _no_damping()
     damping = analysis.motion.damping

@@ -24,7 +24,9 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, USAGE, ProgramError
+from storage.recover import recover
 from storage.run_file.layout import MAGIC
+from storage.run_file.reading import open_run
 from storage.wire_log.records import MAGIC as WIRE_MAGIC
 
 __all__ = ["Loaded", "kind_of", "load", "read_scene", "sample_data", "to_track"]
@@ -97,8 +99,7 @@ class Loaded:
         Raises
         ------
         storage.errors.StorageError
-            If the samples that were read from a run file are not those that were written, or the file is another
-            by now.
+            If a run file is another by now.
         """
         return self.take_sha256()
 
@@ -292,11 +293,9 @@ def _origin(recording: Recording) -> dict[str, Any]:
 
 
 def _load_run(path: Path) -> Loaded:
-    from storage.run_file.reading import open_run
-
     stamp = _stamp(path)
     with open_run(path) as run:
-        samples = run.samples(digests=False)
+        samples = run.samples()
         return Loaded(
             path,
             "run",
@@ -308,7 +307,7 @@ def _load_run(path: Path) -> Loaded:
             run.traps,
             run.malformed_rows,
             lambda: _originals_of(path, stamp),
-            lambda: _sha256_of(path, stamp, samples),
+            lambda: _sha256_of(path, stamp),
             run.scene,
             run.provenance,
             run.format,
@@ -331,28 +330,20 @@ def _demand_same(path: Path, stamp: tuple[int, int, int] | None) -> None:
 
 def _originals_of(path: Path, stamp: tuple[int, int, int] | None) -> tuple[Original, ...]:
     """Read the original files inside a run file that was loaded."""
-    from storage.run_file.reading import open_run
-
     _demand_same(path, stamp)
     with open_run(path) as run:
         return run.originals()
 
 
-def _sha256_of(path: Path, stamp: tuple[int, int, int] | None, samples: Block) -> str:
-    """Digest a run file that was loaded, and hold the samples read from it against their own digests."""
-    from storage.run_file.reading import open_run
-
+def _sha256_of(path: Path, stamp: tuple[int, int, int] | None) -> str:
+    """Digest a run file that was loaded."""
     _demand_same(path, stamp)
-    with open_run(path) as run:
-        run.check(samples)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _load_wire(path: Path, channel: str | None) -> Loaded:
     """Recover a log into a run file that is thrown away, and take that; the log stays as it is."""
-    from storage.recover import recover
-
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
         report = recover(path, Path(folder) / "run.h5")
         names = {str(each.sensor.channel): each for each in report.runs}

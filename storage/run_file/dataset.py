@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import h5netcdf
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from acquisition.block import Block
 from storage.errors import reading
 from storage.run_file import layout
 from storage.run_file.handle import Contents
 from storage.run_file.header import Header
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["checked_dataset", "lazy_dataset"]
 
@@ -23,6 +23,9 @@ def lazy_dataset(contents: Contents) -> xr.Dataset:
     ------
     RunClosed, RunDamaged
     """
+    import h5netcdf
+    import xarray as xr
+
     for name in contents.header.columns:
         contents.column(name)  # type and length, which a lazy reading would take as it finds them
     with reading(contents.path, layout.SIGNAL):
@@ -36,6 +39,8 @@ def lazy_dataset(contents: Contents) -> xr.Dataset:
 
 def checked_dataset(contents: Contents, samples: Block) -> xr.Dataset:
     """Return a dataset of samples that were checked; see :meth:`storage.run_file.reading.Run.load_dataset`."""
+    import xarray as xr
+
     header = contents.header
     values = layout.arrays(samples, header.info.sigma_m)
     variables = {}

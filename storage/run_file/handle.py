@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
-
 from storage.errors import NotARun, RunClosed, damaged, one_line, reading
 from storage.run_file import layout
 from storage.run_file.header import SCHEMA, Header
@@ -85,6 +83,8 @@ def open_contents(path: Path) -> Contents:
     RunDamaged
         If it cannot be read, or its header is not what was written.
     """
+    import h5py
+
     with reading(path, "the file"):
         file = h5py.File(path, "r")
     try:

@@ -25,7 +25,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import Block
@@ -34,6 +33,7 @@ from acquisition.source import SourceInfo
 from storage.errors import NotARun, damaged, reading
 from storage.run_file import layout
 from storage.run_file import verification as verify
+from storage.run_file.dataset import checked_dataset, lazy_dataset
 from storage.run_file.handle import Contents, open_contents
 from storage.run_file.header import Header
 from storage.run_file.layout import CHUNK
@@ -83,9 +83,8 @@ class Run:
     """An open run file.
 
     What it says of itself is read at once, samples when they are asked for. Nothing is delivered unchecked:
-    every chunk carries a checksum, and every column read to its end is held against its SHA-256, unless
-    :meth:`samples` is told to leave that to :meth:`check`. Of the ways to the samples, :meth:`blocks` and
-    :meth:`dataset` are lazy, :meth:`samples` and :meth:`load_dataset` whole.
+    every chunk carries a checksum, and every column read to its end is held against its SHA-256. Of the ways to the
+    samples, :meth:`blocks` and :meth:`dataset` are lazy, :meth:`samples` and :meth:`load_dataset` whole.
 
     Parameters
     ----------
@@ -198,45 +197,21 @@ class Run:
             raise ValueError(f"blocks hold at least 1 sample, got size = {size}")
         return _Blocks(self._contents, size)
 
-    def samples(self, *, digests: bool = True) -> Block:
+    def samples(self) -> Block:
         """Return all samples as one block.
-
-        Parameters
-        ----------
-        digests : bool
-            Whether the columns are held against their SHA-256. Where they are not, damage of what is read is an
-            error all the same, by the chunks' checksums, but an array that someone rewrote is not; :meth:`check`
-            finds it later.
 
         Raises
         ------
         RunDamaged
             If they are not what was written.
         """
-        header = self._contents.header
-        values = {}
+        header, values = self._contents.header, {}
         for name in (name for name in _BLOCK_COLUMNS if name in header.columns):
             column = self._contents.column(name)
             with reading(self.path, f"the column {name!r} from sample 0"):
                 values[name] = column[:]
-            # Fletcher's sum of zeros is zero: only a digest tells a chunk of zeros from one that was lost.
-            digests = digests or (column.compression is None and _has_empty_chunk(values[name], column.chunks))
-        block = _block(header, header.first, values)
-        if digests:
-            self.check(block)
-        return block
-
-    def check(self, samples: Block) -> None:
-        """Hold samples that :meth:`samples` returned against their digests.
-
-        Raises
-        ------
-        RunDamaged
-            Naming the first column that is not what was written.
-        """
-        for name in (name for name in _BLOCK_COLUMNS if name in self._contents.header.columns):
-            values = np.ascontiguousarray(getattr(samples, _BLOCK_COLUMNS[name]))
-            self._contents.check(name, hashlib.sha256(values.data).hexdigest())
+            self._contents.check(name, hashlib.sha256(values[name].data).hexdigest())
+        return _block(header, header.first, values)
 
     def dataset(self) -> xarray.Dataset:
         """Return the samples as a dataset that reads what is asked for, when it is asked for.
@@ -262,8 +237,6 @@ class Run:
         read when the run is closed cannot be read any more (``KeyError``): use the dataset inside the run's
         ``with``, or ``load()`` it there. Closing the dataset leaves the run open.
         """
-        from storage.run_file.dataset import lazy_dataset
-
         return lazy_dataset(self._contents)
 
     def load_dataset(self) -> xarray.Dataset:
@@ -279,8 +252,6 @@ class Run:
         RunClosed, RunDamaged
             If the run is closed, or the samples are not what was written.
         """
-        from storage.run_file.dataset import checked_dataset
-
         return checked_dataset(self._contents, self.samples())
 
     def originals(self) -> tuple[Original, ...]:
@@ -346,13 +317,6 @@ class _Blocks:
             read = _block(run.header, run.header.first + start, values)
             for row in range(0, len(read), self.size):
                 yield read[row : row + self.size]
-
-
-def _has_empty_chunk(values: NDArray[Any], chunks: tuple[int, ...] | None) -> bool:
-    """Tell whether all bytes of some chunk are zero."""
-    size = chunks[0] if chunks else max(values.size, 1)
-    suspects = np.flatnonzero(values[::size] == 0) * size
-    return any(not values[start : start + size].view(np.uint8).any() for start in suspects.tolist())
 
 
 _BLOCK_COLUMNS = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import h5py
 import numpy as np
 
 __all__ = ["DIMENSION_ATTRIBUTES", "stored"]
@@ -20,6 +19,8 @@ def stored(value: Any) -> tuple[Any, Any]:
     global heap, the one part of the file without a checksum: a flipped bit there changes them unseen, or
     sends the HDF5 library into an endless loop.
     """
+    import h5py
+
     if not isinstance(value, str | tuple):
         return value, None
     texts = [_shown(text).encode() for text in ((value,) if isinstance(value, str) else value)]
