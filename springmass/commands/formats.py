@@ -55,8 +55,8 @@ def _describe(path: Path, answers: dict[str, Any]) -> dict[str, Any]:
     kind = kind_of(path)
     if kind != "recording":
         loaded = load(path, **answers)
-        unit = "m"
-        survey = Survey("", loaded.channel, unit, len(loaded.samples), loaded.info.rate_hz, loaded.traps)
+        samples = loaded.samples
+        survey = Survey("", loaded.channel, samples.unit, len(samples), loaded.info.rate_hz, loaded.traps)
         return {**_file(path, Inspection(kind, OURS[kind], _WHY[kind], (survey,))), **_facts(loaded)}
     found = inspect(path)
     facts = _file(path, found)
