@@ -1,4 +1,4 @@
-"""The straight line from a track to findings."""
+"""The straight line from a track to findings, with one branch for each kind of motion."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ import numpy as np
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping import select as dampings
-from pipeline.damping.select import Damping, fit_damping
+from pipeline.damping.select import Damping
 from pipeline.errors import AnalysisError
-from pipeline.motion import equation_fit as solutions
+from pipeline.motion import equation_fit as equations
 from pipeline.motion import phase as phases
 from pipeline.motion import waveform_fit as fullfits
-from pipeline.motion.equation_fit import MotionFit, MotionMisfit, fit_motion, moving_part
-from pipeline.motion.overdamped import relaxation as relaxations
-from pipeline.motion.overdamped.relaxation import Relaxation, find_relaxation, spring_constant
-from pipeline.motion.phase import PhaseFit, fit_phase
-from pipeline.motion.rest import Rest, fit_rest
+from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equation
+from pipeline.motion.kinds import Fitted, Windows, by_equation, by_windows, see_windows
+from pipeline.motion.overdamped import search as relaxations
+from pipeline.motion.overdamped.search import Overdamped, find_overdamped, spring_constant
+from pipeline.motion.phase import PhaseFit
+from pipeline.motion.rest import Rest
 from pipeline.motion.smoother import Smoothed, smooth
-from pipeline.motion.waveform import Waveform, reconstruct
-from pipeline.motion.waveform_fit import FullFit, fit_record
+from pipeline.motion.waveform import Waveform
+from pipeline.motion.waveform_fit import FullFit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.threads import one_thread
@@ -31,17 +32,25 @@ from pipeline.oscillation import cycles as cycling
 from pipeline.oscillation import demodulate as demodulation
 from pipeline.oscillation import disturbances as separation
 from pipeline.oscillation.condition import Conditioned, condition
-from pipeline.oscillation.cycles import Cycles, NoOscillation, find_cycles
-from pipeline.oscillation.demodulate import Demodulated, demodulate
-from pipeline.oscillation.disturbances import Disturbances, separate
+from pipeline.oscillation.cycles import Cycles, NoOscillation
+from pipeline.oscillation.demodulate import Demodulated
+from pipeline.oscillation.disturbances import Disturbances
 from pipeline.results import derive as derivation
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
-from pipeline.results.findings import Finding, by_severity, count_quality, judge, judge_samples, judge_still
+from pipeline.results.findings import (
+    Finding,
+    by_severity,
+    count_quality,
+    judge,
+    judge_fits,
+    judge_overdamped,
+    judge_samples,
+)
 from pipeline.results.scene_findings import judge_scene
 from pipeline.track import U8, Track
 
-__all__ = ["Analysis", "Motion", "Params", "analyse"]
+__all__ = ["Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,12 +74,12 @@ class Params:
     derive: derivation.Params = field(default_factory=derivation.Params)
     full: fullfits.Params | None = None
     relaxation: relaxations.Params = field(default_factory=relaxations.Params)
-    motion: solutions.Params = field(default_factory=solutions.Params)
+    motion: equations.Params = field(default_factory=equations.Params)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """What the stages found in a record that oscillates."""
+class Oscillation:
+    """What the stages found in a record that oscillates, strongly damped or not."""
 
     cycles: Cycles
     demodulated: Demodulated
@@ -83,6 +92,19 @@ class Motion:
     full: FullFit | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Still:
+    """A record in which nothing moves that these stages know.
+
+    Parameters
+    ----------
+    why : str
+        One sentence.
+    """
+
+    why: str
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysis:
     """One run, analysed.
@@ -93,10 +115,8 @@ class Analysis:
     scene : Scene
     params : Params
     conditioned : Conditioned
-    motion : Motion or NoOscillation
-        The latter says why there is nothing to fit; ``estimates`` then holds offset and noise alone. Where damping
-        ends the motion within a few cycles it is a :class:`pipeline.motion.overdamped.relaxation.Relaxation` and
-        brings its rates.
+    motion : Oscillation, Overdamped or Still
+        Of an overdamped motion ``estimates`` hold the rates, of a still one offset and noise alone.
     effects : tuple of Effect
     findings : tuple of Finding
         Gravest first.
@@ -107,7 +127,7 @@ class Analysis:
     scene: Scene
     params: Params
     conditioned: Conditioned
-    motion: Motion | NoOscillation
+    motion: Oscillation | Overdamped | Still
     effects: tuple[Effect, ...]
     findings: tuple[Finding, ...]
     estimates: Mapping[str, Estimate]
@@ -115,7 +135,7 @@ class Analysis:
     @property
     def flags(self) -> U8:
         """(n,) uint8: the final flags of every sample."""
-        return self.motion.demodulated.flags if isinstance(self.motion, Motion) else self.conditioned.flags
+        return self.motion.demodulated.flags if isinstance(self.motion, Oscillation) else self.conditioned.flags
 
     @property
     def quality(self) -> dict[str, int]:
@@ -124,7 +144,7 @@ class Analysis:
 
     @one_thread
     def smoothed(self) -> Smoothed:
-        """Position, velocity and acceleration at every sample with their uncertainties; worked out when asked for.
+        """Position, velocity and acceleration at every sample with their uncertainties; worked out when called.
 
         Raises
         ------
@@ -140,10 +160,30 @@ class Analysis:
         >>> bool(np.std(error) < 0.002 * 0.05 * 8.3)
         True
         """
-        if isinstance(self.motion, NoOscillation):
-            raise AnalysisError(f"there is no oscillation to smooth: {self.motion.why}")
         motion = self.motion
+        if not isinstance(motion, Oscillation):
+            raise AnalysisError(f"there is no oscillation to smooth: {motion.why}")
         return smooth(self.track, motion.demodulated, motion.phase, motion.rest, motion.disturbances)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Record:
+    """What every branch begins from."""
+
+    conditioned: Conditioned
+    scene: Scene
+    params: Params
+
+    def analysis(
+        self,
+        motion: Oscillation | Overdamped | Still,
+        effects: tuple[Effect, ...],
+        findings: tuple[Finding, ...],
+        estimates: Mapping[str, Estimate],
+    ) -> Analysis:
+        """Return the analysis with what one branch found."""
+        track = self.conditioned.track
+        return Analysis(track, self.scene, self.params, self.conditioned, motion, effects, findings, estimates)
 
 
 @one_thread
@@ -181,45 +221,54 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     if track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     conditioned = condition(track, params.condition)
-    cycles = find_cycles(conditioned, params.cycles)
-    stopped = False
-    share = 0.75 if isinstance(cycles, NoOscillation) else 0.25
-    if (moving := moving_part(conditioned, share)) is not None:
-        trimmed = find_cycles(moving, params.cycles)
-        stopped = not isinstance(trimmed, NoOscillation)
-        cycles = trimmed if stopped else cycles
-    if isinstance(cycles, NoOscillation):
-        return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or cycles)
-    demodulated = demodulate(conditioned, cycles, params.demodulate)
-    if (why := _no_sinusoid(conditioned, demodulated)) is not None:
-        return _still(track, scene, params, conditioned, find_relaxation(conditioned, params.relaxation) or why)
-    demodulated, disturbances = separate(conditioned, cycles, demodulated, params.disturbances, params.demodulate)
-    start = float(track.t[np.argmax(conditioned.used)])
-    damping = fit_damping(demodulated, start, params.damping)
-    solved = fit_motion(conditioned, demodulated, damping, params.motion, params.damping, stopped=stopped)
-    strong = damping.best.rate_at_start() > params.relaxation.least_damping * demodulated.angular_frequency
-    linear = not isinstance(solved, MotionFit) or solved.damping.selected == "linear"
-    if strong and linear and isinstance(relaxed := find_relaxation(conditioned, params.relaxation), Relaxation):
-        return _still(track, scene, params, conditioned, relaxed)
-    if isinstance(solved, MotionFit):
-        demodulated, disturbances = solved.windows(demodulated), Disturbances.nothing(conditioned)
-        damping, phase, rest = solved.damping, solved.phase(demodulated), solved.rest(demodulated)
-        waveform = solved.waveform
-    else:
-        phase = fit_phase(demodulated, damping, params.phase)
-        rest = fit_rest(demodulated)
-        waveform = reconstruct(disturbances.conditioned.track, demodulated, phase, rest)
-    full = None
-    if params.full is not None and not isinstance(solved, MotionFit):
-        # The record without modes and with their columns: as good as the whole record with them, for the columns span
-        # what was taken out. Values and intervals agree to rounding, and put_back serves both tiers.
-        extra = disturbances.columns(track.t)
-        full = fit_record(
-            disturbances.conditioned, demodulated, damping, phase, rest, waveform, extra=extra, params=params.full
-        )
-        demodulated = replace(demodulated, flags=full.flags)
-        damping, phase, rest, waveform = full.damping, full.phase, full.rest, full.waveform
-    rest, waveform = rest.stepping(disturbances.steps), waveform.with_disturbances(disturbances, track.t)
+    record = _Record(conditioned, scene, params)
+    windows = see_windows(conditioned, params.cycles, params.demodulate, params.disturbances, params.damping)
+    solved = _solve_equation(windows, params)
+    relaxed = None
+    if _may_be_overdamped(windows, solved, params):
+        relaxed = find_overdamped(conditioned, params.relaxation)
+    if isinstance(relaxed, Overdamped):
+        return _overdamped(record, relaxed)
+    if isinstance(windows, NoOscillation):
+        return _still(record, relaxed or windows)
+    if isinstance(solved, EquationFit):
+        return _oscillation(record, windows.cycles, by_equation(windows, solved), solved)
+    return _oscillation(record, windows.cycles, by_windows(windows, params.phase, params.full), solved)
+
+
+def _solve_equation(windows: Windows | NoOscillation, params: Params) -> EquationFit | EquationMisfit | None:
+    """Return the solution of the equation of motion that a strongly damped oscillation follows."""
+    if isinstance(windows, NoOscillation):
+        return None
+    return fit_equation(
+        windows.conditioned,
+        windows.demodulated,
+        windows.damping,
+        params.motion,
+        params.damping,
+        stopped=windows.stopped,
+    )
+
+
+def _may_be_overdamped(
+    windows: Windows | NoOscillation, solved: EquationFit | EquationMisfit | None, params: Params
+) -> bool:
+    """Whether no oscillation is seen, or one whose damping is strong and, as far as its equation was solved, linear."""
+    if isinstance(windows, NoOscillation):
+        return True
+    linear = not isinstance(solved, EquationFit) or solved.damping.selected == "linear"
+    return linear and windows.damping_ratio > params.relaxation.least_damping
+
+
+def _oscillation(
+    record: _Record, cycles: Cycles, fitted: Fitted, solved: EquationFit | EquationMisfit | None
+) -> Analysis:
+    """What follows from an oscillation, however it was fitted."""
+    track, scene, params = record.conditioned.track, record.scene, record.params
+    demodulated, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
+    disturbances = fitted.disturbances
+    rest = fitted.rest.stepping(disturbances.steps)
+    waveform = fitted.waveform.with_disturbances(disturbances, track.t)
     instrument = Instrument.of(track, u_crystal=params.derive.u_clock_nominal)
     effects = tabulate(
         scene,
@@ -232,58 +281,39 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     )
     derived = derive(demodulated, damping, phase, rest, scene, effects, instrument=instrument, params=params.derive)
     findings = by_severity(
-        judge(conditioned, cycles, demodulated, damping, phase, rest, waveform, disturbances),
+        judge(record.conditioned, cycles, demodulated, damping, phase, rest, waveform, disturbances),
         judge_scene(scene, effects),
-        () if full is None or full.converged else (_not_converged(full),),
-        () if solved is None else (_on_solution(solved),),
+        judge_fits(fitted.full, solved),
     )
-    motion = Motion(cycles, demodulated, damping, phase, rest, waveform, derived, disturbances, full)
-    return Analysis(track, scene, params, conditioned, motion, effects, findings, derived.estimates)
+    motion = Oscillation(cycles, demodulated, damping, phase, rest, waveform, derived, disturbances, fitted.full)
+    return record.analysis(motion, effects, findings, derived.estimates)
 
 
-def _not_converged(full: FullFit) -> Finding:
-    return Finding(
-        "not_converged",
-        "warning",
-        f"the fit of the whole waveform did not converge in {full.steps} Gauss-Newton steps from the windows' values; "
-        "these stand, as at standard accuracy",
-    )
+def _overdamped(record: _Record, found: Overdamped) -> Analysis:
+    """A motion that damping ends within a few cycles or without any."""
+    estimates = {**_at_rest(record), **found.estimates, **spring_constant(found, record.scene)}
+    return record.analysis(found, (), (judge_overdamped(found), *_on_samples(record)), estimates)
 
 
-def _on_solution(solved: MotionFit | MotionMisfit) -> Finding:
-    if isinstance(solved, MotionFit):
-        return Finding("strongly_damped", "info", solved.why)
-    return Finding("not_converged", "warning", solved.why)
+def _still(record: _Record, why: NoOscillation) -> Analysis:
+    """A record without any motion to fit."""
+    finding = Finding("no_oscillation", "error", why.why)
+    return record.analysis(Still(why.why), (), (finding, *_on_samples(record)), _at_rest(record))
 
 
-def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
-    """Why the motion is no oscillation although its spectrum has a peak: a step or a ramp has one too."""
-    most = demodulated.amplitude.size * 9 // 10
-    size = float(np.partition(demodulated.amplitude, most)[most])
-    left = demodulated.noise_m
-    if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
-        return NoOscillation("the distance does not follow the period that its spectrum shows")
-    if left > 0.15 * size and left > 4.0 * conditioned.noise_m:
-        return NoOscillation(
-            f"the distance moves, but not to and fro: a sinusoid of {size * 1e3:.3g} mm leaves {left * 1e3:.3g} mm"
-        )
-    return None
-
-
-def _still(track: Track, scene: Scene, params: Params, conditioned: Conditioned, why: NoOscillation) -> Analysis:
-    y = track.y[conditioned.used]
+def _at_rest(record: _Record) -> dict[str, Estimate]:
+    """Mean and noise of the samples used."""
+    y, noise_m = record.conditioned.track.y[record.conditioned.used], record.conditioned.noise_m
     if not y.size:
         raise AnalysisError("no usable sample is left; see the counts of flagged samples")
     # Where the distance steps or creeps, neighbours say the same: their number would make the mean look certain.
     u = float(np.std(y) * np.sqrt(correlation_length(y) / y.size))
-    estimates = {
-        "offset": Estimate(float(np.mean(y)), float(u), "m"),
-        "noise": Estimate(conditioned.noise_m, conditioned.noise_m / np.sqrt(2.0 * y.size), "m"),
+    return {
+        "offset": Estimate(float(np.mean(y)), u, "m"),
+        "noise": Estimate(noise_m, noise_m / np.sqrt(2.0 * y.size), "m"),
     }
-    if isinstance(why, Relaxation):
-        estimates = {**estimates, **why.estimates, **spring_constant(why, scene)}
-    findings = (
-        judge_still(why),
-        *judge_samples(conditioned, conditioned.flags, conditioned.noise_m),
-    )
-    return Analysis(track, scene, params, conditioned, why, (), findings, estimates)
+
+
+def _on_samples(record: _Record) -> tuple[Finding, ...]:
+    conditioned = record.conditioned
+    return judge_samples(conditioned, conditioned.flags, conditioned.noise_m)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.analyse import Motion, Params, analyse
+from pipeline.analyse import Oscillation, Params, analyse
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.track import F8, U8, Track
@@ -115,7 +115,7 @@ class MotionAccumulator:
             analysis = analyse(track, params=self._params)
         except AnalysisError as error:
             return NotYet(str(error))
-        if not isinstance(analysis.motion, Motion):
+        if not isinstance(analysis.motion, Oscillation):
             return NotYet(analysis.motion.why)
         found = analysis.estimates
         seconds = float(track.t[-1] - track.t[0])

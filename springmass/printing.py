@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pipeline.analyse import Analysis, Motion
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
 
@@ -47,7 +47,7 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str
     """
     rows = [("run", "period", "mass that swings", "spring constant", "residual / u")]
     for name, analysis, k, pull in zip(comparison.names, analyses, comparison.each, comparison.pulls, strict=True):
-        mass = analysis.motion.derived.effective_mass_kg if isinstance(analysis.motion, Motion) else None
+        mass = analysis.motion.derived.effective_mass_kg if isinstance(analysis.motion, Oscillation) else None
         period = str(analysis.estimates["period"])
         rows.append((name.encode("ascii", "replace").decode(), period, str(mass), str(k), f"{pull:+.1f}"))
     # Of constants that disagree there is no mean to give.

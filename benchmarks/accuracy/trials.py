@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.accuracy import params_for
-from pipeline.analyse import Motion, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.errors import PipelineError
 from pipeline.track import Track
 
@@ -102,7 +102,7 @@ def evaluate(job: tuple[Case, str, int]) -> Outcome:
     except Exception as error:  # a defect: it is counted and named like a refusal, so that the rest is measured
         return Outcome(f"{type(error).__name__}: {error}", nothing, nothing)
     motion = analysis.motion
-    if not isinstance(motion, Motion):
+    if not isinstance(motion, Oscillation):
         return Outcome(motion.why, nothing, nothing)
     # Phase and amplitude are those at the first sample used, which a false echo may put off.
     start = np.array([motion.damping.t0 - case.origin_s])

@@ -1,4 +1,4 @@
-"""Motion fit: strongly damped oscillations by their equation of motion, law by law, through every sample.
+"""The equation of motion: strongly damped oscillations by their equation of motion, law by law, through every sample.
 
 Amplitude laws are averages over a cycle, right to first order of the damping ratio. Where drag or friction takes a
 hundredth of the amplitude in a radian, or friction ends the motion within the record, an average over a cycle no longer
@@ -26,14 +26,14 @@ from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import U8, Quality
 
-__all__ = ["MotionFit", "MotionMisfit", "Params", "fit_motion", "moving_part"]
+__all__ = ["EquationFit", "EquationMisfit", "Params", "fit_equation", "moving_part"]
 
 STATE_UNITS = ("m", "m", "m/s", "rad/s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Options of :func:`fit_motion`.
+    """Options of :func:`fit_equation`.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Params:
 
 
 @dataclass(frozen=True, slots=True)
-class MotionMisfit:
+class EquationMisfit:
     """Why no solution of the equation of motion describes a strongly damped record.
 
     Parameters
@@ -66,7 +66,7 @@ class MotionMisfit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MotionFit:
+class EquationFit:
     """A strongly damped oscillation as a solution of its equation of motion.
 
     Parameters
@@ -144,7 +144,7 @@ def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
     return replace(conditioned, track=cut, flags=conditioned.flags[:stop])
 
 
-def fit_motion(
+def fit_equation(
     conditioned: Conditioned,
     demodulated: Demodulated,
     damping: Damping,
@@ -152,7 +152,7 @@ def fit_motion(
     laws: DampingParams | None = None,
     *,
     stopped: bool = False,
-) -> MotionFit | MotionMisfit | None:
+) -> EquationFit | EquationMisfit | None:
     """Fit the equation of motion where the damping requires it.
 
     Parameters
@@ -169,7 +169,7 @@ def fit_motion(
 
     Returns
     -------
-    MotionFit, MotionMisfit or None
+    EquationFit, EquationMisfit or None
         None where damping is weak or no law but none and linear drag is at hand, for which the amplitude's law is
         exact.
 
@@ -191,17 +191,17 @@ def fit_motion(
     search = Search.of(conditioned, demodulated, damping, params.clip_sigmas)
     search.clean()
     if not search.noise_m <= params.misfit * search.expected_m:
-        return MotionMisfit(
+        return EquationMisfit(
             f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err, and the equation of "
             f"motion with {LAWS[search.richest].words} leaves {search.noise_m * 1e3:.2g} mm where samples scatter by "
             f"{search.expected_m * 1e3:.2g} mm: the averaged law stands"
         )
     chosen = search.choose(laws)
     if chosen is None:
-        return MotionMisfit(f"the damping ratio is {ratio:.2g} at the start, and no fit of the equation converged")
+        return EquationMisfit(f"the damping ratio is {ratio:.2g} at the start, and no fit of the equation converged")
     found = _described(search, *chosen)
     if not found.damping.squared_rate(demodulated.t) < found.state["angular_frequency"].value ** 2:
-        return MotionMisfit(f"{found.why}; so strong a damping leaves no oscillation whose frequency could be given")
+        return EquationMisfit(f"{found.why}; so strong a damping leaves no oscillation whose frequency could be given")
     return found
 
 
@@ -216,7 +216,7 @@ def _required(damping: Damping, demodulated: Demodulated, ratio: float, params: 
     return ratio > params.least_damping or bool(last[0] <= 0.0)
 
 
-def _described(search: Search, damping: Damping, fit: least_squares.Fit) -> MotionFit:
+def _described(search: Search, damping: Damping, fit: least_squares.Fit) -> EquationFit:
     """Return the result at every sample."""
     theta = search.full(damping.selected, fit.values)
     every = search.model(np.ones(search.used.size, np.bool_))
@@ -237,4 +237,4 @@ def _described(search: Search, damping: Damping, fit: least_squares.Fit) -> Moti
         + (" and friction ends the motion within the record" if stops else "")
         + f": the equation of motion with {law} was fitted to the samples; it leaves {rms * 1e3:.2g} mm"
     )
-    return MotionFit(why, damping, state, Waveform(position, velocity, residual, rms), flags)
+    return EquationFit(why, damping, state, Waveform(position, velocity, residual, rms), flags)

@@ -12,18 +12,29 @@ import numpy as np
 from pipeline.damping.laws import LAWS
 from pipeline.damping.mixture import MixedDrag, find_mixed
 from pipeline.damping.select import Damping
-from pipeline.motion.overdamped.relaxation import Relaxation
+from pipeline.motion.equation_fit import EquationFit, EquationMisfit
+from pipeline.motion.overdamped.search import Overdamped
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.rest import Rest
 from pipeline.motion.waveform import Waveform
+from pipeline.motion.waveform_fit import FullFit
 from pipeline.oscillation.condition import Conditioned
-from pipeline.oscillation.cycles import Cycles, NoOscillation
+from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
 from pipeline.oscillation.echoes import Clusters, find_clusters
 from pipeline.track import U8, UNUSABLE, Quality
 
-__all__ = ["Finding", "Severity", "by_severity", "count_quality", "judge", "judge_samples", "judge_still"]
+__all__ = [
+    "Finding",
+    "Severity",
+    "by_severity",
+    "count_quality",
+    "judge",
+    "judge_fits",
+    "judge_overdamped",
+    "judge_samples",
+]
 
 GRAVITY_M_PER_S2 = 9.81
 COUNTED = {
@@ -85,24 +96,48 @@ def judge_samples(
     return tuple(_sample_findings(conditioned, flags, noise_m, clusters))
 
 
-def judge_still(why: NoOscillation) -> Finding:
-    """Return what is said of a record without cycles to analyse.
+def judge_overdamped(found: Overdamped) -> Finding:
+    """Return what is said of a motion that damping ends within a few cycles or without any.
 
     Parameters
     ----------
-    why : NoOscillation
-        Or the relaxation that was found instead.
+    found : Overdamped
     """
-    if not isinstance(why, Relaxation):
-        return Finding("no_oscillation", "error", why.why)
-    if why.kind == "strong":
+    if found.kind == "strong":
         return Finding(
             "strongly_damped",
             "info",
-            f"{why.why}; it was fitted as one solution of the equation of motion with linear drag, "
+            f"{found.why}; it was fitted as one solution of the equation of motion with linear drag, "
             "and no damping law was chosen",
         )
-    return Finding("overdamped", "warning", why.why)
+    return Finding("overdamped", "warning", found.why)
+
+
+def judge_fits(full: FullFit | None, solved: EquationFit | EquationMisfit | None) -> tuple[Finding, ...]:
+    """Return what is said of the fits of a whole record, the gravest first.
+
+    Parameters
+    ----------
+    full : FullFit or None
+        Of the waveform.
+    solved : EquationFit, EquationMisfit or None
+        Of the equation of motion.
+    """
+    findings = []
+    if full is not None and not full.converged:
+        findings.append(
+            Finding(
+                "not_converged",
+                "warning",
+                f"the fit of the whole waveform did not converge in {full.steps} Gauss-Newton steps from the windows' "
+                "values; these stand, as at standard accuracy",
+            )
+        )
+    if isinstance(solved, EquationFit):
+        findings.append(Finding("strongly_damped", "info", solved.why))
+    elif solved is not None:
+        findings.append(Finding("not_converged", "warning", solved.why))
+    return tuple(findings)
 
 
 def judge(

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.errors import AcquisitionError
-from pipeline.analyse import Motion
+from pipeline.analyse import Oscillation, Overdamped
 from pipeline.errors import PipelineError
-from pipeline.motion.overdamped.relaxation import Relaxation
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder
@@ -68,7 +67,7 @@ def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | No
         _print_text(analysed)
     if results is not None:
         _write(analysed, results)
-    if not isinstance(analysed.analysis.motion, (Motion, Relaxation)):
+    if not isinstance(analysed.analysis.motion, (Oscillation, Overdamped)):
         complain(f"{analysed.loaded.path}: no oscillation: {analysed.analysis.motion.why}")
         return UNREADABLE
     wrong = [f["code"] for f in analysed.result["findings"] if f["severity"] == "error"]

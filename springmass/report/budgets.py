@@ -7,8 +7,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.analyse import Analysis
-from pipeline.oscillation.cycles import NoOscillation
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.budget import Budget, Contribution
 from springmass.report.tables import QUANTITIES
 
@@ -71,7 +70,7 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
     ----------
     analysis : Analysis
     """
-    if isinstance(analysis.motion, NoOscillation):
+    if not isinstance(analysis.motion, Oscillation):
         return ()
     budgets = analysis.motion.derived.budgets
     rows = []
@@ -117,7 +116,7 @@ def budget_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
     heads = ["run", "quantity", "input", "type", "value", "u", "unit", "sensitivity", "contribution", "share"]
     writer.writerow(heads)
     for run, analysis in zip(names, analyses, strict=True):
-        if isinstance(analysis.motion, NoOscillation):
+        if not isinstance(analysis.motion, Oscillation):
             continue
         for quantity, budget in analysis.motion.derived.budgets.items():
             for c in budget.contributions:

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-from pipeline.analyse import Analysis, Motion
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.joint import JointDamping
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.cycles import NoOscillation
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
 from springmass.report.budgets import INPUTS, budgets_of
@@ -142,7 +141,7 @@ def _part(index: int, run: ReportRun, pictures: Mapping[str, bytes], quality: Ma
             {"name": name, "svg": inline_svg(svg, f"{name}{index}-"), "caption": caption(name, analysis)}
             for name, svg in pictures.items()
         ],
-        "laws": None if isinstance(motion, NoOscillation) else _laws(motion),
+        "laws": _laws(motion) if isinstance(motion, Oscillation) else None,
         "budgets": budgets_of(analysis),
         "effects": analysis.effects,
         "quality": [(_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in _ordered(quality)],
@@ -176,7 +175,7 @@ def _findings(analysis: Analysis) -> list[dict[str, str]]:
     ]
 
 
-def _laws(motion: Motion) -> dict[str, Any]:
+def _laws(motion: Oscillation) -> dict[str, Any]:
     damping = motion.damping
     units = {
         name: unit for fit in damping.fits.values() for name, unit in zip(fit.joint.names, fit.joint.units, strict=True)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.analyse import Analysis
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.errors import AnalysisError
 from pipeline.motion.smoother import Smoothed
-from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import UNUSABLE
 
 __all__ = ["COLUMNS", "motion_csv", "row_step", "smoothed_or_why"]
@@ -35,7 +34,7 @@ def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
     ----------
     analysis : Analysis
     """
-    if isinstance(analysis.motion, NoOscillation):
+    if not isinstance(analysis.motion, Oscillation):
         return "nothing oscillates"
     try:
         return analysis.smoothed()

@@ -7,10 +7,9 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.analyse import Analysis
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate, format_value
-from pipeline.oscillation.cycles import NoOscillation
 
 __all__ = [
     "QUANTITIES",
@@ -151,7 +150,7 @@ def results_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
     writer.writerow(["run", "name", "value", "u", "unit"])
     for run, analysis in zip(names, analyses, strict=True):
         everything = dict(analysis.estimates)
-        if not isinstance(analysis.motion, NoOscillation):
+        if isinstance(analysis.motion, Oscillation):
             for law, fit in analysis.motion.damping.fits.items():
                 everything |= {f"{law}.{name}": x for name, x in fit.joint.estimates().items()}
         for name, x in everything.items():
@@ -207,7 +206,7 @@ def law_status(damping: Damping, name: str) -> str:
 
 
 def _estimate(analysis: Analysis, name: str) -> Estimate | None:
-    if name in analysis.estimates or isinstance(analysis.motion, NoOscillation):
+    if name in analysis.estimates or not isinstance(analysis.motion, Oscillation):
         return analysis.estimates.get(name)
     return analysis.motion.derived.coefficients.get(name)
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.analyse import Analysis, Motion
-from pipeline.motion.overdamped.relaxation import Relaxation
+from pipeline.analyse import Analysis, Oscillation, Overdamped, Still
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.cycles import NoOscillation
 from springmass.report.figures.phase_plot import turn_step
 from springmass.report.figures.position import ZOOM_PERIODS, has_error_bars, is_long
 from springmass.report.motion_table import row_step
@@ -25,9 +23,9 @@ def kept(estimate: Estimate) -> str:
 
 def verdict(analysis: Analysis) -> str:
     """Return what became of the damping laws, in a sentence or a few."""
-    if isinstance(analysis.motion, Relaxation):
+    if isinstance(analysis.motion, Overdamped):
         return f"{analysis.motion.why[0].upper()}{analysis.motion.why[1:]}.".replace("+-", "±")
-    if isinstance(analysis.motion, NoOscillation):
+    if isinstance(analysis.motion, Still):
         return "Nothing oscillates in this record; rest position and noise are all that it gives."
     damping = analysis.motion.damping
     chosen = damping.best.law.words
@@ -59,9 +57,9 @@ def caption(name: str, analysis: Analysis) -> str:
         As in :data:`springmass.report.figures.MAKERS`.
     analysis : Analysis
     """
-    if isinstance(analysis.motion, Relaxation):
+    if isinstance(analysis.motion, Overdamped):
         return f"Distance from the sensor with the fitted relaxation. Samples scatter by {_sigma(analysis)}."
-    if isinstance(analysis.motion, NoOscillation):
+    if isinstance(analysis.motion, Still):
         return f"Distance from the sensor; nothing oscillates. Samples scatter by {_sigma(analysis)}."
     return _CAPTIONS[name](analysis, analysis.motion)
 
@@ -71,7 +69,7 @@ def _sigma(analysis: Analysis) -> str:
     return kept(Estimate(1e3 * noise.value, 1e3 * noise.u, "mm"))
 
 
-def _position(analysis: Analysis, _: Motion) -> str:
+def _position(analysis: Analysis, _: Oscillation) -> str:
     bars = "shown as error bars" if has_error_bars(analysis) else "too small for error bars to show"
     detail = f" Above the whole record, below its first {ZOOM_PERIODS} periods (shaded above)."
     return (
@@ -81,20 +79,20 @@ def _position(analysis: Analysis, _: Motion) -> str:
     )
 
 
-def _amplitude(_: Analysis, motion: Motion) -> str:
+def _amplitude(_: Analysis, motion: Oscillation) -> str:
     return (
         "Amplitude in windows of one period or a few, with one standard uncertainty u, and every law; "
         f"beneath, the residuals of the selected law, {motion.damping.selected}, over u."
     )
 
 
-def _phase(_: Analysis, motion: Motion) -> str:
+def _phase(_: Analysis, motion: Oscillation) -> str:
     step = turn_step(motion)
     every = f" One turn in {step} is drawn." if step > 1 else ""
     return f"Velocity against displacement from rest; colour tells the time.{every}"
 
 
-def _energy(_: Analysis, motion: Motion) -> str:
+def _energy(_: Analysis, motion: Oscillation) -> str:
     mass = motion.derived.effective_mass_kg
     of = f"the mass that oscillates, {kept(mass)}" if mass is not None else "one kilogram, as no mass was given"
     return (
@@ -104,7 +102,7 @@ def _energy(_: Analysis, motion: Motion) -> str:
     )
 
 
-def _drag(_: Analysis, motion: Motion) -> str:
+def _drag(_: Analysis, motion: Oscillation) -> str:
     friction = "; friction is left out" if "mu" in motion.damping.best.joint.names else ""
     return (
         "Drag coefficient against amplitude: what purely quadratic drag on the disc would need to take the energy that "
@@ -115,7 +113,7 @@ def _drag(_: Analysis, motion: Motion) -> str:
     )
 
 
-def _motion(analysis: Analysis, _: Motion) -> str:
+def _motion(analysis: Analysis, _: Oscillation) -> str:
     periods = f"the first {ZOOM_PERIODS} periods" if is_long(analysis) else "time"
     step = row_step(analysis)
     rows = "position, velocity and acceleration at every sample" if step == 1 else f"all three at one sample in {step}"
@@ -128,7 +126,7 @@ def _motion(analysis: Analysis, _: Motion) -> str:
     )
 
 
-_CAPTIONS: dict[str, Callable[[Analysis, Motion], str]] = {
+_CAPTIONS: dict[str, Callable[[Analysis, Oscillation], str]] = {
     "position": _position,
     "amplitude": _amplitude,
     "drag": _drag,

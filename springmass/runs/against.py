@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.analyse import Analysis, Motion
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem
 from pipeline.dynamics.band import Band
@@ -121,15 +121,15 @@ def duration_s(analysis: Analysis) -> float:
     return float(t[-1] - t[0])
 
 
-def _oscillation(analysis: Analysis) -> Motion:
-    if not isinstance(analysis.motion, Motion):
+def _oscillation(analysis: Analysis) -> Oscillation:
+    if not isinstance(analysis.motion, Oscillation):
         raise ProgramError(
             f"{analysis.motion.why}: nothing to lay a prediction over; name a run that oscillates", UNREADABLE
         )
     return analysis.motion
 
 
-def _covariance(motion: Motion) -> F8:
+def _covariance(motion: Oscillation) -> F8:
     """Covariance of frequency, phase, and the damping law's amplitude and coefficients."""
     phase, law = motion.phase, motion.damping.best.joint
     found = np.zeros((2 + len(law.names), 2 + len(law.names)))

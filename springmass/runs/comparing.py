@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.analyse import Motion
+from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.damping.joint import JointDamping, JointFit, fit_joint
 from pipeline.errors import AnalysisError
@@ -154,16 +154,16 @@ def comparison_json(
     }
 
 
-def _moving(name: str, analysed: Analysed) -> Motion:
+def _moving(name: str, analysed: Analysed) -> Oscillation:
     motion = analysed.analysis.motion
-    if not isinstance(motion, Motion):
+    if not isinstance(motion, Oscillation):
         raise AnalysisError(f"{name}: no oscillation to compare: {motion.why}")
     return motion
 
 
-def _of_one_bob(motions: list[tuple[str, Motion]], scenes: list[Scene]) -> list[list[tuple[str, Motion]]]:
+def _of_one_bob(motions: list[tuple[str, Oscillation]], scenes: list[Scene]) -> list[list[tuple[str, Oscillation]]]:
     """Groups of two runs and more with the same bob and disc: the laws' coefficients go as one over the mass."""
-    groups: dict[tuple[Estimate | None, Estimate | None], list[tuple[str, Motion]]] = {}
+    groups: dict[tuple[Estimate | None, Estimate | None], list[tuple[str, Oscillation]]] = {}
     for one, scene in zip(motions, scenes, strict=True):
         groups.setdefault((scene.bob_mass_kg, scene.disc_diameter_m), []).append(one)
     return [group for group in groups.values() if len(group) > 1]

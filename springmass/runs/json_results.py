@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from pipeline.analyse import Analysis, Motion
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.select import LawFit
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.budget import Contribution
@@ -121,7 +121,7 @@ def _quality(loaded: Loaded, analysis: Analysis) -> dict[str, int]:
 
 
 def _budgets(analysis: Analysis) -> dict[str, Any]:
-    if not isinstance(analysis.motion, Motion):
+    if not isinstance(analysis.motion, Oscillation):
         return {}
     return {
         name: {**estimate_json(budget.estimate), "inputs": [_contribution(c) for c in budget.contributions]}
@@ -144,7 +144,7 @@ def _contribution(c: Contribution) -> dict[str, Any]:
 
 
 def _damping(analysis: Analysis) -> dict[str, Any]:
-    if not isinstance(analysis.motion, Motion):
+    if not isinstance(analysis.motion, Oscillation):
         return _no_damping()
     damping = analysis.motion.damping
     return {

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pipeline.accuracy import TIERS, params_for
-from pipeline.analyse import Motion, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
@@ -99,7 +99,7 @@ def _tier(name: str, *, printed: bool = False) -> Callable[[Track], Found]:
 
     def run(track: Track) -> Found:
         analysis = analyse(track, params=params)
-        if not isinstance(analysis.motion, Motion):
+        if not isinstance(analysis.motion, Oscillation):
             raise AnalysisError(analysis.motion.why)
         if printed:
             return {key: analysis.estimates[key] for key in UNITS if key in analysis.estimates}

@@ -21,7 +21,7 @@ from acquisition.clock import SystemClock
 from acquisition.decoders.registry import families, get_family
 from acquisition.simulated.pseudo_terminal import VirtualPort
 from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
-from pipeline.analyse import Motion, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.streaming import NotYet
 from springmass import load
 from springmass.commands.record import _ProgressLine
@@ -77,7 +77,7 @@ def test_a_simulated_run_becomes_a_run_file_with_its_truth(cli: Callable, tmp_pa
     assert 295 <= len(loaded.samples) <= 310
     np.testing.assert_allclose(np.diff(loaded.samples.t), 0.01, atol=1e-9)
     motion = analyse(loaded.track).motion
-    assert isinstance(motion, Motion)
+    assert isinstance(motion, Oscillation)
     omega = motion.derived.statistical["angular_frequency"]
     assert abs(omega.value - OMEGA) < 4.0 * omega.u
     assert not (tmp_path / "run.wire").exists()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.accuracy import TIERS, params_for
-from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError, SceneError, TrackError
 from pipeline.track import Track
@@ -235,7 +235,7 @@ def test_no_fit_claims_more_than_it_knows(synthetic: ModuleType) -> None:
     t = synthetic.times(60.0)
     found = outcome(t, synthetic.noisy(truth, t, 3e-4, 1), "standard")
     assert isinstance(found, Analysis)
-    assert isinstance(found.motion, Motion)
+    assert isinstance(found.motion, Oscillation)
     for fit in found.motion.damping.fits.values():
         assert fit.converged or fit.rejected
         assert fit.rejected or all(estimate.u > 0 for estimate in fit.joint.estimates().values())

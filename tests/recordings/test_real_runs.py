@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.damping.mixture import find_mixed
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
@@ -48,9 +48,9 @@ def analysed_capstone(first_s: float = 0.0) -> Analysis:
     return analyse(Track.from_arrays(t[t >= first_s], y[t >= first_s]))
 
 
-def motion_of(result: Analysis) -> Motion:
+def motion_of(result: Analysis) -> Oscillation:
     """Return the motion of a record that has one."""
-    assert isinstance(result.motion, Motion)
+    assert isinstance(result.motion, Oscillation)
     return result.motion
 
 

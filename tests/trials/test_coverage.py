@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.accuracy import TIERS, params_for
-from pipeline.analyse import Motion, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.track import Track
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "100"))
@@ -37,7 +37,7 @@ def run(
         phase = float(np.random.default_rng((seed, 1)).uniform(-math.pi, math.pi))
         truth = synthetic.Truth(gamma=gamma, phase=phase)
         result = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), params=params_for(accuracy))
-        assert isinstance(result.motion, Motion)
+        assert isinstance(result.motion, Oscillation)
         linear = result.motion.damping.fits["linear"].joint
         found = {
             "period": (result.motion.derived.statistical["period"], truth.period),
@@ -130,7 +130,7 @@ def test_false_echoes_cost_little(synthetic: ModuleType, sigma_m: float, accurac
             motion = analyse(
                 Track.from_arrays(t, np.where(draw < share, echo, clean)), params=params_for(accuracy)
             ).motion
-            assert isinstance(motion, Motion)
+            assert isinstance(motion, Oscillation)
             linear = motion.damping.fits["linear"].joint
             start = truth.amplitude_at(np.array([motion.damping.t0]))[0]
             period = motion.derived.statistical["period"].value
@@ -157,7 +157,7 @@ def test_no_gross_failure_in_deep_noise(synthetic: ModuleType, decibel: float, a
             motion = analyse(
                 Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), params=params_for(accuracy)
             ).motion
-            gross += not isinstance(motion, Motion) or (
+            gross += not isinstance(motion, Oscillation) or (
                 abs(motion.derived.statistical["period"].value - truth.period) > 6.0 * bound
             )
         print(f"{accuracy}, {decibel:g} dB, {seconds:g} s: {gross} of {TRIALS} gross failures")

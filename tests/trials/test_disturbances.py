@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.analyse import Motion, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.track import Track
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "20"))
@@ -40,7 +40,7 @@ def motions(
     rho: float = 0.0,
     mode_m: float = 0.0,
     steps: tuple[float, ...] = (),
-) -> Iterator[tuple[Motion, float]]:
+) -> Iterator[tuple[Oscillation, float]]:
     """Yield the analyses of runs that differ in noise, phase and frequency, with the true periods."""
     t = synthetic.times(seconds)
     for seed in range(TRIALS):
@@ -51,7 +51,7 @@ def motions(
         for k, height_m in enumerate(steps):
             y += height_m * (t >= seconds * (k + 1 + rng.uniform(-0.3, 0.3)) / (len(steps) + 1))
         motion = analyse(Track.from_arrays(t, y)).motion
-        assert isinstance(motion, Motion)
+        assert isinstance(motion, Oscillation)
         yield motion, truth.period
 
 

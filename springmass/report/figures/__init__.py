@@ -11,9 +11,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from pipeline.analyse import Analysis
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.motion.smoother import Smoothed
-from pipeline.oscillation.cycles import NoOscillation
 from springmass.report.figures.amplitude import amplitude_figure
 from springmass.report.figures.canvas import render
 from springmass.report.figures.comparison import comparison_figure
@@ -57,7 +56,7 @@ def draw(analysis: Analysis, smoothed: Smoothed | str | None = None) -> dict[str
     smoothed : Smoothed or str, optional
         The run's ``smoothed()``, where it is at hand, or why there is none; left out, it is worked out.
     """
-    if isinstance(analysis.motion, NoOscillation):
+    if not isinstance(analysis.motion, Oscillation):
         return {"position": position_figure(analysis)}
     makers = dict(MAKERS)
     if isinstance(smoothed, str):

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.analyse import Analysis, Motion
-from pipeline.oscillation.cycles import NoOscillation
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.track import F8
 
 if TYPE_CHECKING:
@@ -141,9 +140,9 @@ def panels(
     return figure, axes
 
 
-def moving(analysis: Analysis) -> Motion:
+def moving(analysis: Analysis) -> Oscillation:
     """Return what moves; ValueError where nothing oscillates."""
-    if isinstance(analysis.motion, NoOscillation):
+    if not isinstance(analysis.motion, Oscillation):
         raise ValueError(f"only the position of this record can be drawn, nothing oscillates: {analysis.motion.why}")
     return analysis.motion
 
@@ -208,7 +207,7 @@ def error_bars(panel: Axes, t: F8, y: F8, u: F8, label: str) -> None:
     panel.errorbar(t, y, yerr=u, label=label, **look)
 
 
-def model_phase(motion: Motion, t: F8) -> tuple[F8, F8]:
+def model_phase(motion: Oscillation, t: F8) -> tuple[F8, F8]:
     """Fitted displacement and velocity at times t, m and m/s."""
     law, angle = motion.damping.best, motion.phase.total(t)
     amplitude = law.amplitude(t - motion.phase.t0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.analyse import Analysis, Motion
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.track import F8, UNUSABLE
 from springmass.report.figures.canvas import DENSE_POINTS, legend_above, model_phase, moving, panels, style
 
@@ -19,7 +19,7 @@ __all__ = ["measured_phase", "phase_figure", "turn_step"]
 LEAST_TURNS, MOST_TURNS = 4, 24  # drawn in a phase plot
 
 
-def turn_step(motion: Motion) -> int:
+def turn_step(motion: Oscillation) -> int:
     """Return one turn in how many the phase plot draws: the less the amplitude falls, the fewer turns."""
     amplitude = motion.demodulated.amplitude
     wanted = 32.0 * float(np.ptp(amplitude) / np.max(amplitude))
@@ -80,7 +80,7 @@ def phase_figure(analysis: Analysis) -> Figure:
         return figure
 
 
-def measured_phase(analysis: Analysis, motion: Motion) -> tuple[F8, F8, str]:
+def measured_phase(analysis: Analysis, motion: Oscillation) -> tuple[F8, F8, str]:
     """Return displacement and velocity of the samples used, NaN elsewhere, and in words where the velocity is from."""
     track = analysis.track
     used: NDArray[np.bool_] = (analysis.flags & UNUSABLE) == 0

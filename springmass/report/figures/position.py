@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipeline.analyse import Analysis, Motion
-from pipeline.motion.overdamped.relaxation import Relaxation
-from pipeline.oscillation.cycles import NoOscillation
+from pipeline.analyse import Analysis, Oscillation, Overdamped
 from pipeline.track import F8, UNUSABLE, Quality
 from springmass.report.figures.canvas import (
     BLUE,
@@ -48,13 +46,13 @@ VISIBLE_NOISE = 0.005  # of the panel's height; error bars of less vanish in the
 
 def is_long(analysis: Analysis) -> bool:
     """Return whether the position is drawn twice, whole and as a detail of the first periods."""
-    return isinstance(analysis.motion, Motion) and analysis.motion.cycles.count > LONG_PERIODS
+    return isinstance(analysis.motion, Oscillation) and analysis.motion.cycles.count > LONG_PERIODS
 
 
 def has_error_bars(analysis: Analysis) -> bool:
     """Return whether the samples' error bars are large enough to be seen, and drawn."""
     y = analysis.track.y[(analysis.flags & UNUSABLE) == 0]
-    return isinstance(analysis.motion, Motion) and bool(analysis.conditioned.noise_m > VISIBLE_NOISE * np.ptp(y))
+    return isinstance(analysis.motion, Oscillation) and bool(analysis.conditioned.noise_m > VISIBLE_NOISE * np.ptp(y))
 
 
 def position_figure(analysis: Analysis) -> Figure:
@@ -70,10 +68,10 @@ def position_figure(analysis: Analysis) -> Figure:
     track, motion = analysis.track, analysis.motion
     start, end = float(np.nanmin(track.t)), float(np.nanmax(track.t))
     with style():
-        if isinstance(motion, NoOscillation):
+        if not isinstance(motion, Oscillation):
             figure, (only,) = panels([(2.6, 0.0)])
             _draw_distance(only, analysis, start, end)
-            if isinstance(motion, Relaxation):
+            if isinstance(motion, Overdamped):
                 t, y = _relaxing(analysis, motion)
                 only.plot(t, y * 1e3, color="#000000", lw=0.9, label="fit", zorder=2.5)
             legend_above(only)
@@ -95,7 +93,7 @@ def position_figure(analysis: Analysis) -> Figure:
         return figure
 
 
-def _relaxing(analysis: Analysis, motion: Relaxation) -> tuple[F8, F8]:
+def _relaxing(analysis: Analysis, motion: Overdamped) -> tuple[F8, F8]:
     """Return times and distances of the relaxation with the rates found; its two amplitudes and rest are linear."""
     track, x = analysis.track, motion.estimates
     used = ((analysis.flags & UNUSABLE) == 0) & (track.t >= motion.start_s)
@@ -116,7 +114,7 @@ def _relaxing(analysis: Analysis, motion: Relaxation) -> tuple[F8, F8]:
     return grid, np.asarray(columns(grid) @ weights)
 
 
-def _draw_pair(axes: Sequence[Axes], analysis: Analysis, motion: Motion, start: float, end: float) -> None:
+def _draw_pair(axes: Sequence[Axes], analysis: Analysis, motion: Oscillation, start: float, end: float) -> None:
     """Draw distance and fit above, residual over noise beneath, between two times."""
     above, below = axes
     t = analysis.track.t
@@ -156,7 +154,7 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
             u = analysis.conditioned.noise_m * 1e3
             panel.vlines(track.t[used], y[used] - u, y[used] + u, color=SKY, lw=0.6, alpha=0.6)
     # What was clipped off is part of the motion: the axis holds the fit as well as the samples.
-    fit = analysis.motion.waveform.position[inside] * 1e3 if isinstance(analysis.motion, Motion) else y[used]
+    fit = analysis.motion.waveform.position[inside] * 1e3 if isinstance(analysis.motion, Oscillation) else y[used]
     shown = np.concatenate([y[used], fit[np.isfinite(fit)]])
     low, high = (float(np.min(shown)), float(np.max(shown))) if shown.size else (0.0, 1.0)
     margin = 0.1 * max(high - low, 6e3 * analysis.conditioned.noise_m, 1e-3)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.analyse import Analysis, Motion
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.motion.smoother import Smoothed
 from pipeline.track import F8
 from springmass.report.figures.canvas import (
@@ -77,7 +77,7 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
         return figure
 
 
-def _draw_samples(panel: Axes, analysis: Analysis, motion: Motion, start: float, end: float) -> None:
+def _draw_samples(panel: Axes, analysis: Analysis, motion: Oscillation, start: float, end: float) -> None:
     """Set beneath the velocity what samples alone say of it."""
     t = analysis.track.t
     _, velocity, label = measured_phase(analysis, motion)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.accuracy import TIERS, params_for
-from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.streaming import LiveMotion, MotionAccumulator
@@ -18,9 +18,9 @@ from pipeline.track import Quality, Track
 every_tier = pytest.mark.parametrize("accuracy", TIERS)
 
 
-def motion_of(result: Analysis) -> Motion:
+def motion_of(result: Analysis) -> Oscillation:
     """Return the motion of a record that oscillates."""
-    assert isinstance(result.motion, Motion)
+    assert isinstance(result.motion, Oscillation)
     return result.motion
 
 

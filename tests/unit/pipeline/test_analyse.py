@@ -15,11 +15,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from pipeline.accuracy import params_for
-from pipeline.analyse import Analysis, Motion, Params, analyse
+from pipeline.analyse import Analysis, Oscillation, Params, Still, analyse
 from pipeline.damping.select import Params as DampingParams
 from pipeline.errors import AnalysisError, PipelineError
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import Track
 
 TABLE = {
@@ -42,9 +41,9 @@ def run(synthetic: ModuleType, seconds: float = 10.0, sigma_m: float = 3e-4, see
     return analyse(Track.from_arrays(t, synthetic.noisy(synthetic.Truth(**truth), t, sigma_m, seed)))
 
 
-def motion_of(result: Analysis) -> Motion:
+def motion_of(result: Analysis) -> Oscillation:
     """Return the motion of a record that has one."""
-    assert isinstance(result.motion, Motion), result.motion
+    assert isinstance(result.motion, Oscillation), result.motion
     return result.motion
 
 
@@ -155,7 +154,7 @@ def test_what_does_not_oscillate_is_an_error_in_words(what: str) -> None:
     """There is no period, amplitude or damping of what does not oscillate: offset and noise only, and the reason."""
     t = np.arange(1000) / 100
     result = analyse(Track.from_arrays(t, STILL[what](t, np.random.default_rng(2))))
-    assert isinstance(result.motion, NoOscillation)
+    assert isinstance(result.motion, Still)
     assert set(result.estimates) == {"offset", "noise"}
     assert (result.findings[0].code, result.findings[0].severity) == ("no_oscillation", "error")
     assert result.findings[0].message == result.motion.why

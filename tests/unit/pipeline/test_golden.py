@@ -12,7 +12,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.analyse import Motion, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.bench.air import air_density, air_viscosity
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate, format_value
@@ -207,7 +207,7 @@ def test_chi_square_of_63_was_no_poor_fit(synthetic: ModuleType) -> None:
     assert 62.87862 / t.size == pytest.approx(0.0052, abs=5e-5)
     assert 62.87862 * (STATED_ERROR_M / 1e-4) ** 2 / t.size == pytest.approx(3.0, abs=0.05)
     motion = analyse(track).motion
-    assert isinstance(motion, Motion)
+    assert isinstance(motion, Oscillation)
     assert motion.damping.fits["linear"].rejection == "misfit"
     assert motion.damping.selected == "linear+quadratic"
 

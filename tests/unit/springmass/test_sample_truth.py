@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.track import Quality, Track
 
@@ -45,9 +45,9 @@ class Sample:
         return float(self.value("effective_mass") * mean)
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> Oscillation:
         """What was found to move."""
-        assert isinstance(self.result.motion, Motion)
+        assert isinstance(self.result.motion, Oscillation)
         return self.result.motion
 
     def share_flagged(self, rows: str, flag: Quality) -> float:

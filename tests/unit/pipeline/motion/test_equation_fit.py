@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.motion.equation_model import FreeMotion
 from pipeline.track import Track
@@ -84,7 +84,7 @@ def test_strong_damping_gives_law_spring_constant_and_coefficients(law: str, coe
     pulls, found = [], []
     for seed in range(8):
         result = analysed(coefficients, seed)
-        assert isinstance(result.motion, Motion)
+        assert isinstance(result.motion, Oscillation)
         damping = result.motion.damping
         assert "strongly_damped" in {finding.code for finding in result.findings}
         assert law in damping.admissible
@@ -143,7 +143,7 @@ def test_intervals_hold_under_strong_damping(law: str, coefficients: dict[str, f
         y = 0.3 + moved(coefficients.get("gamma", 0.0), coefficients.get("beta", 0.0), coefficients.get("mu", 0.0))
         y = y + 3e-4 * np.random.default_rng((seed, 5)).standard_normal(T.size)
         result = analyse(replace(Track.from_arrays(T, y), clock="device"), SPRING)
-        assert isinstance(result.motion, Motion)
+        assert isinstance(result.motion, Oscillation)
         # Without the scale's and the sound's uncertainties, which do not scatter from run to run.
         found = result.motion.derived.statistical | result.motion.damping.fits[law].joint.estimates()
         pulls.append([abs(found[name].value - x) / found[name].u for name, x in true.items()])
@@ -160,7 +160,7 @@ def test_friction_is_not_mistaken_for_a_drag_that_drives(ratio: float, seed: int
     y = 0.3 + moved(0.0, 0.0, ratio * OMEGA * START) + 3e-4 * np.random.default_rng((seed, 5)).standard_normal(T.size)
     result = analyse(Track.from_arrays(T, y))
     assert "strongly_damped" in {finding.code for finding in result.findings}
-    assert isinstance(result.motion, Motion)
+    assert isinstance(result.motion, Oscillation)
     assert result.motion.damping.selected == "friction"
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from pipeline.analyse import Motion, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.bench.scene import Scene
-from pipeline.motion.overdamped.relaxation import Relaxation, find_relaxation
+from pipeline.motion.overdamped.search import Overdamped, find_overdamped
 from pipeline.oscillation.condition import condition
 from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import Track
@@ -36,10 +36,10 @@ def track(y: np.ndarray, sigma_m: float, seed: int, t: np.ndarray = T) -> Track:
     return Track.from_arrays(t, 0.22 + y + sigma_m * np.random.default_rng(seed).standard_normal(t.size))
 
 
-def relaxed(y: np.ndarray, sigma_m: float, seed: int) -> Relaxation:
+def relaxed(y: np.ndarray, sigma_m: float, seed: int) -> Overdamped:
     """Return what is found in a record that is a relaxation."""
-    found = find_relaxation(condition(track(y, sigma_m, seed)))
-    assert isinstance(found, Relaxation)
+    found = find_overdamped(condition(track(y, sigma_m, seed)))
+    assert isinstance(found, Overdamped)
     return found
 
 
@@ -123,7 +123,7 @@ SHAPES = {
 def test_other_motions_are_no_relaxation(name: str, sigma_m: float) -> None:
     """Noise, steps, drifts, ramps and moves are never called overdamped, and give no rate."""
     for seed in range(2):
-        assert not isinstance(find_relaxation(condition(track(SHAPES[name], sigma_m, seed))), Relaxation)
+        assert not isinstance(find_overdamped(condition(track(SHAPES[name], sigma_m, seed))), Overdamped)
     if name != "weakly damped":
         result = analyse(track(SHAPES[name], sigma_m, 5))
         assert not any(name.startswith("relaxation") for name in result.estimates)
@@ -132,23 +132,23 @@ def test_other_motions_are_no_relaxation(name: str, sigma_m: float) -> None:
 
 def test_a_lone_exponential_is_named_but_not_believed() -> None:
     """One exponential may be the end of an overdamped motion or a drift: its rate is told in words, no estimate."""
-    found = find_relaxation(condition(track(0.02 * np.exp(-0.8 * T), 3e-4, 1)))
+    found = find_overdamped(condition(track(0.02 * np.exp(-0.8 * T), 3e-4, 1)))
     assert isinstance(found, NoOscillation)
-    assert not isinstance(found, Relaxation)
+    assert not isinstance(found, Overdamped)
     assert "one exponential, at 0.8" in found.why
 
 
 @pytest.mark.parametrize(("name", "sigma_m", "seed"), [("step", 2.39e-3, 1), ("early step", 2.39e-3, 0)])
 def test_a_fall_between_two_samples_has_no_rate(name: str, sigma_m: float, seed: int) -> None:
     """A step gives no rate above half the sampling rate, in words or as an estimate."""
-    assert find_relaxation(condition(track(SHAPES[name], sigma_m, seed))) is None
-    assert find_relaxation(condition(track(SHAPES["early step"], 3e-4, 2))) is None
+    assert find_overdamped(condition(track(SHAPES[name], sigma_m, seed))) is None
+    assert find_overdamped(condition(track(SHAPES["early step"], 3e-4, 2))) is None
 
 
 def test_an_analysis_says_what_it_found() -> None:
     """Overdamped records carry a finding with both rates, estimates and a spring constant, and no error."""
     result = analyse(track(released(1.5), 3e-4, 1), SPRING)
-    assert isinstance(result.motion, Relaxation)
+    assert isinstance(result.motion, Overdamped)
     (finding,) = (f for f in result.findings if f.code == "overdamped")
     assert finding.severity == "warning"
     assert str(result.estimates["relaxation_rate_slow"]) in finding.message
@@ -164,13 +164,13 @@ def test_the_spring_constant_is_that_of_the_undamped_motion(ratio: float) -> Non
     k = result.estimates["spring_constant"]
     assert k.value == pytest.approx(0.2 * OMEGA**2, abs=4.0 * k.u)
     assert ("strongly_damped" in {f.code for f in result.findings}) == (ratio > 0.05)
-    assert isinstance(result.motion, Motion) == (ratio < 0.05)
+    assert isinstance(result.motion, Oscillation) == (ratio < 0.05)
 
 
 def test_clean_and_short_records_do_no_harm() -> None:
     """Without noise the rates are exact; a dozen samples, equal ones, or none that move give nothing."""
-    found = find_relaxation(condition(Track.from_arrays(T, released(1.5))))
-    assert isinstance(found, Relaxation)
+    found = find_overdamped(condition(Track.from_arrays(T, released(1.5))))
+    assert isinstance(found, Overdamped)
     assert found.estimates["relaxation_rate_fast"].value == pytest.approx((1.5 + math.sqrt(1.25)) * OMEGA, rel=1e-6)
-    assert find_relaxation(condition(Track.from_arrays(T[:12], released(1.5)[:12]))) is None
-    assert find_relaxation(condition(Track.from_arrays(T, np.full(T.size, 0.2)))) is None
+    assert find_overdamped(condition(Track.from_arrays(T[:12], released(1.5)[:12]))) is None
+    assert find_overdamped(condition(Track.from_arrays(T, np.full(T.size, 0.2)))) is None

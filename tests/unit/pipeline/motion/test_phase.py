@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.damping.select import fit_damping
 from pipeline.motion.phase import PhaseFit, fit_phase
 from pipeline.oscillation.demodulate import Demodulated
@@ -26,11 +26,11 @@ def fitted(windows: Windows, t: np.ndarray, amplitude: np.ndarray, phase: np.nda
     return fit_phase(points, fit_damping(points, 0.0))
 
 
-def motion_of(synthetic: ModuleType, truth: object, sigma_m: float, seed: int, seconds: float = 120.0) -> Motion:
+def motion_of(synthetic: ModuleType, truth: object, sigma_m: float, seed: int, seconds: float = 120.0) -> Oscillation:
     """Return the motion found in a whole synthetic record."""
     t = synthetic.times(seconds)
     result: Analysis = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)))
-    assert isinstance(result.motion, Motion)
+    assert isinstance(result.motion, Oscillation)
     return result.motion
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.errors import AnalysisError
 from pipeline.motion.smoother import Params, smooth
 from pipeline.track import Track
@@ -149,7 +149,7 @@ def test_memory_shortens_where_the_motion_wanders(synthetic: ModuleType) -> None
     for seed in range(10):
         t, x, v = driven(synthetic, 60.0, 5e-6, seed)
         result = analyse(Track.from_arrays(t, x + 3e-4 * rng.standard_normal(t.size)))
-        assert isinstance(result.motion, Motion)
+        assert isinstance(result.motion, Oscillation)
         found = result.smoothed()
         assert found.memory_s < 10.0
         inside.append(np.mean(np.abs(found.velocity - v) <= found.u_velocity))
@@ -163,7 +163,7 @@ def test_record_that_follows_its_law_remembers_all_of_it(synthetic: ModuleType) 
     memories = []
     for seed in range(7):
         result = analysed(synthetic, 60.0, 3e-4, seed)
-        assert isinstance(result.motion, Motion)
+        assert isinstance(result.motion, Oscillation)
         found = result.smoothed()
         memories.append(found.memory_s)
         assert rms(found.velocity - result.motion.waveform.velocity) < 0.0015 * rms(found.velocity)
@@ -175,7 +175,7 @@ def test_long_records_have_nodes_further_apart(synthetic: ModuleType) -> None:
     """Fewer nodes than four a period give nearly the same velocity."""
     result = analysed(synthetic, 60.0, 3e-4)
     motion = result.motion
-    assert isinstance(motion, Motion)
+    assert isinstance(motion, Oscillation)
     few = smooth(result.track, motion.demodulated, motion.phase, motion.rest, params=Params(most_nodes=60))
     many = result.smoothed()
     assert rms(few.velocity - many.velocity) < 0.3 * rms(many.u_velocity)
@@ -188,7 +188,7 @@ def test_what_does_not_oscillate_has_no_velocity(synthetic: ModuleType) -> None:
         still.smoothed()
     result = analysed(synthetic, 10.0, 3e-4)
     motion = result.motion
-    assert isinstance(motion, Motion)
+    assert isinstance(motion, Oscillation)
     spoilt = replace(motion.demodulated, flags=np.full(1000, 2, np.uint8))
     with pytest.raises(AnalysisError, match="eight usable samples"):
         smooth(result.track, spoilt, motion.phase, motion.rest)

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from pipeline.accuracy import params_for
-from pipeline.analyse import Motion, Params, analyse
+from pipeline.analyse import Oscillation, Params, analyse
 from pipeline.motion.waveform_fit import FullFit, fit_record
 from pipeline.motion.waveform_fit import Params as FullParams
 from pipeline.track import Quality, Track
 
 
-def best(t: np.ndarray, y: np.ndarray) -> tuple[Motion, FullFit]:
+def best(t: np.ndarray, y: np.ndarray) -> tuple[Oscillation, FullFit]:
     """Return the motion and the full fit of a record."""
     result = analyse(Track.from_arrays(t, y), params=params_for("best"))
-    assert isinstance(result.motion, Motion)
+    assert isinstance(result.motion, Oscillation)
     assert result.motion.full is not None
     return result.motion, result.motion.full
 
@@ -27,7 +27,7 @@ def refit(t: np.ndarray, y: np.ndarray, extra: np.ndarray | None) -> FullFit:
     """Return the full fit from the stages' results, with extra columns."""
     result = analyse(Track.from_arrays(t, y))
     m = result.motion
-    assert isinstance(m, Motion)
+    assert isinstance(m, Oscillation)
     return fit_record(result.conditioned, m.demodulated, m.damping, m.phase, m.rest, m.waveform, extra=extra)
 
 
@@ -151,7 +151,7 @@ def test_samples_put_out_by_a_narrow_window_come_back(synthetic: ModuleType) -> 
     t = synthetic.times(40.0)
     result = analyse(Track.from_arrays(t, synthetic.noisy(synthetic.Truth(gamma=0.01), t, 3e-4, 7)))
     m = result.motion
-    assert isinstance(m, Motion)
+    assert isinstance(m, Oscillation)
     flags = m.demodulated.flags.copy()
     flags[100:3900:50] |= np.uint8(Quality.FALSE_ECHO)
     found = fit_record(result.conditioned, replace(m.demodulated, flags=flags), m.damping, m.phase, m.rest, m.waveform)

@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.analyse import Motion, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.oscillation.condition import Conditioned, condition
 from pipeline.oscillation.cycles import Cycles, find_cycles
 from pipeline.oscillation.demodulate import Demodulated, demodulate
@@ -138,8 +138,8 @@ def test_amplitudes_scatter_less_without_the_mode(synthetic: ModuleType) -> None
     clean = synthetic.noisy(truth, t, 1e-4, 1)
     beating = analyse(Track.from_arrays(t, clean + 1e-3 * np.cos(5.0 * t))).motion
     alone = analyse(Track.from_arrays(t, clean)).motion
-    assert isinstance(beating, Motion)
-    assert isinstance(alone, Motion)
+    assert isinstance(beating, Oscillation)
+    assert isinstance(alone, Oscillation)
     assert beating.disturbances.modelled
     assert beating.derived.statistical["period"].u < 1.3 * alone.derived.statistical["period"].u
     assert beating.waveform.rms_m < 1.05 * alone.waveform.rms_m

@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.analyse import Motion, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.condition import condition
 from pipeline.oscillation.cycles import Cycles, find_cycles
@@ -81,8 +81,8 @@ def test_analysis_follows_steps(synthetic: ModuleType) -> None:
     clean = synthetic.noisy(truth, t, 3e-4, 1)
     jumps = 1.5e-3 * (t >= 20.0) - 1e-3 * (t >= 41.0)
     motion, alone = (analyse(Track.from_arrays(t, y)).motion for y in (clean + jumps, clean))
-    assert isinstance(motion, Motion)
-    assert isinstance(alone, Motion)
+    assert isinstance(motion, Oscillation)
+    assert isinstance(alone, Oscillation)
     assert len(motion.rest.steps) == 2
     assert not motion.rest.drifts
     assert motion.rest.moves

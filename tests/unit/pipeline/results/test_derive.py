@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from uncertainties import ufloat, umath
 
-from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping.select import Damping, fit_damping
@@ -251,7 +251,7 @@ def test_noise_of_a_normal_record(synthetic: ModuleType) -> None:
     t = synthetic.times(10)
     for seed in range(60):
         result: Analysis = analyse(Track.from_arrays(t, synthetic.noisy(synthetic.Truth(), t, 3e-4, seed)))
-        assert isinstance(result.motion, Motion)
+        assert isinstance(result.motion, Oscillation)
         noise = result.estimates["noise"]
         inside.append(abs(noise.value - 3e-4) <= noise.u)
     assert 0.5 <= np.mean(inside) <= 0.87

@@ -15,11 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Motion, analyse
+from pipeline.analyse import Analysis, Oscillation, Overdamped, Still, analyse
 from pipeline.bench.scene import Scene
-from pipeline.motion.overdamped.relaxation import Relaxation
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.cycles import NoOscillation
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.results.findings import Finding
@@ -224,7 +222,7 @@ def test_the_law_of_the_figure_is_the_motion_itself() -> None:
 def test_a_record_that_cannot_be_smoothed_says_so(tmp_path: Path) -> None:
     """Its page has a sentence in the figure's place, and a table of an earlier report is taken away."""
     motion = bare().motion
-    assert isinstance(motion, Motion)
+    assert isinstance(motion, Oscillation)
     flags = np.full_like(motion.demodulated.flags, int(UNUSABLE))
     blind = dataclasses.replace(
         bare(), motion=dataclasses.replace(motion, demodulated=dataclasses.replace(motion.demodulated, flags=flags))
@@ -244,7 +242,7 @@ def test_csv_holds_every_estimate_and_every_law() -> None:
     """The CSV gives back each number to its last digit."""
     rows = list(csv.DictReader(io.StringIO(results_csv(["a, b"], [damped()]))))
     motion = damped().motion
-    assert isinstance(motion, Motion)
+    assert isinstance(motion, Oscillation)
     expected = dict(damped().estimates)
     for law, fit in motion.damping.fits.items():
         expected |= {f"{law}.{name}": x for name, x in fit.joint.estimates().items()}
@@ -267,7 +265,7 @@ def test_tex_is_balanced_and_states_uncertainties_in_parentheses() -> None:
 def test_budget_tables_hold_every_input() -> None:
     """The CSV gives back every contribution; the page and the LaTeX table those of a thousandth and more."""
     motion = damped().motion
-    assert isinstance(motion, Motion)
+    assert isinstance(motion, Oscillation)
     budgets = motion.derived.budgets
     rows = list(csv.DictReader(io.StringIO(budget_csv(["a"], [damped()]))))
     assert [(row["quantity"], row["input"]) for row in rows] == [
@@ -338,7 +336,7 @@ def test_json_is_strict(tmp_path: Path) -> None:
 
 def test_a_run_without_oscillation_gives_a_report_too(tmp_path: Path) -> None:
     """Its report has the position alone, says why, and takes away figures that an earlier one left."""
-    assert isinstance(still().motion, NoOscillation)
+    assert isinstance(still().motion, Still)
     written(tmp_path, run_of(bare()))
     page = written(tmp_path, run_of(still()))
     assert {name for name in files_in(tmp_path) if "figures" in name} == {
@@ -363,7 +361,7 @@ def test_a_relaxation_is_drawn_with_its_fit(shape: Any) -> None:
     t = np.arange(1000) / 100
     rng = np.random.default_rng(2)
     analysis = analyse(Track.from_arrays(t, 0.3 + shape(t) + 3e-4 * rng.standard_normal(t.size)))
-    assert isinstance(analysis.motion, Relaxation)
+    assert isinstance(analysis.motion, Overdamped)
     (fit,) = [line for line in draw(analysis)["position"].axes[0].lines if line.get_label() == "fit"]
     x, y = np.asarray(fit.get_xdata()), np.asarray(fit.get_ydata())
     assert np.max(np.abs(y - 1e3 * (0.3 + shape(x)))) < 0.3
@@ -429,7 +427,7 @@ def test_text_table_is_ascii_and_fits_the_terminal() -> None:
 def test_a_law_that_fails_is_never_called_selected_alone() -> None:
     """Where every law is rejected the least bad one is called so."""
     motion = damped().motion
-    assert isinstance(motion, Motion)
+    assert isinstance(motion, Oscillation)
     name = motion.damping.selected
     assert law_status(motion.damping, name) == "selected"
     fits = {law: dataclasses.replace(fit, rejection="misfit") for law, fit in motion.damping.fits.items()}

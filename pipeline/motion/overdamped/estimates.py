@@ -1,4 +1,4 @@
-"""What a relaxation tells: rates, frequencies and the spring constant with their uncertainties."""
+"""What an overdamped motion tells: rates, frequencies and the spring constant with their uncertainties."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.motion.overdamped.decay_fit import DecayFit
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.cycles import NoOscillation
 
-__all__ = ["Kind", "Relaxation", "described", "spring_constant"]
+__all__ = ["Kind", "Overdamped", "described", "spring_constant"]
 
 Kind = Literal["overdamped", "critical", "strong"]
 
 
 @dataclass(frozen=True, slots=True)
-class Relaxation(NoOscillation):
+class Overdamped:
     """A motion that damping ends within a few cycles or without any.
 
     Parameters
@@ -39,6 +38,7 @@ class Relaxation(NoOscillation):
         From where the motion was followed, s.
     """
 
+    why: str
     kind: Kind
     damping_ratio: Estimate
     squared_frequency: Estimate
@@ -46,7 +46,7 @@ class Relaxation(NoOscillation):
     start_s: float
 
 
-def described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: float) -> Relaxation:
+def described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: float) -> Overdamped:
     """Return what a fit tells.
 
     Parameters
@@ -81,7 +81,7 @@ def described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: fl
             f"the motion relaxes without oscillating, at {found['relaxation_rate']}: "
             "within its noise it is critically damped, with one rate"
         )
-        return Relaxation(why, kind, Estimate(1.0, 0.0), squared, found, start_s)
+        return Overdamped(why, kind, Estimate(1.0, 0.0), squared, found, start_s)
     squared = estimate(stiffness, (0.0, 0.0, 0.0, 0.0, 1.0), "rad^2/s^2", 2)
     ratio = estimate(rate / natural, (0.0, 0.0, 0.0, 1.0 / natural, -0.5 * rate / natural**3), "")
     if kind == "overdamped":
@@ -94,7 +94,7 @@ def described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: fl
     else:
         _add_oscillation(found, fit, estimate)
         why = f"the oscillation is strongly damped: its damping ratio is {ratio}"
-    return Relaxation(why, kind, ratio, squared, found, start_s)
+    return Overdamped(why, kind, ratio, squared, found, start_s)
 
 
 class Estimator(Protocol):
@@ -127,7 +127,7 @@ def _add_oscillation(found: dict[str, Estimate], fit: DecayFit, estimate: Estima
     found["quality_factor"] = estimate(quality, (0.0, 0.0, 0.0, -quality / rate, 0.25 / (natural * rate)), "")
 
 
-def spring_constant(found: Relaxation, scene: Scene) -> dict[str, Estimate]:
+def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
     """Return the spring constant, N/m, by name; nothing where the scene gives no bob mass.
 
     Notes

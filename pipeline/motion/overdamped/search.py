@@ -1,4 +1,4 @@
-"""Relaxation: records in which damping ends the motion before, or almost before, it can oscillate."""
+"""Overdamped motion: records in which damping ends the motion before, or almost before, it can oscillate."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.motion.overdamped.decay_fit import DecayFit, best_decay, critical_decay, lone_exponential
-from pipeline.motion.overdamped.other_shapes import other_shapes
-from pipeline.motion.overdamped.relaxation_estimates import Kind, Relaxation, described, spring_constant
+from pipeline.motion.overdamped.estimates import Kind, Overdamped, described, spring_constant
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import F8
 
-__all__ = ["Params", "Relaxation", "find_relaxation", "spring_constant"]
+__all__ = ["Overdamped", "Params", "find_overdamped", "spring_constant"]
 
 FEWEST = 20  # samples in which five parameters can be looked for
 POINTS = 300  # to which a record is averaged where models of its shape are compared
@@ -23,7 +22,7 @@ POINTS = 300  # to which a record is averaged where models of its shape are comp
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Options of :func:`find_relaxation`.
+    """Options of :func:`find_overdamped`.
 
     Parameters
     ----------
@@ -43,7 +42,7 @@ class Params:
     u_clock: float = 50e-6 / math.sqrt(3.0)
 
 
-def find_relaxation(conditioned: Conditioned, params: Params | None = None) -> Relaxation | NoOscillation | None:
+def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> Overdamped | NoOscillation | None:
     """Fit the free motion of a linearly damped bob, and tell which kind of damping it shows.
 
     Parameters
@@ -53,7 +52,7 @@ def find_relaxation(conditioned: Conditioned, params: Params | None = None) -> R
 
     Returns
     -------
-    Relaxation, NoOscillation or None
+    Overdamped, NoOscillation or None
         NoOscillation says that the record is a lone exponential, which a drift looks like too. None where it is no
         relaxation: noise, a drift, a step, a ramp, a weakly damped oscillation.
 
@@ -100,7 +99,7 @@ def _starts(y: F8, noise: float) -> Iterator[int]:
         yield int(held[-1])
 
 
-def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params) -> Relaxation | NoOscillation | None:
+def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params) -> Overdamped | NoOscillation | None:
     tau = t - t[0]
     fit = best_decay(tau, y, noise, conditioned.track.rate_hz)
     if fit is None or not fit.rate * tau[-1] > 2.0 or _misses(tau, y, fit, params.misfit):
@@ -132,8 +131,44 @@ def _beats_other_shapes(tau: F8, y: F8, fit: DecayFit, noise: float, evidence: f
     t, values, model = (x[:whole].reshape(-1, size).mean(axis=1) for x in (tau, y, fit.position(tau)))
     sigma = max(noise, fit.noise) / math.sqrt(size)
     mine = float(np.sum((values - model) ** 2)) / sigma**2 + 5.0 * math.log(t.size)
-    others = min(left / sigma**2 + count * math.log(t.size) for left, count in other_shapes(t, values))
+    others = min(left / sigma**2 + count * math.log(t.size) for left, count in _other_shapes(t, values))
     return mine + evidence < others
+
+
+def _other_shapes(t: F8, y: F8) -> Iterator[tuple[float, int]]:
+    """Fit polynomials to the third degree, every step and every ramp.
+
+    Parameters
+    ----------
+    t, y : (n,) float64
+        Ascending times from 0, s, and distances, m.
+
+    Yields
+    ------
+    left : float
+        Squares that a shape leaves, m^2; of the steps, and of each degree, the best.
+    count : int
+        Its parameters.
+    """
+    x = 2.0 * t / t[-1] - 1.0
+    for degree in range(4):
+        yield _left(np.polynomial.legendre.legvander(x, degree), y), degree + 1
+    n = t.size
+    splits = np.arange(3, n - 3)
+    total, squares = np.cumsum(y), float(y @ y)
+    before, after = total[splits - 1] ** 2 / splits, (total[-1] - total[splits - 1]) ** 2 / (n - splits)
+    yield squares - float(np.max(before + after)), 3
+    knots = np.linspace(t[0], t[-1], 26)
+    for i, first in enumerate(knots[:-1]):
+        for last in knots[i + 1 :]:
+            ramp = np.clip((t - first) / (last - first), 0.0, 1.0)
+            yield _left(np.stack([np.ones(n), ramp], axis=1), y), 4
+
+
+def _left(design: F8, y: F8) -> float:
+    values = np.linalg.lstsq(design, y, rcond=None)[0]
+    residual: F8 = y - design @ values
+    return float(np.sum(residual**2))
 
 
 def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float) -> tuple[Kind, DecayFit] | NoOscillation | None:

@@ -1,0 +1,166 @@
+"""Kinds of motion: whether a record oscillates, and the oscillation as the fit for its kind has it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.damping.select import Damping, fit_damping
+from pipeline.damping.select import Params as DampingParams
+from pipeline.motion.equation_fit import EquationFit, moving_part
+from pipeline.motion.phase import Params as PhaseParams
+from pipeline.motion.phase import PhaseFit, fit_phase
+from pipeline.motion.rest import Rest, fit_rest
+from pipeline.motion.waveform import Waveform, reconstruct
+from pipeline.motion.waveform_fit import FullFit, fit_record
+from pipeline.motion.waveform_fit import Params as WaveformParams
+from pipeline.oscillation.condition import Conditioned
+from pipeline.oscillation.cycles import Cycles, NoOscillation, find_cycles
+from pipeline.oscillation.cycles import Params as CyclesParams
+from pipeline.oscillation.demodulate import Demodulated, demodulate
+from pipeline.oscillation.demodulate import Params as DemodulateParams
+from pipeline.oscillation.disturbances import Disturbances, separate
+from pipeline.oscillation.disturbances import Params as DisturbancesParams
+
+__all__ = ["Fitted", "Windows", "by_equation", "by_windows", "see_windows"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Windows:
+    """What the windows of an oscillating record show.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+        The whole record.
+    cycles, demodulated, disturbances, damping
+        Outputs of the stages of those names.
+    stopped : bool
+        Whether friction stopped the bob within the record.
+    """
+
+    conditioned: Conditioned
+    cycles: Cycles
+    demodulated: Demodulated
+    disturbances: Disturbances
+    damping: Damping
+    stopped: bool
+
+    @property
+    def damping_ratio(self) -> float:
+        """Of the selected law at the first sample."""
+        return self.damping.best.rate_at_start() / self.demodulated.angular_frequency
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """An oscillation, as the stages after the fit take it.
+
+    Parameters
+    ----------
+    demodulated : Demodulated
+        With the final flags.
+    disturbances : Disturbances
+        What was taken out of the record before.
+    damping, phase, rest, waveform
+        Of the record without it.
+    full : FullFit or None
+        The fit of the whole waveform, where there was one.
+    """
+
+    demodulated: Demodulated
+    disturbances: Disturbances
+    damping: Damping
+    phase: PhaseFit
+    rest: Rest
+    waveform: Waveform
+    full: FullFit | None = None
+
+
+def see_windows(
+    conditioned: Conditioned,
+    cycles: CyclesParams,
+    demodulation: DemodulateParams,
+    separation: DisturbancesParams,
+    damping: DampingParams,
+) -> Windows | NoOscillation:
+    """Return period, amplitudes and laws of damping, or why the record has none.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    cycles, demodulation, separation, damping
+        Options of the stages.
+    """
+    seen, stopped = _see_cycles(conditioned, cycles)
+    if isinstance(seen, NoOscillation):
+        return seen
+    demodulated = demodulate(conditioned, seen, demodulation)
+    if (why := _no_sinusoid(conditioned, demodulated)) is not None:
+        return why
+    demodulated, disturbances = separate(conditioned, seen, demodulated, separation, demodulation)
+    start = float(conditioned.track.t[np.argmax(conditioned.used)])
+    return Windows(conditioned, seen, demodulated, disturbances, fit_damping(demodulated, start, damping), stopped)
+
+
+def _see_cycles(conditioned: Conditioned, params: CyclesParams) -> tuple[Cycles | NoOscillation, bool]:
+    """Return the cycles, of the moving part where the bob stops early, and whether it does."""
+    cycles = find_cycles(conditioned, params)
+    moving = moving_part(conditioned, 0.75 if isinstance(cycles, NoOscillation) else 0.25)
+    if moving is None or isinstance(trimmed := find_cycles(moving, params), NoOscillation):
+        return cycles, False
+    return trimmed, True
+
+
+def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
+    """Why the motion is no oscillation although its spectrum has a peak: a step or a ramp has one too."""
+    most = demodulated.amplitude.size * 9 // 10
+    size = float(np.partition(demodulated.amplitude, most)[most])
+    left = demodulated.noise_m
+    if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
+        return NoOscillation("the distance does not follow the period that its spectrum shows")
+    if left > 0.15 * size and left > 4.0 * conditioned.noise_m:
+        return NoOscillation(
+            f"the distance moves, but not to and fro: a sinusoid of {size * 1e3:.3g} mm leaves {left * 1e3:.3g} mm"
+        )
+    return None
+
+
+def by_windows(windows: Windows, phases: PhaseParams, waveforms: WaveformParams | None) -> Fitted:
+    """Return a weakly damped oscillation: amplitude, phase and rest position against time.
+
+    Parameters
+    ----------
+    windows : Windows
+    phases, waveforms
+        Options of :func:`pipeline.motion.phase.fit_phase` and of the fit of the whole waveform, None for no such fit.
+    """
+    demodulated, damping, disturbances = windows.demodulated, windows.damping, windows.disturbances
+    phase, rest = fit_phase(demodulated, damping, phases), fit_rest(demodulated)
+    waveform = reconstruct(disturbances.conditioned.track, demodulated, phase, rest)
+    if waveforms is None:
+        return Fitted(demodulated, disturbances, damping, phase, rest, waveform)
+    # The record without modes and with their columns: as good as the whole record with them, for the columns span
+    # what was taken out.
+    extra = disturbances.columns(windows.conditioned.track.t)
+    full = fit_record(
+        disturbances.conditioned, demodulated, damping, phase, rest, waveform, extra=extra, params=waveforms
+    )
+    demodulated = replace(demodulated, flags=full.flags)
+    return Fitted(demodulated, disturbances, full.damping, full.phase, full.rest, full.waveform, full)
+
+
+def by_equation(windows: Windows, solved: EquationFit) -> Fitted:
+    """Return a strongly damped oscillation: one solution of the equation of motion.
+
+    Parameters
+    ----------
+    windows : Windows
+    solved : EquationFit
+    """
+    demodulated = solved.windows(windows.demodulated)
+    phase, rest = solved.phase(demodulated), solved.rest(demodulated)
+    # The equation was fitted to the whole record.
+    nothing = Disturbances.nothing(windows.conditioned)
+    return Fitted(demodulated, nothing, solved.damping, phase, rest, solved.waveform)
