@@ -214,7 +214,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     >>> rng = np.random.default_rng(1)
     >>> y = 0.2 + 0.05 * np.exp(-0.01 * t) * np.cos(8.3 * t) + 1e-4 * rng.standard_normal(1000)
     >>> print(analyse(Track.from_arrays(t, y)).estimates["period"])  # 2 pi / 8.3 = 0.757010
-    0.757011 +- 0.000022 s
+    0.757010 +- 0.000022 s
     """
     track.demand_length()
     scene, params = scene or Scene(), params or Params()

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.damping.evidence import BARE_MENTION
-from pipeline.damping.laws import LAWS
+from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import Damping, LawFit
-from pipeline.motion.phase import PhaseFit, amplitude_integral
+from pipeline.motion.phase import PhaseFit, amplitude_integral, backbone_unit, wrapped
 from pipeline.motion.rest import Rest
 from pipeline.motion.waveform import Waveform
-from pipeline.motion.waveform_model import Normal, Record, State, accumulate, scores
-from pipeline.motion.waveform_results import refined_phase, refined_rest, refined_waveform
-from pipeline.numerics.estimate import Joint
-from pipeline.numerics.regression import correlation_length
-from pipeline.numerics.robust import mad_sigma
+from pipeline.motion.waveform_model import Record, State, WaveformModel
+from pipeline.motion.waveform_samples import Chooser, Rows
+from pipeline.numerics import least_squares
+from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.regression import correlation_length, solve_weighted
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.track import F8, UNUSABLE, Quality
+from pipeline.track import F8, UNUSABLE, Quality, Track
 
 __all__ = ["FullFit", "Params", "fit_record"]
 
 FEW_WINDOWS = 4  # below which the amplitudes of windows select no law
+PRECISION = 1e-3  # of the standard uncertainties, that may be left
+STEADY = 1e-4  # share of the samples that may still come or go; one at the limit moves nothing by a tenth of its u
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +43,7 @@ class Params:
     rounds : int
         Most rounds of clipping and fitting again.
     steps : int
-        Most Gauss-Newton steps of a fit.
+        Most evaluations of the model in one fit.
     """
 
     clip_sigmas: float = 4.0
@@ -55,9 +58,9 @@ class FullFit:
     Parameters
     ----------
     converged : bool
-        Where it is False the stages' own results stand and nothing below but ``steps`` means anything.
-    steps : int
-        Gauss-Newton steps taken by the selected law's fit.
+        Where it is False the stages' own results stand and nothing below but ``tried`` means anything.
+    tried : str
+        How the selected law's fit ended, in words for a finding.
     damping : Damping
         The laws that were admissible and the linear one, with parameters of the full fit; the others as before.
     phase : PhaseFit
@@ -72,7 +75,7 @@ class FullFit:
     """
 
     converged: bool
-    steps: int
+    tried: str
     damping: Damping
     phase: PhaseFit
     rest: Rest
@@ -84,19 +87,37 @@ class FullFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solved:
+    """One law fitted to the samples used."""
+
+    record: Record
     state: State
-    normal: Normal
-    weights: F8
-    steps: int
-    converged: bool
+    model: WaveformModel
+    rows: Rows
+    fit: least_squares.Fit
 
     @property
     def dof(self) -> float:
-        return max(float(np.sum(self.weights)) - self.normal.right.size, 1.0)
+        """Samples less parameters, the linear ones too."""
+        return max(float(np.count_nonzero(self.rows) - self.size), 1.0)
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return int(self.fit.values.size + self.record.basis.shape[1])
 
     @property
     def noise_m(self) -> float:
-        return math.sqrt(self.normal.squares / self.dof)
+        """Root mean square of what is left, m."""
+        return math.sqrt(self.fit.cost / self.dof)
+
+    def amplitude(self) -> F8:
+        """Amplitude at every sample of the record (n,), m."""
+        return self.state.law.amplitude(self.record.elapsed, self.state.theta)
+
+    def position(self) -> F8:
+        """Distance at every sample of the record (n,), m, less the record's level."""
+        linear = self.record.basis @ self.model.linear(self.state.values)
+        return np.asarray(linear + self.state.position(self.record.elapsed, self.record.tau))
 
 
 def fit_record(
@@ -128,9 +149,9 @@ def fit_record(
     Notes
     -----
     The model is :math:`y = L c + A(t; \\theta) \\cos\\bigl(\\varphi + \\omega\\tau + \\kappa \\int A^p\\bigr)` with
-    time counted from the middle of the record, where frequency and phase are not correlated. Gauss-Newton steps are
-    taken in all parameters together; those of the linear columns are exact, which is variable projection [1]_. Steps
-    that raise the sum of squares are halved.
+    time counted from the middle of the record, where frequency and phase are not correlated. A drifting rest position
+    and further columns enter linearly and are projected out (:class:`pipeline.motion.waveform_model.WaveformModel`);
+    a constant one is a parameter like the others.
 
     Residuals beyond four standard deviations (from their median) leave, and the fit is repeated until no sample
     changes. Beneath a clipped plateau samples are taken or left by the model, not by their own noise: those that the
@@ -138,240 +159,196 @@ def fit_record(
 
     Where residuals are not white the covariance is that of the sums of score over whole periods, correlation
     between neighbours included, if it exceeds the white one significantly.
-
-    References
-    ----------
-    .. [1] G. Golub, V. Pereyra, "Separable nonlinear least squares", Inverse Problems 19 (2003) R1,
-       doi:10.1088/0266-5611/19/2/201.
     """
     params = params or Params()
-    record = _record(conditioned, demodulated, phase, rest, extra)
-    base = (conditioned.flags & UNUSABLE) == 0
-    weights = (base & ((demodulated.flags & UNUSABLE) == 0)).astype(np.float64)
+    record = Record.of(conditioned, demodulated, phase, rest, extra)
+    chooser = Chooser(conditioned, demodulated, record, params.clip_sigmas)
+    area_of = functools.partial(_area, record, damping.best, phase)
     if demodulated.t.size < FEW_WINDOWS:
-        damping, solved = _select_short(record, weights, demodulated, damping, phase, params)
+        damping, start = _select_short(record, chooser.by_windows, demodulated, damping, phase, params)
     else:
-        solved = _solve(record, _start(record, damping.best, phase), weights, params)
-        if solved.converged and solved.state.area is not None:
-            # The backbone's column was the windows' law's: once more with the amplitudes found.
-            joint = replace(damping.best.joint, values=solved.state.theta)
-            area = _area(record, replace(damping.best, joint=joint), phase)
-            solved = _solve(record, replace(solved.state, area=area), weights, params)
-    if solved.converged:
-        solved = _clipped(record, conditioned, demodulated, solved, base, params)
-    if not solved.converged:
-        return FullFit(False, solved.steps, damping, phase, rest, waveform, demodulated.flags, demodulated.noise_m, {})
+        theta = damping.best.joint.values
+        area = area_of(theta) if phase.coefficients.size == 3 else None
+        start = _state(record, damping.best.law, theta, phase.coefficients, area, phase.exponent)
+    solved = _settled(record, chooser, start, area_of, params)
+    if isinstance(solved, str):
+        noise_m = demodulated.noise_m
+        return FullFit(False, solved, damping, phase, rest, waveform, demodulated.flags, noise_m, {})
+    covariance, factors = _covariance(solved, demodulated)
     fits = dict(damping.fits)
     # The one exponential too, for it is what everyone compares with, admissible or not.
     for name in {damping.selected, *damping.admissible, "linear"} & fits.keys():
-        own = solved if name == damping.selected else _other_law(record, fits[name], solved, params)
-        if own.converged:
-            fits[name] = replace(fits[name], joint=_law_joint(record, own, demodulated), converged=True)
+        if name == damping.selected:
+            fits[name] = _with_joint(fits[name], solved, covariance)
+            continue
+        start = solved.state.with_law(fits[name].law, fits[name].joint.values)
+        own = _solve(record, start, solved.rows, params)
+        if own.fit.converged:
+            fits[name] = _with_joint(fits[name], own, _covariance(own, demodulated)[0])
     damping = replace(damping, fits=fits)
-    return _finish(record, conditioned, demodulated, damping, phase, rest, solved)
-
-
-def _record(
-    conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit, rest: Rest, extra: F8 | None
-) -> Record:
-    track = conditioned.track
-    known = np.isfinite(track.y) & np.isfinite(track.t)
-    t = np.where(np.isfinite(track.t), track.t, phase.middle)
-    last = float(np.max(track.t[conditioned.used]))
-    level = rest.mean.value
-    order = min(6, demodulated.t.size // 4 - 1) if rest.drifts else 0
-    columns = np.empty((len(track), 0)) if extra is None else np.asarray(extra, np.float64)
-    return Record(
-        np.clip(t, phase.t0, last) - phase.t0,
-        t - phase.middle,
-        np.where(known, track.y, level) - level,
-        level,
-        order,
-        float(np.max(np.abs(t - phase.middle))),
-        columns,
+    return FullFit(
+        True,
+        solved.fit.tried,
+        damping,
+        _refined_phase(phase, damping, demodulated, solved.state, covariance),
+        _refined_rest(solved, rest, phase.middle, covariance),
+        _refined_waveform(solved, conditioned.track),
+        _flags(conditioned, chooser, solved),
+        solved.noise_m,
+        dict(zip(solved.state.names, factors.tolist(), strict=True)),
     )
 
 
-def _start(record: Record, fit: LawFit, phase: PhaseFit) -> State:
-    area = _area(record, fit, phase) if phase.coefficients.size == 3 else None
-    return State(
-        fit.law, fit.joint.values.copy(), phase.coefficients.copy(), np.zeros(record.linear_count), area, phase.exponent
-    )
+def _state(
+    record: Record, law: Law, theta: F8, turning: F8, area: tuple[F8, F8] | None = None, exponent: float = 2.0
+) -> State:
+    constant = record.order == 0
+    return State(law, np.concatenate([theta, turning, [0.0] * constant]), constant, area, exponent)
 
 
-def _area(record: Record, fit: LawFit, phase: PhaseFit) -> tuple[F8, F8]:
+def _area(record: Record, fit: LawFit, phase: PhaseFit, theta: F8) -> tuple[F8, F8]:
+    """Return the backbone's column with these parameters of the law."""
     last = phase.t0 + float(record.elapsed.max())
+    fit = replace(fit, joint=replace(fit.joint, values=theta))
     return amplitude_integral(fit, phase.t0, phase.middle, phase.t0, last, phase.exponent)
 
 
-def _solve(record: Record, state: State, weights: F8, params: Params) -> _Solved:
-    """Gauss-Newton to a thousandth of the standard uncertainties."""
-    with np.errstate(all="ignore"):
-        normal = accumulate(record, state, weights)
-    dof = max(float(np.sum(weights)) - normal.right.size, 1.0)
-    for taken in range(1, params.steps + 1):
-        if not (np.isfinite(normal.matrix).all() and np.isfinite(normal.right).all()):
-            return _Solved(state, normal, weights, taken, False)
-        step = _pseudo_inverse(normal.matrix) @ normal.right
-        expected = float(step @ normal.right)
-        if not math.isfinite(expected):
-            return _Solved(state, normal, weights, taken, False)
-        small = expected <= 1e-6 * normal.squares / dof or expected <= 1e-20 * float(record.y @ record.y)
-        for _ in range(8):
-            with np.errstate(all="ignore"):
-                trial_state = state.moved(step)
-                trial = accumulate(record, trial_state, weights)
-            if math.isfinite(trial.squares) and trial.squares <= normal.squares * (1.0 + 1e-12):
-                state, normal = trial_state, trial
-                break
-            if small:
-                return _Solved(state, normal, weights, taken, True)
-            step = 0.5 * step
-        else:
-            return _Solved(state, normal, weights, taken, False)
-        if small:
-            return _Solved(state, normal, weights, taken, True)
-    return _Solved(state, normal, weights, params.steps, False)
+def _solve(record: Record, state: State, rows: Rows, params: Params) -> _Solved:
+    model = WaveformModel(record, state, rows)
+    options = least_squares.Params(precision=PRECISION, steps=params.steps, again=False)
+    fit = least_squares.minimise(model.residuals, state.values, model.jacobian, options)
+    return _Solved(record, replace(state, values=fit.values), model, rows, fit)
 
 
-def _pseudo_inverse(matrix: F8) -> F8:
-    """Inverse of a normal matrix; directions that the record does not show are left where they are."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    kept = values > 1e-13
-    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
-    return np.asarray(inverse / np.outer(scale, scale))
-
-
-def _clipped(
-    record: Record,
-    conditioned: Conditioned,
-    demodulated: Demodulated,
-    solved: _Solved,
-    base: NDArray[np.bool_],
-    params: Params,
-) -> _Solved:
-    """Fit again without what lies off the model, until no sample changes."""
-    steps = solved.steps
-    echo = (demodulated.flags & np.uint8(Quality.FALSE_ECHO)) != 0
-    # Samples that a window's narrow spread or a neighbour's spike put out may come back; those in clusters may not.
-    run = np.convolve(echo, np.ones(3), "same") == 3
-    cluster = np.convolve(run, np.ones(3), "same") > 0
-    told = (conditioned.track.flags & UNUSABLE) != 0
-    others = (demodulated.flags & UNUSABLE & ~np.uint8(Quality.FALSE_ECHO)) != 0
-    candidates = (base | (echo & ~told & ~others)) & ~cluster
+def _settled(
+    record: Record, chooser: Chooser, state: State, area_of: Callable[[F8], tuple[F8, F8]], params: Params
+) -> _Solved | str:
+    """Fit, and again where other samples than those lie on the model, until they stay; or say how that failed."""
+    rows, state = chooser.settled(state, chooser.by_windows)
     for _ in range(params.rounds):
-        residual = solved.normal.residual
-        spread = mad_sigma(residual[candidates])
-        kept = candidates & ~conditioned.near_plateau(record.y - residual + record.level, demodulated.noise_m)
-        if spread > 1.5 * demodulated.noise_m:
-            # What the model leaves is not noise alone: the windows' own verdict on each sample stands.
-            kept &= solved.weights > 0
-        else:
-            kept &= np.abs(residual) <= params.clip_sigmas * spread
-        weights = kept.astype(np.float64)
-        if np.array_equal(weights, solved.weights):
+        if np.count_nonzero(rows) < 2 * (state.values.size + record.basis.shape[1]):
+            return f"only {np.count_nonzero(rows)} samples lie on the model"
+        if state.area is not None:
+            # The backbone's column was that of the windows' amplitudes.
+            state = replace(state, area=area_of(state.theta))
+        solved = _solve(record, state, rows, params)
+        if not solved.fit.converged:
+            return solved.fit.tried
+        chosen, state = chooser.settled(solved.state, rows)
+        if np.count_nonzero(chosen != rows) <= STEADY * rows.size:
             break
-        if np.count_nonzero(kept) < 2 * solved.normal.right.size:
-            return replace(solved, converged=False)
-        solved = _solve(record, solved.state, weights, params)
-        steps += solved.steps
-        if not solved.converged:
-            break
-    return replace(solved, steps=steps)
-
-
-def _other_law(record: Record, fit: LawFit, solved: _Solved, params: Params) -> _Solved:
-    """Another law, from its own start and the selected one's phase and rest position."""
-    state = replace(solved.state, law=fit.law, theta=fit.joint.values.copy())
-    return _solve(record, state, solved.weights, params)
+        rows = chosen
+    return solved
 
 
 def _select_short(
-    record: Record, weights: F8, demodulated: Demodulated, damping: Damping, phase: PhaseFit, params: Params
-) -> tuple[Damping, _Solved]:
+    record: Record, rows: Rows, demodulated: Demodulated, damping: Damping, phase: PhaseFit, params: Params
+) -> tuple[Damping, State]:
     """A record of so few periods shows damping or none: both are fitted to the waveform, and BIC decides."""
     fits: dict[str, LawFit] = {}
-    solutions: dict[str, _Solved] = {}
+    states: dict[str, State] = {}
     amplitude = float(demodulated.amplitude[0])
     rate = float(demodulated.decay[0])
     elapsed = float(demodulated.t[0]) - damping.t0
     starts = {"none": np.array([amplitude]), "linear": np.array([amplitude * math.exp(rate * elapsed), rate])}
     for name, theta in starts.items():
         law = LAWS[name]
-        state = State(law, theta, phase.coefficients[:2].copy(), np.zeros(record.linear_count))
-        solved = _solve(record, state, weights, params)
-        if not solved.converged:
+        solved = _solve(record, _state(record, law, theta, phase.coefficients[:2]), rows, params)
+        if not solved.fit.converged:
             continue
-        solutions[name] = solved
-        count = float(np.sum(weights))
-        size = solved.normal.right.size
+        states[name] = solved.state
+        count = float(np.count_nonzero(rows))
         # Sums of squares are compared at the noise of the fuller model, as a test of chi-square would.
         joint = Joint(law.parameters, solved.state.theta, np.zeros((theta.size, theta.size)), law.units)
-        bic = count * math.log(max(solved.normal.squares, 1e-300) / count) + size * math.log(count)
+        bic = count * math.log(max(solved.fit.cost, 1e-300) / count) + solved.size * math.log(count)
         fits[name] = LawFit(law, joint, 1.0, solved.dof, bic, True, "")
     if not fits:
-        return damping, solved
+        return damping, solved.state
     least = min(fit.bic for fit in fits.values())
     selected = next(name for name in starts if name in fits and fits[name].bic - least < BARE_MENTION)
     admissible = tuple(name for name in fits if fits[name].bic - least <= 6.0)
-    return replace(damping, fits=fits, selected=selected, admissible=admissible), solutions[selected]
+    return replace(damping, fits=fits, selected=selected, admissible=admissible), states[selected]
 
 
-def _covariance(record: Record, solved: _Solved, demodulated: Demodulated) -> tuple[F8, F8]:
-    """Covariance of all parameters, and the factors by which residuals that are not white widened it."""
-    inverse = _pseudo_inverse(solved.normal.matrix)
-    white = inverse * solved.noise_m**2
-    factors = np.ones(white.shape[0])
-    period = max(round(record.tau.size / max(demodulated.t.size, 1)), 1)
-    starts = np.arange(0, record.tau.size, period, dtype=np.int64)
-    u = np.sqrt(np.diag(white))
+def _covariance(solved: _Solved, demodulated: Demodulated) -> tuple[F8, F8]:
+    """Covariance of the parameters, and the factors by which residuals that are not white widened it."""
+    inverse, u = solved.fit.covariance, np.sqrt(np.diag(solved.fit.covariance)) * solved.noise_m
+    factors = np.ones(u.size)
+    count = solved.record.tau.size
+    period = max(round(count / max(demodulated.t.size, 1)), 1)
+    starts = np.arange(0, count, period, dtype=np.int64)
     if starts.size >= 2 * FEW_WINDOWS and np.all(u > 0):
-        pulls = scores(record, solved.state, solved.weights, starts) @ inverse / u
-        for k in range(factors.size):
-            squares = pulls[:, k] ** 2
+        scores = np.zeros((count, u.size))
+        scores[solved.rows] = solved.model.jacobian(solved.state.values) * solved.fit.residual[:, None]
+        pulls = np.add.reduceat(scores, starts, axis=0) @ inverse / u
+        for k, pull in enumerate(pulls.T):
+            squares = pull**2
             ratio = float(squares.sum())
             independent = ratio**2 / max(float(squares @ squares), 1e-300)
             significant = ratio > 1.0 + 3.3 * math.sqrt(2.0 / max(independent, 1.0))
-            factors[k] = math.sqrt((ratio if significant else 1.0) * correlation_length(pulls[:, k]))
-    return white * np.outer(factors, factors), factors
+            factors[k] = math.sqrt((ratio if significant else 1.0) * correlation_length(pull))
+    return inverse * solved.noise_m**2 * np.outer(factors, factors), factors
 
 
-def _law_joint(record: Record, solved: _Solved, demodulated: Demodulated) -> Joint:
-    law, p = solved.state.law, solved.state.theta.size
-    covariance, _ = _covariance(record, solved, demodulated)
-    return Joint(law.parameters, solved.state.theta, covariance[:p, :p], law.units)
+def _with_joint(fit: LawFit, solved: _Solved, covariance: F8) -> LawFit:
+    law, theta = solved.state.law, solved.state.theta
+    joint = Joint(law.parameters, theta, covariance[: theta.size, : theta.size], law.units)
+    return replace(fit, joint=joint, converged=True)
 
 
-def _finish(
-    record: Record,
-    conditioned: Conditioned,
-    demodulated: Demodulated,
-    damping: Damping,
-    phase: PhaseFit,
-    rest: Rest,
-    solved: _Solved,
-) -> FullFit:
-    state = solved.state
-    covariance, factors = _covariance(record, solved, demodulated)
-    p, turns = state.theta.size, state.turning.size
-    names = (*state.law.parameters, "phase", "angular_frequency", "backbone")[: p + turns] + tuple(
-        f"linear{k}" for k in range(state.linear.size)
-    )
+def _flags(conditioned: Conditioned, chooser: Chooser, solved: _Solved) -> NDArray[np.uint8]:
+    """Flags with those of the samples that left the fit."""
     flags = conditioned.flags.copy()
-    left = (conditioned.flags & UNUSABLE) == 0
-    left &= solved.weights == 0
-    crest = left & conditioned.near_plateau(record.y - solved.normal.residual + record.level, demodulated.noise_m)
+    out = ((flags & UNUSABLE) == 0) & ~solved.rows
+    crest = out & chooser.on_plateau(solved.position())
     flags[crest] |= np.uint8(Quality.CLIPPED)
-    flags[left & ~crest] |= np.uint8(Quality.FALSE_ECHO)
-    return FullFit(
-        True,
-        solved.steps,
-        damping,
-        refined_phase(phase, damping, demodulated, state, covariance[p : p + turns, p : p + turns]),
-        refined_rest(record, rest, phase.middle, state.linear, covariance[p + turns :, p + turns :]),
-        refined_waveform(record, conditioned.track, state, solved.noise_m),
-        flags,
-        solved.noise_m,
-        dict(zip(names, factors.tolist(), strict=True)),
+    flags[out & ~crest] |= np.uint8(Quality.FALSE_ECHO)
+    return flags
+
+
+def _refined_phase(
+    phase: PhaseFit, damping: Damping, demodulated: Demodulated, state: State, covariance: F8
+) -> PhaseFit:
+    """Return the phase with the full fit's values; the frequency reported is the record's mean here too."""
+    first = state.theta.size
+    covariance = covariance[first : first + state.turning.size, first : first + state.turning.size]
+    before = np.array([phase.t0 - phase.middle])
+    gradient = np.array([1.0, before[0], 0.0])[: state.turning.size]
+    omega = Estimate(float(state.turning[1]), math.sqrt(covariance[1, 1]), "rad/s")
+    backbone = None
+    if state.area is not None:
+        gradient[2] = float(np.interp(before, *state.area)[0])
+        backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), backbone_unit(phase.exponent))
+        tau = demodulated.t - phase.middle
+        u = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
+        line = solve_weighted(np.stack([np.ones(tau.size), tau], axis=1), state.angle(tau), u)
+        omega = Estimate(float(line.values[1]), phase.angular_frequency.u, "rad/s")
+    u_start = math.sqrt(float(gradient @ covariance @ gradient))
+    return replace(
+        phase,
+        angular_frequency=omega,
+        phase=Estimate(wrapped(float(state.angle(before)[0])), u_start, "rad"),
+        backbone=backbone,
+        coefficients=state.turning,
+        damping=damping,
     )
+
+
+def _refined_rest(solved: _Solved, rest: Rest, middle: float, covariance: F8) -> Rest:
+    """Return the rest position with the full fit's constant or curve."""
+    if solved.state.constant:
+        mean = solved.record.level + float(solved.state.values[-1])
+        return replace(rest, mean=Estimate(mean, math.sqrt(covariance[-1, -1]), "m"), curve=np.full(rest.t.size, mean))
+    curve = solved.record.curve(rest.t - middle, solved.model.linear(solved.state.values))
+    return replace(rest, curve=curve, drift_m=float(np.ptp(curve)))
+
+
+def _refined_waveform(solved: _Solved, track: Track) -> Waveform:
+    """Return the model at every sample; its velocity is that of the oscillation, without drift and extra columns."""
+    state, amplitude = solved.state, solved.amplitude()
+    position = solved.record.level + solved.position()
+    angle, rate = state.angle(solved.record.tau), state.turning[1]
+    if state.area is not None:
+        rate = rate + state.turning[2] * np.abs(amplitude) ** state.exponent
+    velocity = -state.law.rate(amplitude, state.theta) * np.cos(angle) - amplitude * rate * np.sin(angle)
+    return Waveform(position, velocity, track.y - position, solved.noise_m)

@@ -129,8 +129,8 @@ def judge_fits(full: FullFit | None, solved: EquationFit | EquationMisfit | None
             Finding(
                 "not_converged",
                 "warning",
-                f"the fit of the whole waveform did not converge in {full.steps} Gauss-Newton steps from the windows' "
-                "values; these stand, as at standard accuracy",
+                f"the fit of the whole waveform did not converge from where the windows arrived: "
+                f"{full.tried}; the windows' values stand, as at standard accuracy",
             )
         )
     if isinstance(solved, EquationFit):

@@ -12,6 +12,7 @@ from pipeline.accuracy import params_for
 from pipeline.analyse import Oscillation, Params, analyse
 from pipeline.motion.waveform_fit import FullFit, fit_record
 from pipeline.motion.waveform_fit import Params as FullParams
+from pipeline.results.findings import judge_fits
 from pipeline.track import Quality, Track
 
 
@@ -121,29 +122,33 @@ def test_a_drifting_rest_position_is_followed(synthetic: ModuleType) -> None:
     np.testing.assert_allclose(motion.rest.curve, truth.offset + np.interp(motion.rest.t, t, drift), atol=2e-4)
 
 
-def test_a_fit_that_does_not_converge_is_told(synthetic: ModuleType) -> None:
-    """With one step allowed the windows' values stand, and a finding says that and what was tried."""
+def test_a_fit_that_does_not_converge_is_said_so(synthetic: ModuleType) -> None:
+    """From a frequency off by ten line widths, in one step, nothing converges: the windows' values stand."""
+    t = synthetic.times(20.0)
+    result = analyse(Track.from_arrays(t, synthetic.noisy(synthetic.Truth(gamma=0.01), t, 3e-4, 5)))
+    m = result.motion
+    assert isinstance(m, Oscillation)
+    off = replace(m.phase, coefficients=m.phase.coefficients + np.array([0.0, 3.0]))
+    found = fit_record(
+        result.conditioned, m.demodulated, m.damping, off, m.rest, m.waveform, params=FullParams(steps=1)
+    )
+    assert not found.converged
+    assert found.phase is off
+    assert found.waveform is m.waveform
+    (finding,) = judge_fits(found, None)
+    assert (finding.code, finding.severity) == ("not_converged", "warning")
+    assert "no minimum in" in finding.message
+
+
+def test_too_few_samples_on_the_model_are_no_fit(synthetic: ModuleType) -> None:
+    """With a limit that no sample keeps the windows' values stand, and a finding says why."""
     t = synthetic.times(20.0)
     track = Track.from_arrays(t, synthetic.noisy(synthetic.Truth(gamma=0.01), t, 3e-4, 5))
-    hurried = analyse(track, params=Params(full=FullParams(steps=1)))
+    narrow = analyse(track, params=Params(full=FullParams(clip_sigmas=0.0)))
     standard = analyse(track, params=params_for("standard"))
-    (finding,) = [f for f in hurried.findings if f.code == "not_converged"]
-    assert finding.severity == "warning"
-    assert "1 Gauss-Newton steps" in finding.message
-    assert hurried.estimates["period"] == standard.estimates["period"]
-
-
-def test_chunks_of_a_long_record_sum_up(synthetic: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Normal equations summed in chunks of 1000 samples give what one sum gives."""
-    truth = synthetic.Truth(gamma=0.01)
-    t = synthetic.times(40.0)
-    y = synthetic.noisy(truth, t, 3e-4, 6)
-    _, whole = best(t, y)
-    monkeypatch.setattr("pipeline.motion.waveform_model.CHUNK", 1000)
-    _, parts = best(t, y)
-    assert parts.noise_m == pytest.approx(whole.noise_m, rel=1e-9)
-    assert parts.phase.angular_frequency.u == pytest.approx(whole.phase.angular_frequency.u, rel=1e-6)
-    assert parts.widening == pytest.approx(whole.widening, rel=1e-6)
+    (finding,) = [f for f in narrow.findings if f.code == "not_converged"]
+    assert "only 0 samples lie on the model" in finding.message
+    assert narrow.estimates["period"] == standard.estimates["period"]
 
 
 def test_samples_put_out_by_a_narrow_window_come_back(synthetic: ModuleType) -> None:
