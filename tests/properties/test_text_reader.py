@@ -16,10 +16,7 @@ from hypothesis import strategies as st
 from acquisition.errors import FormatError
 from acquisition.recordings.families.motion_sensor import FORMAT
 from acquisition.recordings.recording import Recording
-from acquisition.recordings.tables import cells
 from acquisition.recordings.tables import table as table_module
-from acquisition.recordings.tables.fixed_point import Page
-from acquisition.recordings.tables.line_pages import Lines
 from acquisition.recordings.tables.table import Table, read_table
 from acquisition.recordings.tables.text import Text, decode, parse_number, split_cells, unify
 
@@ -204,23 +201,24 @@ def test_odd_rows_among_many_regular_ones_are_read_alike(rows_oracle: ModuleType
         assert np.count_nonzero(table.bad) < 60
 
 
-def test_a_few_odd_cells_do_not_send_the_others_down_the_slow_path(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only odd cells are read one by one; a regular file has none but a sample."""
+def test_a_few_odd_rows_do_not_send_the_others_down_the_slow_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only odd rows and a few beside them are read one by one; of a regular file none is."""
     singly: list[str] = []
 
-    def counting(cell: str, shift: int = 0) -> float | None:
-        singly.append(cell)
-        return parse_number(cell, shift)
+    def counting(rows: object, line: str) -> None:
+        singly.append(line)
+        take_single(rows, line)
 
-    monkeypatch.setattr(cells, "parse_number", counting)
+    take_single = table_module._Rows._take_single
+    monkeypatch.setattr(table_module._Rows, "_take_single", counting)
     lines = regular_lines()
     read_table(Text.of("\n".join(lines).encode()), range(3), "\t", width=3)
-    sampled = len(singly)
-    assert sampled < 10
+    assert not singly
     lines[700:700] = ["text in the middle"]
     table = read_table(Text.of("\n".join(lines).encode()[:-3]), range(3), "\t", width=3)
     assert table.bad.nonzero()[0].tolist() == [700, 3000]
-    assert len(singly) - sampled < 3 * 12 + 10  # a dozen of each column tell its form
+    assert "text in the middle" in singly
+    assert len(singly) < 20
 
 
 @pytest.mark.parametrize("delimiter", ["\t", ";", "  "])
@@ -260,7 +258,7 @@ def signed_columns(draw: st.DrawFn) -> tuple[list[str], int, str]:
 
 @settings(max_examples=400, deadline=None)
 @given(drawn=signed_columns(), newline=st.sampled_from(["\n", "\r\n", "\r"]), cut=st.integers(0, 9))
-def test_cells_that_are_walked_to_are_read_as_plain_python_reads_rows(
+def test_short_pages_are_read_as_plain_python_reads_rows(
     rows_oracle: ModuleType, drawn: tuple[list[str], int, str], newline: str, cut: int
 ) -> None:
     """Signs, lengths that change, odd cells and lines in the midst of short pages: every number and line as by rows."""
@@ -268,43 +266,23 @@ def test_cells_that_are_walked_to_are_read_as_plain_python_reads_rows(
     body = "\n".join([*lines, ""])
     body = body[: len(body) - cut]
     text = Text.of(body.replace("\n", newline).encode())
+    whole = [read_table(text, range(columns), delimiter, width=width) for width in (columns, None)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(table_module, "_PAGE_BYTES", (64, 160))
+        patch.setattr(table_module, "_PAGE_BYTES", 64)
         read_both(rows_oracle, body, columns, delimiter, newline)
-        # Ragged rows, and rows that are too long; cells of columns in another order are never walked to.
-        for asked, width in ((columns, None), (columns - 1, None), (columns - 1, columns - 1)):
-            order = list(range(asked))
-            if not order:
-                continue
-            walked = read_table(text, order, delimiter, width=width)
-            searched = read_table(text, [*order[::-1], 0], delimiter, width=width)
-            assert walked.bad.tobytes() == searched.bad.tobytes()
-            assert (walked.last_cell, walked.cut) == (searched.last_cell, searched.cut)
-            assert walked.decimals == searched.decimals[:asked][::-1]
-            for column in order:
-                assert walked.values[column].tobytes() == searched.values[asked - 1 - column].tobytes()
-                assert walked.form[column].tobytes() == searched.form[asked - 1 - column].tobytes()
-
-
-@pytest.mark.parametrize("end", [",\n", "\n", ",\r\n"])
-def test_pages_of_signed_numbers_are_walked(monkeypatch: pytest.MonkeyPatch, end: str) -> None:
-    """Separators are searched for where a row is odd, not in thousands that are not."""
-    searched: list[int] = []
-    of = Lines.of
-
-    def counting(page: Page, mark: int) -> Lines | None:
-        searched.append(page.raw.size)
-        return of(page, mark)
-
-    monkeypatch.setattr(Lines, "of", counting)
-    values = np.random.default_rng(5).normal(0, 8, (40_000, 2))
-    lines = [f"{i / 100:.3f},{a:.6f},{b:.6f}{end}" for i, (a, b) in enumerate(values)]
-    table = read_table(Text.of("".join(lines).encode()), (0, 1), ",")
-    assert table.values[1].tolist() == [float(f"{a:.6f}") for a, _ in values]
-    assert not searched
-    lines[20_000] = f"here I touched it{end}"
-    assert np.flatnonzero(read_table(Text.of("".join(lines).encode()), (0, 1), ",").form[0] < 0).tolist() == [20_000]
-    assert len(searched) == 2  # its page, and the next in case that more follow
+        paged = [read_table(text, range(columns), delimiter, width=width) for width in (columns, None)]
+        patch.setattr(table_module, "_SINGLE_ROWS", 1000)
+        patch.setattr(table_module._Rows, "_read_whole", lambda *_: None)
+        patch.setattr(table_module._Rows, "_read_mixed", lambda *_: None)
+        singly = [read_table(text, range(columns), delimiter, width=width) for width in (columns, None)]
+    # Neither where a page ends nor who reads a row makes a difference.
+    for one, other in zip([*whole, *paged], [*singly, *singly], strict=True):
+        assert one.bad.tobytes() == other.bad.tobytes()
+        assert (one.last_cell, one.cut, one.decimals) == (other.last_cell, other.cut, other.decimals)
+        assert one.skipped.tolist() == other.skipped.tolist()
+        for column in range(columns):
+            assert one.values[column].tobytes() == other.values[column].tobytes()
+            assert one.form[column].tobytes() == other.form[column].tobytes()
 
 
 EXPONENT_CELL = st.builds(
@@ -361,15 +339,3 @@ def test_fixed_point_is_read_bit_for_bit(column: tuple[list[str], str], beside: 
     for cell, value in zip(cells, np.asarray(table.values[0]).tolist(), strict=True):
         exact = float(Decimal(cell).scaleb(shift))
         assert (value, math.copysign(1.0, value)) == (exact, math.copysign(1.0, exact))
-
-
-def test_a_column_of_one_number_takes_no_room() -> None:
-    """A constant column is a view of one number; zeros of either sign and a late change are kept apart."""
-    rows = [f"{i / 100:07.3f}\t0.239" for i in range(30_000)]
-    constant = read_table(Text.of("\n".join([*rows, ""]).encode()), (0, 1), "\t").values[1]
-    assert (constant.strides, set(constant.tolist())) == ((0,), {0.239})
-    rows[-1] = rows[-1].replace("0.239", "0.240")
-    changed = read_table(Text.of("\n".join([*rows, ""]).encode()), (0, 1), "\t").values[1]
-    assert (changed[-1], set(changed[:-1].tolist())) == (0.240, {0.239})
-    zeros = read_table(Text.of(b"00000.000\n" * 40_000 + b"-0000.000\n" * 40_000), (0,), "\t").values[0]
-    assert np.count_nonzero(np.signbit(zeros)) == 40_000

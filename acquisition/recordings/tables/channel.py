@@ -12,9 +12,8 @@ from acquisition.block import F8
 from acquisition.errors import FormatError
 from acquisition.recordings.sampling.samples import Rows, within
 from acquisition.recordings.sampling.timing import tolerance_of
-from acquisition.recordings.tables.cells import EMPTY, EXPONENT, UNREAD
 from acquisition.recordings.tables.contents import Arrays, Channel, Sheet
-from acquisition.recordings.tables.table import Table, read_table
+from acquisition.recordings.tables.table import EMPTY, EXPONENT, UNREAD, Table, read_table
 from acquisition.recordings.units import time_power
 
 __all__ = ["Pulled", "pull"]
@@ -88,8 +87,10 @@ def _no_line(row: int) -> int:  # noqa: ARG001
 
 def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Pulled:
     time, shift = channel.time, _time_power(path, channel)
-    # The first column of a sheet tells rows from remarks, whoever's it is.
-    columns = list(dict.fromkeys([0, *([] if time is None else [time]), channel.column]))
+    # The first column of a sheet tells rows from remarks, whoever's it is, unless it is left empty.
+    row = next(sheet.text.lines(sheet.start), None)
+    leads = row is not None and row.text.split(sheet.delimiter or None)[:1] not in ([], [""])
+    columns = list(dict.fromkeys([*([0] if leads else []), *([] if time is None else [time]), channel.column]))
     powers = {time: shift, channel.column: power}
     table = read_table(
         sheet.text,
@@ -104,7 +105,7 @@ def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Pulled
     empty = table.form[-1] == EMPTY
     if at is not None:
         empty &= (table.form[at] == EMPTY) | (table.form[at] == UNREAD)
-    remark = empty & (table.form[0] == UNREAD)
+    remark = empty & table.text
     keep = _present(table, at, channel.ragged) | remark
     if not (keep & ~remark).any():
         demand = f'expected rows of numbers for "{channel.name}", got none'
