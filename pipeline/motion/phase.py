@@ -13,6 +13,7 @@ from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlati
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
 
+TABLE = 2049  # points of the integral of the amplitude
 EXPONENTS = (2.0, 1.0, 0.5)  # a spring that is not linear; carried air that grows with the stroke, as vortices do
 
 __all__ = ["Params", "PhaseFit", "amplitude_integral", "backbone_unit", "fit_phase", "words_on_exponent", "wrapped"]
@@ -181,7 +182,10 @@ def _integral_at(t: F8, middle: float, damping: Damping, exponent: float) -> F8:
 def amplitude_integral(
     fit: LawFit, t0: float, middle: float, first: float, last: float, exponent: float
 ) -> tuple[F8, F8]:
-    """Return times from ``middle`` (513,), s, and the integral of A^p from there, m^p s, by Simpson's rule.
+    """Return times from ``middle`` (2049,), s, and the integral of A^p from there, m^p s, by the trapezoidal rule.
+
+    The rule and straight lines between its points err by less than 1e-5 of the integral where A^p falls by a
+    factor of e^10 within the table.
 
     Parameters
     ----------
@@ -192,13 +196,11 @@ def amplitude_integral(
     exponent : float
         p.
     """
-    grid = np.linspace(first - middle, last - middle, 513)
-    half = 0.5 * (grid[1:] + grid[:-1])
-    since = middle - t0
-    power = np.abs(fit.amplitude(grid + since)) ** exponent
-    inner = np.abs(fit.amplitude(half + since)) ** exponent
-    pieces = (grid[1] - grid[0]) / 6.0 * (power[:-1] + 4.0 * inner + power[1:])
-    integral = np.concatenate([[0.0], np.cumsum(pieces)])
+    from scipy.integrate import cumulative_trapezoid
+
+    grid = np.linspace(first - middle, last - middle, TABLE)
+    power = np.abs(fit.amplitude(grid + (middle - t0))) ** exponent
+    integral = cumulative_trapezoid(power, grid, initial=0.0)
     return grid, np.asarray(integral - np.interp(0.0, grid, integral))
 
 

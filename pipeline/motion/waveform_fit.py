@@ -153,9 +153,10 @@ def fit_record(
     and further columns enter linearly and are projected out (:class:`pipeline.motion.waveform_model.WaveformModel`);
     a constant one is a parameter like the others.
 
-    Residuals beyond four standard deviations (from their median) leave, and the fit is repeated until no sample
-    changes. Beneath a clipped plateau samples are taken or left by the model, not by their own noise: those that the
-    model sees within 3.5 standard deviations of where samples count as clipped are left out, and nothing is biased.
+    Residuals beyond four standard deviations (from their median) leave, and the fit is repeated until the samples
+    stay (:class:`pipeline.motion.waveform_samples.Chooser`). Beneath a clipped plateau samples are taken or left by
+    the model, not by their own noise: those that the model sees within 3.5 standard deviations of where samples count
+    as clipped are left out, and nothing is biased.
 
     Where residuals are not white the covariance is that of the sums of score over whole periods, correlation
     between neighbours included, if it exceeds the white one significantly.
