@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -20,7 +21,7 @@ from pipeline.bench.air import (
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.budget import Inputs, estimate_of, function, linear, product
+from pipeline.results.budget import Inputs, estimate_of
 
 __all__ = ["Ambient"]
 
@@ -59,12 +60,11 @@ class Ambient:
     @cached_property
     def density(self) -> Any:
         """Density of the air, kg/m^3."""
-        air = (self._temperature, self._pressure, self._humidity)
-        return product(1.0, (function(air_density, *air), 1), (self._density_formula, 1))
+        return _of(air_density, self._temperature, self._pressure, self._humidity) * self._density_formula
 
     def viscosity(self) -> Any:
         """Return the dynamic viscosity of the air, Pa s."""
-        return product(1.0, (function(air_viscosity, self._temperature), 1), (self._viscosity_formula, 1))
+        return _of(air_viscosity, self._temperature) * self._viscosity_formula
 
     def scale(self, instrument: Instrument) -> Any:
         """Return the factor on all distances: 1, with what the speed of sound or a calibration leaves uncertain.
@@ -79,15 +79,17 @@ class Ambient:
             return self._inputs.add("calibrated_scale", Estimate(1.0, instrument.u_scale), "B")
         if not self.known:
             return 1.0
-        sound = function(speed_of_sound, self._temperature, self._pressure, self._humidity)
+        sound = _of(speed_of_sound, self._temperature, self._pressure, self._humidity)
         actual = estimate_of(sound, "m/s").value
-        # Factors that are 1 but for their uncertainty: to first order their deviations add.
-        terms = [
-            (1.0 / actual, sound),
-            (1.0, self._inputs.add("speed_of_sound_formula", Estimate(1.0, U_SOUND), "B")),
-        ]
+        factor = sound / actual * self._inputs.add("speed_of_sound_formula", Estimate(1.0, U_SOUND), "B")
         if instrument.speed_of_sound_m_per_s is not None:
             half = abs(actual / instrument.speed_of_sound_m_per_s - 1.0)
-            recorded = Estimate(1.0, half / math.sqrt(3.0))
-            terms.append((1.0, self._inputs.add("recorded_speed_of_sound", recorded, "B")))
-        return linear(1.0, terms)
+            factor *= self._inputs.add("recorded_speed_of_sound", Estimate(1.0, half / math.sqrt(3.0)), "B")
+        return factor
+
+
+def _of(formula: Callable[..., float], *xs: Any) -> Any:
+    """Return a formula of variables as a variable, its derivatives by central differences."""
+    from uncertainties import wrap
+
+    return wrap(formula)(*xs)

@@ -130,6 +130,8 @@ def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:
     AnalysisError
         If the record is shorter than the window.
     """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     step = float(np.median(np.diff(t)))
     width = round(window_s / step) + 1
     if width > y.size:
@@ -137,17 +139,11 @@ def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:
             f"the classic method slides a window of {window_s:g} s, the record lasts {t[-1] - t[0]:.3g} s; "
             "record longer"
         )
-    return t[: y.size - width + 1], 0.5 * (_sliding_maximum(y, width) + _sliding_maximum(-y, width))
-
-
-def _sliding_maximum(y: F8, width: int) -> F8:
-    """Maximum over every window by doubling: two overlapping windows of a power of two cover each one."""
-    reach, top = 1, y
-    while 2 * reach <= width:
-        top = np.maximum(top[: top.size - reach], top[reach:])
-        reach *= 2
     count = y.size - width + 1
-    return np.asarray(np.maximum(top[:count], top[width - reach : width - reach + count]))
+    # A filter's window lies about its sample: the first whole one about sample width // 2.
+    whole = slice(width // 2, width // 2 + count)
+    half_range = 0.5 * (maximum_filter1d(y, width) - minimum_filter1d(y, width))
+    return t[:count], half_range[whole]
 
 
 def _period(t: F8, y: F8) -> Estimate:

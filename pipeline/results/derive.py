@@ -21,7 +21,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.ambient import Ambient
-from pipeline.results.budget import Budget, Budgets, Inputs, added, estimate_of, linear, product
+from pipeline.results.budget import Budget, Inputs, estimate_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality
@@ -51,7 +51,7 @@ class Params:
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """Everything that Table 1 lists. Budgets, and what only they and curves need, are worked out when asked for.
+    """Everything that Table 1 lists; what only curves and comparisons need is worked out when asked for.
 
     Parameters
     ----------
@@ -187,51 +187,50 @@ def derive(
     laws = _Laws(damping, inputs, demodulated.t - damping.t0)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B")
     scale = ambient.scale(instrument)
-    omega = product(1.0, (inputs.add("angular_frequency", phase.angular_frequency, "A"), 1), (rate, 1))
-    start = product(1.0, (laws.start(), 1), (scale, 1))
-    lam = product(1.0, (laws.rate_at_start(), 1), (rate, 1))
-    v_rms = product(1.0, (omega, 1), (scale, 1), (laws.root_mean_square(), 1))
+    omega = inputs.add("angular_frequency", phase.angular_frequency, "A") * rate
+    start = laws.start() * scale
+    lam = laws.rate_at_start() * rate
+    v_rms = omega * scale * laws.root_mean_square()
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, "m"), "B")
-    offset = product(1.0, (inputs.add("rest_position", rest.mean, "A"), 1), (scale, 1))
+    offset = inputs.add("rest_position", rest.mean, "A") * scale
     found: dict[str, tuple[Any, str]] = {
-        "period": (product(2 * math.pi, (omega, -1)), "s"),
-        "frequency": (product(1.0 / (2 * math.pi), (omega, 1)), "Hz"),
+        "period": (2 * math.pi / omega, "s"),
+        "frequency": (omega / (2 * math.pi), "Hz"),
         "angular_frequency": (omega, "rad/s"),
         "amplitude": (start, "m"),
-        "offset": (added(offset, zero), "m"),
+        "offset": (offset + zero, "m"),
         "phase": (inputs.add("phase", phase.phase, "A"), "rad"),
         "noise": (inputs.add("noise", _noise(demodulated), "A"), "m"),
         "damping_rate": (lam, "1/s"),
         "velocity_rms": (v_rms, "m/s"),
     }
     if laws.rate > 0:
-        found["quality_factor"] = (product(0.5, (omega, 1), (lam, -1)), "")
+        found["quality_factor"] = (0.5 * omega / lam, "")
     coefficients = _coefficients(damping, laws, rate, scale)
     diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
-    mass = own if share is None else added(own, share)
-    parts = {"half_stiffness": (product(0.5, (omega, 2), (scale, 2), (1.0 if mass is None else mass, 1)), "N/m")}
+    mass = own if share is None else own + share
+    parts = {"half_stiffness": (0.5 * (omega * scale) ** 2 * (1.0 if mass is None else mass), "N/m")}
     for name, x in (("mass", mass), ("own_mass", own), ("spring_share", share)):
         if x is not None:
             parts[name] = x, "kg"
     if mass is not None:
-        squared = added(product(1.0, (omega, 2)), product(laws.squared_rate, (rate, 2)))
-        found["spring_constant"] = (product(1.0, (squared, 1), (mass, 1)), "N/m")
+        found["spring_constant"] = ((omega**2 + laws.squared_rate * rate**2) * mass, "N/m")
     if diameter is not None:
-        found["keulegan_carpenter_number"] = (product(2 * math.pi, (start, 1), (diameter, -1)), "")
+        found["keulegan_carpenter_number"] = (2 * math.pi * start / diameter, "")
         if ambient.known:
-            reynolds = product(1.0, (ambient.density, 1), (v_rms, 1), (diameter, 1), (ambient.viscosity(), -1))
-            found["reynolds_number"] = (reynolds, "")
+            found["reynolds_number"] = (ambient.density * v_rms * diameter / ambient.viscosity(), "")
         if ambient.known and mass is not None:
             # C over beta; the area, the mass and the density are in it once.
-            over_beta = product(6.0, (mass, 1), (omega, -1), (ambient.density, -1), (diameter, -2))
-            parts["drag_length"] = product(1.0, (over_beta, 1), (rate, 1), (scale, -1)), "m"
+            over_beta = 6.0 * mass / (omega * ambient.density * diameter**2)
+            parts["drag_length"] = over_beta * rate / scale, "m"
             if damping.settled and "beta" in coefficients:
-                found["drag_coefficient"] = (product(1.0, (over_beta, 1), (coefficients["beta"][0], 1)), "")
+                found["drag_coefficient"] = (over_beta * coefficients["beta"][0], "")
+    budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
     return Derived(
-        estimates={name: estimate_of(x, unit) for name, (x, unit) in found.items()},
-        coefficients={name: estimate_of(x, unit) for name, (x, unit) in coefficients.items()},
-        budgets=Budgets(inputs, found | coefficients),
+        estimates={name: budgets[name].estimate for name in found},
+        coefficients={name: budgets[name].estimate for name in coefficients},
+        budgets=budgets,
         law_weights=laws.weights,
         parts=parts,
     )
@@ -277,9 +276,9 @@ class _Laws:
 
     def _quantity(self, slopes: list[float], values: list[float]) -> Any:
         """A quantity's value under each law as one variable: linear in the selected law's parameters."""
-        terms = list(zip(slopes, self.variables, strict=True))
-        terms += [(other - values[0], z) for other, z in zip(values[1:], self.choices, strict=True)]
-        return linear(values[0], terms)
+        departures = [x - value for x, value in zip(self.variables, self.best.joint.values.tolist(), strict=True)]
+        moved = sum(slope * x for slope, x in zip(slopes, departures, strict=True))
+        return values[0] + moved + sum((x - values[0]) * z for x, z in zip(values[1:], self.choices, strict=True))
 
 
 def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
@@ -289,7 +288,7 @@ def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[
     for name, unit, x in zip(joint.names, joint.units, laws.variables, strict=True):
         if name in _DIMENSIONS and name != "A0":
             length, per_time = _DIMENSIONS[name]
-            found[name] = (product(1.0, (x, 1), (scale, length), (rate, per_time)), unit)
+            found[name] = (x * scale**length * rate**per_time, unit)
     if "n" in joint.names:
         c, n = (laws.variables[joint.names.index(name)] for name in ("c", "n"))
         found["c"] = (c * rate * scale ** (1 - n), joint.units[joint.names.index("c")])
@@ -306,9 +305,9 @@ def _masses(
     own = inputs.add("bob_mass", scene.bob_mass_kg, "B")
     included = {effect.name for effect in effects if effect.included}
     if "added_mass" in included and diameter is not None:
-        own = added(own, product(ADDED_MASS_SHAPE / 8.0, (ambient.density, 1), (diameter, 3)))
+        own = own + ADDED_MASS_SHAPE / 8.0 * ambient.density * diameter**3
     if "spring_mass" in included and scene.spring_mass_kg is not None:
-        return own, product(1.0 / 3.0, (inputs.add("spring_mass", scene.spring_mass_kg, "B"), 1))
+        return own, inputs.add("spring_mass", scene.spring_mass_kg, "B") / 3.0
     return own, None
 
 

@@ -114,22 +114,11 @@ def _decay(tau: F8, y: F8, noise: float, start: F8) -> DecayFit | None:
 
 
 def _fit(curve: Curve, y: F8, noise: float, start: F8, options: least_squares.Params = FINE) -> least_squares.Fit:
-    kept: dict[bytes, tuple[F8, F8]] = {}
+    def both(theta: F8) -> tuple[F8, F8]:
+        value, slope = curve.evaluate(theta)
+        return (value - y) / noise, slope / noise
 
-    def at(theta: F8) -> tuple[F8, F8]:
-        key = theta.tobytes()
-        if key not in kept:
-            kept.clear()
-            value, slope = curve.evaluate(theta)
-            kept[key] = (value - y) / noise, slope / noise
-        return kept[key]
-
-    def residuals(theta: F8) -> F8:
-        return at(theta)[0]
-
-    def jacobian(theta: F8) -> F8:
-        return at(theta)[1]
-
+    residuals, jacobian = least_squares.evaluated_once(both)
     return least_squares.minimise(residuals, start, jacobian, options)
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from uncertainties import correlated_values, ufloat, wrap
+from uncertainties import correlated_values
 
-from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density
+from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping.select import fit_damping
@@ -18,7 +18,7 @@ from pipeline.motion.phase import fit_phase
 from pipeline.motion.rest import fit_rest
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.results.budget import Budget, Inputs, added, function, product
+from pipeline.results.budget import Budget, Inputs
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import tabulate
 
@@ -282,19 +282,6 @@ def test_one_name_is_one_input() -> None:
         inputs.add("mass", Estimate(0.3, 1e-4), "B")
 
 
-@pytest.mark.parametrize("zero", [False, True])
-def test_a_product_is_what_arithmetic_with_variables_gives(zero: bool) -> None:
-    """Value, uncertainty and correlation of powers built in one go are the package's own, at a factor of 0 too."""
-    a, b = correlated_values([0.0 if zero else 3.0, 4.0], [[0.01, 0.004], [0.004, 0.09]])
-    c = ufloat(2.0, 0.05)
-    built = product(0.5, (a, 1), (b, -2), (c, 3), (a, 1), (7.0, 1))
-    written = 0.5 * a * b**-2 * c**3 * a * 7.0
-    assert built.nominal_value == pytest.approx(written.nominal_value, rel=1e-14)
-    assert built.std_dev == pytest.approx(written.std_dev, rel=1e-14)
-    assert (built - written).std_dev == pytest.approx(0.0, abs=1e-13)
-    assert product(2.0, (3.0, 2)) == 18.0
-
-
 def test_parameters_fitted_together_are_the_packages_correlated_values() -> None:
     """Their sums and differences have the uncertainties that correlated_values gives, with an exact one among them."""
     covariance = np.array([[4e-10, -3e-9, 0.0], [-3e-9, 9e-8, 0.0], [0.0, 0.0, 0.0]])
@@ -318,20 +305,3 @@ def test_parameters_that_determine_each_other_count_once() -> None:
         assert one.std_dev == pytest.approx(expected, rel=1e-12)
     assert (x / u[0] + y / u[1]).std_dev < 3e-8
     assert (x / u[0] + z / u[2]).std_dev == pytest.approx(2.0, rel=1e-12)
-
-
-def test_functions_and_sums_are_what_the_package_gives() -> None:
-    """Air's density and a sum have the derivatives by each input that the package's wrap and arithmetic find."""
-    celsius, pascal, humidity = ufloat(20.0, 1.5), ufloat(1e5, 800.0), ufloat(0.0, 0.1)
-    ours = function(air_density, celsius, pascal, humidity)
-    theirs = wrap(air_density)(celsius, pascal, humidity)
-    assert ours.nominal_value == theirs.nominal_value
-    for variable in (celsius, pascal, humidity):
-        assert ours.derivatives[variable] == pytest.approx(theirs.derivatives[variable], rel=1e-7)
-    assert function(air_density, 20.0, pascal, 0.5).std_dev == pytest.approx(
-        wrap(air_density)(20.0, pascal, 0.5).std_dev, rel=1e-7
-    )
-    assert function(air_density, 20.0) == air_density(20.0)
-    whole, plain = added(celsius, 2.0, pascal, celsius), celsius + 2.0 + pascal + celsius
-    assert (whole.nominal_value, whole.derivatives) == (plain.nominal_value, plain.derivatives)
-    assert added(1.0, 2.0) == 3.0
