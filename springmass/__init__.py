@@ -9,7 +9,7 @@ Examples
 >>> loaded = springmass.load(springmass.sample_data() / "undamped_simulated_position.txt")
 >>> analysis = springmass.analyse(loaded.track)
 >>> print(analysis.estimates["period"])
-0.758517 +- 0.000022 s
+0.758516 +- 0.000022 s
 """
 
 from __future__ import annotations
