@@ -268,7 +268,7 @@ def _oscillation(
     demodulated, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
     disturbances = fitted.disturbances
     rest = fitted.rest.stepping(disturbances.steps)
-    waveform = fitted.waveform.with_disturbances(disturbances, track.t)
+    waveform = fitted.waveform.with_disturbances(disturbances)
     instrument = Instrument.of(track, u_crystal=params.derive.u_clock_nominal)
     effects = tabulate(
         scene,

@@ -36,9 +36,9 @@ class Waveform:
     residual: F8
     rms_m: float
 
-    def with_disturbances(self, disturbances: Disturbances, t: F8) -> Waveform:
-        """Return the waveform of the whole record, t (n,) s, from that of the record without its disturbances."""
-        return replace(self, position=self.position + disturbances.position(t)) if disturbances else self
+    def with_disturbances(self, disturbances: Disturbances) -> Waveform:
+        """Return the waveform of the whole record, from that of the record without its disturbances."""
+        return replace(self, position=self.position + disturbances.position) if disturbances else self
 
 
 def reconstruct(track: Track, demodulated: Demodulated, phase: PhaseFit, rest: Rest) -> Waveform:

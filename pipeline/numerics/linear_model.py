@@ -108,3 +108,8 @@ class LinearModel:
     def coefficients(self) -> F8:
         """Return the coefficients (p,) of all columns in the order in which they came, fitted together."""
         return np.asarray(np.linalg.lstsq(self._factor, self._share, rcond=None)[0])
+
+    def falls(self) -> F8:
+        """Return by how much each column (p,), the others given, lowers chi-square."""
+        inverse = np.linalg.inv(self._factor)
+        return np.asarray((inverse @ self._share) ** 2 / np.sum(inverse**2, axis=1))

@@ -211,8 +211,8 @@ def strongest(blocks: Blocks, model: LinearModel, band: Band) -> Peak | None:
     if np.count_nonzero(inside) < 4:
         return None
     coefficients, variance = _autoregression(residual, 1)
-    shaped = np.where(inside, power / _density(coefficients, variance, frequency * blocks.step), 0.0)
-    f = float(frequency[int(np.argmax(shaped))])
+    shaped = power[inside] / _density(coefficients, variance, frequency[inside] * blocks.step)
+    f = float(frequency[inside][int(np.argmax(shaped))])
     pair = np.stack([np.cos(2.0 * math.pi * f * blocks.t), np.sin(2.0 * math.pi * f * blocks.t)], axis=1)
     # The line itself first; then what it may vary by, which must not pass for noise beside it.
     powers = np.polynomial.legendre.legvander(2.0 * blocks.t / blocks.seconds - 1.0, VARYING)
@@ -288,27 +288,27 @@ def smooth_density(y: F8, turns: float) -> float:
     return float(_density(coefficients, variance, np.array([turns]))[0])
 
 
-def _autoregression(y: F8, highest: int) -> tuple[F8, float]:
-    """Coefficients (p,) and innovation variance of the order that the BIC prefers, by Levinson's recursion."""
+def _autoregression(y: F8, highest: int) -> tuple[list[float], float]:
+    """Coefficients (p) and innovation variance of the order that the BIC prefers, by Levinson's recursion."""
     n = y.size
-    covariances = np.array([float(y[lag:] @ y[: n - lag]) / n for lag in range(min(highest, n - 1) + 1)])
-    coefficients: F8 = np.empty(0)
-    variance = max(float(covariances[0]), 1e-300)
+    covariances = [float(y[lag:] @ y[: n - lag]) / n for lag in range(min(highest, n - 1) + 1)]
+    coefficients, variance = list[float](), max(covariances[0], 1e-300)
     best = (math.log(variance), coefficients, variance)
-    for order in range(1, covariances.size):
-        reflection = (covariances[order] - coefficients @ covariances[order - 1 : 0 : -1]) / variance
-        coefficients = np.concatenate([coefficients - reflection * coefficients[::-1], [reflection]])
-        variance = max(variance * (1.0 - float(reflection) ** 2), 1e-300)
+    for order in range(1, len(covariances)):
+        known = sum(c * covariances[order - 1 - k] for k, c in enumerate(coefficients))
+        reflection = (covariances[order] - known) / variance
+        mirrored = [c - reflection * d for c, d in zip(coefficients, coefficients[::-1], strict=True)]
+        coefficients = [*mirrored, reflection]
+        variance = max(variance * (1.0 - reflection**2), 1e-300)
         criterion = math.log(variance) + order * math.log(n) / n
         if criterion < best[0]:
             best = (criterion, coefficients, variance)
     return best[1], best[2]
 
 
-def _density(coefficients: F8, variance: float, turns: F8) -> F8:
+def _density(coefficients: list[float], variance: float, turns: F8) -> F8:
     """Spectral density at frequencies in turns per block: its mean over all of them is the variance."""
-    if not coefficients.size:
-        return np.full(turns.size, variance)
-    lags = np.arange(1, coefficients.size + 1)
-    response = 1.0 - np.exp(-2j * math.pi * turns[:, None] * lags) @ coefficients
+    response = np.ones(turns.size, np.complex128)
+    for lag, coefficient in enumerate(coefficients, start=1):
+        response -= coefficient * np.exp(-2j * math.pi * lag * turns)
     return np.asarray(variance / np.abs(response) ** 2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +71,10 @@ class Conditioned:
         """(n,) bool: samples without any flag that speaks against them."""
         mask: NDArray[np.bool_] = (self.flags & UNUSABLE) == 0
         return mask
+
+    def less(self, taken_m: F8) -> Conditioned:
+        """Return the record with something (n,) taken out of its distances; flags and times stay."""
+        return replace(self, track=replace(self.track, y=self.track.y - taken_m))
 
     def near_plateau(self, model_m: F8, noise_m: float) -> NDArray[np.bool_]:
         """Return where a model comes so near a plateau that noise decides whether a sample is clipped.

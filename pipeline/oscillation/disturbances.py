@@ -14,8 +14,8 @@ from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated, demodulate
 from pipeline.oscillation.demodulate import Params as Demodulation
 from pipeline.oscillation.modes import Sideways
-from pipeline.oscillation.sideways import find_sideways, without
-from pipeline.oscillation.steps import Step, find_steps, staircase, unstepped, weighed
+from pipeline.oscillation.sideways import find_sideways
+from pipeline.oscillation.steps import Step, find_steps, staircase, weighed
 from pipeline.track import F8
 
 __all__ = ["Disturbances", "Params", "separate"]
@@ -59,6 +59,8 @@ class Disturbances:
         By how much it would, m.
     steps : tuple of Step
         Of the rest position; always taken out.
+    position : (n,) float64, m
+        What was taken out, at the record's times.
     """
 
     conditioned: Conditioned
@@ -66,11 +68,12 @@ class Disturbances:
     modelled: bool
     leak_m: float
     steps: tuple[Step, ...]
+    position: F8
 
     @classmethod
     def nothing(cls, conditioned: Conditioned) -> Disturbances:
         """Return what says that nothing was found, or sought."""
-        return cls(conditioned, Sideways((), None), False, 0.0, ())
+        return cls(conditioned, Sideways((), None), False, 0.0, (), np.zeros(len(conditioned.track)))
 
     def __bool__(self) -> bool:
         return self.modelled or bool(self.steps)
@@ -82,11 +85,6 @@ class Disturbances:
             parts.append(self.sideways.columns(t))
         parts.extend((t >= step.time.value).astype(np.float64)[:, None] for step in self.steps)
         return np.concatenate(parts, axis=1)
-
-    def position(self, t: F8) -> F8:
-        """(n,): what was taken out, m, at times t (n,), s."""
-        added = staircase(self.steps, t)
-        return added + self.sideways.position(t) if self.modelled else added
 
 
 def separate(
@@ -122,22 +120,21 @@ def separate(
     sideways = find_sideways(conditioned, demodulated, params.sideways) if params.modes else Sideways((), None)
     leak_m = _leak(sideways)
     modelled = bool(sideways) and leak_m > SHARE * _u_amplitude(demodulated)
-    cleared = conditioned
+    t, taken = conditioned.track.t, np.zeros(len(conditioned.track))
     for again in range(params.rounds if modelled else 0):
         if again:
             # The windows' fits without the modes tell false echoes and the main oscillation better.
             sideways = find_sideways(conditioned, demodulated, params.sideways) or sideways
-        cleared = without(conditioned, sideways)
-        demodulated = demodulate(cleared, cycles, demodulation)
+        taken = sideways.position(t)
+        demodulated = demodulate(conditioned.less(taken), cycles, demodulation)
     if modelled:
         demodulated = replace(demodulated, covariance=demodulated.covariance * _price(sideways))
-    steps = find_steps(cleared, demodulated, params.steps)
+    steps = find_steps(conditioned.less(taken), demodulated, params.steps)
     if steps:
-        whole = cleared
-        demodulated = demodulate(unstepped(whole, steps), cycles, demodulation)
+        demodulated = demodulate(conditioned.less(taken + staircase(steps, t)), cycles, demodulation)
         steps, demodulated = weighed(steps, demodulated)
-        cleared = unstepped(whole, steps)
-    return demodulated, Disturbances(cleared, sideways, modelled, leak_m, steps)
+        taken = taken + staircase(steps, t)
+    return demodulated, Disturbances(conditioned.less(taken), sideways, modelled, leak_m, steps, taken)
 
 
 def _u_amplitude(demodulated: Demodulated) -> float:

@@ -18,7 +18,7 @@ from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.modes import Mode, Sideways
 from pipeline.track import F8, UNUSABLE
 
-__all__ = ["Params", "find_sideways", "without"]
+__all__ = ["Params", "find_sideways"]
 
 # Turns of (sideways mode, main oscillation) at which a range measured along a slant shows a product of both.
 PRODUCTS = ((2, 0), (1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2), (3, 0))
@@ -92,12 +92,6 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
     if not worth_a_look(blocks, band, multiples, 0.5 * params.false_alarm):
         return Sideways((), carrier)
     return _Search(carrier, blocks, band, params).run()
-
-
-def without(conditioned: Conditioned, sideways: Sideways) -> Conditioned:
-    """Return the record with the modes taken out of its distances; flags and times stay."""
-    track = conditioned.track
-    return replace(conditioned, track=replace(track, y=track.y - sideways.position(track.t)))
 
 
 def _band(carrier: Carrier, blocks: Blocks) -> Band:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.linear_model import LinearModel
 from pipeline.numerics.regression import correlation_length, solve_weighted
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.carrier import Carrier
@@ -17,7 +17,7 @@ from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, UNUSABLE
 
-__all__ = ["Params", "Step", "find_steps", "staircase", "unstepped", "weighed"]
+__all__ = ["Params", "Step", "find_steps", "staircase", "weighed"]
 
 DEGREES = (0, 1, 2, 4, 6, 9, 12)  # of the smooth drift that steps compete with
 SUDDEN = 4.0  # fall of chi-square by which a jump must beat a glide
@@ -141,12 +141,6 @@ def weighed(steps: tuple[Step, ...], demodulated: Demodulated) -> tuple[tuple[St
     return better, replace(demodulated, offset=demodulated.offset - change)
 
 
-def unstepped(conditioned: Conditioned, steps: tuple[Step, ...]) -> Conditioned:
-    """Return the record with the steps taken out of its distances; flags and times stay."""
-    track = conditioned.track
-    return replace(conditioned, track=replace(track, y=track.y - staircase(steps, track.t)))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Windows:
     """Rest positions of the windows, over their uncertainty.
@@ -176,88 +170,80 @@ class _Windows:
         """Time between windows, s."""
         return float(np.median(np.diff(self.t)))
 
+    @property
+    def deviations(self) -> F8:
+        """Rest positions about their mean, over their uncertainty."""
+        return np.asarray((self.y - self.y.mean()) / self.u)
+
     def threshold(self, params: Params, dof: float = math.inf) -> float:
         """Fall of chi-square that noise shows anywhere with the probability of a false alarm.
 
-        Student's quantile by its expansion about the normal one, since the noise is known from the windows themselves.
+        Student's quantile where the noise is known from what few windows leave.
         """
-        z = NormalDist().inv_cdf(1.0 - params.false_alarm / (2.0 * self.t.size))
-        first, second = (z**3 + z) / 4.0, (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
-        return (z + first / dof + second / dof**2) ** 2
+        from scipy.special import ndtri, stdtrit
+
+        probability = 1.0 - params.false_alarm / (2.0 * self.t.size)
+        return float(ndtri(probability) if math.isinf(dof) else stdtrit(dof, probability)) ** 2
 
     def suspicious(self, params: Params) -> bool:
         """Whether one step in a constant would be worth a look."""
-        residual = (self.y - self.y.mean()) / self.u
-        _, gain = _best_step(residual, self.polynomial(0), params.apart)
-        return gain > self.threshold(params)
-
-    def polynomial(self, degree: int) -> F8:
-        """Orthonormal powers of time, (w, degree + 1)."""
-        x = 2.0 * (self.t - self.t[0]) / (self.t[-1] - self.t[0]) - 1.0
-        return np.linalg.qr(np.polynomial.legendre.legvander(x, degree))[0]
+        constant = np.full((self.t.size, 1), 1.0 / math.sqrt(self.t.size))
+        return _best_step(self.deviations, constant, params.apart)[1] > self.threshold(params)
 
     def staircase(self, params: Params) -> dict[int, float]:
         """First window after each step, and the probability that noise shows as much."""
         trials = [self.grow(degree, params) for degree in DEGREES if degree <= self.t.size // 6]
         # One correlation length for all: that of the model that leaves least.
-        length = correlation_length(min(trials, key=lambda trial: float(trial[1] @ trial[1]))[1])
+        length = correlation_length(min(trials, key=lambda trial: trial.chi2).left)
         price = math.log(self.t.size)
-        costs = [
-            float(left @ left) / length + (degree + 1 + 2 * len(steps)) * price
-            for (steps, left), degree in zip(trials, DEGREES, strict=False)
-        ]
-        steps, left = trials[int(np.argmin(costs))]
-        if len(steps) > params.most:
+        best = min(trials, key=lambda trial: trial.chi2 / length + (trial.degree + 1 + 2 * len(trial.steps)) * price)
+        if len(best.steps) > params.most:
             return {}
-        degree = DEGREES[int(np.argmin(costs))]
-        return {index: self.chance(index, steps, left, degree, length) for index in sorted(steps)}
+        chances = [min(1.0, self.t.size * math.erfc(math.sqrt(0.5 * fall / length))) for fall in best.falls]
+        return dict(sorted(zip(best.steps, chances, strict=True)))
 
-    def grow(self, degree: int, params: Params) -> tuple[list[int], F8]:
-        """Add steps to a polynomial as long as each counts; return them and what is left over ``u``.
+    def grow(self, degree: int, params: Params) -> _Staircase:
+        """Add steps to a polynomial as long as each counts.
 
         Residuals of too few steps are correlated by those that are missing. So steps are added as if noise were white,
         and the first number of them is kept at which every one stands against the correlation of what is left.
         """
-        polynomial, steps = self.polynomial(degree), list[int]()
-        y = (self.y - self.y.mean()) / self.u
-        basis, left = polynomial, y - polynomial @ (polynomial.T @ y)
-        kept = (list[int](), left)
-        while len(steps) <= params.most:
-            index, gain = _best_step(left, basis, params.apart, steps)
+        x = 2.0 * (self.t - self.t[0]) / (self.t[-1] - self.t[0]) - 1.0
+        model = LinearModel(self.deviations, np.polynomial.legendre.legvander(x, degree))
+        kept = now = _Staircase(degree, [], model.left, [])
+        while len(now.steps) <= params.most:
+            index, gain = _best_step(model.left, model.basis, params.apart, now.steps)
             if index < 0 or gain <= self.threshold(params):
                 break
-            steps.append(index)
-            basis = np.linalg.qr(np.concatenate([basis, _after(self.t.size, index)[:, None]], axis=1))[0]
-            left = y - basis @ (basis.T @ y)
-            if self.all_count(y, left, polynomial, steps, params):
-                kept = (list(steps), left)
-            elif kept[0]:
+            model.add(model.terms((np.arange(self.t.size) >= index).astype(np.float64)[:, None]))
+            now = _Staircase(degree, [*now.steps, index], model.left, model.falls()[degree + 1 :].tolist())
+            if self.all_count(now, params):
+                kept = now
+            elif kept.steps:
                 break
         return kept
 
-    def all_count(self, y: F8, left: F8, polynomial: F8, steps: list[int], params: Params) -> bool:
-        """Whether each of the steps, the others given, is more than noise as correlated as ``left`` shows."""
-        dof = max(self.t.size - polynomial.shape[1] - 2.0 * len(steps), 1.0)
-        chi2, length = float(left @ left), correlation_length(left)
-        least = length * max(1.0, chi2 / dof) * self.threshold(params, max(dof / length, 2.0))
-        return all(_without(y, polynomial, steps, index) - chi2 > least for index in steps)
-
-    def chance(self, index: int, steps: list[int], left: F8, degree: int, length: float) -> float:
-        """Probability that noise shows a step as high as this one, the others given."""
-        y = (self.y - self.y.mean()) / self.u
-        gain = max(_without(y, self.polynomial(degree), steps, index) - float(left @ left), 0.0) / length
-        return min(1.0, self.t.size * math.erfc(math.sqrt(0.5 * gain)))
+    def all_count(self, trial: _Staircase, params: Params) -> bool:
+        """Whether each of the steps, the others given, is more than noise as correlated as what is left."""
+        dof = max(self.t.size - trial.degree - 1 - 2.0 * len(trial.steps), 1.0)
+        length = correlation_length(trial.left)
+        least = length * max(1.0, trial.chi2 / dof) * self.threshold(params, max(dof / length, 2.0))
+        return min(trial.falls) > least
 
 
-def _after(size: int, index: int) -> F8:
-    return np.asarray(np.arange(size) >= index, np.float64)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Staircase:
+    """A polynomial with steps: first windows after each, what they leave over its uncertainty (w,), and by how much
+    each, the others given, lowers chi-square."""
 
+    degree: int
+    steps: list[int]
+    left: F8
+    falls: list[float]
 
-def _without(y: F8, polynomial: F8, steps: list[int], index: int) -> float:
-    """Chi-square with one of the steps left out."""
-    others = [_after(y.size, other)[:, None] for other in steps if other != index]
-    basis = np.linalg.qr(np.concatenate([polynomial, *others], axis=1))[0]
-    return float(y @ y) - float(np.sum((basis.T @ y) ** 2))
+    @property
+    def chi2(self) -> float:
+        return float(self.left @ self.left)
 
 
 def _best_step(left: F8, basis: F8, apart: int, taken: list[int] | None = None) -> tuple[int, float]:

@@ -13,7 +13,7 @@ from pipeline.oscillation.cycles import Cycles, find_cycles
 from pipeline.oscillation.demodulate import Demodulated, demodulate
 from pipeline.oscillation.disturbances import separate
 from pipeline.oscillation.modes import Sideways
-from pipeline.oscillation.sideways import Params, find_sideways, without
+from pipeline.oscillation.sideways import Params, find_sideways
 from pipeline.track import Track
 
 F8 = np.ndarray
@@ -125,7 +125,7 @@ def test_without_takes_out_what_was_found(synthetic: ModuleType) -> None:
     y[100:110] = np.nan
     conditioned, _, demodulated = stages(t, y)
     found = find_sideways(conditioned, demodulated)
-    cleared = without(conditioned, found)
+    cleared = conditioned.less(found.position(t))
     np.testing.assert_array_equal(np.isnan(cleared.track.y), np.isnan(y))
     np.testing.assert_array_equal(cleared.flags, conditioned.flags)
     np.testing.assert_allclose((y - cleared.track.y)[200:], 1e-3 * np.cos(5.0 * t[200:]), atol=6e-5)
