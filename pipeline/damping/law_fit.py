@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from pipeline.damping.laws import Drag, Law
-from pipeline.damping.laws.drag import POWERS
+from pipeline.damping.laws import Law
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
 
@@ -82,26 +82,22 @@ class LawFit:
         """Return the logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
         return _relative_rate(self.law, self.joint.values)
 
-    def slopes_of_rate(self) -> F8:
-        """Return the derivatives (p,) of :meth:`rate_at_start` by the parameters.
+    def by_parameters(self, f: Callable[[F8], F8 | float]) -> F8:
+        """Return the derivatives (p, ...) of a number or an array by the parameters of which it is a function.
 
-        In closed form for laws of drag; else central differences over a thousandth of each parameter's uncertainty, so
-        that their error is far below it.
+        Notes
+        -----
+        Central differences over a thousandth of each parameter's uncertainty, so that their error is far below it.
         """
         theta = self.joint.values
-        if isinstance(self.law, Drag) and theta[0] > 0.0:
-            start, terms = _terms(self.law, theta)
-            by_start = sum(c * power * size for c, power, size in terms) / start
-            return np.array([by_start, *(size for _, _, size in terms)])
-        slopes = np.empty(theta.size)
-        variances = self.joint.covariance.diagonal().tolist()
-        for k, (value, variance) in enumerate(zip(theta.tolist(), variances, strict=True)):
-            step = max(1e-3 * math.sqrt(max(variance, 0.0)), 1e-7 * max(abs(value), 1e-9))
-            above, below = theta.copy(), theta.copy()
-            above[k] += step
-            below[k] -= step
-            slopes[k] = (_relative_rate(self.law, above) - _relative_rate(self.law, below)) / (2.0 * step)
-        return slopes
+        u = np.sqrt(np.maximum(np.diag(self.joint.covariance), 0.0))
+        steps = np.maximum(1e-3 * u, 1e-7 * np.maximum(np.abs(theta), 1e-9))
+        shifts = zip(np.diag(steps), steps, strict=True)
+        return np.array([(np.asarray(f(theta + d)) - f(theta - d)) / (2.0 * h) for d, h in shifts])
+
+    def slopes_of_rate(self) -> F8:
+        """Return the derivatives (p,) of :meth:`rate_at_start` by the parameters."""
+        return self.by_parameters(lambda theta: _relative_rate(self.law, theta))
 
     def damping_rate(self) -> Estimate:
         """Return :meth:`rate_at_start` with its uncertainty."""
@@ -124,17 +120,7 @@ def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8
 
 def _relative_rate(law: Law, theta: F8) -> float:
     """-dA/dt over A at the first amplitude, 1/s."""
-    if isinstance(law, Drag) and theta[0] > 0.0:
-        return float(sum(c * size for c, _, size in _terms(law, theta)[1]))
     return float(law.rate(theta[:1], theta)[0] / theta[0])
-
-
-def _terms(law: Drag, theta: F8) -> tuple[float, list[tuple[float, int, float]]]:
-    """The first amplitude A, and each coefficient of -dA/dt over A with its power of A and that power's value."""
-    start, *coefficients = theta.tolist()
-    values = {-1: 1.0 / start, 0: 1.0, 1: start}
-    powers = (POWERS[name] - 1 for name in law.parameters[1:])
-    return start, [(c, power, values[power]) for c, power in zip(coefficients, powers, strict=True)]
 
 
 def mean_squared_rate(fit: LawFit, amplitude: F8) -> float:

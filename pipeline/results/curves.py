@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from pipeline.numerics.regression import solve_weighted
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
 
-__all__ = ["Curve", "by_parameters", "drag_curve", "energy_curve"]
+__all__ = ["Curve", "drag_curve", "energy_curve"]
 
 POINTS = 200  # of a drawn curve
 GROUPS = 12  # of windows whose local slope is drawn beside the law
@@ -115,49 +115,22 @@ def drag_curve(
     # Amplitudes beyond the record would be extrapolated; equal ratios show the small ones too.
     x = np.geomspace(least, most, POINTS)
 
-    def coefficient(fit: LawFit) -> F8:
-        return factor.value * _drag_rate(fit, x) / x**2
+    def coefficient(fit: LawFit, theta: F8) -> F8:
+        return factor.value * (fit.law.rate(x, theta) - _friction(fit, theta)) / x**2
 
-    y = coefficient(best)
-    gradient = by_parameters(best, coefficient)
+    y = coefficient(best, best.joint.values)
+    gradient = best.by_parameters(lambda theta: coefficient(best, theta))
     variance = np.einsum("in,ij,jn->n", gradient, best.joint.covariance, gradient)
     variance = np.maximum(variance, 0.0) + (y * factor.u / factor.value) ** 2
     for name, weight in weights.items():
-        variance += weight * (coefficient(damping.fits[name]) - y) ** 2
+        other = damping.fits[name]
+        variance += weight * (coefficient(other, other.joint.values) - y) ** 2
     return Curve(x, y, np.sqrt(variance), "", *_local_drag(damping, demodulated, factor.value))
 
 
-def by_parameters(fit: LawFit, f: Callable[[LawFit], F8 | float]) -> F8:
-    """Return the derivatives (p, ...) of what a law says by its parameters.
-
-    Parameters
-    ----------
-    fit : LawFit
-    f : callable
-        Of a fit; a number or an array.
-
-    Notes
-    -----
-    Central differences over a thousandth of each parameter's uncertainty, so that their error is far below it.
-    """
-    theta = fit.joint.values
-    u = np.sqrt(np.maximum(np.diag(fit.joint.covariance), 0.0))
-    steps = np.maximum(1e-3 * u, 1e-7 * np.maximum(np.abs(theta), 1e-9))
-
-    def at(values: F8) -> F8:
-        return np.asarray(f(replace(fit, joint=replace(fit.joint, values=values))))
-
-    return np.array([(at(theta + d) - at(theta - d)) / (2.0 * h) for d, h in zip(np.diag(steps), steps, strict=True)])
-
-
-def _friction(fit: LawFit) -> float:
+def _friction(fit: LawFit, theta: F8) -> float:
     names = fit.joint.names
-    return float(fit.joint.values[names.index("mu")]) if "mu" in names else 0.0
-
-
-def _drag_rate(fit: LawFit, amplitude: F8) -> F8:
-    """-dA/dt without friction, m/s."""
-    return fit.law.rate(amplitude, fit.joint.values) - _friction(fit)
+    return float(theta[names.index("mu")]) if "mu" in names else 0.0
 
 
 def _local_drag(damping: Damping, demodulated: Demodulated, factor: float) -> tuple[F8, F8, F8]:
@@ -172,7 +145,7 @@ def _local_drag(damping: Damping, demodulated: Demodulated, factor: float) -> tu
             continue
         line = solve_weighted(np.stack([np.ones(part.size), t[part] - middle], axis=1), np.log(a), u[part] / a)
         centre = math.exp(float(line.values[0]))
-        slope = -float(line.values[1]) - _friction(damping.best) / centre
+        slope = -float(line.values[1]) - _friction(damping.best, damping.best.joint.values) / centre
         spread = math.sqrt(float(line.covariance[1, 1]) * damping.scatter.correlation)
         rows.append((centre, factor * slope / centre, factor * spread / centre))
     x, y, scatter = np.array(rows).reshape(-1, 3).T
