@@ -35,18 +35,12 @@ from pipeline.oscillation.condition import Conditioned, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
+from pipeline.oscillation.echoes import find_clusters
 from pipeline.results import derive as derivation
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
-from pipeline.results.findings import (
-    Finding,
-    by_severity,
-    count_quality,
-    judge,
-    judge_fits,
-    judge_overdamped,
-    judge_samples,
-)
+from pipeline.results.findings import Finding, by_severity, judge, judge_fits, judge_overdamped
+from pipeline.results.sample_findings import count_quality, judge_samples
 from pipeline.results.scene_findings import judge_scene
 from pipeline.track import U8, Track
 
@@ -280,8 +274,10 @@ def _oscillation(
         disturbances=disturbances,
     )
     derived = derive(demodulated, damping, phase, rest, scene, effects, instrument=instrument, params=params.derive)
+    clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]))
     findings = by_severity(
-        judge(record.conditioned, cycles, demodulated, damping, phase, rest, waveform, disturbances),
+        judge(cycles, demodulated, damping, phase, rest, waveform, disturbances),
+        judge_samples(record.conditioned, demodulated.flags, demodulated.noise_m, clusters),
         judge_scene(scene, effects),
         judge_fits(fitted.full, solved),
     )
@@ -292,13 +288,13 @@ def _oscillation(
 def _overdamped(record: _Record, found: Overdamped) -> Analysis:
     """A motion that damping ends within a few cycles or without any."""
     estimates = {**_at_rest(record), **found.estimates, **spring_constant(found, record.scene)}
-    return record.analysis(found, (), (judge_overdamped(found), *_on_samples(record)), estimates)
+    return record.analysis(found, (), _findings(record, judge_overdamped(found)), estimates)
 
 
 def _still(record: _Record, why: NoOscillation) -> Analysis:
     """A record without any motion to fit."""
     finding = Finding("no_oscillation", "error", why.why)
-    return record.analysis(Still(why.why), (), (finding, *_on_samples(record)), _at_rest(record))
+    return record.analysis(Still(why.why), (), _findings(record, finding), _at_rest(record))
 
 
 def _at_rest(record: _Record) -> dict[str, Estimate]:
@@ -314,6 +310,6 @@ def _at_rest(record: _Record) -> dict[str, Estimate]:
     }
 
 
-def _on_samples(record: _Record) -> tuple[Finding, ...]:
+def _findings(record: _Record, first: Finding) -> tuple[Finding, ...]:
     conditioned = record.conditioned
-    return judge_samples(conditioned, conditioned.flags, conditioned.noise_m)
+    return first, *judge_samples(conditioned, conditioned.flags, conditioned.noise_m)

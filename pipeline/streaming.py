@@ -1,7 +1,7 @@
 """Streaming: period and amplitude while the samples still come, by the same stages as afterwards.
 
-An accumulator takes samples with ``push``, tells with ``value`` and forgets with ``clear``. Its value is the analysis
-of the samples it holds, so that live and batch agree on the same samples to the last bit.
+An accumulator takes samples with ``push``, gives the motion with ``value`` and forgets with ``clear``. Its value is
+the analysis of the samples it holds, so that live and batch agree on the same samples to the last bit.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class MotionAccumulator:
         )
 
     def value(self) -> LiveMotion | NotYet:
-        """Return the motion of the samples held, or why there is none to tell."""
+        """Return the motion of the samples held, or why there is none."""
         if len(self) < 16:
             return NotYet(f"{len(self)} samples so far")
         track = self.track()

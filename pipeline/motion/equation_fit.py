@@ -165,7 +165,7 @@ def fit_equation(
     laws : pipeline.damping.select.Params, optional
         For the choice among the laws.
     stopped : bool
-        Whether the bob was seen to stop within the record, as :func:`moving_part` tells.
+        Whether the bob was seen to stop within the record, as :func:`moving_part` finds.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def fit_equation(
     :math:`\\mu = 2f/\\pi\\omega_0`. Solutions come from Strang splitting with located turning points
     (:mod:`pipeline.dynamics.integrators.strang`), the least squares from :mod:`pipeline.numerics.least_squares`.
 
-    The richest law goes first: what it leaves tells false echoes and the noise. The others are held to that noise,
+    The richest law goes first: what it leaves shows false echoes and the noise. The others are held to that noise,
     and chosen among as the amplitude's laws are.
     """
     params, laws = params or Params(), laws or DampingParams()

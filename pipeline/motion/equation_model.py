@@ -129,7 +129,7 @@ class FreeMotion:
         if key not in self._kept:
             _, y, v, omega, mu, gamma, beta = (float(x) for x in theta)
             equation = Equation.from_laws(omega, gamma_per_s=abs(gamma), beta_per_m_s=abs(beta), mu_m_per_s=abs(mu))
-            # A fit asks for residuals and then for derivatives at one point: the last few are kept.
+            # A fit evaluates residuals and then derivatives at one point: the last few are kept.
             while len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[key] = STRANG.run(Problem(equation, y, v), self._spacing, self._steps)

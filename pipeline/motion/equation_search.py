@@ -58,7 +58,7 @@ def _away(blocks: F8, end: float) -> F8:
 
 
 def fittable(damping: Damping) -> list[str]:
-    """Names of the laws asked for that have an equation of motion, the richest last."""
+    """Names of the laws to be fitted that have an equation of motion, the richest last."""
     names = [n for n in LAWS if (n in damping.fits or n in damping.unfitted) and isinstance(LAWS[n], Drag)]
     return sorted((n for n in names if n != "none"), key=lambda name: len(LAWS[name].parameters))
 
@@ -74,7 +74,7 @@ class Search:
         floor = 1e-9 * float(np.hypot(theta[1], theta[2] / theta[3]))
         self.expected_m = self.noise_m = max(conditioned.noise_m, quantum, floor)
         self.clip_sigmas, self.step = 4.0, STEP
-        # Samples of a bob that rests tell noise, and in their number hide what the moving ones do not fit.
+        # Samples of a bob at rest show noise alone, and in their number hide what the moving ones do not fit.
         stop = stop_row(conditioned)
         self.stopped = stop is not None
         self.within = conditioned.used & (np.arange(used.size) < (used.size if stop is None else stop))
@@ -188,7 +188,7 @@ class Search:
         )
 
     def clean(self, rounds: int = 3) -> None:
-        """Fit the richest law until the set of false echoes stays; what is left then is the noise."""
+        """Fit the richest law until the set of false echoes stays; its residual then is the noise."""
         every = np.ones(self.used.size, np.bool_)
         for _ in range(rounds):
             fit = self.fit(self.richest, self.theta)

@@ -271,7 +271,7 @@ class _Walk:
         """Return by how much noise is stronger near the oscillation than on the whole, in variance, and the noise, m.
 
         The density is read off half and twice the frequency, on what the shortest memory leaves, so that motion which
-        wanders does not pass for noise. Records too short or too long to tell give 1 and None.
+        wanders does not pass for noise. Records too short or too long to show it give 1 and None.
         """
         if t.size < 64 or float(t[-1] - t[0]) > LONGEST * self.period:
             return 1.0, None
@@ -294,7 +294,7 @@ class _Walk:
     def smooth(self, freedom: F8, carried: _Carried, at: F8, rate_hz: float, params: Params) -> _Followed:
         """Smooth with every memory that the record admits and average them by their likelihood.
 
-        ``carried`` is the fitted oscillation at the times ``at`` that are asked for.
+        ``carried`` is the fitted oscillation at the times ``at`` of the result.
         """
         span = max(float(self.t[-1] - self.t[0]), self.period)
         memories = np.geomspace(self.period, 30.0 * span, params.memories)

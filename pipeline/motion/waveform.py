@@ -1,4 +1,4 @@
-"""Waveform: the record as rest position, damping law and phase predict it, and what is left over."""
+"""Waveform: the record as rest position, damping law and phase predict it, and the residual."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ class _Solved:
 
     @property
     def noise_m(self) -> float:
-        """Root mean square of what is left, m."""
+        """Root mean square of the residual, m."""
         return math.sqrt(self.fit.cost / self.dof)
 
     def amplitude(self) -> F8:
@@ -139,7 +139,7 @@ def fit_record(
     demodulated, damping, phase, rest, waveform
         Outputs of the stages of those names: start values, and what stands if the fit fails.
     extra : (n, k) float64, optional
-        Columns that enter linearly beside the rest position: cosine and sine of a sideways mode, steps.
+        Columns that enter linearly besides the rest position: cosine and sine of a sideways mode, steps.
     params : Params, optional
 
     Returns

@@ -57,7 +57,7 @@ class Record:
     def of(
         cls, conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit, rest: Rest, extra: F8 | None
     ) -> Record:
-        """Centre a record; ``extra`` (n, k) float64 are columns that enter linearly beside the rest position."""
+        """Centre a record; ``extra`` (n, k) float64 are columns that enter linearly besides the rest position."""
         track = conditioned.track
         known = np.isfinite(track.y) & np.isfinite(track.t)
         t = np.where(np.isfinite(track.t), track.t, phase.middle)

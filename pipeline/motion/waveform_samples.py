@@ -19,7 +19,7 @@ Rows = NDArray[np.bool_]
 
 DEPENDENT = 1e-13  # share of the largest singular value, below which a step is not taken
 ROUNDS = 20  # most, of choosing on a tangent
-TANGENT = 1.1  # greatest ratio of the squares that a model leaves to those that its tangent foretells
+TANGENT = 1.1  # greatest ratio of the squares that a model leaves to those that its tangent predicts
 
 
 class Chooser:
@@ -57,7 +57,7 @@ class Chooser:
     def settled(self, state: State, before: Rows) -> tuple[Rows, State]:
         """Return the samples (n,) that lie on the model fitted to them, and that fit, on the tangent about a state.
 
-        Both as given where the state is so far from the end that the tangent does not foretell what the model leaves.
+        Both as given where the state is so far from the end that the tangent does not predict what the model leaves.
         """
         record, rows = self._record, before
         left = record.y - state.position(record.elapsed, record.tau)
@@ -70,8 +70,8 @@ class Chooser:
             out = slope[~rows]
             inverse = np.linalg.pinv(normal - out.T @ out, rcond=DEPENDENT, hermitian=True)
             step = inverse @ (right - out.T @ left[~rows])
-            foretold = left - slope @ step
-            chosen = self._near(foretold, rows)
+            predicted = left - slope @ step
+            chosen = self._near(predicted, rows)
             if np.array_equal(chosen, rows):
                 break
             rows = chosen
@@ -79,7 +79,7 @@ class Chooser:
         moved = replace(state, values=state.values + step[: state.values.size])
         linear = record.basis @ step[state.values.size :]
         found = record.y - moved.position(record.elapsed, record.tau) - linear
-        good = np.sum(found[rows] ** 2) <= TANGENT * np.sum(foretold[rows] ** 2)
+        good = np.sum(found[rows] ** 2) <= TANGENT * np.sum(predicted[rows] ** 2)
         return (rows, moved) if good else (before, state)
 
     def _near(self, left: F8, rows: Rows) -> Rows:

@@ -75,7 +75,7 @@ def tabulate(
     instrument : Instrument
         Clock and scale of the sensor.
     disturbances : Disturbances, optional
-        Modes beside the main oscillation; left out, they were not sought.
+        Modes other than the main oscillation; left out, they were not sought.
     """
     omega = phase.angular_frequency
     u_k = 2.0 * math.hypot(omega.u / omega.value, instrument.clock_rate.u)

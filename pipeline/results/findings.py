@@ -1,4 +1,4 @@
-"""Judge: say in words what holds, what does not, and what the record cannot tell."""
+"""Judge: say in words what holds, what does not, and what the record cannot show."""
 
 from __future__ import annotations
 
@@ -18,30 +18,20 @@ from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.rest import Rest
 from pipeline.motion.waveform import Waveform
 from pipeline.motion.waveform_fit import FullFit
-from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
-from pipeline.oscillation.echoes import Clusters, find_clusters
-from pipeline.track import U8, UNUSABLE, Quality
 
 __all__ = [
     "Finding",
     "Severity",
     "by_severity",
-    "count_quality",
     "judge",
     "judge_fits",
     "judge_overdamped",
-    "judge_samples",
 ]
 
 GRAVITY_M_PER_S2 = 9.81
-COUNTED = {
-    str(quality.name).lower(): int(quality)
-    for quality in Quality
-    if quality not in (Quality.GAP_BEFORE, Quality.MALFORMED)
-}
 
 Severity = Literal["info", "warning", "error"]
 
@@ -62,38 +52,6 @@ class Finding:
     code: str
     severity: Severity
     message: str
-
-
-def count_quality(flags: U8) -> dict[str, int]:
-    """Return how many samples carry each flag, and how many were used.
-
-    Examples
-    --------
-    >>> count_quality(np.array([0, 1, 2, 2], np.uint8))["false_echo"]
-    2
-    """
-    counts = np.bincount(flags) if flags.any() else np.array([flags.size])
-    held = [(value, count) for value, count in enumerate(counts.tolist()) if count]
-    found = {name: sum(count for value, count in held if value & bit) for name, bit in COUNTED.items()}
-    return {**found, "used": sum(count for value, count in held if not value & int(UNUSABLE))}
-
-
-def judge_samples(
-    conditioned: Conditioned, flags: U8, noise_m: float, clusters: Clusters | None = None
-) -> tuple[Finding, ...]:
-    """Return what the samples alone say, whether they oscillate or not.
-
-    Parameters
-    ----------
-    conditioned : Conditioned
-    flags : (n,) uint8
-        Final ones.
-    noise_m : float
-        Standard deviation of one sample, m.
-    clusters : Clusters, optional
-        Of false echoes, where the record oscillates.
-    """
-    return tuple(_sample_findings(conditioned, flags, noise_m, clusters))
 
 
 def judge_overdamped(found: Overdamped) -> Finding:
@@ -141,7 +99,6 @@ def judge_fits(full: FullFit | None, solved: EquationFit | EquationMisfit | None
 
 
 def judge(
-    conditioned: Conditioned,
     cycles: Cycles,
     demodulated: Demodulated,
     damping: Damping,
@@ -150,19 +107,17 @@ def judge(
     waveform: Waveform,
     disturbances: Disturbances | None = None,
 ) -> tuple[Finding, ...]:
-    """Return every finding on a run that oscillates, the gravest first.
+    """Return what is said of a motion that oscillates and of its laws of damping, the gravest first.
 
     Parameters
     ----------
-    conditioned, cycles, demodulated, damping, phase, rest, waveform, disturbances
+    cycles, demodulated, damping, phase, rest, waveform, disturbances
         Outputs of the stages of those names.
     """
-    clusters = find_clusters(demodulated, lambda rows: phase.total(conditioned.track.t[rows]))
     findings = [
         *_damping_findings(damping),
         *_motion_findings(cycles, demodulated, phase, rest, waveform),
         *_mode_findings(demodulated, phase, disturbances),
-        *judge_samples(conditioned, demodulated.flags, demodulated.noise_m, clusters),
     ]
     return by_severity(findings)
 
@@ -171,55 +126,6 @@ def by_severity(*groups: Iterable[Finding]) -> tuple[Finding, ...]:
     """Return all findings, the gravest first, else in their order."""
     rank = {"error": 0, "warning": 1, "info": 2}
     return tuple(sorted((one for group in groups for one in group), key=lambda finding: rank[finding.severity]))
-
-
-def _sample_findings(
-    conditioned: Conditioned, flags: U8, noise_m: float, clusters: Clusters | None
-) -> Iterator[Finding]:
-    track, plateaus_m, quantum_m = conditioned.track, conditioned.plateaus_m, conditioned.quantum_m
-    counts, n = count_quality(flags), len(track)
-    if counts["clipped"]:
-        levels = " and ".join(f"{level * 1e3:.1f} mm" for level in plateaus_m) or "a level flagged in the record"
-        yield Finding(
-            "clipped",
-            "warning",
-            f"{counts['clipped']} of {n} samples lie on a plateau at {levels}: a fixed object or a lost target cut the "
-            "motion there; they were left out and the amplitude comes from the rest of each cycle",
-        )
-    if counts["false_echo"]:
-        share = counts["false_echo"] / n
-        yield Finding(
-            "false_echoes",
-            "warning" if share > 0.1 else "info",
-            f"{counts['false_echo']} of {n} samples ({share:.1%}) are false echoes and were left out of the fit"
-            + _words_on(clusters),
-        )
-    if counts["missing"]:
-        yield Finding("missing_samples", "info", f"{counts['missing']} of {n} samples carry no distance")
-    if counts["duplicate_time"]:
-        yield Finding("duplicate_time", "warning", f"{counts['duplicate_time']} samples repeat an earlier time")
-    if counts["non_monotonic_time"]:
-        yield Finding("non_monotonic_time", "warning", f"{counts['non_monotonic_time']} samples run backward in time")
-    if track.clock == "nominal":
-        yield Finding(
-            "nominal_clock",
-            "info",
-            "times are row numbers over the nominal rate; a crystal's 50 ppm is part of every period's uncertainty",
-        )
-    if track.stated_error_m is not None and track.stated_error_m > 3.0 * noise_m:
-        yield Finding(
-            "stated_error_is_not_noise",
-            "info",
-            f"the file states an error of {track.stated_error_m * 1e3:.2f} mm for every distance; "
-            f"the samples scatter by {noise_m * 1e3:.2g} mm, so the stated error was not used as noise",
-        )
-    if quantum_m is not None and noise_m > 0 and quantum_m > 3.0 * noise_m:
-        yield Finding(
-            "quantised",
-            "warning",
-            f"distances come in steps of {quantum_m * 1e3:.3g} mm, more than three times their noise: "
-            "amplitudes may err by several times their stated uncertainty",
-        )
 
 
 def _damping_findings(damping: Damping) -> Iterator[Finding]:
@@ -351,13 +257,3 @@ def _words_on_rest(rest: Rest) -> str:
     more = f" and {len(rest.steps) - 5} more" if len(rest.steps) > 5 else ""
     jumps = f"jumps {len(rest.steps)} time{'s' * (len(rest.steps) > 1)}: {', '.join(shown)}{more}" if shown else ""
     return f"the rest position {' and '.join(part for part in (drift, jumps) if part)}"
-
-
-def _words_on(clusters: Clusters | None) -> str:
-    if clusters is None or not clusters.count:
-        return ""
-    many = f"{clusters.count} cluster{'s' * (clusters.count > 1)}"
-    return (
-        f"; {clusters.samples} of them come in {many}, {clusters.turning} of these at turning "
-        f"points; left in, all of them would change the amplitude by {clusters.shift_m * 1e3:+.2g} mm"
-    )

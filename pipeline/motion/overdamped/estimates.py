@@ -1,4 +1,4 @@
-"""What an overdamped motion tells: rates, frequencies and the spring constant with their uncertainties."""
+"""What follows from an overdamped motion: rates, frequencies and the spring constant with their uncertainties."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Overdamped:
 
 
 def described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: float) -> Overdamped:
-    """Return what a fit tells.
+    """Return what follows from a fit.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class Params:
 
 
 def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> Overdamped | NoOscillation | None:
-    """Fit the free motion of a linearly damped bob, and tell which kind of damping it shows.
+    """Fit the free motion of a linearly damped bob, and say which kind of damping it shows.
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> O
     of a grid of rates
     and frequencies, for each of which the other three parameters are linear. A relaxation must leave no more than 1.5
     times the noise, in its moving part too, beat every polynomial to the third degree, every step and every ramp by
-    ten in BIC, and be over within the record (:math:`gT > 2`). Critical damping, two rates and an oscillation are told
-    apart by the lowest BIC, which must be lower than a lone exponential's by six. A record
+    ten in BIC, and be over within the record (:math:`gT > 2`). Of critical damping, two rates and an oscillation
+    the one of lowest BIC is taken, which must be lower than a lone exponential's by six. A record
     that begins before the release is followed from where the displacement begins to fall.
     """
     params = params or Params()

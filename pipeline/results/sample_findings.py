@@ -1,0 +1,105 @@
+"""What the samples alone say, whether they oscillate or not: how many were usable, and how they were taken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.oscillation.condition import Conditioned
+from pipeline.oscillation.echoes import Clusters
+from pipeline.results.findings import Finding
+from pipeline.track import U8, UNUSABLE, Quality
+
+__all__ = ["count_quality", "judge_samples"]
+
+COUNTED = {
+    str(quality.name).lower(): int(quality)
+    for quality in Quality
+    if quality not in (Quality.GAP_BEFORE, Quality.MALFORMED)
+}
+
+
+def count_quality(flags: U8) -> dict[str, int]:
+    """Return how many samples carry each flag, and how many were used.
+
+    Examples
+    --------
+    >>> count_quality(np.array([0, 1, 2, 2], np.uint8))["false_echo"]
+    2
+    """
+    counts = np.bincount(flags) if flags.any() else np.array([flags.size])
+    held = [(value, count) for value, count in enumerate(counts.tolist()) if count]
+    found = {name: sum(count for value, count in held if value & bit) for name, bit in COUNTED.items()}
+    return {**found, "used": sum(count for value, count in held if not value & int(UNUSABLE))}
+
+
+def judge_samples(
+    conditioned: Conditioned, flags: U8, noise_m: float, clusters: Clusters | None = None
+) -> Iterator[Finding]:
+    """Yield what the samples alone say, whether they oscillate or not.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    flags : (n,) uint8
+        Final ones.
+    noise_m : float
+        Standard deviation of one sample, m.
+    clusters : Clusters, optional
+        Of false echoes, where the record oscillates.
+    """
+    track, plateaus_m, quantum_m = conditioned.track, conditioned.plateaus_m, conditioned.quantum_m
+    counts, n = count_quality(flags), len(track)
+    if counts["clipped"]:
+        levels = " and ".join(f"{level * 1e3:.1f} mm" for level in plateaus_m) or "a level flagged in the record"
+        yield Finding(
+            "clipped",
+            "warning",
+            f"{counts['clipped']} of {n} samples lie on a plateau at {levels}: a fixed object or a lost target cut the "
+            "motion there; they were left out and the amplitude comes from the rest of each cycle",
+        )
+    if counts["false_echo"]:
+        share = counts["false_echo"] / n
+        yield Finding(
+            "false_echoes",
+            "warning" if share > 0.1 else "info",
+            f"{counts['false_echo']} of {n} samples ({share:.1%}) are false echoes and were left out of the fit"
+            + _words_on(clusters),
+        )
+    if counts["missing"]:
+        yield Finding("missing_samples", "info", f"{counts['missing']} of {n} samples carry no distance")
+    if counts["duplicate_time"]:
+        yield Finding("duplicate_time", "warning", f"{counts['duplicate_time']} samples repeat an earlier time")
+    if counts["non_monotonic_time"]:
+        yield Finding("non_monotonic_time", "warning", f"{counts['non_monotonic_time']} samples run backward in time")
+    if track.clock == "nominal":
+        yield Finding(
+            "nominal_clock",
+            "info",
+            "times are row numbers over the nominal rate; a crystal's 50 ppm is part of every period's uncertainty",
+        )
+    if track.stated_error_m is not None and track.stated_error_m > 3.0 * noise_m:
+        yield Finding(
+            "stated_error_is_not_noise",
+            "info",
+            f"the file states an error of {track.stated_error_m * 1e3:.2f} mm for every distance; "
+            f"the samples scatter by {noise_m * 1e3:.2g} mm, so the stated error was not used as noise",
+        )
+    if quantum_m is not None and noise_m > 0 and quantum_m > 3.0 * noise_m:
+        yield Finding(
+            "quantised",
+            "warning",
+            f"distances come in steps of {quantum_m * 1e3:.3g} mm, more than three times their noise: "
+            "amplitudes may err by several times their stated uncertainty",
+        )
+
+
+def _words_on(clusters: Clusters | None) -> str:
+    if clusters is None or not clusters.count:
+        return ""
+    many = f"{clusters.count} cluster{'s' * (clusters.count > 1)}"
+    return (
+        f"; {clusters.samples} of them come in {many}, {clusters.turning} of these at turning "
+        f"points; left in, all of them would change the amplitude by {clusters.shift_m * 1e3:+.2g} mm"
+    )
