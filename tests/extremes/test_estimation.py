@@ -210,15 +210,15 @@ def test_impossible_uncertainties_of_a_track_are_refused(name: str, value: float
 @pytest.mark.parametrize(
     ("scene", "words"),
     [
-        ({"bob": {"mass_kg": 0}}, "more than 0 kg, got 0"),
-        ({"bob": {"mass_kg": -0.2}}, "more than 0 kg, got -0.2"),
+        ({"bob": {"mass_kg": 0}}, "more than 0 kg, from 1e-12 to 1e.06, got 0$"),
+        ({"bob": {"mass_kg": -0.2}}, "more than 0 kg, from 1e-12 to 1e.06, got -0.2$"),
         ({"bob": {"mass_kg": math.nan}}, "finite"),
         ({"bob": {"mass_kg": {"value": 0.2, "u": -1e-5}}}, "must not be negative"),
         ({"bob": {"mass_kg": {"value": 0.2, "u": math.inf}}}, "finite"),
         ({"bob": {"mass_kg": {"u": 1e-5}}}, "mass_kg"),
         ({"spring": {"mass_kg": {"value": -0.01, "u": 1e-3}}}, "spring"),
         ({"disc": {"diameter_m": 0}}, "more than 0 m"),
-        ({"air": {"temperature_c": -300}}, "more than -273.15"),
+        ({"air": {"temperature_c": -300}}, "at least -100 degC and at most 200, got -300"),
         ({"sensor": {"sigma_m": 0}}, "more than 0 m"),
     ],
 )
