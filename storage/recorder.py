@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import queue
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -114,9 +115,10 @@ class Recorder:
         self._sync_every_ns = int(sync_every_s * 1e9)
         self._limit = queue_bytes
         self._lock = threading.Lock()
-        self._come = threading.Condition(self._lock)
         self._done = threading.Condition(self._lock)
         self._queue: list[Item] = []
+        # Rung whenever there is something again. A condition's waiting and waking are Python, and cost twice as much.
+        self._bell: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._queued_bytes = 0
         self._appending = False
         self._overflows: dict[int, _Overflow] = {}
@@ -169,7 +171,7 @@ class Recorder:
     def drain(self, *, sync: bool = False) -> RecorderStatus:
         """Return when all that was put before is in the log, with ``sync`` on the disk; or the recording stopped."""
         with self._done:
-            self._done.wait_for(lambda: self._error or not (self._queue or self._appending))
+            self._done.wait_for(lambda: self._error or not (self._queue or self._overflows or self._appending))
         if sync:
             self._sync()
         return self.status
@@ -186,7 +188,7 @@ class Recorder:
             if self._closing:
                 return
             self._closing = True
-            self._come.notify()
+            self._bell.put(None)
         self._appender.join()
         self._stop_sync.set()
         self._syncer.join()
@@ -200,11 +202,13 @@ class Recorder:
             raise self._error
 
     def _offer(self, kind: Kind, records: Sequence[Read]) -> None:
+        for channel, _, _ in records:
+            if not 0 <= channel <= 255:
+                raise ValueError(f"a channel must lie in 0 to 255, got {channel}")
         with self._lock:
             open_ = self._error is None and not self._closing
+            rung = bool(self._queue or self._overflows)
             for channel, mono_ns, payload in records:
-                if not 0 <= channel <= 255:
-                    raise ValueError(f"a channel must lie in 0 to 255, got {channel}")
                 size = HEAD_BYTES + len(payload)
                 # After an overflow nothing is taken before its event: records around a loss must not look like
                 # neighbours.
@@ -219,7 +223,8 @@ class Recorder:
                     lost.last_ns = mono_ns
                     lost.records += 1
                     lost.bytes += len(payload)
-            self._come.notify()
+            if not rung and (self._queue or self._overflows):
+                self._bell.put(None)
 
     def _append_all(self) -> None:
         while taken := self._take_queued():
@@ -234,15 +239,17 @@ class Recorder:
 
         What overflowed came after everything queued and before everything to come: its events stand in its place.
         """
-        with self._lock:
-            self._appending = False
-            self._done.notify_all()
-            self._come.wait_for(lambda: self._queue or self._overflows or self._closing)
-            taken, self._queue, self._queued_bytes = self._queue, [], 0
-            taken += [lost.event(channel) for channel, lost in self._overflows.items()]
-            self._overflows.clear()
-            self._appending = bool(taken)
-            return taken
+        while True:
+            with self._lock:
+                taken, self._queue, self._queued_bytes = self._queue, [], 0
+                taken += [lost.event(channel) for channel, lost in self._overflows.items()]
+                self._overflows.clear()
+                self._appending = bool(taken)
+                if not taken:
+                    self._done.notify_all()
+                if taken or self._closing:
+                    return taken
+            self._bell.get()
 
     def _one_line(self, error: Exception) -> WriteFailed:
         if isinstance(error, WriteFailed):

@@ -190,6 +190,8 @@ def line_of(progress: Progress) -> str:
     found = progress.motion()
     motion = f"T {found.period}, A {found.amplitude}" if isinstance(found, LiveMotion) else found.why
     parts = [state, motion, f"{progress.rate_hz:.0f} Hz", f"{progress.missing} missing, {progress.gaps} gaps"]
+    if progress.unshown:
+        parts.append(f"{progress.unshown} samples recorded and not shown")
     if progress.status is not None:
         parts.append(f"{progress.status.synced_bytes / 1e3:.0f} kB safe")
         if progress.disk_free_bytes is not None:

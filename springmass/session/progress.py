@@ -40,6 +40,8 @@ class Progress:
         Left on the disk that the log lies on; None before there is a log.
     waiting : bool
         Whether the trigger has not come yet.
+    unshown : int
+        Samples that came faster than they were shown; the run file holds them.
     """
 
     seconds: float
@@ -51,6 +53,7 @@ class Progress:
     status: RecorderStatus | None
     disk_free_bytes: int | None
     waiting: bool
+    unshown: int = 0
 
 
 class Shown:

@@ -24,6 +24,8 @@ __all__ = ["Tee"]
 
 HEARD_BYTES = 4096
 """So many bytes tell what sensor it is."""
+HELD_SAMPLES = 1 << 15
+"""So many samples of a sensor wait to be asked for: five minutes at 100 Hz, in which a display hangs, take 8 MB."""
 
 
 class Tee:
@@ -33,6 +35,13 @@ class Tee:
     ----------
     chains : sequence of SensorChain
         By channel.
+
+    Attributes
+    ----------
+    gone : dict of int to str
+        By channel, why a port that was lost went away.
+    unshown : int
+        Samples that nobody asked for in time: recorded, and the run file holds them, but not shown.
     """
 
     def __init__(self, chains: Sequence[SensorChain]) -> None:
@@ -42,6 +51,7 @@ class Tee:
         self._kept: deque[Read] | None = None
         self._heard: list[bytearray] | None = [bytearray() for _ in chains]
         self.gone: dict[int, str] = {}
+        self.unshown = 0
 
     def line(self, channel: int, sensor: Sensor) -> Line:
         """Return how the reader speaks to a sensor; a polled one is asked as its chain's decoder says."""
@@ -62,7 +72,10 @@ class Tee:
                 for channel, _, data in reads:
                     self._heard[channel] += data[: HEARD_BYTES - len(self._heard[channel])]
             for channel, host_ns, data in reads:
-                self._chains[channel].take(host_ns, data)
+                chain = self._chains[channel]
+                chain.take(host_ns, data)
+                if len(chain) > HELD_SAMPLES:
+                    self.unshown += len(chain.block())
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Take an event; called on the reading thread."""

@@ -261,6 +261,7 @@ class Session:
             None if recorder is None else recorder.status,
             None if recorder is None else shutil.disk_usage(recorder.path.parent).free,
             recorder is None,
+            self._tee.unshown,
         )
 
     def _header(self) -> LogHeader:

@@ -11,6 +11,7 @@ import sys
 import threading
 import tty
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -24,7 +25,7 @@ from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from pipeline.analyse import Oscillation, analyse
 from pipeline.streaming import NotYet
 from springmass import load
-from springmass.commands.record import _ProgressLine
+from springmass.commands.record import _ProgressLine, line_of
 from springmass.session.progress import Progress
 from storage.run_file.reading import open_run
 
@@ -444,3 +445,10 @@ def test_off_a_terminal_the_progress_line_comes_now_and_then(capsys: pytest.Capt
         line(progress(float(second)))
     assert asked == [1.0, 10.0, 40.0, 70.0]
     assert capsys.readouterr().err.count("no samples so far") == 4
+
+
+def test_the_progress_line_says_what_is_recorded_and_not_shown() -> None:
+    """Samples that came while the display hung are named by their number, and where there are none, nothing is."""
+    found = Progress(3.0, 300, 0, 0, 100.0, lambda: NotYet("too short"), None, None, waiting=False)
+    assert "not shown" not in line_of(found)
+    assert line_of(replace(found, unshown=41)).endswith("| 41 samples recorded and not shown")

@@ -225,6 +225,17 @@ def test_an_overflow_is_told_where_it_happened() -> None:
     assert records[16].json()["dropped_records"] == 88
 
 
+def test_a_read_that_is_larger_than_the_queue_is_an_overflow_at_once() -> None:
+    """Nothing else need come: its event is in the log when the queue has been drained."""
+    disk = Disk()
+    recording = recorder(disk, queue_bytes=100)
+    recording.put(1, 5, bytes(200))
+    assert recording.drain().dropped_bytes == 200
+    *_, last = list(parse_log(bytes(disk.data)))
+    assert (last.channel, last.json()["facts"]) == (1, {"records": 1, "bytes": 200, "first_ns": 5})
+    recording.close()
+
+
 def test_a_full_disk_stops_the_recording_and_says_so() -> None:
     """The status shows the error at once, putting goes on harmlessly, closing raises it, and the log is whole."""
     disk = Disk()

@@ -103,6 +103,20 @@ def test_what_is_asked_for_is_all_that_was_read() -> None:
         assert getattr(parts, name).tobytes() == getattr(whole, name).tobytes()
 
 
+def test_samples_that_nobody_asks_for_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond a bound they are recorded, counted and not shown; those after them have the times they would have had."""
+    monkeypatch.setattr(reads, "HELD_SAMPLES", 60)
+    tee = Tee([chain()])
+    log = started(tee, [chain()], 0)
+    for i in range(200):
+        tee.reads([(0, i * STEP_NS, frame(i))])
+    ((_, block),) = tee.blocks()
+    assert len(log.taken) == 200
+    assert (len(block), tee.unshown) == (17, 183)
+    assert block.first == 183
+    np.testing.assert_allclose(block.t, np.arange(183, 200) * 0.01, atol=1e-12)
+
+
 def test_a_defect_of_a_decoder_costs_no_byte(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was read is recorded before it is decoded."""
     tee, each = Tee([chain()]), chain()
