@@ -7,13 +7,12 @@ import stat
 from typing import TYPE_CHECKING, BinaryIO, Protocol, runtime_checkable
 
 from acquisition.errors import FormatError
+from acquisition.recordings.inspection import Survey
 from acquisition.recordings.recording import Recording
 from acquisition.recordings.tables.text import is_text
 
 if TYPE_CHECKING:
     import mmap
-
-    from acquisition.recordings.inspection import Survey
 
 __all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "read_bytes", "read_head"]
 

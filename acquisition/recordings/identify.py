@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.recordings.base import HEAD_BYTES, Format, PairFormat, SurveyFormat, read_bytes, read_head
+from acquisition.recordings.foreign import refuse
+from acquisition.recordings.inspection import Inspection
 from acquisition.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
-
-    from acquisition.recordings.inspection import Inspection
 
 __all__ = ["formats", "get_format", "inspect", "open_recording", "sniff"]
 
@@ -131,8 +131,6 @@ def inspect(path: str | os.PathLike[str]) -> Inspection:
     FormatError
         If it cannot be opened, no format recognises it, or its content cannot be read.
     """
-    from acquisition.recordings.inspection import Inspection  # of no use to a recording that is read
-
     name = os.fspath(path)
     head = read_head(path)
     reader = _recognise(name, head)
@@ -147,8 +145,6 @@ def _recognise(path: str, head: bytes) -> Format:
         if candidate.recognises(head[:HEAD_BYTES]):
             return candidate
         names.append(candidate.name)
-    from acquisition.recordings.foreign import refuse
-
     raise refuse(path, head, tuple(names))
 
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from acquisition.errors import FormatError
+from acquisition.recordings.families import motion_sensor
 from acquisition.recordings.tables.contents import Channel, Contents, Sheet
 from acquisition.recordings.tables.sheet import ColumnFormat
 from acquisition.recordings.tables.text import (
@@ -55,9 +56,7 @@ def _evidence(head: bytes) -> str:
     rows, mark = _rows(unify(decode(head[:4096])).split("\n"))
     if not rows:
         return ""
-    from acquisition.recordings.families.motion_sensor import FORMAT as MOTION_SENSOR
-
-    if MOTION_SENSOR.recognises(head):
+    if motion_sensor.FORMAT.recognises(head):
         return ""
     between = {"\t": "tabs", ";": "semicolons", ",": "commas", "": "blanks"}[mark]
     count = len(rows[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from acquisition.recordings.families import capstone, logger_pro, motion_sensor, phyphox
 from acquisition.recordings.tables.contents import (
     Contents,
     Heading,
@@ -39,8 +40,6 @@ def _evidence(head: bytes) -> str:
 
 def _is_of_others(head: bytes) -> bool:
     """Tell headings of the families that have more to say of such columns."""
-    from acquisition.recordings.families import capstone, logger_pro, motion_sensor, phyphox
-
     others = (capstone.FORMAT, logger_pro.FORMAT, phyphox.FORMAT, motion_sensor.FORMAT)
     return any(each.recognises(head) for each in others)
 

@@ -1,15 +1,14 @@
 """A template: copy it, and change what is marked. The recipe for a new family of recordings.
 
-1. Copy this file to ``acquisition/formats/NAME.py``. Say in the docstring what a file looks like, with a few real
-   lines, and what a careless reader would take at face value.
+1. Copy this file to ``acquisition/recordings/families/NAME.py``. Say in the docstring what a file looks like, with a
+   few real lines, and what a careless reader would take at face value.
 2. ``_evidence`` tells from the head of a file, in a few words, why it is of this family; the words are empty where it
    is not. It goes by content, never by the file's name, and never raises.
 3. ``_contents`` finds the headers and says what stands where: runs, channels, units, times. It reads no numbers:
    :class:`acquisition.recordings.tables.sheet.ColumnFormat` does that, with everything that can be wrong in them.
 4. What the file does not say stays empty: unit, times. The user is then asked for it by name.
 5. One line in ``_TABLE`` of ``acquisition/recordings/identify.py``, or, in a package of your own, an entry point in
-   the group
-   ``springmass.formats``.
+   the group ``springmass.formats``.
 6. One ``Case`` in ``tests/conformance/test_formats.py``.
 
 The logger of this template is invented. It writes millimetres, one a line, behind the number of the sample::

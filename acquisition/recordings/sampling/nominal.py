@@ -19,18 +19,14 @@ _BLOCK = 16384
 
 
 def median(values: NDArray[Any]) -> float:
-    """Return the median of at least one number, none of them NaN; numpy's own imports ``numpy.ma`` for it.
+    """Return the median of at least one number, none of them NaN; numpy.median imports numpy.ma, 15 ms of a cold start.
 
     Examples
     --------
     >>> median(np.array([3.0, 1.0, 2.0])), median(np.array([4, 1, 2, 3]))
     (2.0, 2.5)
     """
-    half = values.size // 2
-    if values.size % 2:
-        return float(np.partition(values, half)[half])
-    low, high = np.partition(values, (half - 1, half))[half - 1 : half + 1].tolist()
-    return float(0.5 * (low + high))
+    return float(np.quantile(values, 0.5))
 
 
 class Grid(NamedTuple):
@@ -46,16 +42,6 @@ class Grid(NamedTuple):
     def time(self, index: I8) -> F8:
         """Return the time of each i, s."""
         return self.origin_s + index / self.rate_hz if self.origin_s else index / self.rate_hz
-
-    def fill(self, first: int, out: F8) -> None:
-        """Write the times (n,) of i from ``first`` on, what :meth:`time` gives for them bit for bit."""
-        ramp = np.arange(min(_BLOCK, out.size), dtype=np.float64)
-        for row in range(0, out.size, _BLOCK):  # what fits into the cache is calculated in a fraction of the time
-            part = out[row : row + _BLOCK]
-            np.add(ramp[: part.size], float(first + row), out=part)
-            np.divide(part, self.rate_hz, out=part)
-            if self.origin_s:
-                np.add(part, self.origin_s, out=part)
 
 
 class Rate(NamedTuple):

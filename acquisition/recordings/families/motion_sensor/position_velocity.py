@@ -2,7 +2,7 @@
 
 A file holds position (``Time (s)``, ``Distance (cm)``, ``Dist Error (cm)``) or velocity (``Time (s)``,
 ``Velocity (cm/s)``), tab separated, three decimals, usually without line end after the last row. Title and
-column line may have been edited or deleted: :mod:`acquisition.recordings.families.motion_sensor_layout` tells what is
+column line may have been edited or deleted: :mod:`acquisition.recordings.families.motion_sensor.layout` tells what is
 there. What no careful reader may take at face value:
 
 - Times are row numbers over a nominal rate, rounded to a millisecond.
@@ -14,22 +14,20 @@ there. What no careful reader may take at face value:
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from acquisition.block import I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.families.motion_sensor_column import Column, read_column
-from acquisition.recordings.families.motion_sensor_layout import evidence
+from acquisition.recordings.families.motion_sensor.column import Column, read_column
+from acquisition.recordings.families.motion_sensor.layout import evidence
+from acquisition.recordings.inspection import Survey
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.nominal import time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
+from acquisition.recordings.sampling.velocity import find_quantum, integrate, outer_join
 from acquisition.recordings.tables.text import decode, is_text, unify
 from acquisition.source import SourceInfo
-
-if TYPE_CHECKING:
-    from acquisition.recordings.inspection import Survey
 
 __all__ = ["FORMAT", "MotionSensor"]
 
@@ -50,8 +48,6 @@ class MotionSensor:
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Tell what the one channel of a file is; nothing, where the user must say what the numbers are."""
-        from acquisition.recordings.inspection import Survey
-
         try:
             column = read_column(path, data, None, None, None)
         except NeedsAnswer:
@@ -132,8 +128,6 @@ def _position_alone(column: Column) -> Recording:
 
 def _velocity_alone(column: Column) -> Recording:
     """Sum velocity up to position; its zero is the first sample, for the file does not hold its offset."""
-    from acquisition.recordings.sampling.velocity import find_quantum, integrate
-
     rate_hz, tick = column.timing.rate_hz, column.tick()
     flags = column.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
@@ -157,8 +151,6 @@ def _velocity_alone(column: Column) -> Recording:
 
 
 def _join(position: Column, velocity: Column) -> Recording:
-    from acquisition.recordings.sampling.velocity import find_quantum, outer_join
-
     rate_hz = position.timing.rate_hz
     if abs(velocity.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
         demand = f"expected {rate_hz:g} Hz as in {position.name}, got {velocity.timing.rate_hz:g} Hz"

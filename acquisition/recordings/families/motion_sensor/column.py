@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, U8, Flag
 from acquisition.errors import FormatError
-from acquisition.recordings.families.motion_sensor_layout import Layout, ask_columns, find_layout
+from acquisition.recordings.families.motion_sensor.layout import Layout, ask_columns, find_layout
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.samples import Rows, flags_of, place, row_traps, sample_traps, value_traps, within
 from acquisition.recordings.sampling.timing import Timing, check_rate, clock_traps, time_by_column
+from acquisition.recordings.sampling.velocity import find_tick
 from acquisition.recordings.tables.table import Table, read_table
 from acquisition.recordings.tables.text import says_simulated, text_of
 
@@ -74,8 +75,6 @@ class Column:
 
     def tick(self) -> float | None:
         """Return the step that all values are multiples of, m or m/s, if one is evident."""
-        from acquisition.recordings.sampling.velocity import find_tick
-
         return find_tick(self.value, self.resolution)
 
 
