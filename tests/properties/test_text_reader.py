@@ -218,7 +218,7 @@ def test_a_few_odd_rows_do_not_send_the_others_down_the_slow_path(monkeypatch: p
     table = read_table(Text.of("\n".join(lines).encode()[:-3]), range(3), "\t", width=3)
     assert table.bad.nonzero()[0].tolist() == [700, 3000]
     assert "text in the middle" in singly
-    assert len(singly) < 20
+    assert len(singly) < 100
 
 
 @pytest.mark.parametrize("delimiter", ["\t", ";", "  "])

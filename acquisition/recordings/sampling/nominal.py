@@ -19,14 +19,20 @@ _BLOCK = 16384
 
 
 def median(values: NDArray[Any]) -> float:
-    """Return the median of at least one number, none of them NaN; numpy.median imports numpy.ma, 15 ms of a cold start.
+    """Return the median of at least one number, none of them NaN.
+
+    By hand, for numpy.median imports numpy.ma: 10 ms of a cold start of 150.
 
     Examples
     --------
     >>> median(np.array([3.0, 1.0, 2.0])), median(np.array([4, 1, 2, 3]))
     (2.0, 2.5)
     """
-    return float(np.quantile(values, 0.5))
+    half = values.size // 2
+    if values.size % 2:
+        return float(np.partition(values, half)[half])
+    low, high = np.partition(values, (half - 1, half))[half - 1 : half + 1].tolist()
+    return float(0.5 * (low + high))
 
 
 class Grid(NamedTuple):

@@ -33,7 +33,7 @@ Mask = NDArray[np.bool_]
 
 _PAGE_BYTES = 1 << 16
 _MIXED_ROWS = 512  # more rows that are not all of fixed point are halved: most of them may be
-_SINGLE_ROWS = 8  # so few are read one by one
+_SINGLE_ROWS = 32  # so few are read one by one
 _MOST_DIGITS = 15  # whole numbers of so many digits and powers of ten up to 10^22 are exact in binary, so that their
 _MOST_POWER = 22  # quotient is rounded once
 _LONGEST_EXPONENT = len("e-99")
@@ -155,11 +155,14 @@ def _pages(data: bytes, start: int, stop: int) -> Iterator[bytes]:
 
 
 def _unified(page: bytes, delimiter: str) -> bytes:
-    """End every line by LF, put one tab for every run of white space that separates, and points for commas."""
+    """End lines by LF, separate by one tab instead of white space, take quotes off cells, put points for commas."""
     if b"\r" in page:
         page = page.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if not page.endswith(b"\n"):
         page += b"\n"
+    if b'"' in page:
+        mark = re.escape((delimiter or "\t").encode())
+        page = re.sub(rb'(?<![^%b\n])"([^"%b\n]*)"(?![^%b\n])' % (mark, mark, mark), rb"\1", page)
     if not delimiter:
         page = page.replace(b" ", b"\t")
         while b"\t\t" in page:
@@ -227,6 +230,12 @@ class _Rows:
         cells = lines[: lines.find(b"\n")].decode("ascii", "replace").rstrip("\r").split(self.mark)
         if self.width not in (None, len(cells)) or max(self.columns) >= len(cells):
             return None
+        printed = [cells[column] for column in self.columns]
+        decimals = [printed_decimals(cell) for cell in printed]
+        if any(
+            parse_number(cell) is None or ("." in cell) != (n > 0) for cell, n in zip(printed, decimals, strict=True)
+        ):
+            return None
         raw = np.frombuffer(lines, np.uint8)
         marks = np.flatnonzero((raw == ord(self.mark)) | (raw == _NEWLINE))
         length = np.concatenate((marks[:1], np.diff(marks) - 1)).reshape(-1, len(cells))
@@ -236,11 +245,8 @@ class _Rows:
             length[:, -1] -= 1
         if length.max() > _MOST_DIGITS:
             return None
-        decimals = [printed_decimals(cells[column]) for column in self.columns]
         for column, places in zip(self.columns, decimals, strict=True):
             point = places > 0
-            if parse_number(cells[column]) is None or point != ("." in cells[column]):
-                return None
             if length[:, column].min() <= places + point:
                 return None
             if point and (raw[ends[:, column] - places - 1] != _POINT).any():
