@@ -112,7 +112,7 @@ class _Solved:
 
     def amplitude(self) -> F8:
         """Amplitude at every sample of the record (n,), m."""
-        return self.state.law.amplitude(self.record.elapsed, self.state.theta)
+        return self.state.amplitude(self.record.elapsed)
 
     def position(self) -> F8:
         """Distance at every sample of the record (n,), m, less the record's level."""
@@ -235,10 +235,10 @@ def _settled(
         solved = _solve(record, state, rows, params)
         if not solved.fit.converged:
             return solved.fit.tried
-        chosen, state = chooser.settled(solved.state, rows)
+        chosen = chooser.near(record.y - solved.position(), rows)
         if np.count_nonzero(chosen != rows) <= STEADY * rows.size:
             break
-        rows = chosen
+        rows, state = chooser.settled(solved.state, chosen)
     return solved
 
 

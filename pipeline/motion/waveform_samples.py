@@ -71,7 +71,7 @@ class Chooser:
             inverse = np.linalg.pinv(normal - out.T @ out, rcond=DEPENDENT, hermitian=True)
             step = inverse @ (right - out.T @ left[~rows])
             predicted = left - slope @ step
-            chosen = self._near(predicted, rows)
+            chosen = self.near(predicted, rows)
             if np.array_equal(chosen, rows):
                 break
             rows = chosen
@@ -82,7 +82,7 @@ class Chooser:
         good = np.sum(found[rows] ** 2) <= TANGENT * np.sum(predicted[rows] ** 2)
         return (rows, moved) if good else (before, state)
 
-    def _near(self, left: F8, rows: Rows) -> Rows:
+    def near(self, left: F8, rows: Rows) -> Rows:
         """Return the samples within the noise of a model that leaves (n,), m."""
         spread = mad_sigma(left[self._candidates])
         near = self._candidates & ~self.on_plateau(self._record.y - left)
