@@ -73,7 +73,7 @@ def test_a_saturated_sensor_is_told(cli: Cli, write: Write, accuracy: str) -> No
 @pytest.mark.parametrize(
     ("toml", "word"),
     [
-        ("[bob]\nmass_kg = 0", "more than 0 kg, got 0"),
+        ("[bob]\nmass_kg = 0", "more than 0 kg, from 1e-12 to 1e+06, got 0"),
         ("[bob]\nmass_kg = { value = 0.2, u = -1e-5 }", "must not be negative"),
         ("[bob]\nmass_kg = nan", "finite"),
         ("[bob]\nmass_kg = { u = 1e-5 }", "mass_kg"),

@@ -184,7 +184,7 @@ def test_what_is_missing_is_named(arguments: list[str], words: str, capsys: pyte
 @pytest.mark.parametrize(
     ("scene", "words"),
     [
-        ("[bob]\nmass_kg = 0.0\n", "[bob] mass_kg must be more than 0 kg, got 0"),
+        ("[bob]\nmass_kg = 0.0\n", "[bob] mass_kg must be more than 0 kg, from 1e-12 to 1e+06, got 0"),
         ("[bob]\nmass_kg = { value = 0.2, u = -1e-5 }\n", "its u must not be negative"),
         ("[bob]\nmass_kg = { value = 0.2, u = nan }\n", "its u must be a finite number"),
         ("[bob]\nmass_kg = { u = 1e-5 }\n", "must be a number or { value = ..., u = ... }"),
