@@ -1,4 +1,9 @@
-"""Lines: single frequencies in what a smooth model of an oscillation leaves, found at a stated false-alarm rate."""
+"""Lines: single frequencies in what a smooth model of an oscillation leaves, found at a stated false-alarm rate.
+
+The periodograms of libraries state that rate for white noise alone: at a rate of 0.01 such a threshold finds a line in
+every one of 200 records of noise with a correlation of 0.9 from block to block, this in at most two of a hundred
+(``tests/unit/pipeline/numerics/test_spectrum.py``).
+"""
 
 from __future__ import annotations
 
@@ -308,7 +313,8 @@ def _autoregression(y: F8, highest: int) -> tuple[list[float], float]:
 
 def _density(coefficients: list[float], variance: float, turns: F8) -> F8:
     """Spectral density at frequencies in turns per block: its mean over all of them is the variance."""
-    response = np.ones(turns.size, np.complex128)
+    real, imaginary = np.ones(turns.size), np.zeros(turns.size)
     for lag, coefficient in enumerate(coefficients, start=1):
-        response -= coefficient * np.exp(-2j * math.pi * lag * turns)
-    return np.asarray(variance / np.abs(response) ** 2)
+        real -= coefficient * np.cos(2.0 * math.pi * lag * turns)
+        imaginary += coefficient * np.sin(2.0 * math.pi * lag * turns)
+    return np.asarray(variance / (real**2 + imaginary**2))

@@ -148,17 +148,11 @@ def _spectral_line(t: F8, y: F8, rate_hz: float, false_alarm: float) -> tuple[fl
     values -= centred * (float(centred @ values) / float(centred @ centred))
     threshold = math.log(n / false_alarm)
     # Without a window lines are narrow, and between two bins one may be lost: they must lie closer.
-    for shape, finer in ((_hann, 1), (np.ones_like, 4)):
-        window = shape(centred)
+    for window, finer in ((np.hanning(n), 1), (np.ones(n), 4)):
         frequency_hz, power, ratio = _peak(values * window, rate_hz, finer)
         if ratio >= threshold:
             return frequency_hz, 2.0 * math.sqrt(power) / float(window.sum())
     return NoOscillation("no line stands out of the spectrum's noise: there is no oscillation to be seen")
-
-
-def _hann(centred: F8) -> F8:
-    """The raised cosine that is 0 at the first and the last of n places counted from their middle."""
-    return 0.5 + 0.5 * np.cos(centred * (2.0 * math.pi / (centred.size - 1)))
 
 
 def _peak(values: F8, rate_hz: float, finer: int) -> tuple[float, float, float]:

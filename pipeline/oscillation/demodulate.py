@@ -1,4 +1,10 @@
-"""Demodulate: amplitude, phase, rest position and noise against time, window by window, with covariance."""
+"""Demodulate: amplitude, phase, rest position and noise against time, window by window, with covariance.
+
+No library fits every period robustly: on the bundled damped recording, in which clusters of false echoes lie at the
+turning points, one least-squares fit of a damped sine gives the amplitude 3.68 mm wrong, this 0.01 mm
+(``docs/decisions/0004-demodulation-first.md``). :mod:`windows` holds the linear fit, :mod:`tuning` the frequency and
+decay that its basis needs, this module the passes: let clusters go, rescue, clip, tune, clip.
+"""
 
 from __future__ import annotations
 

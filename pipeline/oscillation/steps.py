@@ -158,7 +158,7 @@ class _Windows:
         if t.size < 5:
             return cls(t, offset, 1.0)
         around = np.lib.stride_tricks.sliding_window_view(np.pad(offset, 2, mode="edge"), 5)
-        away = np.abs(offset - np.partition(around, 2, axis=1)[:, 2])
+        away = np.abs(offset - np.median(around, axis=1))
         kept = away <= 8.0 * max(mad_sigma(away), 1e-300)
         t, offset = t[kept], offset[kept]
         stated = float(np.median(np.sqrt(demodulated.covariance[kept, 2, 2])))
