@@ -114,8 +114,8 @@ def separate(
     variances grow by what it costs to know it from the same samples.
 
     Where the strongest mode would do that, the windows are fitted again without it before all modes are sought, for
-    beats pass for false echoes. Repeating this until nothing changes moves the amplitude of the two-minute disc in
-    ``docs/explanation/real-records.md`` by two of its uncertainties and costs five times as much; the clean ones stay.
+    beats pass for false echoes. It is done once: with up to six rounds the amplitude of the two-minute disc in
+    ``docs/explanation/real-records.md``, which is not clean, went on moving by up to two of its uncertainties.
     """
     params = params or Params()
     t, taken = conditioned.track.t, np.zeros(len(conditioned.track))
