@@ -7,7 +7,8 @@
    count what is none, and hold a bounded number of bytes.
 3. What a frame must be is written as strictly as the data sheet allows: fixed digits, range, checksum. A code for
    "no target" is NaN; a number that is no distance never passes for one.
-4. :func:`acquisition.decoders.rows.rows` makes the readings. Echo times go in as echo times.
+4. ``reading`` says what a frame means; all else is :class:`acquisition.decoders.framed.FramedDecoder`'s. Echo times go
+   in as echo times.
 5. The encoder is written from the data sheet and not from the decoder, so that one checks the other.
 6. One line in ``_TABLE`` of ``acquisition/decoders/registry.py``, or, in a package of your own, an entry point in the
    group ``springmass.sensors``.
@@ -21,13 +22,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
-from types import MappingProxyType
 
 from acquisition.decoders.family import Family
+from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
-from acquisition.decoders.rows import NAN, rows
-from acquisition.readings import Readings
+from acquisition.readings import NAN, Reading
 
 __all__ = ["FAMILY", "ExampleDecoder", "ExampleEncoder"]
 
@@ -35,39 +34,18 @@ _LONGEST = 32  # change: longer than any line of the device
 _FORM = re.compile(rb":([0-9]{4}),([0-9A-F]{2})\r?")  # change
 
 
-class ExampleDecoder:
+class ExampleDecoder(FramedDecoder):
     """Decodes the example's lines."""
 
     def __init__(self) -> None:
-        self._faults = {"garbage_bytes": 0, "bad_frame": 0, "bad_checksum": 0}
-        self._lines = LineSplitter(b"\n", _LONGEST, self._faults)
+        super().__init__(LineSplitter(b"\n", _LONGEST, {"garbage_bytes": 0, "bad_frame": 0, "bad_checksum": 0}))
 
-    @property
-    def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading."""
-        return MappingProxyType(self._faults)
-
-    @property
-    def pending(self) -> int:
-        """Bytes held until the line they began is whole."""
-        return self._lines.pending
-
-    def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the distances whose lines these bytes end."""
-        found = [mm for line in self._lines.split(data) if (mm := self._millimetres(line)) is not None]
-        return rows(host_ns, distance_m=[mm / 1000 if mm else NAN for mm in found])
-
-    def flush(self) -> None:
-        """Forget a half-received line."""
-        self._lines.flush()
-
-    def _millimetres(self, line: bytes) -> int | None:
-        """Return a line's number, or count why it has none."""
-        found = _FORM.fullmatch(line)
+    def reading(self, host_ns: int, frame: bytes) -> Reading | None:
+        """Return a line's distance, or count why it has none."""
+        found = _FORM.fullmatch(frame)
         if found is not None and sum(found[1]) & 0xFF == int(found[2], 16):
-            return int(found[1])
-        self._faults["bad_frame" if found is None else "bad_checksum"] += 1
-        self._faults["garbage_bytes"] += len(line) + 1
+            return Reading(host_ns, distance_m=int(found[1]) / 1000 or NAN)
+        self._count("bad_frame" if found is None else "bad_checksum", len(frame) + 1)
         return None
 
 

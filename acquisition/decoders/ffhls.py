@@ -8,13 +8,11 @@ another sensor) of the newer DYP modules.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
 
 from acquisition.decoders.family import Family
-from acquisition.decoders.rows import NAN, rows
+from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.sum_frames import SumFrames, with_sum
-from acquisition.readings import Readings
+from acquisition.readings import NAN, Reading
 
 __all__ = ["FAMILY", "FfhlsDecoder", "FfhlsEncoder"]
 
@@ -32,30 +30,16 @@ def _plausible(frame: bytes) -> bool:
     return _value(frame) <= FARTHEST_MM or _value(frame) in _NO_TARGET
 
 
-class FfhlsDecoder:
+class FfhlsDecoder(FramedDecoder):
     """Decodes FF H L SUM."""
 
     def __init__(self) -> None:
-        self._frames = SumFrames(4, b"\xff", _plausible)
+        super().__init__(SumFrames(4, b"\xff", _plausible))
 
-    @property
-    def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading."""
-        return MappingProxyType(self._frames.faults)
-
-    @property
-    def pending(self) -> int:
-        """Bytes held until the frame they began is whole."""
-        return self._frames.pending
-
-    def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the distances whose frames these bytes complete."""
-        values = [frame[1] << 8 | frame[2] for frame in self._frames.split(data)]
-        return rows(host_ns, distance_m=[NAN if mm in _NO_TARGET else mm / 1000 for mm in values])
-
-    def flush(self) -> None:
-        """Forget a half-received frame."""
-        self._frames.flush()
+    def reading(self, host_ns: int, frame: bytes) -> Reading:
+        """Return a frame's distance."""
+        mm = _value(frame)
+        return Reading(host_ns, distance_m=NAN if mm in _NO_TARGET else mm / 1000)
 
 
 class FfhlsEncoder:

@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 import re
 from binascii import crc_hqx
-from collections.abc import Mapping
-from types import MappingProxyType
 
 from acquisition.decoders.family import Family
+from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
-from acquisition.readings import NAN, Reading, Readings
+from acquisition.readings import NAN, Reading
 
 __all__ = ["FAMILY", "LineProtocolDecoder", "LineProtocolEncoder", "checksum", "frame"]
 
@@ -44,7 +43,7 @@ def frame(body: bytes) -> bytes:
     return b"$%s*%04X\n" % (body, checksum(body))
 
 
-class LineProtocolDecoder:
+class LineProtocolDecoder(FramedDecoder):
     """Decodes the line protocol.
 
     Notes
@@ -54,42 +53,20 @@ class LineProtocolDecoder:
     ``unknown_record``.
     """
 
-    __slots__ = ("_faults", "_lines")
-
     def __init__(self) -> None:
-        self._faults = {"garbage_bytes": 0, "bad_checksum": 0, "bad_frame": 0, "unknown_record": 0, "comment": 0}
-        self._lines = LineSplitter(b"\n", LONGEST, self._faults)
+        faults = {"garbage_bytes": 0, "bad_checksum": 0, "bad_frame": 0, "unknown_record": 0, "comment": 0}
+        super().__init__(LineSplitter(b"\n", LONGEST, faults))
 
-    @property
-    def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading."""
-        return MappingProxyType(self._faults)
-
-    @property
-    def pending(self) -> int:
-        """Bytes held until the line they began is whole."""
-        return self._lines.pending
-
-    def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the readings whose lines these bytes end."""
-        found: list[Reading] = []
-        for line in self._lines.split(data):
-            reading = _reading(host_ns, line) or self._behind_noise(host_ns, line)
-            if reading is not None:
-                found.append(reading)
-        return Readings(found)
-
-    def flush(self) -> None:
-        """Forget a half-received line."""
-        self._lines.flush()
+    def reading(self, host_ns: int, frame: bytes) -> Reading | None:
+        """Return what a line carries, or count why it carries nothing."""
+        return _reading(host_ns, frame) or self._behind_noise(host_ns, frame)
 
     def _behind_noise(self, host_ns: int, line: bytes) -> Reading | None:
         """Return what a line that is not sound from its beginning carries, and count what is wrong with it."""
         # What stands before the last $ is noise, or a line whose end was lost; the rest may be whole.
         start = max(line.rfind(b"$"), 0)
         reading = _reading(host_ns, line[start:]) if start else None
-        self._faults["bad_frame" if reading else _fault(line, start)] += 1
-        self._faults["garbage_bytes"] += start if reading else len(line) + 1
+        self._count("bad_frame" if reading else _fault(line, start), start if reading else len(line) + 1)
         return reading
 
 

@@ -21,12 +21,10 @@ class LineSplitter:
         have begun midway, and half a number looks like a number.
     """
 
-    __slots__ = ("_end", "_faults", "_held", "_limit", "_overlong", "_skip", "_skip_first")
-
     def __init__(self, end: bytes, limit: int, faults: dict[str, int], *, skip_first: bool = False) -> None:
         self._end = end
         self._limit = limit
-        self._faults = faults
+        self.faults = faults
         self._skip_first = skip_first
         self._skip = skip_first
         self._overlong = False
@@ -46,7 +44,7 @@ class LineSplitter:
             self._drop(lines.pop(0), "partial_line" if self._skip else "bad_frame")
             self._skip = self._overlong = False
         if self._overlong or len(self._held) > self._limit:
-            self._faults["garbage_bytes"] += len(self._held)
+            self.faults["garbage_bytes"] += len(self._held)
             self._held = b""
             self._overlong = True
         if len(data) > self._limit and lines and max(map(len, lines)) > self._limit:
@@ -59,12 +57,12 @@ class LineSplitter:
     def flush(self) -> None:
         """Forget the line that has begun."""
         if self._held or self._overlong:
-            self._faults["garbage_bytes"] += len(self._held)
-            self._faults["bad_frame"] += 1
+            self.faults["garbage_bytes"] += len(self._held)
+            self.faults["bad_frame"] += 1
         self._held = b""
         self._overlong = False
         self._skip = self._skip_first
 
     def _drop(self, line: bytes, why: str) -> None:
-        self._faults["garbage_bytes"] += len(line) + 1
-        self._faults[why] += 1
+        self.faults["garbage_bytes"] += len(line) + 1
+        self.faults[why] += 1

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from types import MappingProxyType
 
 from acquisition.decoders.family import Family
+from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
-from acquisition.decoders.rows import NAN, rows
-from acquisition.readings import Readings
+from acquisition.readings import NAN, Reading
 
 __all__ = ["FAMILIES", "MaxbotixDecoder", "MaxbotixEncoder", "Variant"]
 
@@ -46,7 +44,7 @@ class Variant:
     tail: str = ""
 
 
-class MaxbotixDecoder:
+class MaxbotixDecoder(FramedDecoder):
     """Decodes ``R`` lines.
 
     Parameters
@@ -60,43 +58,25 @@ class MaxbotixDecoder:
     """
 
     def __init__(self, variant: Variant) -> None:
+        super().__init__(LineSplitter(b"\r", _LONGEST, {"garbage_bytes": 0, "bad_frame": 0}))
         self._unit_m = variant.unit_m
         self._no_target = frozenset((0, *variant.no_target))
         self._form = re.compile(rb"R([0-9]{%d})(?: P[0-9]| )?" % variant.digits)
-        self._faults = {"garbage_bytes": 0, "bad_frame": 0}
-        self._lines = LineSplitter(b"\r", _LONGEST, self._faults)
 
-    @property
-    def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading."""
-        return MappingProxyType(self._faults)
-
-    @property
-    def pending(self) -> int:
-        """Bytes held until the line they began is whole."""
-        return self._lines.pending
-
-    def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the distances whose lines these bytes end."""
-        distance_m = []
-        for line in self._lines.split(data):
-            # What stands before the last R is noise, or a line whose return was lost; the rest may be whole.
-            start = max(line.rfind(b"R"), 0)
-            found = self._form.fullmatch(line, start)
-            if start or found is None:
-                self._spoiled(line, start if found else len(line) + 1)
-            if found is not None:
-                number = int(found[1])
-                distance_m.append(NAN if number in self._no_target else number * self._unit_m)
-        return rows(host_ns, distance_m=distance_m)
-
-    def flush(self) -> None:
-        """Forget a half-received line."""
-        self._lines.flush()
-
-    def _spoiled(self, line: bytes, garbage: int) -> None:
-        self._faults["garbage_bytes"] += garbage
-        self._faults["bad_frame"] += line[:garbage] != b"\n"  # adapters that end lines with CR LF
+    def reading(self, host_ns: int, frame: bytes) -> Reading | None:
+        """Return a line's distance, and count what stands before it or in its place."""
+        # What stands before the last R is noise, or a line whose return was lost; the rest may be whole.
+        start = max(frame.rfind(b"R"), 0)
+        found = self._form.fullmatch(frame, start)
+        garbage = start if found else len(frame) + 1
+        if frame[:garbage] == b"\n":  # adapters that end lines with CR LF
+            self._frames.faults["garbage_bytes"] += garbage
+        elif garbage:
+            self._count("bad_frame", garbage)
+        if found is None:
+            return None
+        number = int(found[1])
+        return Reading(host_ns, distance_m=NAN if number in self._no_target else number * self._unit_m)
 
 
 class MaxbotixEncoder:
@@ -136,8 +116,8 @@ def _family(
     )
 
 
-FAMILIES = {
-    "maxbotix-lv": _family(
+_EVERY = (
+    _family(
         "maxbotix-lv",
         "MaxBotix LV-MaxSonar-EZ (Rddd, inches)",
         Variant(3, 0.0254, (255,)),
@@ -146,7 +126,7 @@ FAMILIES = {
         limits="Steps of one inch, and everything nearer than 6 inches reads 6.",
         source="MaxBotix LV-MaxSonar-EZ data sheet",
     ),
-    "maxbotix-lv-p": _family(
+    _family(
         "maxbotix-lv-p",
         "MaxBotix LV-ProxSonar-EZ (Rddd Pn, inches)",
         Variant(3, 0.0254, (255,), " P0"),
@@ -155,7 +135,7 @@ FAMILIES = {
         limits="Steps of one inch, and everything nearer than 6 inches reads 6.",
         source="MaxBotix LV-ProxSonar-EZ data sheet",
     ),
-    "maxbotix-xl": _family(
+    _family(
         "maxbotix-xl",
         "MaxBotix XL-MaxSonar, 7.6 m models (Rddd, cm)",
         Variant(3, 0.01, (765,)),
@@ -164,7 +144,7 @@ FAMILIES = {
         limits="Steps of 1 cm at 10 Hz.",
         source="MaxBotix XL-MaxSonar-EZ and -WR data sheets",
     ),
-    "maxbotix-xl-long": _family(
+    _family(
         "maxbotix-xl-long",
         "MaxBotix XL-MaxSonar, 10 m models (Rdddd, cm)",
         Variant(4, 0.01, (1068,)),
@@ -173,7 +153,7 @@ FAMILIES = {
         limits="Steps of 1 cm at 10 Hz.",
         source="MaxBotix XL-MaxSonar-EZL and -WRL data sheets",
     ),
-    "maxbotix-hr": _family(
+    _family(
         "maxbotix-hr",
         "MaxBotix HRLV- and HRUSB-MaxSonar (Rdddd, mm)",
         Variant(4, 0.001, (5000,)),
@@ -182,7 +162,7 @@ FAMILIES = {
         limits="10 Hz, and everything nearer than 300 mm reads 300.",
         source="MaxBotix HRLV-MaxSonar-EZ and HRUSB-MaxSonar-EZ data sheets",
     ),
-    "maxbotix-wr": _family(
+    _family(
         "maxbotix-wr",
         "MaxBotix HRXL-MaxSonar-WR (Rdddd, mm)",
         Variant(4, 0.001, (4999, 9999)),
@@ -191,5 +171,6 @@ FAMILIES = {
         limits="The free-running output is filtered to 1.2 to 1.5 Hz, useless for oscillations: trigger each reading.",
         source="MaxBotix HRXL-MaxSonar-WR data sheet",
     ),
-}
+)
+FAMILIES = {family.name: family for family in _EVERY}
 """By name."""

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 
-from acquisition.decoders.cycle import Cycle
-from acquisition.decoders.rows import NAN, rows
+from acquisition.decoders.cycle import Cycle, PolledEncoder
+from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.sum_frames import SumFrames, with_sum
-from acquisition.readings import Readings
+from acquisition.readings import NAN, Reading
 
-__all__ = ["ReplyDecoder", "ReplyEncoder", "ReplyForm"]
+__all__ = ["ReplyDecoder", "ReplyForm"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,8 +41,16 @@ class ReplyForm:
     distance_code: Callable[[float], int]
     temperature_code: Callable[[float], int]
 
+    def encoder(self, temperature_every: int = 0) -> PolledEncoder:
+        """Return the simulated sensor's encoder."""
+        return PolledEncoder(
+            Cycle(self.ask_distance, self.ask_temperature, temperature_every),
+            lambda distance_m: with_sum(self.distance_head + self.distance_code(distance_m).to_bytes(2, "big")),
+            lambda celsius: with_sum(self.temperature_head + self.temperature_code(celsius).to_bytes(2, "big")),
+        )
 
-class ReplyDecoder:
+
+class ReplyDecoder(FramedDecoder):
     """Decodes such replies; a temperature goes with the next distance.
 
     Parameters
@@ -56,76 +63,29 @@ class ReplyDecoder:
     def __init__(self, form: ReplyForm, temperature_every: int = 0) -> None:
         head = len(form.distance_head)
         starts = bytes({form.distance_head[0], form.temperature_head[0]})
+        super().__init__(SumFrames(head + 3, starts, form.plausible))
         self._form = form
-        self._frames = SumFrames(head + 3, starts, form.plausible)
         self._command_at = head - 1
-        self._cycle = Cycle(temperature_every)
+        self._cycle = Cycle(form.ask_distance, form.ask_temperature, temperature_every)
         self._celsius = NAN
-
-    @property
-    def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading."""
-        return MappingProxyType(self._frames.faults)
-
-    @property
-    def pending(self) -> int:
-        """Bytes held until the frame they began is whole."""
-        return self._frames.pending
 
     @property
     def request(self) -> bytes:
         """What to send next."""
-        return self._form.ask_temperature if self._cycle.wants_temperature else self._form.ask_distance
+        return self._cycle.request
 
-    def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the distances whose replies these bytes complete."""
-        form, command, at = self._form, self._form.temperature_head[-1], self._command_at
-        distance_m: list[float] = []
-        temperature_c: list[float] = []
-        for frame in self._frames.split(data):
-            value = frame[at + 1] << 8 | frame[at + 2]
-            is_temperature = frame[at] == command
-            self._cycle.answered(temperature=is_temperature)
-            if is_temperature:
-                self._celsius = form.celsius(value)
-                continue
-            distance_m.append(form.metres(value))
-            temperature_c.append(self._celsius)
-            self._celsius = NAN
-        return rows(host_ns, distance_m=distance_m, temperature_c=temperature_c)
+    def reading(self, host_ns: int, frame: bytes) -> Reading | None:
+        """Return a reply's distance; keep a temperature for the next one."""
+        at = self._command_at
+        value = frame[at + 1] << 8 | frame[at + 2]
+        is_temperature = frame[at] == self._form.temperature_head[-1]
+        self._cycle.answered(temperature=is_temperature)
+        celsius, self._celsius = self._celsius, self._form.celsius(value) if is_temperature else NAN
+        if is_temperature:
+            return None
+        return Reading(host_ns, distance_m=self._form.metres(value), temperature_c=celsius)
 
     def flush(self) -> None:
         """Forget a half-received reply; the next request is for a distance."""
-        self._frames.flush()
+        super().flush()
         self._cycle.restart()
-
-
-class ReplyEncoder:
-    """Writes such replies.
-
-    Parameters
-    ----------
-    form : ReplyForm
-    temperature_every : int
-        As the decoder's.
-    """
-
-    def __init__(self, form: ReplyForm, temperature_every: int = 0) -> None:
-        self._form = form
-        self._cycle = Cycle(temperature_every)
-
-    def encode(self, *, distance_m: float, temperature_c: float, **_: float) -> bytes:
-        """Return the reply to the request whose turn it is."""
-        temperature = self._cycle.wants_temperature
-        self._cycle.answered(temperature=temperature)
-        request = self._form.ask_temperature if temperature else self._form.ask_distance
-        return self.reply(request, distance_m=distance_m, temperature_c=temperature_c)
-
-    def reply(self, request: bytes, *, distance_m: float, temperature_c: float) -> bytes:
-        """Return the reply to a request, nothing to what is none."""
-        form = self._form
-        if request == form.ask_distance:
-            return with_sum(form.distance_head + form.distance_code(distance_m).to_bytes(2, "big"))
-        if request == form.ask_temperature:
-            return with_sum(form.temperature_head + form.temperature_code(temperature_c).to_bytes(2, "big"))
-        return b""

@@ -11,9 +11,9 @@ from functools import partial
 
 from acquisition.decoders.cycle import OPTIONS
 from acquisition.decoders.family import Family, Poll
-from acquisition.decoders.replies import ReplyDecoder, ReplyEncoder, ReplyForm
-from acquisition.decoders.rows import NAN
+from acquisition.decoders.replies import ReplyDecoder, ReplyForm
 from acquisition.decoders.sum_frames import with_sum
+from acquisition.readings import NAN
 
 __all__ = ["FAMILY"]
 
@@ -69,7 +69,7 @@ FAMILY = Family(
     range_m=(0.2, 10.0),
     limits="Nothing nearer than 20 cm, and one request at a time on the bus.",
     decoder=partial(ReplyDecoder, _FORM),
-    encoder=partial(ReplyEncoder, _FORM),
+    encoder=_FORM.encoder,
     poll=Poll(request=_FORM.ask_distance, interval_s=0.1, timeout_s=0.25),
     options=OPTIONS,
     source="DFRobot SEN0149, SEN0150: communication protocol",

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from types import MappingProxyType
+from typing import Any
 
 from acquisition.decoders.columns import Column, as_column, as_separator, split
 from acquisition.decoders.family import Family
+from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
-from acquisition.decoders.rows import NAN, rows
 from acquisition.errors import SensorError
-from acquisition.readings import Readings
+from acquisition.readings import NAN, Reading
 
 __all__ = ["FAMILY", "TextLinesDecoder", "TextLinesEncoder"]
 
@@ -40,8 +40,8 @@ _OPTIONS = {
 }
 
 
-class TextLinesDecoder:
-    """Decodes text lines.
+class _Form:
+    """What stands where in a line; the parameters are the family's options.
 
     Parameters
     ----------
@@ -58,12 +58,6 @@ class TextLinesDecoder:
     ------
     SensorError
         If an option has no such value.
-
-    Notes
-    -----
-    There is no checksum. A reading is a number in a line that was received from its beginning to its end; a flipped
-    bit that makes another digit cannot be seen. Zero, a negative number, an echo from 38 ms and a distance from 20 m
-    are missing samples.
     """
 
     def __init__(
@@ -76,65 +70,59 @@ class TextLinesDecoder:
         time_unit: str = "us",
         temperature: int | str | None = None,
     ) -> None:
-        self._separator = as_separator(separator)
-        self._is_echo = unit == "us"
-        self._scale = 1.0 if self._is_echo else _factor("unit", unit, LENGTHS_M, "us")
-        self._time_us = _factor("time_unit", time_unit, TIMES_US)
-        self._reading = as_column("column", column, unit)
-        self._sequence = None if sequence is None else as_column("sequence", sequence)
-        self._time = None if time is None else as_column("time", time, time_unit)
-        self._temperature = None if temperature is None else as_column("temperature", temperature, "C")
-        self._faults = {"garbage_bytes": 0, "bad_frame": 0, "partial_line": 0, "blank_line": 0}
-        self._lines = LineSplitter(b"\n", LONGEST, self._faults, skip_first=True)
+        self.separator = as_separator(separator)
+        self.is_echo = unit == "us"
+        self.scale = 1.0 if self.is_echo else _factor("unit", unit, LENGTHS_M, "us")
+        self.time_us = _factor("time_unit", time_unit, TIMES_US)
+        self.reading = as_column("column", column, unit)
+        self.sequence = None if sequence is None else as_column("sequence", sequence)
+        self.time = None if time is None else as_column("time", time, time_unit)
+        self.temperature = None if temperature is None else as_column("temperature", temperature, "C")
 
-    @property
-    def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading."""
-        return MappingProxyType(self._faults)
 
-    @property
-    def pending(self) -> int:
-        """Bytes held until the line they began is whole."""
-        return self._lines.pending
+class TextLinesDecoder(FramedDecoder):
+    """Decodes text lines.
 
-    def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the readings whose lines these bytes end."""
-        found = [row for line in self._lines.split(data) if (row := self._row(line)) is not None]
-        if not found:
-            return rows(host_ns, distance_m=[])
-        value, sequence, device_us, temperature_c = zip(*found, strict=True)
-        return rows(
-            host_ns,
-            echo_us=value if self._is_echo else None,
-            distance_m=None if self._is_echo else value,
-            sequence=sequence,
-            device_us=device_us,
-            temperature_c=temperature_c,
-        )
+    Parameters
+    ----------
+    **options
+        Those of the family.
 
-    def flush(self) -> None:
-        """Forget a half-received line, and the one after: it may be the rest of it."""
-        self._lines.flush()
+    Raises
+    ------
+    SensorError
+        If an option has no such value.
 
-    def _row(self, line: bytes) -> tuple[float, int, int, float] | None:
-        """Return reading, sequence, device us and degC of a line, or count why there is none."""
-        text = line.strip(b"\r ")
+    Notes
+    -----
+    There is no checksum. A reading is a number in a line that was received from its beginning to its end; a flipped
+    bit that makes another digit cannot be seen. Zero, a negative number, an echo from 38 ms and a distance from 20 m
+    are missing samples.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        self._form = _Form(**options)
+        faults = {"garbage_bytes": 0, "bad_frame": 0, "partial_line": 0, "blank_line": 0}
+        super().__init__(LineSplitter(b"\n", LONGEST, faults, skip_first=True))
+
+    def reading(self, host_ns: int, frame: bytes) -> Reading | None:
+        """Return a line's numbers, or count why there are none."""
+        text = frame.strip(b"\r ")
         if not text:
-            self._faults["blank_line"] += 1
+            self._count("blank_line", 0)
             return None
-        cells = split(text, self._separator)
-        value = self._reading.number(text, cells)
-        sequence, time = _whole(self._sequence, text, cells, 1.0), _whole(self._time, text, cells, self._time_us)
-        if value is None or sequence is None or time is None:
-            self._faults["bad_frame"] += 1
-            self._faults["garbage_bytes"] += len(line) + 1
+        form = self._form
+        cells = split(text, form.separator)
+        value = form.reading.number(text, cells)
+        sequence, device_us = _whole(form.sequence, text, cells, 1.0), _whole(form.time, text, cells, form.time_us)
+        if value is None or sequence is None or device_us is None:
+            self._count("bad_frame", len(frame) + 1)
             return None
-        celsius = NAN if self._temperature is None else self._temperature.number(text, cells)
-        return self._measured(value), sequence, time, NAN if celsius is None else celsius
-
-    def _measured(self, value: float) -> float:
-        scaled = value * self._scale
-        return scaled if 0 < scaled < (_LATEST_US if self._is_echo else _FARTHEST_M) else NAN
+        celsius = None if form.temperature is None else form.temperature.number(text, cells)
+        scaled = value * form.scale
+        measured = scaled if 0 < scaled < (_LATEST_US if form.is_echo else _FARTHEST_M) else NAN
+        echo_us, distance_m = (measured, NAN) if form.is_echo else (NAN, measured)
+        return Reading(host_ns, sequence, device_us, echo_us, distance_m, NAN if celsius is None else celsius)
 
 
 def _whole(column: Column | None, text: bytes, cells: list[bytes], scale: float) -> int | None:
@@ -154,38 +142,27 @@ def _factor(option: str, unit: str, known: Mapping[str, float], *more: str) -> f
 class TextLinesEncoder:
     """Writes text lines as a decoder with the same options reads them."""
 
-    def __init__(
-        self,
-        column: int | str = 0,
-        unit: str = "cm",
-        separator: str | None = None,
-        sequence: int | str | None = None,
-        time: int | str | None = None,
-        time_unit: str = "us",
-        temperature: int | str | None = None,
-    ) -> None:
-        self._separator = as_separator(separator) or b","
-        self._unit = unit
-        self._scale = 1.0 if unit == "us" else _factor("unit", unit, LENGTHS_M, "us")
-        self._time_us = _factor("time_unit", time_unit, TIMES_US)
-        asked = {"column": column, "sequence": sequence, "time": time, "temperature": temperature}
-        self._columns = {what: as_column(what, where) for what, where in asked.items() if where is not None}
+    def __init__(self, **options: Any) -> None:
+        self._form = form = _Form(**options)
+        asked = {"column": form.reading, "sequence": form.sequence, "time": form.time, "temperature": form.temperature}
+        self._columns = {what: column for what, column in asked.items() if column is not None}
 
     def encode(
         self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
     ) -> bytes:
         """Return one line; 0 for no target."""
-        value = echo_us if self._unit == "us" else distance_m / self._scale
+        form = self._form
+        value = echo_us if form.is_echo else distance_m / form.scale
         numbers = {
             "column": b"0" if math.isnan(distance_m) or math.isnan(value) else b"%.8g" % value,
             "sequence": b"%d" % sequence,
-            "time": b"%.10g" % (device_us / self._time_us),
+            "time": b"%.10g" % (device_us / form.time_us),
             "temperature": b"%.2f" % temperature_c,
         }
         placed = {column.index: numbers[what] for what, column in self._columns.items() if column.index is not None}
         cells = [placed.get(index, b"0") for index in range(max(placed, default=-1) + 1)]
         named = [column.name + b"=" + numbers[what] for what, column in self._columns.items() if column.index is None]
-        return self._separator.join(cells + named) + b"\r\n"
+        return (form.separator or b",").join(cells + named) + b"\r\n"
 
 
 FAMILY = Family(

@@ -11,8 +11,8 @@ from functools import partial
 
 from acquisition.decoders.cycle import OPTIONS
 from acquisition.decoders.family import Family, Poll
-from acquisition.decoders.replies import ReplyDecoder, ReplyEncoder, ReplyForm
-from acquisition.decoders.rows import NAN
+from acquisition.decoders.replies import ReplyDecoder, ReplyForm
+from acquisition.readings import NAN
 
 __all__ = ["FAMILY"]
 
@@ -80,7 +80,7 @@ FAMILY = Family(
     range_m=(0.02, 8.0),
     limits="Steps of 1 cm and 10 Hz: enough to see a swing of a decimetre, not to weigh its damping.",
     decoder=partial(ReplyDecoder, _FORM),
-    encoder=partial(ReplyEncoder, _FORM),
+    encoder=_FORM.encoder,
     poll=Poll(request=_FORM.ask_distance, interval_s=0.1, timeout_s=0.25),
     options=OPTIONS,
     source="DFRobot SEN0001 (URM37): communication protocol",

@@ -17,12 +17,11 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from acquisition.decoders.cycle import OPTIONS, Cycle
+from acquisition.decoders.cycle import OPTIONS, Cycle, PolledEncoder
 from acquisition.decoders.family import Family, Poll
-from acquisition.decoders.rows import NAN, rows
-from acquisition.readings import Readings
+from acquisition.readings import NAN, Reading, Readings
 
-__all__ = ["FAMILY", "Us100Decoder", "Us100Encoder"]
+__all__ = ["FAMILY", "Us100Decoder"]
 
 _ASK_DISTANCE, _ASK_TEMPERATURE = b"\x55", b"\x50"
 _NEAREST_MM, _FARTHEST_MM = 20, 4500
@@ -43,7 +42,7 @@ class Us100Decoder:
     """
 
     def __init__(self, temperature_every: int = 0) -> None:
-        self._cycle = Cycle(temperature_every)
+        self._cycle = Cycle(_ASK_DISTANCE, _ASK_TEMPERATURE, temperature_every)
         self._faults = {"garbage_bytes": 0, "bad_temperature": 0, "resynchronised": 0}
         self._held = b""
         self._celsius = NAN
@@ -62,27 +61,26 @@ class Us100Decoder:
     @property
     def request(self) -> bytes:
         """What to send next."""
-        return _ASK_TEMPERATURE if self._cycle.wants_temperature else _ASK_DISTANCE
+        return self._cycle.request
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
         """Return the distances whose replies these bytes complete."""
         data = self._held + data
-        distance_m: list[float] = []
-        temperature_c: list[float] = []
+        found: list[Reading] = []
         at, size = 0, len(data)
         while at < size:
             if self._cycle.wants_temperature:
                 self._take_temperature(data[at])
                 at += 1
             elif at + 1 < size:
-                distance_m.append(self._distance(data[at], data[at + 1]))
-                temperature_c.append(self._celsius)
+                distance_m = self._distance(data[at], data[at + 1])
+                found.append(Reading(host_ns, distance_m=distance_m, temperature_c=self._celsius))
                 self._celsius = NAN
                 at += 2 - self._slips(data[at], data[at + 1])
             else:
                 break
         self._held = data[at:]
-        return rows(host_ns, distance_m=distance_m, temperature_c=temperature_c)
+        return Readings(found)
 
     def flush(self) -> None:
         """Forget a half-received reply; the next request is for a distance."""
@@ -115,33 +113,18 @@ class Us100Decoder:
         return 1
 
 
-class Us100Encoder:
-    """Writes US-100 replies.
+def _distance_reply(distance_m: float) -> bytes:
+    mm = 0 if math.isnan(distance_m) else round(distance_m * 1000)
+    return (mm if _in_range(0, mm) else 0).to_bytes(2, "big")
 
-    Parameters
-    ----------
-    temperature_every : int
-        As the decoder's.
-    """
 
-    def __init__(self, temperature_every: int = 0) -> None:
-        self._cycle = Cycle(temperature_every)
+def _temperature_reply(temperature_c: float) -> bytes:
+    celsius = 0.0 if math.isnan(temperature_c) else temperature_c
+    return bytes([min(max(round(celsius) + 45, 0), 255)])
 
-    def encode(self, *, distance_m: float, temperature_c: float, **_: float) -> bytes:
-        """Return the reply to the request whose turn it is."""
-        request = _ASK_TEMPERATURE if self._cycle.wants_temperature else _ASK_DISTANCE
-        self._cycle.answered(temperature=request == _ASK_TEMPERATURE)
-        return self.reply(request, distance_m=distance_m, temperature_c=temperature_c)
 
-    def reply(self, request: bytes, *, distance_m: float, temperature_c: float) -> bytes:
-        """Return the reply to a request, nothing to what is none."""
-        if request == _ASK_DISTANCE:
-            mm = 0 if math.isnan(distance_m) else round(distance_m * 1000)
-            return (mm if _in_range(0, mm) else 0).to_bytes(2, "big")
-        if request == _ASK_TEMPERATURE:
-            celsius = 0.0 if math.isnan(temperature_c) else temperature_c
-            return bytes([min(max(round(celsius) + 45, 0), 255)])
-        return b""
+def _encoder(temperature_every: int = 0) -> PolledEncoder:
+    return PolledEncoder(Cycle(_ASK_DISTANCE, _ASK_TEMPERATURE, temperature_every), _distance_reply, _temperature_reply)
 
 
 FAMILY = Family(
@@ -153,7 +136,7 @@ FAMILY = Family(
     range_m=(_NEAREST_MM / 1000, _FARTHEST_MM / 1000),
     limits="No checksum: a byte that was changed or lost may give a wrong reading before it is noticed.",
     decoder=Us100Decoder,
-    encoder=Us100Encoder,
+    encoder=_encoder,
     poll=Poll(request=_ASK_DISTANCE, interval_s=0.05, timeout_s=0.15),
     options=OPTIONS,
     self_framing=False,

@@ -1,0 +1,71 @@
+"""What all decoders of lines or summed frames share: cut the stream, make a reading of each frame, count the rest."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Protocol
+
+from acquisition.readings import Reading, Readings
+
+__all__ = ["FramedDecoder", "Frames"]
+
+
+class Frames(Protocol):
+    """Cuts a stream: a :class:`acquisition.decoders.lines.LineSplitter` or a ``sum_frames.SumFrames``."""
+
+    faults: dict[str, int]
+
+    @property
+    def pending(self) -> int:
+        """Bytes of the frame that has begun."""
+        ...
+
+    def split(self, data: bytes) -> list[bytes]:
+        """Return the frames that these bytes complete."""
+        ...
+
+    def flush(self) -> None:
+        """Forget the frame that has begun."""
+        ...
+
+
+class FramedDecoder(ABC):
+    """A :class:`acquisition.decoders.family.Decoder` of frames; a family says in :meth:`reading` what one means.
+
+    Parameters
+    ----------
+    frames : Frames
+    """
+
+    def __init__(self, frames: Frames) -> None:
+        self._frames = frames
+
+    @property
+    def faults(self) -> Mapping[str, int]:
+        """Counts of what was no reading."""
+        return MappingProxyType(self._frames.faults)
+
+    @property
+    def pending(self) -> int:
+        """Bytes held until the frame they began is whole."""
+        return self._frames.pending
+
+    def feed(self, host_ns: int, data: bytes) -> Readings:
+        """Return the readings whose frames these bytes complete, all stamped with the read that completed them."""
+        found = [self.reading(host_ns, frame) for frame in self._frames.split(data)]
+        return Readings(reading for reading in found if reading is not None)
+
+    def flush(self) -> None:
+        """Forget a half-received frame."""
+        self._frames.flush()
+
+    @abstractmethod
+    def reading(self, host_ns: int, frame: bytes) -> Reading | None:
+        """Return what a frame says; None where it says no distance, which :meth:`_count` counts if it should."""
+
+    def _count(self, fault: str, garbage_bytes: int) -> None:
+        """Count a fault, and the bytes that were part of no frame."""
+        self._frames.faults[fault] += 1
+        self._frames.faults["garbage_bytes"] += garbage_bytes
