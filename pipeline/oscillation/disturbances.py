@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pipeline.oscillation import sideways as swings
+from pipeline.oscillation import steps as jumps
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated, demodulate
-from pipeline.oscillation.demodulate import Params as DemodulateParams
+from pipeline.oscillation.demodulate import Params as Demodulation
 from pipeline.oscillation.modes import Sideways
-from pipeline.oscillation.sideways import Params as SidewaysParams
 from pipeline.oscillation.sideways import find_sideways
-from pipeline.oscillation.steps import Params as StepsParams
 from pipeline.oscillation.steps import Step, find_steps, staircase, weighed
 from pipeline.track import F8
 
@@ -33,11 +33,14 @@ class Params:
     steps : pipeline.oscillation.steps.Params
     modes : bool
         Whether modes are looked for at all.
+    rounds : int
+        Most times that the modes are looked for, with the windows' fits of the record without them.
     """
 
-    sideways: SidewaysParams = field(default_factory=SidewaysParams)
-    steps: StepsParams = field(default_factory=StepsParams)
+    sideways: swings.Params = field(default_factory=swings.Params)
+    steps: jumps.Params = field(default_factory=jumps.Params)
     modes: bool = True
+    rounds: int = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +92,7 @@ def separate(
     cycles: Cycles,
     demodulated: Demodulated,
     params: Params | None = None,
-    demodulation: DemodulateParams | None = None,
+    demodulation: Demodulation | None = None,
 ) -> tuple[Demodulated, Disturbances]:
     """Look for modes and steps, and demodulate again without them.
 
@@ -112,25 +115,19 @@ def separate(
     :math:`B/(\\pi\\,\\Delta f\\,T)` in the amplitude of a record of length T. Where that is less than a tenth of the
     amplitude's standard uncertainty the mode is reported and left where it is. Where it is taken out, the windows'
     variances grow by what it costs to know it from the same samples.
-
-    Where the strongest mode would do that, the windows are fitted again without it before all modes are sought, for
-    beats pass for false echoes. It is done once: with up to six rounds the amplitude of the two-minute disc in
-    ``docs/explanation/real-records.md``, which is not clean, went on moving by up to two of its uncertainties.
     """
     params = params or Params()
-    t, taken = conditioned.track.t, np.zeros(len(conditioned.track))
-    sideways, seen = Sideways((), None), demodulated
-    if params.modes:
-        rough = find_sideways(conditioned, demodulated, params.sideways, strongest_only=True)
-        if _leak(rough) > SHARE * _u_amplitude(demodulated):
-            # The windows' fits without the strongest mode tell false echoes and the main oscillation better.
-            seen = demodulate(conditioned.less(rough.position(t)), cycles, demodulation)
-        sideways = find_sideways(conditioned, seen, params.sideways) or rough
+    sideways = find_sideways(conditioned, demodulated, params.sideways) if params.modes else Sideways((), None)
     leak_m = _leak(sideways)
     modelled = bool(sideways) and leak_m > SHARE * _u_amplitude(demodulated)
-    if modelled:
+    t, taken = conditioned.track.t, np.zeros(len(conditioned.track))
+    for again in range(params.rounds if modelled else 0):
+        if again:
+            # The windows' fits without the modes tell false echoes and the main oscillation better.
+            sideways = find_sideways(conditioned, demodulated, params.sideways) or sideways
         taken = sideways.position(t)
         demodulated = demodulate(conditioned.less(taken), cycles, demodulation)
+    if modelled:
         demodulated = replace(demodulated, covariance=demodulated.covariance * _price(sideways))
     steps = find_steps(conditioned.less(taken), demodulated, params.steps)
     if steps:

@@ -51,9 +51,7 @@ class Params:
     most_periods: int = 4096
 
 
-def find_sideways(
-    conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None, *, strongest_only: bool = False
-) -> Sideways:
+def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None) -> Sideways:
     """Look for lines beside the main oscillation.
 
     Parameters
@@ -62,8 +60,6 @@ def find_sideways(
     demodulated : Demodulated
         Its windows give the main oscillation, whatever law that follows, its flags the samples.
     params : Params, optional
-    strongest_only : bool
-        Whether to stop at the strongest mode of its own frequency.
 
     Returns
     -------
@@ -95,8 +91,7 @@ def find_sideways(
     multiples = tuple(turns[1] * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
     if not worth_a_look(blocks, band, multiples, 0.5 * params.false_alarm):
         return Sideways((), carrier)
-    search = _Search(carrier, blocks, band, params)
-    return search.strongest_mode() if strongest_only else search.run()
+    return _Search(carrier, blocks, band, params).run()
 
 
 def _band(carrier: Carrier, blocks: Blocks) -> Band:
@@ -124,32 +119,20 @@ class _Search:
         self.hole(*((b * self.main_hz, width) for _, b in HARMONICS))
         first: Mode | None = None
         for _ in range(self.params.most):
-            mode = self.next_mode()
-            if mode is None:
+            peak = strongest(self.blocks, self.model, self.band)
+            if peak is None or peak.false_alarm > 0.5 * self.params.false_alarm:
                 break
+            mode, terms = self.free(peak)
+            if not self.band.inside(np.array([mode.frequency.value]))[0]:
+                break  # it ran away into what the model holds already
+            self.model.add(terms)
+            self.found.append(mode)
+            self.hole((mode.frequency.value, width))
             if first is None:
                 first, self.first = mode, mode.whole(self.t, self.wave(mode))
                 self.locked(PRODUCTS, mode.frequency)
         order = ("mode", "product", "harmonic")
         return Sideways(tuple(sorted(self.together(), key=lambda mode: order.index(mode.kind))), self.carrier, first)
-
-    def strongest_mode(self) -> Sideways:
-        """Return the strongest mode alone."""
-        mode = self.next_mode()
-        return Sideways(() if mode is None else (mode,), self.carrier)
-
-    def next_mode(self) -> Mode | None:
-        """Find the strongest mode beyond the model and take it in; None where none is left."""
-        peak = strongest(self.blocks, self.model, self.band)
-        if peak is None or peak.false_alarm > 0.5 * self.params.false_alarm:
-            return None
-        mode, terms = self.free(peak)
-        if not self.band.inside(np.array([mode.frequency.value]))[0]:
-            return None  # it ran away into what the model holds already
-        self.model.add(terms)
-        self.found.append(mode)
-        self.hole((mode.frequency.value, 2.0 / self.blocks.seconds))
-        return mode
 
     def together(self) -> Iterator[Mode]:
         """Fit the coefficients of all modes at once: each was found before the later ones were known."""
@@ -198,9 +181,8 @@ class _Search:
         taken, fallen = list[int](), 0.0
         for i, trial in enumerate(trials):
             both = [*taken, 2 * i, 2 * i + 1]
-            together = terms.only(both)
-            values, cofactors, fall = together.fitted()
-            left = self.blocks.unweighted(self.model.left_by(together, values))
+            values, cofactors, fall = terms.only(both).fitted()
+            left = self.blocks.unweighted(self.model.left_by(terms.only(both), values))
             unit = spectral_density(self.blocks, left, trial.frequency.value, self.band) * self.blocks.samples
             chance = false_alarm(0.5 * (fall - fallen) / unit, len(orders))
             if chance <= 0.5 * self.params.false_alarm:
