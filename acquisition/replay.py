@@ -1,7 +1,7 @@
 """A recording played again through the interface of a live source.
 
 Time is kept as in rosbag2: the clock is injected, and a snapshot (clock time, record time) is taken anew
-whenever play pauses, jumps or changes speed. Between snapshots every deadline is absolute, so nothing drifts.
+whenever play pauses or jumps. Between snapshots every deadline is absolute, so nothing drifts.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import math
 import threading
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -21,7 +20,7 @@ from acquisition.source import SourceInfo
 
 __all__ = ["Replay"]
 
-_LONGEST_SLEEP_NS = 50_000_000  # how long a change of speed or a pause may take to be noticed
+_LONGEST_SLEEP_NS = 50_000_000  # how long a jump or a pause may take to be noticed
 
 
 class Replay:
@@ -78,12 +77,14 @@ class Replay:
     ) -> None:
         if block_samples < 1:
             raise ValueError(f"block_samples must be at least 1, got {block_samples}")
+        if speed is not None and not speed > 0:
+            raise ValueError(f"speed must be positive, or None to never wait, got {speed!r}")
         self.info = info if info.kind == "simulated" else replace(info, kind="replay")
         self._run = concatenate(blocks)
         # Times that run back are due at once: nothing waits for the past.
         self._due = np.maximum.accumulate(self._run.t) if len(self._run) else self._run.t
         self._clock = clock
-        self._speed = _checked(speed)
+        self._speed = math.inf if speed is None else float(speed)
         self._block_samples = block_samples
         self._loop = loop
         self._changed = threading.Condition()
@@ -97,7 +98,6 @@ class Replay:
         self._cut = False
         self._steps = 0
         self._closed = False
-        self._generation = 0
         self._reference: tuple[int, float] | None = None  # clock ns, record s; None until play begins
 
     def __enter__(self) -> Self:
@@ -107,9 +107,7 @@ class Replay:
                 self._rewind()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()
 
@@ -117,7 +115,7 @@ class Replay:
         """End the iteration, also a paused one; may be repeated."""
         with self._changed:
             self._closed = True
-            self._touch()
+            self._changed.notify_all()
 
     @property
     def segment(self) -> int:
@@ -128,16 +126,6 @@ class Replay:
     def paused(self) -> bool:
         """Whether play stands still."""
         return self._paused
-
-    @property
-    def speed(self) -> float:
-        """Record seconds per clock second; infinite where play never waits."""
-        return self._speed
-
-    @property
-    def duration_s(self) -> float:
-        """From the first sample to the last, s."""
-        return float(self._due[-1] - self._due[0]) if len(self._run) else 0.0
 
     @property
     def position_s(self) -> float:
@@ -151,16 +139,14 @@ class Replay:
             if not self._paused:
                 self._move_reference(self._position())
                 self._paused = True
-                self._touch()
 
     def resume(self) -> None:
         """Go on from where play stands."""
         with self._changed:
             if self._paused:
-                position = self._position()
+                self._move_reference(self._position())
                 self._paused, self._steps = False, 0
-                self._move_reference(position)
-                self._touch()
+                self._changed.notify_all()
 
     def step(self, n: int = 1) -> None:
         """Deliver the next ``n`` samples at once and stand still again; only while paused.
@@ -174,7 +160,7 @@ class Replay:
             if n < 1 or not self._paused:
                 raise ValueError(f"step needs n of at least 1 and a paused replay, got n={n}, paused={self._paused}")
             self._steps += n
-            self._touch()
+            self._changed.notify_all()
 
     def seek(self, t_s: float) -> None:
         """Go to the first sample at or after a record time, s; past the end, to the end.
@@ -192,15 +178,6 @@ class Replay:
             self._steps = 0
             start, end = (self._due[0], self._due[-1]) if len(self._run) else (0.0, 0.0)
             self._move_reference(float(min(max(t_s, start), end)))
-            self._touch()
-
-    def set_speed(self, speed: float | None) -> None:
-        """Change the pace from now on; None or infinity never waits."""
-        checked = _checked(speed)
-        with self._changed:
-            self._move_reference(self._position())
-            self._speed = checked
-            self._touch()
 
     def __iter__(self) -> Iterator[Block]:
         """Yield the blocks that are left, each when it is due; play begins at the first ``next``."""
@@ -223,14 +200,10 @@ class Replay:
                     self._steps -= stop - self._next
                     self._take_reference(float(self._due[stop - 1]))
                     return self._deliver(stop)
-                deadline_ns, generation = self._deadline_ns(stop - 1), self._generation
-                if deadline_ns is None or self._clock.now_ns() >= deadline_ns:
+                deadline_ns, now_ns = self._deadline_ns(stop - 1), self._clock.now_ns()
+                if now_ns >= deadline_ns:
                     return self._deliver(stop)
-            self._wait(deadline_ns, generation)
-
-    def _wait(self, deadline_ns: int, generation: int) -> None:
-        """Sleep until the deadline in slices, so that a control call is noticed soon."""
-        while self._generation == generation and (now_ns := self._clock.now_ns()) < deadline_ns:
+            # In slices, so that a control call is noticed soon.
             self._clock.sleep_until_ns(min(deadline_ns, now_ns + _LONGEST_SLEEP_NS))
 
     def _find_next(self) -> bool:
@@ -242,7 +215,7 @@ class Replay:
             return False
         self._next = 0
         self._cut = self._delivered > 0
-        if self._reference is not None and not self._paused and math.isfinite(self._speed):
+        if self._reference is not None and not self._paused:
             # The first sample comes one period after the last one was due, not after it was consumed.
             reference_ns, reference_s = self._reference
             lasted = self._due[-1] - reference_s + 1.0 / self.info.rate_hz
@@ -264,13 +237,9 @@ class Replay:
         self._next = stop
         return block
 
-    def _deadline_ns(self, row: int) -> int | None:
-        """Return the clock time at which a sample is due; None where nothing waits."""
-        if self._reference is None:
-            self._take_reference(float(self._due[self._next]))
-        if not math.isfinite(self._speed) or self._reference is None:
-            return None
-        reference_ns, reference_s = self._reference
+    def _deadline_ns(self, row: int) -> int:
+        """Return the clock time at which a sample is due; at infinite speed that of the reference."""
+        reference_ns, reference_s = self._reference or self._take_reference(float(self._due[self._next]))
         return reference_ns + round((float(self._due[row]) - reference_s) / self._speed * 1e9)
 
     def _position(self) -> float:
@@ -290,18 +259,6 @@ class Replay:
         if self._reference is not None:  # before play begins there is nothing to move
             self._take_reference(position_s)
 
-    def _take_reference(self, position_s: float) -> None:
+    def _take_reference(self, position_s: float) -> tuple[int, float]:
         self._reference = (self._clock.now_ns(), position_s)
-
-    def _touch(self) -> None:
-        self._generation += 1
-        self._changed.notify_all()
-
-
-def _checked(speed: float | None) -> float:
-    """Return the speed, infinite for None."""
-    if speed is None:
-        return math.inf
-    if not speed > 0:
-        raise ValueError(f"speed must be positive, or None to never wait, got {speed!r}")
-    return float(speed)
+        return self._reference

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
 from acquisition.block import Block, Flag
-from acquisition.clock import Clock
 from acquisition.errors import SensorError
 from acquisition.source import SourceInfo
 
-__all__ = ["Shot", "VirtualRangefinder", "VirtualSensor", "VirtualSource"]
+__all__ = ["Shot", "VirtualRangefinder", "VirtualSensor"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,12 +111,6 @@ class VirtualRangefinder:
         self._cluster_left = 0
         self._cluster_m = 0.0
 
-    def again(self) -> VirtualRangefinder:
-        """Return one that takes the readings which this one would take next."""
-        other = VirtualRangefinder(self._position, self.sensor, copy.deepcopy(self._rng))
-        other._cluster_left, other._cluster_m = self._cluster_left, self._cluster_m
-        return other
-
     def shots(self) -> Iterator[Shot]:
         """Yield readings without end."""
         sequence = 0
@@ -143,6 +133,21 @@ class VirtualRangefinder:
         distance = 0.5e-6 * echo_us * sensor.speed_of_sound_m_per_s
         return Shot(intended_s, sequence, device_us, echo_us, distance, sensor.temperature_c)
 
+    def block(self, seconds: float) -> Block:
+        """Return the readings of so much true time from the start; :class:`acquisition.replay.Replay` paces them."""
+        true_rate_hz = self.sensor.rate_hz * (1.0 + self.sensor.crystal_ppm * 1e-6)
+        # Rounded: 0.07 s at 100 Hz are seven samples and not the eight of 7.000000000000001.
+        shots = [self.shot(sequence) for sequence in range(math.ceil(round(seconds * true_rate_hz, 6)))]
+        distance = np.array([shot.distance_m for shot in shots], np.float64)
+        flags = np.isnan(distance) * np.uint8(Flag.MISSING)
+        host_ns = np.array([round(shot.true_s * 1e9) for shot in shots], np.int64)
+        return Block(0, np.arange(len(shots)) / self.sensor.rate_hz, distance, flags, host_ns)
+
+    def info(self, name: str) -> SourceInfo:
+        """Return what is known of it as a source."""
+        quantum_m = 0.5 * self.sensor.tick_s * self.sensor.speed_of_sound_m_per_s
+        return SourceInfo("simulated", name, self.sensor.rate_hz, quantum_m=quantum_m, clock="device")
+
     def _false_echo(self, t: float) -> float:
         """Displacement of this reading; clusters begin where the bob turns nearest to the sensor."""
         if self._cluster_left > 0:
@@ -155,62 +160,3 @@ class VirtualRangefinder:
             self._cluster_left = int(self._rng.integers(3, 18))
             self._cluster_m = self.sensor.false_echo_m * float(self._rng.uniform(0.5, 1.5))
         return 0.0
-
-
-class VirtualSource:
-    """The simulated rangefinder as a source of blocks; each iteration takes the same readings.
-
-    Parameters
-    ----------
-    rangefinder : VirtualRangefinder
-    clock : Clock
-        A virtual one delivers as fast as possible.
-    seconds : float
-        Of true time; it ends there.
-    name : str
-    block_samples : int
-        Samples a block.
-    """
-
-    def __init__(
-        self, rangefinder: VirtualRangefinder, clock: Clock, *, seconds: float, name: str, block_samples: int = 1
-    ) -> None:
-        self._rangefinder = rangefinder
-        self._clock = clock
-        true_rate_hz = rangefinder.sensor.rate_hz * (1.0 + rangefinder.sensor.crystal_ppm * 1e-6)
-        # Rounded: 0.07 s at 100 Hz are seven samples and not the eight of 7.000000000000001.
-        self._count = math.ceil(round(seconds * true_rate_hz, 6))
-        self._size = block_samples
-        self._open = False
-        sensor = rangefinder.sensor
-        self.info = SourceInfo(
-            "simulated",
-            name,
-            sensor.rate_hz,
-            quantum_m=0.5 * sensor.tick_s * sensor.speed_of_sound_m_per_s,
-            clock="device",
-        )
-
-    def __enter__(self) -> Self:
-        self._open = True
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._open = False
-
-    def __iter__(self) -> Iterator[Block]:
-        start_ns = self._clock.now_ns()
-        rangefinder = self._rangefinder.again()
-        for first in range(0, self._count, self._size):
-            if not self._open:
-                return
-            shots = [rangefinder.shot(i) for i in range(first, min(first + self._size, self._count))]
-            due_ns = start_ns + round(shots[-1].true_s * 1e9)
-            self._clock.sleep_until_ns(due_ns)
-            distance = np.array([shot.distance_m for shot in shots])
-            flags = np.where(np.isnan(distance), np.uint8(Flag.MISSING), np.uint8(0)).astype(np.uint8)
-            t = np.array([shot.sequence for shot in shots]) / rangefinder.sensor.rate_hz
-            host = np.array([start_ns + round(shot.true_s * 1e9) for shot in shots], np.int64)
-            yield Block(first, t, distance, flags, host)

@@ -11,7 +11,7 @@ import pytest
 from acquisition.block import Block, Flag, concatenate
 from acquisition.clock import Clock, VirtualClock
 from acquisition.replay import Replay
-from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor, VirtualSource
+from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from acquisition.source import Source, SourceInfo
 
 SECONDS = 120
@@ -40,7 +40,7 @@ def simulated(block_samples: int) -> Callable[[Clock], Source]:
 
     def make(clock: Clock) -> Source:
         bob = VirtualRangefinder(lambda t: 0.25 + 0.05 * math.sin(7.9 * t), sensor, np.random.default_rng(1))
-        return VirtualSource(bob, clock, seconds=SECONDS, name="run", block_samples=block_samples)
+        return Replay([bob.block(SECONDS)], clock, info=bob.info("run"), block_samples=block_samples)
 
     return make
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
+from itertools import islice
 from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.block import Flag, concatenate
-from acquisition.clock import VirtualClock
+from acquisition.block import Flag
 from acquisition.errors import SensorError
-from acquisition.simulated.rangefinder import Shot, VirtualRangefinder, VirtualSensor, VirtualSource
+from acquisition.simulated.rangefinder import Shot, VirtualRangefinder, VirtualSensor
 
 QUIET: dict[str, Any] = {"noise_m": 0.0, "false_echo_rate_hz": 0.0}
 
@@ -132,51 +131,36 @@ def test_the_seed_gives_the_same_readings_again() -> None:
 
 def test_readings_without_end_are_the_single_ones() -> None:
     """The iterator takes the same readings as calls with consecutive numbers."""
-    finder = VirtualRangefinder(bob, VirtualSensor(), np.random.default_rng(3))
-    stream = finder.again().shots()
-    assert [next(stream) for _ in range(50)] == [finder.shot(i) for i in range(50)]
+    stream, finder = (VirtualRangefinder(bob, VirtualSensor(), np.random.default_rng(3)) for _ in range(2))
+    assert list(islice(stream.shots(), 50)) == [finder.shot(i) for i in range(50)]
 
 
-def source(clock: VirtualClock, *, seconds: float = 120.0, block_samples: int = 1, **sensor: Any) -> VirtualSource:
-    """Return a simulated source."""
-    finder = VirtualRangefinder(bob, VirtualSensor(**sensor), np.random.default_rng(2))
-    return VirtualSource(finder, clock, seconds=seconds, name="bench", block_samples=block_samples)
+def finder(**sensor: Any) -> VirtualRangefinder:
+    """Return a rangefinder over the bob."""
+    return VirtualRangefinder(bob, VirtualSensor(**sensor), np.random.default_rng(2))
 
 
-def test_two_minutes_on_a_virtual_clock_take_no_real_time() -> None:
-    """12,000 samples come in far less than the 120 s that the virtual clock shows."""
-    clock = VirtualClock(5_000_000_000)
-    began = time.monotonic()
-    with source(clock) as bench:
-        samples = concatenate(bench)
-    assert time.monotonic() - began < 12.0
-    assert len(samples) == 12_000
-    assert clock.now_ns() == 5_000_000_000 + 119_990_000_000
-    assert samples.host_ns is not None
-    assert samples.host_ns[0] == 5_000_000_000
+def test_a_block_holds_the_readings_of_its_seconds_at_their_times() -> None:
+    """All samples of two minutes: the device's times, the distances of single readings, the true host times."""
+    samples = finder(crystal_ppm=50.0).block(120.0)
+    single = finder(crystal_ppm=50.0)
+    shots = [single.shot(i) for i in range(12_001)]
+    assert len(samples) == 12_001
+    np.testing.assert_array_equal(samples.t, np.arange(12_001) / 100.0)
+    np.testing.assert_array_equal(samples.distance, [shot.distance_m for shot in shots])
+    np.testing.assert_array_equal(samples.host_ns, [round(shot.true_s * 1e9) for shot in shots])
 
 
 def test_simulated_data_says_that_it_is() -> None:
     """The kind is simulated, the clock the device's, and the step that of a tick."""
-    info = source(VirtualClock(), tick_s=4e-6).info
+    info = finder(tick_s=4e-6).info("bench")
     assert (info.kind, info.clock, info.rate_hz, info.name) == ("simulated", "device", 100.0, "bench")
     assert info.quantum_m == pytest.approx(0.5 * 4e-6 * 344.0)
 
 
-def test_samples_do_not_depend_on_the_size_of_blocks() -> None:
-    """One by one or by 64, the samples are the same to the last bit."""
-    joined = []
-    for size in (1, 64):
-        with source(VirtualClock(), seconds=10.0, block_samples=size) as bench:
-            joined.append(concatenate(bench))
-    for column in ("t", "distance", "flags", "host_ns"):
-        assert getattr(joined[0], column).tobytes() == getattr(joined[1], column).tobytes()
-
-
-def test_no_target_is_a_missing_sample_of_the_source() -> None:
+def test_no_target_is_a_missing_sample_of_a_block() -> None:
     """A reading within the dead time is NaN and flagged."""
-    with source(VirtualClock(), seconds=10.0, dead_time_s=1.2e-3) as bench:
-        samples = concatenate(bench)
+    samples = finder(dead_time_s=1.2e-3).block(10.0)
     missing = np.isnan(samples.distance)
     assert 0 < missing.sum() < len(samples)
     np.testing.assert_array_equal(samples.flags, np.where(missing, Flag.MISSING, 0))
@@ -185,10 +169,9 @@ def test_no_target_is_a_missing_sample_of_the_source() -> None:
 @pytest.mark.parametrize(
     ("seconds", "crystal_ppm", "expected"), [(0.07, 0.0, 7), (0.071, 0.0, 8), (1000.0, 100.0, 100_010), (0.0, 0.0, 0)]
 )
-def test_it_ends_after_its_seconds_of_true_time(seconds: float, crystal_ppm: float, expected: int) -> None:
+def test_a_block_ends_after_its_seconds_of_true_time(seconds: float, crystal_ppm: float, expected: int) -> None:
     """Every reading is taken before the end, and the next one would not be."""
-    with source(VirtualClock(), seconds=seconds, crystal_ppm=crystal_ppm, block_samples=5000) as bench:
-        assert sum(len(block) for block in bench) == expected
+    assert len(finder(crystal_ppm=crystal_ppm).block(seconds)) == expected
 
 
 @pytest.mark.parametrize(
