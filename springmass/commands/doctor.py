@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import asdict
 
 from springmass.doctor import examine
 from springmass.errors import OK, SOME_FAILED
@@ -15,7 +16,7 @@ def run(options: argparse.Namespace) -> int:
     """Print every check; exit with 1 where one failed."""
     checks = examine()
     if options.json:
-        print(json.dumps([{"name": c.name, "ok": c.ok, "found": c.found, "remedy": c.remedy} for c in checks]))
+        print(json.dumps([asdict(check) for check in checks]))
     else:
         for check in checks:
             print(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:<24} {check.found}")

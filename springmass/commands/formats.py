@@ -13,9 +13,9 @@ import numpy as np
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.identify import formats, inspect
 from acquisition.recordings.inspection import Inspection, Survey
-from acquisition.recordings.recording import Trap
 from springmass.commands import completions
 from springmass.errors import OK
+from springmass.runs.json_results import picked, plain
 from springmass.runs.loading import Loaded, kind_of, load
 
 __all__ = ["run"]
@@ -64,7 +64,7 @@ def _describe(path: Path, answers: dict[str, Any]) -> dict[str, Any]:
         return {**facts, **_facts(load(path, **answers))}
     except NeedsAnswer as error:
         traps = list(dict.fromkeys(trap for survey in found.surveys for trap in survey.traps))
-        return {**facts, "needs": str(error).removeprefix(f"{path}: "), "traps": [_trap(trap) for trap in traps]}
+        return {**facts, "needs": str(error).removeprefix(f"{path}: "), "traps": plain(traps)}
 
 
 def _file(path: Path, found: Inspection) -> dict[str, Any]:
@@ -100,17 +100,10 @@ def _facts(loaded: Loaded) -> dict[str, Any]:
         "malformed_rows": loaded.malformed_rows,
         "from_s": float(finite.min()) if finite.size else None,
         "to_s": float(finite.max()) if finite.size else None,
-        "rate_hz": loaded.info.rate_hz,
-        "clock": loaded.info.clock,
-        "quantum_m": loaded.info.quantum_m,
-        "stated_error_m": loaded.info.stated_error_m,
+        **picked(loaded.info, ("rate_hz", "clock", "quantum_m", "stated_error_m")),
         "sha256": loaded.sha256,
-        "traps": [_trap(trap) for trap in loaded.traps],
+        "traps": plain(loaded.traps),
     }
-
-
-def _trap(trap: Trap) -> dict[str, Any]:
-    return {"code": trap.code, "message": trap.message, "count": trap.count, "line": trap.line}
 
 
 def _lines(facts: dict[str, Any]) -> Iterator[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from springmass.report.html import ComparedRuns, ReportRun, render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.tables import results_csv
+from springmass.runs.json_results import plain
 from storage.atomic import write_whole
 
 __all__ = ["ReportRun", "write_report"]
@@ -87,8 +87,7 @@ def write_report(
         motion = directory / f"{stem}motion.csv"
         _put(motion, None if isinstance(smoothed, str) else motion_csv(run.analysis, smoothed))
         pictures.append({name: files["svg"] for name, files in drawn.items()})
-    plain = [_plain(result) for result in results]
-    content = _plain(summary) if summary is not None else plain[0] if len(plain) == 1 else plain
+    content = plain(summary if summary is not None else results[0] if len(results) == 1 else results)
     write_whole(directory / "results.json", json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
     write_whole(directory / "results.csv", results_csv(names, analyses))
     write_whole(directory / "table.tex", table_tex(names, analyses))
@@ -129,16 +128,3 @@ def _stems(names: Sequence[str]) -> list[str]:
         taken = {stem.lower() for stem in stems}
         stems.append(f"{safe}_" if f"{safe}_".lower() not in taken else f"{safe}_{i}_")
     return stems
-
-
-def _plain(value: object) -> Any:
-    """Return a value as strict JSON can hold it: numbers that are none become null."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(inner) for key, inner in value.items()}
-    if hasattr(value, "tolist"):  # numpy's scalars and arrays
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple | set | frozenset):
-        return [_plain(inner) for inner in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, bool | int | str) else str(value)

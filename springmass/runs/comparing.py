@@ -15,7 +15,7 @@ from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.findings import Finding
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.analysing import Analysed
-from springmass.runs.json_results import SCHEMA, estimate_json, finding_json, finite
+from springmass.runs.json_results import SCHEMA, picked, plain
 
 __all__ = ["Compared", "compare_analysed", "comparison_json", "demand_one_spring"]
 
@@ -114,44 +114,37 @@ def comparison_json(
     found = compared.comparison
     derived = [_moving(name, analysed).derived for name, analysed in named]
     each = zip(found.names, derived, found.each, found.own_u, found.pulls, strict=True)
-    return {
+    numbers = ("chi2", "dof", "largest_deviation", "exchanged", "exchanged_chi2", "message")
+    content = {
         "schema": SCHEMA,
         "comparison": {
             "agree": found.agree,
-            "spring_constant": estimate_json(found.spring_constant) if found.agree else None,
-            "chi2": finite(found.chi2),
-            "dof": found.dof,
-            "largest_deviation": finite(found.largest_deviation),
-            "exchanged": list(found.exchanged),
-            "exchanged_chi2": finite(found.exchanged_chi2),
-            "message": found.message,
+            "spring_constant": found.spring_constant if found.agree else None,
+            **picked(found, numbers),
             "each": [
                 {
                     "name": name,
-                    "period": estimate_json(d.estimates["period"]),
-                    "mass": estimate_json(d.effective_mass_kg or Estimate(float("nan"), float("nan"), "kg")),
-                    "spring_constant": estimate_json(k),
-                    "u_own": finite(u_own),
-                    "pull": finite(pull),
+                    "period": d.estimates["period"],
+                    "mass": d.effective_mass_kg or Estimate(float("nan"), float("nan"), "kg"),
+                    "spring_constant": k,
+                    "u_own": u_own,
+                    "pull": pull,
                 }
                 for name, d, k, u_own, pull in each
             ],
         },
         "joint_damping": [
             {
-                "runs": list(joint.runs),
-                "one_law": joint.one_law,
-                "selected": joint.selected,
-                "admissible": list(joint.admissible),
-                "message": joint.message,
+                **picked(joint, ("runs", "one_law", "selected", "admissible", "message")),
                 "laws": {name: _law(fit) for name, fit in joint.fits.items()},
             }
             for joint in compared.joint
         ],
-        "findings": [finding_json(f) for f in compared.findings],
+        "findings": compared.findings,
         "runs": [analysed.result for _, analysed in named],
-        "provenance": dict(provenance),
+        "provenance": provenance,
     }
+    return {key: plain(value) for key, value in content.items()}
 
 
 def _moving(name: str, analysed: Analysed) -> Oscillation:
@@ -180,12 +173,5 @@ def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Fin
 
 
 def _law(fit: JointFit) -> dict[str, Any]:
-    return {
-        "parameters": {name: estimate_json(e) for name, e in fit.coefficients.estimates().items()},
-        "reduced_chi2": finite(fit.reduced_chi2),
-        "dof": finite(fit.dof),
-        "bic": finite(fit.bic),
-        "excess_chi2": finite(fit.excess_chi2),
-        "excess_dof": finite(fit.excess_dof),
-        "rejection": fit.rejection,
-    }
+    told = ("reduced_chi2", "dof", "bic", "excess_chi2", "excess_dof", "rejection")
+    return {"parameters": fit.coefficients.estimates(), **picked(fit, told)}

@@ -1,21 +1,23 @@
-"""The JSON of a result: one schema for the command line, the report's results.json and scripts."""
+"""The JSON of a result: one schema for the command line, the report's results.json and scripts.
+
+An estimate, a finding, an effect or a trap stands in it by its fields, as :func:`plain` has them.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.damping.select import LawFit
-from pipeline.numerics.estimate import Estimate
 from pipeline.results.budget import Contribution
 from pipeline.results.classic import Classic
 from pipeline.results.findings import Finding, by_severity
 from springmass import __version__
 from springmass.runs.loading import Loaded
 
-__all__ = ["SCHEMA", "all_findings", "estimate_json", "finding_json", "finite", "input_of", "result_of"]
+__all__ = ["SCHEMA", "all_findings", "input_of", "picked", "plain", "result_of"]
 
 SCHEMA = 1
 # How grave it is that a reader saw this; what is not named here is for information.
@@ -60,25 +62,15 @@ def result_of(
         If given, its estimates stand in place of the analysis's.
     """
     estimates = classic.estimates if classic is not None else analysis.estimates
-    return {
+    content = {
         "schema": SCHEMA,
         "input": input_of(loaded),
         "quality": _quality(loaded, analysis),
-        "estimates": {name: estimate_json(e) for name, e in estimates.items()},
+        "estimates": estimates,
         "budget": _budgets(analysis) if classic is None else {},
-        "damping": _damping(analysis) if classic is None else _no_damping(),
-        "effects": [
-            {
-                "name": e.name,
-                "predicted": finite(e.predicted),
-                "measured": finite(e.measured),
-                "unit": e.unit,
-                "included": e.included,
-                "why": e.why,
-            }
-            for e in analysis.effects
-        ],
-        "findings": [finding_json(f) for f in all_findings(loaded, analysis)],
+        "damping": _damping(analysis, wanted=classic is None),
+        "effects": analysis.effects,
+        "findings": all_findings(loaded, analysis),
         "provenance": {
             "version": __version__,
             "accuracy": accuracy,
@@ -86,6 +78,7 @@ def result_of(
             "time_utc": time_utc,
         },
     }
+    return {key: plain(value) for key, value in content.items()}
 
 
 def input_of(loaded: Loaded) -> dict[str, Any]:
@@ -99,7 +92,7 @@ def input_of(loaded: Loaded) -> dict[str, Any]:
         "channel": loaded.channel,
         "samples": len(track),
         "rate_hz": track.rate_hz,
-        "duration_s": finite(float(track.t[-1] - track.t[0])) if len(track) else 0.0,
+        "duration_s": track.t[-1] - track.t[0] if len(track) else 0.0,
     }
 
 
@@ -124,60 +117,41 @@ def _budgets(analysis: Analysis) -> dict[str, Any]:
     if not isinstance(analysis.motion, Oscillation):
         return {}
     return {
-        name: {**estimate_json(budget.estimate), "inputs": [_contribution(c) for c in budget.contributions]}
+        name: {**plain(budget.estimate), "inputs": [_contribution(c) for c in budget.contributions]}
         for name, budget in analysis.motion.derived.budgets.items()
     }
 
 
 def _contribution(c: Contribution) -> dict[str, Any]:
-    given = c.input
-    return {
-        "name": c.name,
-        "type": c.kind,
-        "value": None if given is None else finite(given.value),
-        "u": None if given is None else finite(given.u),
-        "unit": "" if given is None else given.unit,
-        "sensitivity": finite(c.sensitivity),
-        "contribution": finite(c.u),
-        "share": finite(c.share),
-    }
+    given = {"value": None, "u": None, "unit": ""} if c.input is None else plain(c.input)
+    numbers = {"sensitivity": c.sensitivity, "contribution": c.u, "share": c.share}
+    return {"name": c.name, "type": c.kind, **given, **numbers}
 
 
-def _damping(analysis: Analysis) -> dict[str, Any]:
-    if not isinstance(analysis.motion, Oscillation):
-        return _no_damping()
+def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
+    if not wanted or not isinstance(analysis.motion, Oscillation):
+        return {"selected": None, "admissible": [], "laws": {}}
     damping = analysis.motion.damping
-    return {
-        "selected": damping.selected,
-        "admissible": list(damping.admissible),
-        "laws": {name: _law(fit) for name, fit in damping.fits.items()},
-    }
+    told = ("reduced_chi2", "dof", "bic", "rejected")
+    laws = {name: {"parameters": fit.joint.estimates(), **picked(fit, told)} for name, fit in damping.fits.items()}
+    return {**picked(damping, ("selected", "admissible")), "laws": laws}
 
 
-def _no_damping() -> dict[str, Any]:
-    return {"selected": None, "admissible": [], "laws": {}}
+def picked(thing: object, names: Sequence[str]) -> dict[str, Any]:
+    """Return some attributes by name."""
+    return {name: getattr(thing, name) for name in names}
 
 
-def _law(fit: LawFit) -> dict[str, Any]:
-    return {
-        "parameters": {name: estimate_json(e) for name, e in fit.joint.estimates().items()},
-        "reduced_chi2": finite(fit.reduced_chi2),
-        "dof": finite(fit.dof),
-        "bic": finite(fit.bic),
-        "rejected": fit.rejected,
-    }
-
-
-def finding_json(finding: Finding) -> dict[str, str]:
-    """Return a finding as the JSON holds it."""
-    return {"code": finding.code, "severity": finding.severity, "message": finding.message}
-
-
-def estimate_json(estimate: Estimate) -> dict[str, Any]:
-    """Return an estimate as the JSON holds it."""
-    return {"value": finite(estimate.value), "u": finite(estimate.u), "unit": estimate.unit}
-
-
-def finite(value: float | None) -> float | None:
-    """Return a number as the JSON holds it: None for what is no number."""
-    return None if value is None or not math.isfinite(value) else float(value)
+def plain(value: object) -> Any:
+    """Return a value as strict JSON can hold it: a dataclass is its fields, a number that is none becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(inner) for key, inner in value.items()}
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if hasattr(value, "tolist"):  # numpy's scalars and arrays
+        return plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(inner) for inner in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int | str) else str(value)

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.numerics.estimate import Estimate
+from springmass.runs.json_results import picked, plain
 from springmass.trade.measure import Trade
 from springmass.trade.methods import UNITS, Method, Unavailable
 
 __all__ = ["hostile_json", "hostile_text", "own_json", "own_text", "ratio", "trade_json", "trade_text"]
 
+TRUTH = ("seconds", "rate_hz", "noise_m", "frequency_hz", "amplitude_m", "damping_per_s", "echoes")
 HEADS = {"frequency": "frequency", "amplitude": "amplitude", "damping_rate": "damping"}
 
 
@@ -42,19 +44,10 @@ def trade_text(trade: Trade, absent: Sequence[Unavailable]) -> str:
 
 def trade_json(trade: Trade, absent: Sequence[Unavailable], version: str) -> dict[str, Any]:
     """Return the measurement as a JSON object."""
-    truth = trade.truth
     return {
         "schema": 1,
         "kind": "simulated",
-        "truth": {
-            "seconds": truth.seconds,
-            "rate_hz": truth.rate_hz,
-            "noise_m": truth.noise_m,
-            "frequency_hz": truth.frequency_hz,
-            "amplitude_m": truth.amplitude_m,
-            "damping_per_s": truth.damping_per_s,
-            "echoes": truth.echoes,
-        },
+        "truth": picked(trade.truth, TRUTH),
         "seeds": trade.seeds,
         "bounds": dict(trade.bound),
         "methods": [
@@ -69,7 +62,7 @@ def trade_json(trade: Trade, absent: Sequence[Unavailable], version: str) -> dic
             }
             for row in trade.rows
         ],
-        "absent": [{"name": each.name, "needs": each.needs} for each in absent],
+        "absent": plain(absent),
         "recommended": trade.recommended,
         "version": version,
     }
@@ -142,18 +135,14 @@ def own_json(path: str, results: Own, absent: Sequence[Unavailable], version: st
         if isinstance(found, str):
             entry["failed"] = found
         else:
-            values = {"period": _period(found), **found}
-            entry["estimates"] = {
-                name: {"value": e.value, "u": e.u if math.isfinite(e.u) else None, "unit": e.unit}
-                for name, e in values.items()
-            }
+            entry["estimates"] = plain({"period": _period(found), **found})
         methods.append(entry)
     return {
         "schema": 1,
         "kind": "record",
         "input": path,
         "methods": methods,
-        "absent": [{"name": each.name, "needs": each.needs} for each in absent],
+        "absent": plain(absent),
         "version": version,
     }
 
