@@ -19,7 +19,7 @@ from storage.errors import HDF5_ERRORS, RunExists, WriteFailed, one_line
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["whole_file", "whole_h5", "write_whole", "writing_h5"]
+__all__ = ["sync_folder", "whole_file", "whole_h5", "write_whole", "writing_h5"]
 
 # Some network and FUSE file systems cannot sync a folder, and Windows cannot even open one.
 _FOLDER_CANNOT_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EBADF}
@@ -99,7 +99,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
         try:
             _sync(temporary)
             _place(temporary, target, overwrite=overwrite)
-            _sync_folder(target.parent)
+            sync_folder(target.parent)
         except OSError as error:
             raise _failed(target, error) from error
     finally:
@@ -250,7 +250,8 @@ def _place(temporary: Path, target: Path, *, overwrite: bool) -> None:
         os.replace(temporary, target)
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
+    """Return when the names in a folder are safe on the disk, where its file system can do that. Raises OSError."""
     try:
         descriptor = os.open(folder, os.O_RDONLY)
     except OSError as error:

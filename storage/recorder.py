@@ -15,17 +15,15 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from acquisition.clock import Clock
 from acquisition.readings import Read
-from storage.disk import DiskNearlyFull, check_disk
 from storage.errors import WriteFailed, one_line
-from storage.wire_log.appending import Item, Kind, LogFile, LogHeader, WireLogWriter, open_log_file
-from storage.wire_log.records import HEAD_BYTES, event_payload
+from storage.wire_log.appending import Item, LogFile, WireLogWriter, open_log_file
+from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, event_payload
 
-__all__ = ["DiskNearlyFull", "Recorder", "RecorderStatus", "check_disk"]
+__all__ = ["Recorder", "RecorderStatus"]
 
 QUEUE_BYTES = 16 << 20
 """Half an hour of one sensor at 100 Hz, two minutes of 16 of them."""
@@ -134,12 +132,7 @@ class Recorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property

@@ -6,6 +6,8 @@ log. The layout of a record is that of :mod:`storage.wire_log.records`.
 Examples
 --------
 >>> import tempfile
+>>> from storage.wire_log.records import SensorEntry
+>>> from storage.wire_log.scanning import read_log
 >>> header = LogHeader(sensors=(SensorEntry(0, "maxbotix", "COM3", 9600),), mono_ns=0, unix_ns=0)
 >>> with tempfile.TemporaryDirectory() as folder:
 ...     log = WireLogWriter(folder + "/run.wire", header)
@@ -22,6 +24,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import os
 import secrets
 import threading
@@ -30,26 +33,11 @@ from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from storage.atomic import sync_folder
 from storage.errors import RunExists, WriteFailed, one_line
-from storage.wire_log.records import Kind, LogHeader, SensorEntry, ends_item, frames
-from storage.wire_log.scanning import Damage, LogContents, NotALog, Record, parse_log, read_log
+from storage.wire_log.records import Kind, LogHeader, ends_item, frames
 
-__all__ = [
-    "Damage",
-    "Item",
-    "Kind",
-    "LogContents",
-    "LogFile",
-    "LogHeader",
-    "NotALog",
-    "Record",
-    "SensorEntry",
-    "WireLogWriter",
-    "Written",
-    "open_log_file",
-    "parse_log",
-    "read_log",
-]
+__all__ = ["Item", "LogFile", "WireLogWriter", "Written", "open_log_file"]
 
 FIRST_COPY = 8192
 """Byte of the log past which the header is first repeated."""
@@ -76,37 +64,25 @@ class LogFile(Protocol):
         ...
 
 
-class _OsFile:
-    """A file descriptor; nothing is buffered on this side of the kernel."""
+class _NewFile(io.FileIO):
+    """A file that was not there yet; nothing is buffered on this side of the kernel."""
 
     # macOS and Windows have no fdatasync; fsync does more than it.
     _sync: Callable[[int], None] = staticmethod(getattr(os, "fdatasync", os.fsync))
 
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
-
-    def write(self, data: bytes | memoryview) -> int:
-        return os.write(self._descriptor, data)
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "x", opener=lambda name, flags: os.open(name, flags | os.O_APPEND, 0o666))
 
     def sync(self) -> None:
-        self._sync(self._descriptor)
-
-    def close(self) -> None:
-        os.close(self._descriptor)
+        self._sync(self.fileno())
 
 
 def open_log_file(path: Path) -> LogFile:
     """Make a file that is not there yet, for appending, its name safe on the disk. Raises OSError."""
-    flags = os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_WRONLY
-    descriptor = os.open(path, flags | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0), 0o666)
-    # Windows opens no folder, and some file systems sync none: there the name is as safe as it gets.
-    with contextlib.suppress(OSError):
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    return _OsFile(descriptor)
+    file = _NewFile(path)
+    with contextlib.suppress(OSError):  # then the name is as safe as it gets
+        sync_folder(path.parent)
+    return file
 
 
 class Written(NamedTuple):

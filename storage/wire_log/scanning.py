@@ -264,8 +264,11 @@ class _Scan:
         self._owed += missing
         self._ended = kind is _END
         if kind is not _DATA:
-            return self._joined(Record(offset, sequence, mono_ns, kind, channel, payload), parts, missing)
-        if self._parts:
+            joined = self._joined(Record(offset, sequence, mono_ns, kind, channel, payload), parts, missing)
+            if joined is None:
+                return None
+            offset, sequence, mono_ns, _, _, payload, _ = joined
+        elif self._parts:
             self._drop_parts()
         owed, self._owed = self._owed, 0
         return Record(offset, sequence, mono_ns, kind, channel, payload, owed)
@@ -282,15 +285,8 @@ class _Scan:
         self._parts.append(record)
         if parts & Parts.GOES_ON:
             return None
-        first, payload = self._parts[0], b"".join(part.payload for part in self._parts)
-        self._parts = []
-        return self._after_loss(Record(first.offset, first.sequence, first.mono_ns, first.kind, first.channel, payload))
-
-    def _after_loss(self, record: Record) -> Record:
-        if not self._owed:
-            return record
-        owed, self._owed = self._owed, 0
-        return record._replace(lost_before=owed)
+        whole, self._parts = self._parts, []
+        return whole[0]._replace(payload=b"".join(part.payload for part in whole))
 
     def _drop_parts(self) -> None:
         self._lost += len(self._parts)

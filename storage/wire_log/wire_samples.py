@@ -65,36 +65,24 @@ def decode_log(
     Where records are missing, or a port went away, no frame is put together across the gap, and the first sample
     after it is flagged.
     """
-    ways = [_Way(chain) for chain in chains_for(sensors)]
-    by_channel = {sensor.channel: way for sensor, way in zip(sensors, ways, strict=True)}
+    chains = {sensor.channel: chain for sensor, chain in zip(sensors, chains_for(sensors), strict=True)}
+    blocks: dict[int, list[Block]] = {channel: [] for channel in chains}
+    reads = dict.fromkeys(chains, 0)
     for record in log:
         if record.lost_before:
-            for way in ways:
-                way.chain.lost()
-        if (sensor_way := by_channel.get(record.channel)) is None:
+            for each in chains.values():
+                each.lost()
+        channel = record.channel
+        if (chain := chains.get(channel)) is None:
             continue
         if record.kind is _DATA:
-            sensor_way.take(record)
+            chain.take(record.mono_ns, record.payload)
+            reads[channel] += 1
+            if reads[channel] % HELD_READS == 0:
+                blocks[channel].append(chain.block())
         elif record.kind is Kind.EVENT and record.json().get("kind") in BREAKS:
-            sensor_way.chain.lost()
+            chain.lost()
     return tuple(
-        Decoded(sensor, way.chain, way.samples(), way.reads) for sensor, way in zip(sensors, ways, strict=True)
+        Decoded(sensor, chain, concatenate([*blocks[sensor.channel], chain.block()]), reads[sensor.channel])
+        for sensor, chain in zip(sensors, chains.values(), strict=True)
     )
-
-
-class _Way:
-    """One sensor's chain, and what came out of it so far."""
-
-    def __init__(self, chain: SensorChain) -> None:
-        self.chain = chain
-        self.reads = 0
-        self._blocks: list[Block] = []
-
-    def take(self, record: Record) -> None:
-        self.reads += 1
-        self.chain.take(record.mono_ns, record.payload)
-        if self.reads % HELD_READS == 0:
-            self._blocks.append(self.chain.block())
-
-    def samples(self) -> Block:
-        return concatenate([*self._blocks, self.chain.block()])

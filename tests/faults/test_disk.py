@@ -13,7 +13,9 @@ import pytest
 from acquisition.clock import SystemClock, VirtualClock
 from storage.errors import WriteFailed
 from storage.recorder import Recorder
-from storage.wire_log.appending import Kind, LogFile, LogHeader, SensorEntry, open_log_file, read_log
+from storage.wire_log.appending import LogFile, open_log_file
+from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.scanning import read_log
 
 HEADER = LogHeader(sensors=(SensorEntry(0, "line"),), mono_ns=0, unix_ns=0)
 LIMIT = 20_000

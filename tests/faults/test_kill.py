@@ -23,7 +23,8 @@ from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
 from springmass.session.reads import Tee
 from storage.recorder import Recorder
-from storage.wire_log.appending import Kind, LogHeader, SensorEntry, read_log
+from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.scanning import read_log
 
 KILLS = int(os.environ.get("SPRINGMASS_KILLS", "12"))
 PACKET = 64

@@ -19,7 +19,8 @@ import pytest
 
 from storage.recover import recover
 from storage.run_file.reading import open_run
-from storage.wire_log.appending import Kind, LogHeader, SensorEntry, WireLogWriter
+from storage.wire_log.appending import WireLogWriter
+from storage.wire_log.records import Kind, LogHeader, SensorEntry
 
 TRIALS = max(10, int(os.environ.get("SPRINGMASS_KILLS", "12")) // 2)
 HEADER = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr"),), mono_ns=0, unix_ns=0, kind="simulated")

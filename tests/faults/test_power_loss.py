@@ -16,7 +16,9 @@ import pytest
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
 from acquisition.readings import Reading, Readings
-from storage.wire_log.appending import Kind, LogHeader, SensorEntry, WireLogWriter, parse_log
+from storage.wire_log.appending import WireLogWriter
+from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.scanning import parse_log
 from storage.wire_log.wire_samples import decode_log
 
 PAGE = 4096

@@ -13,10 +13,12 @@ import pytest
 
 from acquisition.clock import VirtualClock
 from acquisition.live.reader import Sink
-from storage.disk import DiskNearlyFull
+from storage.disk import DiskNearlyFull, check_disk
 from storage.errors import RunExists, WriteFailed
-from storage.recorder import Recorder, check_disk
-from storage.wire_log.appending import Kind, LogFile, LogHeader, SensorEntry, open_log_file, parse_log, read_log
+from storage.recorder import Recorder
+from storage.wire_log.appending import LogFile, open_log_file
+from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.scanning import parse_log, read_log
 
 HEADER = LogHeader(sensors=(SensorEntry(0, "line"), SensorEntry(1, "line")), mono_ns=0, unix_ns=0)
 HOUR_S = 3600.0

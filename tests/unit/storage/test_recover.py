@@ -19,7 +19,9 @@ from storage.errors import RunDamaged, RunExists
 from storage.recorder import Recorder
 from storage.recover import recover
 from storage.run_file.reading import Run, open_run
-from storage.wire_log.appending import Kind, LogHeader, NotALog, SensorEntry, WireLogWriter, read_log
+from storage.wire_log.appending import WireLogWriter
+from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.scanning import NotALog, read_log
 from storage.wire_log.wire_samples import chains_of, decode_log
 
 FAMILY = "line-protocol"

@@ -11,19 +11,9 @@ from typing import Any
 import pytest
 
 from storage.errors import RunExists, WriteFailed
-from storage.wire_log.appending import (
-    FIRST_COPY,
-    Kind,
-    LogHeader,
-    NotALog,
-    Record,
-    SensorEntry,
-    WireLogWriter,
-    Written,
-    parse_log,
-    read_log,
-)
-from storage.wire_log.records import HEAD_BYTES, MAX_PAYLOAD, event_payload, frame, frames
+from storage.wire_log.appending import FIRST_COPY, WireLogWriter, Written
+from storage.wire_log.records import HEAD_BYTES, MAX_PAYLOAD, Kind, LogHeader, SensorEntry, event_payload, frame, frames
+from storage.wire_log.scanning import NotALog, Record, parse_log, read_log
 
 HEADER = LogHeader(
     sensors=(
