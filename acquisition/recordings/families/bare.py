@@ -15,15 +15,7 @@ from acquisition.errors import FormatError
 from acquisition.recordings.families import motion_sensor
 from acquisition.recordings.tables.contents import Channel, Contents, Sheet
 from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import (
-    decode,
-    guess_delimiter,
-    is_text,
-    parse_number,
-    split_cells,
-    text_of,
-    unify,
-)
+from acquisition.recordings.tables.text import guess_delimiter, head_lines, parse_number, split_cells, text_of
 
 __all__ = ["FORMAT"]
 
@@ -51,12 +43,8 @@ def _comma(lines: Sequence[str]) -> str:
 
 
 def _evidence(head: bytes) -> str:
-    if not is_text(head):
-        return ""
-    rows, mark = _rows(unify(decode(head[:4096])).split("\n"))
-    if not rows:
-        return ""
-    if motion_sensor.FORMAT.recognises(head):
+    rows, mark = _rows(head_lines(head[:4096]))
+    if not rows or motion_sensor.FORMAT.recognises(head):
         return ""
     between = {"\t": "tabs", ";": "semicolons", ",": "commas", "": "blanks"}[mark]
     count = len(rows[0])

@@ -13,19 +13,8 @@ from __future__ import annotations
 
 import re
 
-from acquisition.errors import FormatError
-from acquisition.recordings.tables.contents import (
-    Channel,
-    Contents,
-    Heading,
-    Sheet,
-    channels_of,
-    is_time,
-    name_and_unit,
-    split_heading,
-)
-from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import Line, decode, is_text, text_of, unify
+from acquisition.recordings.tables.contents import Heading, is_time, name_and_unit, split_heading
+from acquisition.recordings.tables.sheet import headed_format
 
 __all__ = ["FORMAT"]
 
@@ -56,29 +45,13 @@ def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
     return (), mark
 
 
-def _evidence(head: bytes) -> str:
-    if not is_text(head):
-        return ""
-    line = unify(decode(head)).partition("\n")[0]
-    headings, mark = _headings(line)
-    if not headings:
-        return ""
-    if any(each.run for each in headings):
-        return f'headings in line 1 end in a run, "{next(each.run for each in headings if each.run)}"'
+def _why(headings: tuple[Heading, ...], mark: str) -> str:
+    run = next((each.run for each in headings if each.run), "")
+    if run:
+        return f'headings in line 1 end in a run, "{run}"'
     return f'line 1 is the headings "{mark.join(each.name for each in headings)}"'
 
 
-def _contents(path: str, data: bytes) -> Contents:
-    text = text_of(path, data)
-    first: Line | None = next(text.lines(), None)
-    headings, mark = _headings(first.text) if first else ((), "")
-    channels: tuple[Channel, ...] = ()
-    if first is not None and headings:
-        sheet = Sheet(text, first.next, text.stop, first.number + 1, mark)
-        channels = tuple(each for each in channels_of(sheet, headings) if each.name and headings[each.column].name)
-    if not channels:
-        raise FormatError(path, 'expected headings like "Position (m) Run #1"', "export the run again", line=1)
-    return Contents(channels, zeros=text.zeros)
-
-
-FORMAT = ColumnFormat("capstone", "PASCO Capstone CSV: runs side by side, any decimal mark", _evidence, _contents)
+FORMAT = headed_format(
+    "capstone", "PASCO Capstone CSV: runs side by side, any decimal mark", _headings, _why, '"Position (m) Run #1"'
+)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from acquisition.recordings.families import capstone, logger_pro, motion_sensor, phyphox
-from acquisition.recordings.tables.contents import (
-    Contents,
-    Heading,
-    is_time,
-    name_and_unit,
-    split_heading,
-    under_first_line,
-)
-from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import decode, is_text, parse_number, unify
+from acquisition.recordings.tables.contents import Heading, is_time, name_and_unit, split_heading
+from acquisition.recordings.tables.sheet import headed_format
+from acquisition.recordings.tables.text import head_lines, parse_number
 
 __all__ = ["FORMAT"]
+
+_OTHERS = (capstone.FORMAT, logger_pro.FORMAT, phyphox.FORMAT, motion_sensor.FORMAT)
+"""Families that have more to say of such columns."""
 
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
@@ -25,27 +23,19 @@ def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
     return headings, mark
 
 
-def _evidence(head: bytes) -> str:
-    if not is_text(head):
-        return ""
-    lines = unify(decode(head)).split("\n")
-    headings, mark = _headings(lines[0])
-    if not headings or _is_of_others(head):
-        return ""
-    row = lines[1].split(mark) if len(lines) > 1 else []
-    if row and row[0].strip() and parse_number(row[0].strip(' "')) is None:
-        return ""
+def _why(headings: tuple[Heading, ...], mark: str) -> str:  # noqa: ARG001
     return f'line 1 is headings with units that begin with "{headings[0].name} ({headings[0].unit})"'
 
 
-def _is_of_others(head: bytes) -> bool:
-    """Tell headings of the families that have more to say of such columns."""
-    others = (capstone.FORMAT, logger_pro.FORMAT, phyphox.FORMAT, motion_sensor.FORMAT)
-    return any(each.recognises(head) for each in others)
+def _evidence(head: bytes) -> str:
+    why = _HEADED.evidence(head)
+    first, second = (*head_lines(head), "")[:2]
+    cell = second.split(split_heading(first)[1])[0].strip(' "')
+    numbers = not cell or parse_number(cell) is not None
+    return why if why and numbers and not any(each.recognises(head) for each in _OTHERS) else ""
 
 
-def _contents(path: str, data: bytes) -> Contents:
-    return under_first_line(path, data, _headings, '"Time (s),Distance (m)"')
-
-
-FORMAT = ColumnFormat("csv", "columns under headings with units, times first", _evidence, _contents)
+_HEADED = headed_format(
+    "csv", "columns under headings with units, times first", _headings, _why, '"Time (s),Distance (m)"'
+)
+FORMAT = replace(_HEADED, evidence=_evidence)

@@ -19,7 +19,7 @@ from acquisition.recordings.tables.contents import (
     split_heading,
 )
 from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import Line, Text, decode, is_text, text_of, unify
+from acquisition.recordings.tables.text import Line, Text, head_lines, text_of
 
 __all__ = ["FORMAT"]
 
@@ -38,9 +38,7 @@ def _headings(title: str, line: str) -> tuple[Heading, ...]:
 
 
 def _evidence(head: bytes) -> str:
-    if not is_text(head):
-        return ""
-    lines = unify(decode(head)).split("\n")
+    lines = head_lines(head)
     if len(lines) > 1 and _headings(lines[0], lines[1]):
         return f'line 1 is the run, "{lines[0].strip()}", line 2 the headings with units'
     return ""

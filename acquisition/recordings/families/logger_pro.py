@@ -4,16 +4,8 @@ from __future__ import annotations
 
 import re
 
-from acquisition.recordings.tables.contents import (
-    Contents,
-    Heading,
-    is_time,
-    name_and_unit,
-    split_heading,
-    under_first_line,
-)
-from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import decode, is_text, unify
+from acquisition.recordings.tables.contents import Heading, is_time, name_and_unit, split_heading
+from acquisition.recordings.tables.sheet import headed_format
 
 __all__ = ["FORMAT"]
 
@@ -30,15 +22,8 @@ def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
     return (headings, mark) if known else ((), mark)
 
 
-def _evidence(head: bytes) -> str:
-    if not is_text(head):
-        return ""
-    headings, _ = _headings(unify(decode(head)).partition("\n")[0])
-    return f'headings in line 1 begin with a run, "{headings[0].run}: "' if headings else ""
+def _why(headings: tuple[Heading, ...], mark: str) -> str:  # noqa: ARG001
+    return f'headings in line 1 begin with a run, "{headings[0].run}: "'
 
 
-def _contents(path: str, data: bytes) -> Contents:
-    return under_first_line(path, data, _headings, '"Latest: Position (m)"')
-
-
-FORMAT = ColumnFormat("logger-pro", "Logger Pro CSV: runs side by side", _evidence, _contents)
+FORMAT = headed_format("logger-pro", "Logger Pro CSV: runs side by side", _headings, _why, '"Latest: Position (m)"')

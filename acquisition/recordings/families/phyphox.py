@@ -26,7 +26,7 @@ from acquisition.recordings.tables.contents import (
     under_first_line,
 )
 from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import decode, is_text, parse_number, text_of, unify
+from acquisition.recordings.tables.text import decode, head_lines, parse_number, text_of
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -51,12 +51,10 @@ def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
 
 
 def _evidence(head: bytes) -> str:
-    if not is_text(head):
-        return ""
-    text = unify(decode(head))
-    if _ROOT.match(text):
+    lines = head_lines(head)
+    if _ROOT.match("\n".join(lines)):
         return "it is XML with the root <phyphox>"
-    headings, _ = _headings(text.partition("\n")[0])
+    headings, _ = _headings(lines[0])
     return f'line 1 is quoted headings that begin with "{headings[0].name} ({headings[0].unit})"' if headings else ""
 
 

@@ -25,7 +25,7 @@ import re
 from acquisition.errors import FormatError
 from acquisition.recordings.tables.contents import Channel, Contents, Formula, Sheet
 from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import decode, is_text, text_of, unify
+from acquisition.recordings.tables.text import head_lines, text_of
 
 __all__ = ["FORMAT"]
 
@@ -33,7 +33,7 @@ _TITLE = re.compile(r"Height log, (\d+(?:\.\d+)?) Hz")  # change: what only your
 
 
 def _evidence(head: bytes) -> str:
-    first = unify(decode(head)).partition("\n")[0] if is_text(head) else ""
+    first = head_lines(head)[0]
     return f'line 1 is the title "{first}"' if _TITLE.fullmatch(first) else ""
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from acquisition.errors import FormatError
 from acquisition.recordings.tables.contents import Contents, Heading, Sheet, channels_of, name_and_unit, split_heading
 from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import Line, Text, decode, guess_delimiter, is_text, parse_number, text_of
+from acquisition.recordings.tables.text import Line, Text, guess_delimiter, head_lines, parse_number, text_of
 
 __all__ = ["FORMAT"]
 
@@ -38,9 +38,7 @@ def _find(lines: Sequence[str]) -> int:
 
 
 def _evidence(head: bytes) -> str:
-    if not is_text(head):
-        return ""
-    lines = decode(head[:4096]).splitlines()
+    lines = head_lines(head)
     at = _find(lines)
     if at < 0:
         return ""

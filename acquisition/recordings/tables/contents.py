@@ -50,6 +50,8 @@ class Sheet:
     first_line : int
         One-based line of the first row.
     delimiter : str
+    width : int or None
+        Cells that a row must have, all of them numbers; None where rows may be ragged.
     """
 
     text: Text
@@ -57,6 +59,7 @@ class Sheet:
     stop: int
     first_line: int
     delimiter: str
+    width: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,6 +105,8 @@ class Channel:
         ISO 8601, as the file states it; empty where it does not.
     ragged : bool
         Whether it may end before its times do, which then belong to others.
+    difference : bool
+        Whether its values differ from the row before: the first has nothing to differ from, and NaN is right there.
     """
 
     name: str
@@ -115,6 +120,7 @@ class Channel:
     clock: ClockKind = "device"
     start_time: str = ""
     ragged: bool = False
+    difference: bool = False
 
     @property
     def label(self) -> str:
@@ -308,6 +314,8 @@ def under_first_line(
 def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind = "device") -> tuple[Channel, ...]:
     """Return the channels of a sheet: each has the times to its left, or the first of its run.
 
+    Beside columns of runs, a column without a heading is of none.
+
     Parameters
     ----------
     sheet : Sheet
@@ -318,7 +326,9 @@ def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind =
     """
     times = [column for column, each in enumerate(headings) if is_time(each.name)]
     found = []
-    values = [column for column in range(len(headings)) if column not in times]
+    runs = any(each.run for each in headings)
+    named = [column for column, each in enumerate(headings) if each.name or each.run or not runs]
+    values = [column for column in named if column not in times]
     for run in dict.fromkeys(headings[column].run for column in values):
         own = [column for column in values if headings[column].run == run]
         of_run = [column for column in times if headings[column].run == run]

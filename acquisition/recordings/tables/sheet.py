@@ -6,29 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import PurePath
 
-import numpy as np
-
 from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.inspection import Survey
 from acquisition.recordings.recording import Original, Recording, Trap
-from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps, value_traps
-from acquisition.recordings.sampling.timing import (
-    Timing,
-    check_rate,
-    clock_traps,
-    row_times,
-    time_by_column,
-    time_by_formula,
-    time_by_rate,
-)
-from acquisition.recordings.tables.channel import Pulled, pull
-from acquisition.recordings.tables.contents import Channel, Contents, Formula, choose
-from acquisition.recordings.tables.text import says_simulated
+from acquisition.recordings.sampling.samples import value_traps
+from acquisition.recordings.sampling.timing import check_rate
+from acquisition.recordings.tables.channel import pull, sample
+from acquisition.recordings.tables.contents import Channel, Contents, Heading, choose, under_first_line
+from acquisition.recordings.tables.text import head_lines, says_simulated
 from acquisition.recordings.units import LENGTHS, length_power, unit_words
 from acquisition.source import Kind, SourceInfo
 
-__all__ = ["ColumnFormat"]
+__all__ = ["ColumnFormat", "headed_format"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,23 +59,21 @@ class ColumnFormat:
         contents = self.contents(path, data)
         chosen = choose(path, contents, channel, run)
         power, told = _power(path, chosen, unit)
-        pulled = pull(path, chosen, power)
-        timing, traps = _timing(path, chosen, pulled, rate_hz)
-        samples, found, line = _samples(path, chosen, pulled, timing, contents.zeros)
+        column = sample(path, chosen, pull(path, chosen, power), rate_hz, contents.zeros)
         length = chosen.is_length or not chosen.unit
-        quantum, others = value_traps(samples.distance, samples.flags, pulled.resolution, line, length=length)
+        quantum, others = value_traps(column.value, column.flags, column.resolution, column.line, length=length)
         name = PurePath(path).name
-        clock = "nominal" if timing.grid is not None else chosen.clock
+        clock = "nominal" if column.timing.grid is not None else chosen.clock
         kind: Kind = "simulated" if says_simulated(f"{contents.title} {chosen.name} {name}") else "replay"
-        info = SourceInfo(kind, name, timing.rate_hz, quantum_m=quantum or None, clock=clock)
+        info = SourceInfo(kind, name, column.timing.rate_hz, quantum_m=quantum or None, clock=clock)
         return Recording(
             format=self.name,
             path=path,
             info=info,
             channel=chosen.name,
-            samples=samples,
-            traps=(*contents.traps, *told, *traps, *found, *others),
-            malformed_rows=int(np.count_nonzero(pulled.rows.bad)),
+            samples=Block(0, column.t, column.value, column.flags),
+            traps=(*contents.traps, *told, *column.traps, *others),
+            malformed_rows=column.malformed_rows,
             originals=(Original(name, data),),
             title=contents.title,
             run=chosen.run,
@@ -98,12 +86,43 @@ class ColumnFormat:
 
     def _survey(self, path: str, channel: Channel) -> Survey:
         pulled = pull(path, channel, length_power(channel.unit) or 0)
+        rows = pulled.value.size
         try:
-            timing, traps = _timing(path, channel, pulled, None)
+            column = sample(path, channel, pulled, None)
         except NeedsAnswer:
-            return Survey(channel.run, channel.name, channel.unit, pulled.value.size, None, ())
-        samples, found, _ = _samples(path, channel, pulled, timing, 0)
-        return Survey(channel.run, channel.name, channel.unit, len(samples), timing.rate_hz, (*traps, *found))
+            return Survey(channel.run, channel.name, channel.unit, rows, None, ())
+        rate_hz, traps = column.timing.rate_hz, column.traps
+        return Survey(channel.run, channel.name, channel.unit, column.t.size, rate_hz, traps)
+
+
+def headed_format(
+    name: str,
+    title: str,
+    headings_of: Callable[[str], tuple[tuple[Heading, ...], str]],
+    why: Callable[[tuple[Heading, ...], str], str],
+    example: str,
+) -> ColumnFormat:
+    """Return a family whose files are a line of headings and rows.
+
+    Parameters
+    ----------
+    name, title : str
+    headings_of : callable
+        From the first line to its headings, none where it is of another family, and what separates cells.
+    why : callable
+        From headings and what separates them: why these are of this family.
+    example : str
+        Headings as the family writes them.
+    """
+
+    def evidence(head: bytes) -> str:
+        headings, mark = headings_of(head_lines(head)[0])
+        return why(headings, mark) if headings else ""
+
+    def contents(path: str, data: bytes) -> Contents:
+        return under_first_line(path, data, headings_of, example)
+
+    return ColumnFormat(name, title, evidence, contents)
 
 
 def _power(path: str, channel: Channel, unit: str | None) -> tuple[int, tuple[Trap, ...]]:
@@ -129,66 +148,3 @@ def _power(path: str, channel: Channel, unit: str | None) -> tuple[int, tuple[Tr
         "frequencies and damping rates hold, everything in metres is in that unit"
     )
     return power, (Trap("unit_assumed", message),)
-
-
-def _timing(path: str, channel: Channel, pulled: Pulled, rate_hz: float | None) -> tuple[Timing, tuple[Trap, ...]]:
-    traps: list[Trap] = []
-    formula = channel.formula
-    count = pulled.rows.samples
-    if formula is not None and formula.samples is not None and formula.samples != count:
-        message = f"the header declares {formula.samples} samples, {count} rows are there; all are kept"
-        traps.append(Trap("stale_header", message, abs(formula.samples - count)))
-    timing = None
-    if formula is not None:
-        printed = pulled.printed
-        if printed is not None and pulled.rows.bad.any():
-            printed = np.where(pulled.rows.bad, np.nan, printed)
-        numbers = pulled.rows.numbers()
-        timing = time_by_formula(path, formula.start_s, formula.step_s, printed, pulled.tolerance, numbers, rate_hz)
-        if timing is None:
-            traps.append(_stale(formula, pulled))
-    if timing is None and pulled.printed is not None:
-        sound = pulled.printed[~pulled.rows.bad] if pulled.rows.bad.any() else pulled.printed
-        timing = time_by_column(path, sound, pulled.time_resolution, rate_hz)
-        if not channel.time_unit and formula is None:
-            traps.append(Trap("unit_assumed", "the times have no unit: read as seconds"))
-    if timing is None:
-        timing = time_by_rate(path, rate_hz, "no column of times and no sampling interval")
-    return timing, (*traps, *clock_traps(timing))
-
-
-def _stale(formula: Formula, pulled: Pulled) -> Trap:
-    said = f"the header says {formula.start_s:g} s + i * {formula.step_s:g} s"
-    if pulled.printed is None:
-        return Trap("stale_header", f"{said}, which makes no times")
-    return Trap("stale_header", f"{said}, the column of times says otherwise and is believed", pulled.value.size)
-
-
-def _samples(
-    path: str, channel: Channel, pulled: Pulled, timing: Timing, zeros: int
-) -> tuple[Block, tuple[Trap, ...], Callable[[int], int | None]]:
-    """Return the samples, what was seen in them, and what gives the line of each; the times printed are used up."""
-    rows, value, bad = pulled.rows, pulled.value, pulled.rows.bad
-    if pulled.printed is None or timing.by_row:
-        room = np.empty(value.size) if pulled.printed is None else np.require(pulled.printed, requirements="W")
-        t = row_times(timing, rows.numbers(), out=room)
-        if rows.remark is not None:
-            t[rows.remark] = np.nan
-    else:
-        t = place(pulled.printed, rows, timing)
-    told = np.isfinite(t)
-    every = bool(told.all())
-    if np.isnan(value if every else value[told]).all():
-        demand = f'expected numbers as "{channel.name}", got NaN in all {value.size} rows'
-        raise FormatError(path, demand, "record the run again")
-    traps = tuple(row_traps(rows, told, zeros))
-    where = None
-    if not every:
-        where = np.flatnonzero(told)
-        t, value, bad = t[where], value[where], bad[where]
-
-    def line(row: int) -> int | None:
-        return rows.line(row if where is None else int(where[row])) or None
-
-    flags = flags_of(t, value, bad, timing.rate_hz)
-    return Block(0, t, value, flags), (*traps, *sample_traps(flags, t, timing.rate_hz, line)), line

@@ -16,6 +16,7 @@ __all__ = [
     "Text",
     "decode",
     "guess_delimiter",
+    "head_lines",
     "is_text",
     "parse_number",
     "printed_decimals",
@@ -190,6 +191,17 @@ def unify(text: str) -> str:
     'a\\nb\\nc\\n'
     """
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
+def head_lines(head: bytes) -> list[str]:
+    """Return the lines of the head of a file; one empty line where it is binary.
+
+    Examples
+    --------
+    >>> head_lines(b"Time (s)\\r\\n0.5"), head_lines(bytes(64))
+    (['Time (s)', '0.5'], [''])
+    """
+    return unify(decode(head)).split("\n") if is_text(head) else [""]
 
 
 def parse_number(cell: str, shift: int = 0) -> float | None:

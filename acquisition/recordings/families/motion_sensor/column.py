@@ -1,28 +1,25 @@
-"""One MotionSensor.vi file as arrays, with everything that was seen on the way."""
+"""One MotionSensor.vi file as samples, with everything that was seen on the way."""
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.block import F8, U8, Flag
-from acquisition.errors import FormatError
+from acquisition.block import F8
 from acquisition.recordings.families.motion_sensor.layout import Layout, ask_columns, find_layout
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.samples import Rows, flags_of, place, row_traps, sample_traps, value_traps, within
-from acquisition.recordings.sampling.timing import Timing, check_rate, clock_traps, time_by_column
+from acquisition.recordings.sampling.samples import value_traps
+from acquisition.recordings.sampling.timing import check_rate
 from acquisition.recordings.sampling.velocity import find_tick
-from acquisition.recordings.tables.table import Table, read_table
+from acquisition.recordings.tables.channel import Sampled, pull, sample
+from acquisition.recordings.tables.contents import Channel
 from acquisition.recordings.tables.text import says_simulated, text_of
+from acquisition.recordings.units import LENGTHS
 
 __all__ = ["Column", "read_column"]
 
-_LONGEST_S = 1e7
 _CONSTANT = 0.95
 
 
@@ -35,32 +32,20 @@ class Column:
     path : str
     data : bytes
     layout : Layout
-    t : (n,) float64, s
-    value : (n,) float64, m or m/s
-        NaN where not measured or not readable.
-    flags : (n,) uint8
-    timing : Timing
-    resolution : float
-        Last printed digit of the quantity, m or m/s.
+    samples : Sampled
+        Values in m or m/s.
     quantum : float
         Step that all distances are multiples of, m: the last printed digit or a multiple of it.
     stated_error_m : float or None
-    malformed : int
-        Rows that could not be read.
     traps : tuple of Trap
     """
 
     path: str
     data: bytes
     layout: Layout
-    t: F8
-    value: F8
-    flags: U8
-    timing: Timing
-    resolution: float
+    samples: Sampled
     quantum: float
     stated_error_m: float | None
-    malformed: int
     traps: tuple[Trap, ...]
 
     @property
@@ -75,104 +60,44 @@ class Column:
 
     def tick(self) -> float | None:
         """Return the step that all values are multiples of, m or m/s, if one is evident."""
-        return find_tick(self.value, self.resolution)
+        return find_tick(self.samples.value, self.samples.resolution)
 
 
 def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | None, unit: str | None) -> Column:
     """Read one file; for the arguments and errors see :class:`acquisition.recordings.base.Format`."""
     check_rate(path, rate_hz)
     text = text_of(path, data)
-    layout = find_layout(path, text, channel, unit)
-    power = -round(math.log10(layout.per_si))
-    table = read_table(
-        text,
-        range(layout.columns),
-        layout.delimiter,
-        width=layout.columns,
-        start=layout.body,
-        first_line=layout.first_line,
-        shifts=(0, power, power)[: layout.columns],
-    )
-    printed = table.values[0]
-    bad = table.bad
-    if not within(printed, _LONGEST_S):
-        bad = bad | ~(np.abs(printed) < _LONGEST_S)
-    any_bad = bool(bad.any())
-    _demand_rows(path, layout, table, bad)
-    timing = time_by_column(path, printed[~bad] if any_bad else printed, 10.0 ** -table.decimals[0], rate_hz)
-    rows = Rows(bad, table.line, table.cut, table.last_cell, table.decimals[0])
-    t = place(np.where(np.abs(printed) < _LONGEST_S, printed, np.nan) if any_bad else printed, rows, timing)
-    told = np.isfinite(t)
-    value = np.require(table.values[1], requirements="W")
-    if any_bad:
-        value = np.where(bad, np.nan, value)
-    where = None if told.all() else np.flatnonzero(told)
-    if where is not None:
-        t, value = t[where], value[where]
-    if np.isnan(np.fmax.reduce(value)):
-        demand = f"expected numbers as {layout.quantity}, got NaN in all {value.size} rows"
-        raise FormatError(path, demand, "record the run again", line=table.line(0))
-
-    def line(row: int) -> int:
-        return table.line(row if where is None else int(where[row]))
-
-    flags = flags_of(t, value, bad if where is None else bad[where], timing.rate_hz)
-    if layout.quantity == "velocity" and not bad[0] and np.isnan(value[0]):
-        flags[0] &= ~np.uint8(Flag.MISSING)  # the first velocity has nothing to differ from: NaN is right there
-    resolution = 10.0 ** -table.decimals[1] / layout.per_si
-    quantum = resolution
-    found: tuple[Trap, ...] = ()
-    if layout.quantity == "distance":
-        quantum, found = value_traps(value, flags, resolution, line)
-    stated, constant = _stated_error(path, layout, table, bad)
-    traps = (
-        *_layout_traps(layout),
-        *clock_traps(timing),
-        *_error_traps(layout, stated, constant),
-        *row_traps(rows, told, text.zeros),
-        *sample_traps(flags, t, timing.rate_hz, line),
-        *found,
-    )
-    malformed = int(np.count_nonzero(bad)) if any_bad else 0
-    return Column(path, data, layout, t, value, flags, timing, resolution, quantum, stated, malformed, traps)
-
-
-def _demand_rows(path: str, layout: Layout, table: Table, bad: NDArray[np.bool_]) -> None:
-    if bad.all():
-        demand = f"expected rows of {layout.columns} numbers, got none in {bad.size} lines"
-        remedy = "check that rows and column line belong together"
-        raise FormatError(path, demand, remedy, line=table.line(0) if bad.size else layout.first_line)
-
-
-def _stated_error(path: str, layout: Layout, table: Table, bad: NDArray[np.bool_]) -> tuple[float | None, bool]:
-    """Return the usual error of the file, m, and whether it is constant."""
-    if layout.columns < 3:
-        return None, False
-    stated = table.values[2]
-    if bad.any():
-        stated = stated[~bad]
-    first = float(stated[0])
-    if (stated == first).all():
-        return first, True
-    stated = stated[np.isfinite(stated)]
-    if stated.size == 0:
-        return None, False
-    median = float(np.sort(stated)[stated.size // 2])
-    constant = bool(np.mean(stated == median) >= _CONSTANT)
-    if layout.assumed and not constant:
-        raise ask_columns(path, "three columns that all vary", layout.first_line)
-    return median, constant
-
-
-def _layout_traps(layout: Layout) -> Iterator[Trap]:
+    layout, sheet = find_layout(path, text, channel, unit)
+    quantity, is_velocity = layout.quantity, layout.quantity == "velocity"
+    power = LENGTHS[layout.unit]
+    described = Channel(quantity, layout.unit, sheet, column=1, time=0, time_unit="s", difference=is_velocity)
+    samples = sample(path, described, pull(path, described, power), rate_hz, text.zeros)
+    traps = []
     if layout.assumed:
-        yield Trap("unit_assumed", f"no column line: read as time (s) and {layout.assumed}, in {layout.unit}")
+        message = f"no column line: read as time (s) and {layout.assumed}, in {layout.unit}"
+        traps.append(Trap("unit_assumed", message))
+    traps.extend(samples.traps)
+    stated = None
+    if samples.behind:
+        stated, constant = _usual(samples.behind[0])
+        if constant and stated is not None:
+            message = (
+                f"the error column is a constant {stated / 10.0**power:g} {layout.unit}: a stated figure, not the noise"
+            )
+            traps.append(Trap("stated_error_is_not_noise", message))
+        elif stated is not None and layout.assumed:
+            raise ask_columns(path, "three columns that all vary", sheet.first_line)
+    quantum = samples.resolution
+    if not is_velocity:
+        quantum, found = value_traps(samples.value, samples.flags, samples.resolution, samples.line)
+        traps.extend(found)
+    return Column(path, data, layout, samples, quantum, stated, tuple(traps))
 
 
-def _error_traps(layout: Layout, stated: float | None, constant: bool) -> Iterator[Trap]:
-    if stated is not None and constant:
-        figure = f"{stated * layout.per_si:g} {layout.unit}"
-        yield Trap(
-            "stated_error_is_not_noise",
-            f"the error column is a constant {figure}: a stated figure, not the noise",
-        )
+def _usual(stated: F8) -> tuple[float | None, bool]:
+    """Return the usual error, m, and whether it is constant."""
+    finite = stated[np.isfinite(stated)]
+    if not finite.size:
+        return None, False
+    usual = float(np.partition(finite, finite.size // 2)[finite.size // 2])
+    return usual, bool(np.mean(finite == usual) >= _CONSTANT)

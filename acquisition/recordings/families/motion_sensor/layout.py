@@ -8,19 +8,19 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.tables.contents import Sheet
 from acquisition.recordings.tables.text import Text, guess_delimiter, parse_number, split_cells
+from acquisition.recordings.units import LENGTHS
 
 __all__ = ["Layout", "Quantity", "ask_columns", "evidence", "find_layout"]
 
 Quantity = Literal["distance", "velocity"]
 
-PER_METRE = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
-
 _TITLE, _TIME = "motion sensor data file", "time (s)"
-_DISTANCE = {f"distance ({unit})": unit for unit in PER_METRE}
-_ERROR = {f"{name} error ({unit})": unit for unit in PER_METRE for name in ("dist", "distance")}
-_VELOCITY = {f"velocity ({unit}/s)": unit for unit in PER_METRE}
-_HEAD = 16384
+_DISTANCE = {f"distance ({unit})": unit for unit in LENGTHS}
+_ERROR = {f"{name} error ({unit})": unit for unit in LENGTHS for name in ("dist", "distance")}
+_VELOCITY = {f"velocity ({unit}/s)": unit for unit in LENGTHS}
+_CHANNELS: dict[str, Quantity] = {"distance": "distance", "position": "distance", "velocity": "velocity"}
 _HEADER_LINES = 20
 _ROWS_OF_SHAPE = 100
 _REMEDY = 'put the column line "Time (s)<TAB>Distance (cm)" or "Time (s)<TAB>Velocity (cm/s)" above the rows'
@@ -34,34 +34,22 @@ class Layout(NamedTuple):
     quantity : {"distance", "velocity"}
     columns : int
         Cells of a row: time, the quantity, and the error if there are three.
-    per_si : float
-        Printed units in a metre.
     unit : str
-        "cm", say.
-    title : str
-    first_line : int
-        One-based line where the rows start.
-    body : int
-        Byte where they start.
-    delimiter : str
+        A length: "cm" of centimetres a second too.
     assumed : str
         What was concluded from the shape of the rows, because no column line says it; else empty.
+    title : str
     """
 
     quantity: Quantity
     columns: int
-    per_si: float
     unit: str
-    title: str = ""
-    first_line: int = 1
-    body: int = 0
-    delimiter: str = "\t"
     assumed: str = ""
+    title: str = ""
 
 
-def evidence(text: str) -> str:
-    """Say why the start of a text, lines ended by LF, is a MotionSensor.vi file; empty where it is not."""
-    lines = _head_lines(text)
+def evidence(lines: Sequence[str]) -> str:
+    """Say why the first lines of a text are those of a MotionSensor.vi file; empty where they are not."""
     for number, line in enumerate(lines[:_HEADER_LINES], 1):
         if _is_title(line):
             return f'line {number} is the title "{line.strip()}"'
@@ -72,8 +60,8 @@ def evidence(text: str) -> str:
     return f"the rows have the shape of {shape.assumed}" if shape else ""
 
 
-def find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> Layout:
-    """Tell where the rows start and what they mean.
+def find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> tuple[Layout, Sheet]:
+    """Tell what the rows mean, and where they are.
 
     Raises
     ------
@@ -84,7 +72,9 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
     """
     head = text.head(_HEADER_LINES + _ROWS_OF_SHAPE)
     lines = [line.text for line in head]
-    asked = _asked_quantity(path, channel)
+    if channel is not None and channel.lower() not in _CHANNELS:
+        raise FormatError(path, f'channel must be distance or velocity, got "{channel}"', "name one of these")
+    asked = None if channel is None else _CHANNELS[channel.lower()]
     found = _column_line(lines)
     if found:
         at, layout = found
@@ -98,7 +88,10 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
         if start < 0:
             raise _no_rows(path, lines, "rows of two or three numbers")
         layout = _by_shape(path, lines[start:], titled, asked, start + 1)
-        layout = _with_unit(path, layout, unit)
+        if unit is not None:
+            if _plain(unit) not in LENGTHS:
+                raise FormatError(path, f'unit must be one of {", ".join(LENGTHS)}, got "{unit}"', "name one of these")
+            layout = layout._replace(unit=_plain(unit))
         title, start = _title_and_start(lines, start)
     if asked and asked != layout.quantity:
         demand = f'channel "{channel}" was asked for, but the file holds {layout.quantity}'
@@ -107,8 +100,8 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
     if not rows:
         raise _no_rows(path, lines, "rows of numbers below the column line")
     delimiter = next((guess_delimiter(row) for row in rows if _is_row(row)), guess_delimiter(rows[0]))
-    body = head[start].start
-    return layout._replace(title=title, first_line=start + 1, body=body, delimiter=delimiter)
+    sheet = Sheet(text, head[start].start, text.stop, start + 1, delimiter, layout.columns)
+    return layout._replace(title=title), sheet
 
 
 def ask_columns(path: str, got: str, line: int | None = None) -> NeedsAnswer:
@@ -117,12 +110,7 @@ def ask_columns(path: str, got: str, line: int | None = None) -> NeedsAnswer:
 
 
 def _no_rows(path: str, lines: Sequence[str], demand: str) -> FormatError:
-    last = len(lines)
-    return FormatError(path, f"expected {demand}, got none", "check that the export ended", line=max(last, 1))
-
-
-def _head_lines(text: str) -> list[str]:
-    return text[:_HEAD].split("\n")
+    return FormatError(path, f"expected {demand}, got none", "check that the export ended", line=max(len(lines), 1))
 
 
 def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
@@ -135,14 +123,10 @@ def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
         cells = [cell.strip().lower() for cell in split_cells(line, guess_delimiter(line) or "\t")]
         if 2 <= len(cells) <= 3 and cells[0] == _TIME:
             if (unit := _VELOCITY.get(cells[1])) and len(cells) == 2:
-                return at, _layout("velocity", 2, unit)
+                return at, Layout("velocity", 2, unit)
             if (unit := _DISTANCE.get(cells[1])) and (len(cells) == 2 or _ERROR.get(cells[2]) == unit):
-                return at, _layout("distance", len(cells), unit)
+                return at, Layout("distance", len(cells), unit)
     return None
-
-
-def _layout(quantity: Quantity, columns: int, unit: str, assumed: str = "") -> Layout:
-    return Layout(quantity, columns, PER_METRE[unit], unit, assumed=assumed)
 
 
 def _is_title(line: str) -> bool:
@@ -183,11 +167,11 @@ def _shape(lines: Sequence[str]) -> Layout | None:
         third = [row[2] for row in three]
         usual = max(set(third), key=third.count)
         if usual > 0 and third.count(usual) >= 0.95 * len(third) and _times_run(three):
-            return _layout("distance", 3, "cm", "distance and its error, for the third column is constant")
+            return Layout("distance", 3, "cm", "distance and its error, for the third column is constant")
     elif (
         len(two) >= 3 and rows[0] == two[0] and math.isnan(two[0][1]) and not math.isnan(two[1][1]) and _times_run(two)
     ):
-        return _layout("velocity", 2, "cm", "velocity, for the first value is NaN")
+        return Layout("velocity", 2, "cm", "velocity, for the first value is NaN")
     return None
 
 
@@ -196,33 +180,14 @@ def _times_run(rows: Sequence[Sequence[float]]) -> bool:
     return rows[0][0] >= 0 and forward >= 0.5 * (len(rows) - 1)
 
 
-def _by_shape(path: str, rows: Sequence[str], titled: bool, asked: str, line: int) -> Layout:
+def _by_shape(path: str, rows: Sequence[str], titled: bool, asked: Quantity | None, line: int) -> Layout:
     if layout := _shape(rows):
         return layout
     columns = len(_numbers(rows[0]))
-    if columns == 2 and asked == "distance":
-        return _layout("distance", 2, "cm", "distance, as asked for")
-    if columns == 2 and asked == "velocity":
-        return _layout("velocity", 2, "cm", "velocity, as asked for")
+    if columns == 2 and asked:
+        return Layout(asked, 2, "cm", f"{asked}, as asked for")
     raise ask_columns(path, f"{columns} columns" + (" under the title" if titled else ""), line)
-
-
-def _with_unit(path: str, layout: Layout, unit: str | None) -> Layout:
-    if unit is None:
-        return layout
-    if _plain(unit) not in PER_METRE:
-        raise FormatError(path, f'unit must be one of m, cm, mm, got "{unit}"', "name one of these")
-    return layout._replace(unit=_plain(unit), per_si=PER_METRE[_plain(unit)])
 
 
 def _plain(unit: str) -> str:
     return unit.strip().removesuffix("/s")
-
-
-def _asked_quantity(path: str, channel: str | None) -> str:
-    names = {None: "", "distance": "distance", "position": "distance", "velocity": "velocity"}
-    if channel is not None:
-        channel = channel.lower()
-    if channel not in names:
-        raise FormatError(path, f'channel must be distance or velocity, got "{channel}"', "name one of these")
-    return names[channel]

@@ -26,7 +26,8 @@ from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.nominal import time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
 from acquisition.recordings.sampling.velocity import find_quantum, integrate, outer_join
-from acquisition.recordings.tables.text import decode, is_text, unify
+from acquisition.recordings.tables.channel import Sampled
+from acquisition.recordings.tables.text import head_lines
 from acquisition.source import SourceInfo
 
 __all__ = ["FORMAT", "MotionSensor"]
@@ -40,7 +41,7 @@ class MotionSensor:
 
     def evidence(self, head: bytes) -> str:
         """Tell from the title, the column line, or the shape of rows without either."""
-        return evidence(unify(decode(head))) if is_text(head) else ""
+        return evidence(head_lines(head))
 
     def recognises(self, head: bytes) -> bool:
         """Tell whether there is evidence for this family."""
@@ -52,9 +53,9 @@ class MotionSensor:
             column = read_column(path, data, None, None, None)
         except NeedsAnswer:
             return ()
-        layout = column.layout
+        layout, samples = column.layout, column.samples
         unit = layout.unit + ("/s" if layout.quantity == "velocity" else "")
-        return (Survey("", layout.quantity, unit, column.t.size, column.timing.rate_hz, column.traps),)
+        return (Survey("", layout.quantity, unit, samples.t.size, samples.timing.rate_hz, column.traps),)
 
     def read(
         self,
@@ -100,13 +101,16 @@ class MotionSensor:
 FORMAT = MotionSensor()
 
 
-def _recording(column: Column, samples: Block, quantum_m: float, traps: Iterable[Trap]) -> Recording:
+def _recording(
+    column: Column, samples: Block, quantum_m: float, traps: Iterable[Trap], velocity: Column | None = None
+) -> Recording:
+    files = (column,) if velocity is None else (column, velocity)
     info = SourceInfo(
         kind="simulated" if column.simulated else "replay",
         name=column.name,
-        rate_hz=column.timing.rate_hz,
+        rate_hz=column.samples.timing.rate_hz,
         quantum_m=quantum_m,
-        clock="device" if column.timing.grid is None else "nominal",
+        clock="device" if column.samples.timing.grid is None else "nominal",
         stated_error_m=column.stated_error_m,
     )
     return Recording(
@@ -116,76 +120,64 @@ def _recording(column: Column, samples: Block, quantum_m: float, traps: Iterable
         channel=column.layout.quantity,
         samples=samples,
         traps=(*column.traps, *traps),
-        malformed_rows=column.malformed,
-        originals=(Original(column.name, column.data),),
+        malformed_rows=sum(each.samples.malformed_rows for each in files),
+        originals=tuple(Original(each.name, each.data) for each in files),
         title=column.layout.title,
     )
 
 
 def _position_alone(column: Column) -> Recording:
-    return _recording(column, Block(0, column.t, column.value, column.flags), column.quantum, ())
+    samples = column.samples
+    return _recording(column, Block(0, samples.t, samples.value, samples.flags), column.quantum, ())
 
 
 def _velocity_alone(column: Column) -> Recording:
     """Sum velocity up to position; its zero is the first sample, for the file does not hold its offset."""
-    rate_hz, tick = column.timing.rate_hz, column.tick()
-    flags = column.flags.copy()
+    samples, tick = column.samples, column.tick()
+    rate_hz, flags = samples.timing.rate_hz, samples.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
-    index = np.rint(column.t[regular] * rate_hz).astype(np.int64)
-    path = integrate(column.value[regular], index, rate_hz, tick, column.resolution / 2)
-    distance = np.full(column.t.size, np.nan)
+    index = np.rint(samples.t[regular] * rate_hz).astype(np.int64)
+    path = integrate(samples.value[regular], index, rate_hz, tick, samples.resolution / 2)
+    distance = np.full(samples.t.size, np.nan)
     distance[regular] = path.position
     flags[regular[path.bridged]] |= Flag.GAP_BEFORE.value
     flags[np.isnan(distance)] |= Flag.MISSING.value
-    quantum_m = find_quantum(column.value, tick) / rate_hz if tick else column.resolution / rate_hz
+    quantum_m = find_quantum(samples.value, tick) / rate_hz if tick else samples.resolution / rate_hz
     summed = "position is summed up from velocity: its offset is unknown and the first sample stands at 0 m"
-    traps = [Trap("offset_unknown", summed, column.t.size)]
+    traps = [Trap("offset_unknown", summed, samples.t.size)]
     if holes := int(np.count_nonzero(path.bridged)):
-        first = float(column.t[regular[path.bridged]][0])
+        first = float(samples.t[regular[path.bridged]][0])
         message = (
             f"{holes} holes in the velocity, the first before t = {first:g} s: the offset after each is "
             "unknown and bridged with interpolated velocity"
         )
         traps.append(Trap("offset_unknown_after_gap", message, holes))
-    return _recording(column, Block(0, column.t, distance, flags, None, column.value), quantum_m, traps)
+    return _recording(column, Block(0, samples.t, distance, flags, None, samples.value), quantum_m, traps)
 
 
 def _join(position: Column, velocity: Column) -> Recording:
-    rate_hz = position.timing.rate_hz
-    if abs(velocity.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
-        demand = f"expected {rate_hz:g} Hz as in {position.name}, got {velocity.timing.rate_hz:g} Hz"
+    p, v = position.samples, velocity.samples
+    rate_hz = p.timing.rate_hz
+    if abs(v.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
+        demand = f"expected {rate_hz:g} Hz as in {position.name}, got {v.timing.rate_hz:g} Hz"
         raise FormatError(velocity.path, demand, "name the velocity file of the same run")
-    resolution = min(position.timing.resolution_s, velocity.timing.resolution_s)
-    keys = [np.rint(column.t / resolution).astype(np.int64) for column in (position, velocity)]
-    from_p, from_v = outer_join(keys[0], keys[1], (position.flags & IRREGULAR) == 0)
+    resolution = min(p.timing.resolution_s, v.timing.resolution_s)
+    keys = [np.rint(t / resolution).astype(np.int64) for t in (p.t, v.t)]
+    from_p, from_v = outer_join(keys[0], keys[1], (p.flags & IRREGULAR) == 0)
     in_p, in_v = from_p >= 0, from_v >= 0
     if not (in_p & in_v).any():
         demand = f"expected times in common with {position.name}, got none"
         raise FormatError(velocity.path, demand, "name the velocity file of the same run")
-    t = np.where(in_p, position.t[from_p], velocity.t[from_v])
-    distance = np.where(in_p, position.value[from_p], np.nan)
-    speed = np.where(in_v, velocity.value[from_v], np.nan)
+    t = np.where(in_p, p.t[from_p], v.t[from_v])
+    distance = np.where(in_p, p.value[from_p], np.nan)
+    speed = np.where(in_v, v.value[from_v], np.nan)
     flags = time_flags(t, 1.0 / rate_hz)
-    flags |= np.where(in_p, position.flags[from_p], velocity.flags[from_v]) & UNREAD_FLAGS
+    flags |= np.where(in_p, p.flags[from_p], v.flags[from_v]) & UNREAD_FLAGS
     flags[~in_p] |= Flag.MISSING.value
     tick = velocity.tick()
-    joined = _recording(
-        position,
-        Block(0, t, distance, flags, None, speed),
-        find_quantum(velocity.value, tick) / rate_hz if tick else position.quantum,
-        (*_velocity_traps(velocity), *_join_traps(position, velocity, from_p, from_v)),
-    )
-    return Recording(
-        joined.format,
-        joined.path,
-        joined.info,
-        joined.channel,
-        joined.samples,
-        joined.traps,
-        position.malformed + velocity.malformed,
-        (*joined.originals, Original(velocity.name, velocity.data)),
-        joined.title,
-    )
+    quantum_m = find_quantum(v.value, tick) / rate_hz if tick else position.quantum
+    traps = (*_velocity_traps(velocity), *_join_traps(p, v, from_p, from_v))
+    return _recording(position, Block(0, t, distance, flags, None, speed), quantum_m, traps, velocity)
 
 
 def _velocity_traps(velocity: Column) -> Iterable[Trap]:
@@ -195,7 +187,7 @@ def _velocity_traps(velocity: Column) -> Iterable[Trap]:
             yield Trap(trap.code, f"in {velocity.name}: {trap.message}", trap.count, trap.line)
 
 
-def _join_traps(position: Column, velocity: Column, from_p: I8, from_v: I8) -> Iterable[Trap]:
+def _join_traps(p: Sampled, v: Sampled, from_p: I8, from_v: I8) -> Iterable[Trap]:
     alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
     if alone_v:
         message = f"{alone_v} times stand in the velocity file only: no distance there"
@@ -204,10 +196,10 @@ def _join_traps(position: Column, velocity: Column, from_p: I8, from_v: I8) -> I
         yield Trap("velocity_missing", f"{alone_p} times stand in the position file only: no velocity there", alone_p)
     # Neighbours in the position file whose later one has a velocity: it must be their difference.
     both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
-    x, rate_hz = position.value, position.timing.rate_hz
-    apart = np.abs((x[from_p[both]] - x[from_p[both - 1]]) * rate_hz - velocity.value[from_v[both]])
+    x, rate_hz = p.value, p.timing.rate_hz
+    apart = np.abs((x[from_p[both]] - x[from_p[both - 1]]) * rate_hz - v.value[from_v[both]])
     apart = apart[np.isfinite(apart)]
-    allowed = position.resolution * rate_hz + velocity.resolution
+    allowed = p.resolution * rate_hz + v.resolution
     wrong = int(np.count_nonzero(apart > 1.01 * allowed))
     if wrong > 0.5 * apart.size:
         message = f"{wrong} of {apart.size} velocities are no differences of the positions: is it the same run?"

@@ -263,7 +263,7 @@ def test_a_constant_distance_is_read() -> None:
         (f"{POSITION}\n0.000\t20.000\t0.239", "got 1 rows at one time"),
         (
             f"{POSITION}\n0.000\tNaN\t0.239\n0.010\tNaN\t0.239\n",
-            "line 2: expected numbers as distance, got NaN",
+            'line 2: expected numbers as "distance", got NaN',
         ),
         (f"{POSITION}\n0.000\t20.000\n0.010\t20.000\n", "line 2: expected rows of 3 numbers, got none"),
         (f"{POSITION}\nhello\nworld\n", "expected rows of 3 numbers, got none in 2 lines"),
