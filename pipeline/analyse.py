@@ -13,12 +13,12 @@ from pipeline.damping import select as dampings
 from pipeline.damping.select import Damping
 from pipeline.errors import AnalysisError
 from pipeline.motion import equation_fit as equations
+from pipeline.motion import overdamped as relaxations
 from pipeline.motion import phase as phases
 from pipeline.motion import waveform_fit as fullfits
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equation
 from pipeline.motion.kinds import Fitted, Windows, by_equation, by_windows, see_windows
-from pipeline.motion.overdamped import search as relaxations
-from pipeline.motion.overdamped.search import Overdamped, find_overdamped, spring_constant
+from pipeline.motion.overdamped import Overdamped, find_overdamped, spring_constant
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.rest import Rest
 from pipeline.motion.smoother import Smoothed, smooth

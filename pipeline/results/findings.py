@@ -13,7 +13,7 @@ from pipeline.damping.laws import LAWS
 from pipeline.damping.mixture import MixedDrag, find_mixed
 from pipeline.damping.select import Damping
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit
-from pipeline.motion.overdamped.search import Overdamped
+from pipeline.motion.overdamped import Overdamped
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.rest import Rest
 from pipeline.motion.waveform import Waveform

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from pipeline.analyse import Oscillation, analyse
 from pipeline.bench.scene import Scene
-from pipeline.motion.overdamped.search import Overdamped, find_overdamped
+from pipeline.motion.overdamped import Overdamped, find_overdamped
 from pipeline.oscillation.condition import condition
 from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import Track

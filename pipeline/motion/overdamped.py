@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
-from pipeline.motion.overdamped.decay_fit import DecayFit, best_decay, critical_decay, lone_exponential
-from pipeline.motion.overdamped.estimates import Kind, Overdamped, described, spring_constant
+from pipeline.bench.added_mass import added_mass_kg
+from pipeline.bench.scene import Scene
+from pipeline.motion.decay import DecayFit, best_decay, critical_decay, lone_exponential
+from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import F8
 
-__all__ = ["Overdamped", "Params", "find_overdamped", "spring_constant"]
+__all__ = ["Kind", "Overdamped", "Params", "find_overdamped", "spring_constant"]
+
+Kind = Literal["overdamped", "critical", "strong"]
 
 FEWEST = 20  # samples in which five parameters can be looked for
 POINTS = 300  # to which a record is averaged where models of its shape are compared
@@ -42,6 +47,33 @@ class Params:
     u_clock: float = 50e-6 / math.sqrt(3.0)
 
 
+@dataclass(frozen=True, slots=True)
+class Overdamped:
+    """A motion that damping ends within a few cycles or without any.
+
+    Parameters
+    ----------
+    why : str
+        One sentence with the rates.
+    kind : {"overdamped", "critical", "strong"}
+        Two rates; one; or an oscillation whose damping ratio is large.
+    damping_ratio : Estimate
+        :math:`\\zeta = g/\\omega_0`.
+    squared_frequency : Estimate
+        :math:`\\omega_0^2` of the undamped motion, rad^2/s^2: times the mass, the spring constant.
+    estimates : mapping of str to Estimate
+    start_s : float
+        From where the motion was followed, s.
+    """
+
+    why: str
+    kind: Kind
+    damping_ratio: Estimate
+    squared_frequency: Estimate
+    estimates: Mapping[str, Estimate]
+    start_s: float
+
+
 def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> Overdamped | NoOscillation | None:
     """Fit the free motion of a linearly damped bob, and say which kind of damping it shows.
 
@@ -58,9 +90,7 @@ def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> O
 
     Notes
     -----
-    :class:`pipeline.motion.overdamped.decay_model.Decay` covers all strengths of damping. Start values are the best
-    of a grid of rates
-    and frequencies, for each of which the other three parameters are linear. A relaxation must leave no more than 1.5
+    :func:`pipeline.motion.decay.best_decay` covers all strengths of damping. A relaxation must leave no more than 1.5
     times the noise, in its moving part too, beat every polynomial to the third degree, every step and every ramp by
     ten in BIC, and be over within the record (:math:`gT > 2`). Of critical damping, two rates and an oscillation
     the one of lowest BIC is taken, which must be lower than a lone exponential's by six. A record
@@ -113,7 +143,7 @@ def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params
     # Uncertainties grow with what the fit leaves beyond the noise.
     fit = replace(fit, covariance=fit.covariance * max(1.0, fit.chi2 / max(t.size - 5, 1)))
     u_clock = params.u_clock if conditioned.track.clock == "nominal" else 0.0
-    found = described(fit, kind, float(t[0]), t.size, u_clock)
+    found = _described(fit, kind, float(t[0]), t.size, u_clock)
     return None if kind == "strong" and found.damping_ratio.value < params.least_damping else found
 
 
@@ -177,15 +207,11 @@ def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float) -> tuple[Kind, DecayFit
     None where the motion ends at a rate beyond the fastest, 1/s: between two samples, where a step looks alike.
     """
     price = math.log(tau.size)
-    fall = np.exp(-fit.slowest * tau)
-    offset = float(fit.theta[0])
-    start = np.array([offset, float(fall @ (y - offset)) / float(fall @ fall), math.log(fit.slowest)])
-    lone = lone_exponential(tau, y, fit.noise, start)
+    rate, left = lone_exponential(tau, y, fit.noise, fit.slowest)
     one = critical_decay(tau, y, fit)
     critical = math.inf if one is None else one.chi2 + 4.0 * price
     free = fit.chi2 + 5.0 * price
-    if min(critical, free) > lone.cost + 3.0 * price - 6.0:
-        rate = math.exp(lone.values[2])
+    if min(critical, free) > left + 3.0 * price - 6.0:
         if rate > fastest:
             return None
         return NoOscillation(
@@ -197,3 +223,67 @@ def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float) -> tuple[Kind, DecayFit
     if fit.slowest > fastest:
         return None
     return ("overdamped" if fit.square > 0.0 else "strong"), fit
+
+
+def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: float) -> Overdamped:
+    """Return what follows from a fit of so many samples with a clock of this relative standard uncertainty."""
+    from uncertainties import correlated_values, ufloat, umath
+
+    clock = ufloat(1.0, u_clock)
+    offset, a, v, *logarithms = correlated_values(fit.theta, fit.covariance)
+    v, rate = v * clock, umath.exp(logarithms[0]) * clock
+    stiffness = rate**2 if fit.critical else umath.exp(logarithms[1]) * clock**2
+    spread = math.sqrt(fit.chi2 / max(count - 5, 1)) * fit.noise
+    found = {"offset": _estimate(offset, "m"), "noise": Estimate(spread, spread / math.sqrt(2.0 * count), "m")}
+    squared, natural = _estimate(stiffness, "rad^2/s^2"), umath.sqrt(stiffness)
+    ratio = Estimate(1.0, 0.0) if kind == "critical" else _estimate(rate / natural, "")
+    if kind == "critical":
+        found["relaxation_rate"] = _estimate(rate, "1/s")
+        why = (
+            f"the motion relaxes without oscillating, at {found['relaxation_rate']}: "
+            "within its noise it is critically damped, with one rate"
+        )
+    elif kind == "overdamped":
+        fast = rate + umath.sqrt(rate**2 - stiffness)
+        # Their difference would lose digits.
+        found["relaxation_rate_slow"] = _estimate(stiffness / fast, "1/s")
+        found["relaxation_rate_fast"] = _estimate(fast, "1/s")
+        slow, fast = found["relaxation_rate_slow"], found["relaxation_rate_fast"]
+        why = f"the motion is overdamped: it relaxes without oscillating, at {slow} and {fast}"
+    else:
+        # A cosine of a and a sine of -(v + g a)/omega.
+        omega = umath.sqrt(stiffness - rate**2)
+        side = (v + rate * a) / omega
+        turn = 2.0 * math.pi
+        found["angular_frequency"] = _estimate(omega, "rad/s")
+        found["frequency"] = _estimate(omega / turn, "Hz")
+        found["period"] = _estimate(turn / omega, "s")
+        found["amplitude"] = _estimate(umath.sqrt(a**2 + side**2), "m")
+        found["phase"] = _estimate(umath.atan2(-side, a), "rad")
+        found["damping_rate"] = _estimate(rate, "1/s")
+        found["quality_factor"] = _estimate(0.5 * natural / rate, "")
+        why = f"the oscillation is strongly damped: its damping ratio is {ratio}"
+    return Overdamped(why, kind, ratio, squared, found, start_s)
+
+
+def _estimate(quantity: Any, unit: str) -> Estimate:
+    return Estimate(quantity.nominal_value, quantity.std_dev, unit)
+
+
+def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
+    """Return the spring constant, N/m, by name; nothing where the scene gives no bob mass.
+
+    Notes
+    -----
+    :math:`k = \\omega_0^2 (m + m_s/3 + m_a)` with the undamped frequency; the spring's share and the air carried
+    along count where the scene names them.
+    """
+    if scene.bob_mass_kg is None:
+        return {}
+    mass, squares = scene.bob_mass_kg.value + added_mass_kg(scene), scene.bob_mass_kg.u**2
+    if scene.spring_mass_kg is not None:
+        mass += scene.spring_mass_kg.value / 3.0
+        squares += (scene.spring_mass_kg.u / 3.0) ** 2
+    k = found.squared_frequency.value * mass
+    relative = math.hypot(math.sqrt(squares) / mass, found.squared_frequency.u / found.squared_frequency.value)
+    return {"spring_constant": Estimate(k, k * relative, "N/m")}

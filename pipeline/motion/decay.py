@@ -1,0 +1,199 @@
+"""The free motion of a linearly damped bob at any strength of damping, fitted from starts that a record itself gives.
+
+Two parameters are searched for; rest position, displacement and velocity enter linearly and follow from them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.numerics import least_squares
+from pipeline.numerics.regression import covariance_of, solve_weighted
+from pipeline.track import F8
+
+__all__ = ["DecayFit", "best_decay", "critical_decay", "lone_exponential"]
+
+# A hundredth of a standard uncertainty is left. One attempt is enough: starts are many.
+ROUGH = least_squares.Params(precision=0.1, steps=15, again=False)
+FINE = least_squares.Params(precision=0.01, steps=40, again=False)
+FINISHED = 2  # of the starts, the best, also where the steps were too few
+EACH = 2  # starts of each kind of damping
+DIFFERENCE = 1e-5  # of a rate, by which it is moved for the covariance
+
+Shape = Callable[[F8, F8], F8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DecayFit:
+    """Where a fit of (o, a, v, ln g, ln w) ended.
+
+    Parameters
+    ----------
+    theta : (5,) float64
+        Critical, (4,): without the last.
+    covariance : (5, 5) or (4, 4) float64
+    chi2 : float
+    noise : float
+        Of a sample, m.
+    """
+
+    theta: F8
+    covariance: F8
+    chi2: float
+    noise: float
+
+    @property
+    def critical(self) -> bool:
+        """Whether w is g^2."""
+        return self.theta.size == 4
+
+    @property
+    def rate(self) -> float:
+        """g, 1/s."""
+        return math.exp(self.theta[3])
+
+    @property
+    def stiffness(self) -> float:
+        """w, the square of the undamped frequency, rad^2/s^2."""
+        return self.rate**2 if self.critical else math.exp(self.theta[4])
+
+    @property
+    def square(self) -> float:
+        """q = g^2 - w, 1/s^2."""
+        return self.rate**2 - self.stiffness
+
+    @property
+    def slowest(self) -> float:
+        """The rate at which the motion ends, 1/s: of two the slower."""
+        # g - sqrt(q) would lose digits.
+        return self.stiffness / (self.rate + math.sqrt(self.square)) if self.square > 0.0 else self.rate
+
+    def position(self, tau: F8) -> F8:
+        """Return the distances, (n,), m, at times since the start, s."""
+        return np.asarray(_motion(tau, self.theta[3:]) @ self.theta[:3])
+
+
+def best_decay(tau: F8, y: F8, noise: float, rate_hz: float) -> DecayFit | None:
+    """Return the best of the fits from a grid of starts; None where none converged.
+
+    Parameters
+    ----------
+    tau, y : (n,) float64
+        Times since the first sample, s, and distances, m.
+    noise : float
+        Of a sample, m.
+    rate_hz : float
+        Samples per second.
+
+    Notes
+    -----
+    Of :math:`\\ddot x + 2g\\dot x + w x = 0` about a rest position o, from x = a at speed v, the parameters are
+    (o, a, v, ln g, ln w), so that g and w stay positive and the valley that strong damping makes, where only w/2g is
+    known, is straight. With :math:`q = s^2 = g^2 - w` the motion is
+    :math:`e^{-gt}(a\\cosh st + (v + ga)\\sinh(st)/s)`: it oscillates for q < 0, is critically damped for q = 0 and
+    has the two rates :math:`g \\mp \\sqrt q` for q > 0.
+    """
+    starts = _grid(tau, y, noise, rate_hz)
+    ends = sorted((_search(_motion, tau, y, noise, start, ROUGH) for start in starts), key=lambda end: end.cost)
+    # Two rates of which the record knows one make a valley without a floor; on its side there may be a minimum.
+    tried = ends[:FINISHED] + [end for end in ends[FINISHED:] if end.converged]
+    fits = (_decay(tau, y, noise, end.values) for end in tried)
+    return next((fit for fit in fits if fit is not None), None)
+
+
+def critical_decay(tau: F8, y: F8, near: DecayFit) -> DecayFit | None:
+    """Return the critically damped motion near another; None where it was not found."""
+    return _decay(tau, y, near.noise, near.theta[3:4])
+
+
+def lone_exponential(tau: F8, y: F8, noise: float, rate: float) -> tuple[float, float]:
+    """Fit :math:`o + p e^{-rt}` from a rate, 1/s, and return r and chi-square."""
+
+    end = _search(_exponential, tau, y, noise, np.array([math.log(rate)]), FINE)
+    return math.exp(end.values[0]), end.cost
+
+
+def _decay(tau: F8, y: F8, noise: float, start: F8) -> DecayFit | None:
+    end = _search(_motion, tau, y, noise, start, FINE)
+    if not end.converged:
+        return None
+    design = _motion(tau, end.values)
+    linear = solve_weighted(design, y, np.ones(y.size)).values
+    moved = [
+        (_motion(tau, end.values + step) - _motion(tau, end.values - step)) @ linear / (2.0 * DIFFERENCE)
+        for step in DIFFERENCE * np.eye(start.size)
+    ]
+    covariance = covariance_of(np.column_stack([design, *moved]) / noise)
+    return DecayFit(np.concatenate([linear, end.values]), covariance, end.cost, noise)
+
+
+def _search(shape: Shape, t: F8, y: F8, noise: float, start: F8, options: least_squares.Params) -> least_squares.Fit:
+    """Fit what does not enter linearly, by what the best linear parameters leave (n,)."""
+
+    def residuals(theta: F8) -> F8:
+        design = shape(t, theta)
+        if not np.all(np.isfinite(design)):
+            return np.full(t.size, np.nan)
+        base = np.linalg.qr(design)[0]
+        return np.asarray((y - base @ (base.T @ y)) / noise)
+
+    return least_squares.minimise(residuals, start, params=options)
+
+
+def _grid(tau: F8, y: F8, noise: float, rate_hz: float) -> F8:
+    """Start values (k, 2) of (ln g, ln w): the best of a grid of oscillations, of rates near each other and apart.
+
+    On samples thinned with growing time, which stand for as many as lie about them. Of rates apart the slower is that
+    of the record's lone exponential, where there may be a minimum on the valley's side.
+    """
+    rows = np.unique(np.concatenate([np.arange(min(60, tau.size)), np.geomspace(1, tau.size, 240).astype(int) - 1]))
+    share = np.sqrt(np.gradient(rows.astype(np.float64)))[:, None]
+
+    def best(shape: Shape, thetas: F8, keep: int) -> F8:
+        base = np.linalg.qr(np.array([shape(tau[rows], theta) * share for theta in thetas]))[0]
+        explained = np.sum((base.transpose(0, 2, 1) @ (y[rows] * share[:, 0])) ** 2, axis=1)
+        return np.asarray(thetas[np.argsort(-explained)[:keep]])
+
+    rates = np.geomspace(1.0 / tau[-1], 0.5 * rate_hz, 24)
+    ((start,),) = best(_exponential, np.log(rates)[:, None], 1)
+    slow, _ = lone_exponential(tau, y, noise, math.exp(start))
+    fast = np.geomspace(1.5 * slow, max(rate_hz, 3.0 * slow), 24)
+    near = np.array([(g, g * g * (1.0 - x)) for g in rates for x in (0.04, 0.3)])
+    turning = np.array([(g, g * g * (1.0 + x * x)) for g in rates for x in (0.4, 1.0, 2.0, 4.0, 8.0, 16.0)])
+    apart = np.stack([0.5 * (slow + fast), slow * fast], axis=1)
+    return np.concatenate([best(_motion, np.log(kind), EACH) for kind in (apart, near, turning)])
+
+
+def _exponential(t: F8, theta: F8) -> F8:
+    """Return a constant and a lone exponential (n, 2), for (ln r,)."""
+    with np.errstate(all="ignore"):
+        return np.stack([np.ones(t.size), np.exp(-np.exp(theta[0]) * t)], axis=1)
+
+
+def _motion(t: F8, theta: F8) -> F8:
+    """Return what each of (o, a, v) does to the distance (n, 3), for (ln g, ln w), or (ln g,) of critical damping.
+
+    Notes
+    -----
+    For positive q both functions are sums of two falling exponentials, so that nothing overflows; for negative q
+    cosine and sine stand in; for small arguments :math:`\\sinh(st)/s` is :math:`t + q t^3/6`.
+    """
+    with np.errstate(all="ignore"):
+        rate = np.exp(theta[0])
+        stiffness = np.exp(theta[1]) if theta.size == 2 else rate**2
+        square = rate**2 - stiffness
+        root = np.sqrt(abs(square))
+        if square > 0.0:
+            # g - sqrt(q) would lose digits.
+            slow, fast = np.exp(-stiffness / (rate + root) * t), np.exp(-(rate + root) * t)
+            cosine, sine = 0.5 * (slow + fast), 0.5 * (slow - fast)
+        else:
+            fall = np.exp(-rate * t)
+            cosine, sine = fall * np.cos(root * t), fall * np.sin(root * t)
+        near = np.exp(-rate * t) * t * (1.0 + square * t * t / 6.0)
+        sine = np.where(root * t < 1e-4, near, sine / root)
+    return np.stack([np.ones(t.size), cosine + rate * sine, sine], axis=1)
