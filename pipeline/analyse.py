@@ -35,12 +35,11 @@ from pipeline.oscillation.condition import Conditioned, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
-from pipeline.oscillation.echoes import find_clusters
 from pipeline.results import derive as derivation
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
 from pipeline.results.findings import Finding, by_severity, judge, judge_fits, judge_overdamped
-from pipeline.results.sample_findings import count_quality, judge_samples
+from pipeline.results.sample_findings import count_quality, find_clusters, judge_samples
 from pipeline.results.scene_findings import judge_scene
 from pipeline.track import U8, Track
 

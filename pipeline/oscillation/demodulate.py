@@ -2,8 +2,8 @@
 
 No library fits every period robustly: on the bundled damped recording, in which clusters of false echoes lie at the
 turning points, one least-squares fit of a damped sine gives the amplitude 3.68 mm wrong, this 0.01 mm
-(``docs/decisions/0004-demodulation-first.md``). :mod:`windows` holds the linear fit, :mod:`tuning` the frequency and
-decay that its basis needs, this module the passes: let clusters go, rescue, clip, tune, clip.
+(``docs/decisions/0004-demodulation-first.md``). :mod:`windows` holds the linear fit and the tuning of its basis, this
+module the passes: let clusters go, rescue, clip, tune, clip.
 """
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.robust import MAD_TO_SIGMA, mad_sigma
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import Cycles
-from pipeline.oscillation.tuning import Tuning, retune, unwrap
-from pipeline.oscillation.windows import Solution, Windows, quantile, solve
+from pipeline.oscillation.windows import Solution, Tuning, Windows, quantile, retune, solve, unwrap
 from pipeline.track import F8, U8, Quality
 
 __all__ = ["Demodulated", "Params", "demodulate", "polar"]

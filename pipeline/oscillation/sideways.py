@@ -12,10 +12,9 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.linear_model import LinearModel, Terms
 from pipeline.numerics.robust import mad_sigma
 from pipeline.numerics.spectrum import Band, Blocks, Peak, false_alarm, spectral_density, strongest, worth_a_look
-from pipeline.oscillation.carrier import C16, Carrier, rotating
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.modes import Mode, Sideways
+from pipeline.oscillation.modes import C16, Carrier, Mode, Sideways, rotating
 from pipeline.track import F8, UNUSABLE
 
 __all__ = ["Params", "find_sideways"]

@@ -12,9 +12,9 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.linear_model import LinearModel
 from pipeline.numerics.regression import correlation_length, solve_weighted
 from pipeline.numerics.robust import mad_sigma
-from pipeline.oscillation.carrier import Carrier
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
+from pipeline.oscillation.modes import Carrier
 from pipeline.track import F8, UNUSABLE
 
 __all__ = ["Params", "Step", "find_steps", "staircase", "weighed"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.echoes import Clusters, find_clusters
+from pipeline.results.sample_findings import Clusters, find_clusters
 
 Windows = Callable[..., Demodulated]
 
