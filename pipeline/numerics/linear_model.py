@@ -51,6 +51,10 @@ class Terms:
         values = cofactors @ self.right
         return values, cofactors, float(values @ self.right)
 
+    def falls(self) -> F8:
+        """Return (k,): by how much the first, the first two, ... and all terms lower chi-square."""
+        return np.asarray(np.cumsum(np.linalg.solve(np.linalg.cholesky(self.normal), self.right) ** 2))
+
 
 class LinearModel:
     """Data and the columns that were fitted to them so far.
@@ -107,7 +111,7 @@ class LinearModel:
 
     def coefficients(self) -> F8:
         """Return the coefficients (p,) of all columns in the order in which they came, fitted together."""
-        return np.asarray(np.linalg.lstsq(self._factor, self._share, rcond=None)[0])
+        return np.asarray(np.linalg.solve(self._factor, self._share))
 
     def falls(self) -> F8:
         """Return by how much each column (p,), the others given, lowers chi-square."""

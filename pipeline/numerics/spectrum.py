@@ -218,11 +218,12 @@ def strongest(blocks: Blocks, model: LinearModel, band: Band) -> Peak | None:
     coefficients, variance = _autoregression(residual, 1)
     shaped = power[inside] / _density(coefficients, variance, frequency[inside] * blocks.step)
     f = float(frequency[inside][int(np.argmax(shaped))])
-    pair = np.stack([np.cos(2.0 * math.pi * f * blocks.t), np.sin(2.0 * math.pi * f * blocks.t)], axis=1)
+    angle = 2.0 * math.pi * f * blocks.t
+    pair = np.stack([np.cos(angle), np.sin(angle)]) * blocks.weight
     # The line itself first; then what it may vary by, which must not pass for noise beside it.
     powers = np.polynomial.legendre.legvander(2.0 * blocks.t / blocks.seconds - 1.0, VARYING)
-    columns = (powers[:, :, None] * pair[:, None, :]).reshape(blocks.t.size, -1) * blocks.weight[:, None]
-    line = model.terms(columns / np.linalg.norm(columns, axis=0))
+    rows = (powers.T[:, None] * pair).reshape(-1, angle.size)
+    line = model.terms((rows / np.linalg.norm(rows, axis=1)[:, None]).T)
     if np.linalg.eigvalsh(line.normal[:2, :2])[0] < 0.04:  # the model holds it already
         return None
     density = spectral_density(blocks, blocks.unweighted(model.left_by(line, line.fitted()[0])), f, band)

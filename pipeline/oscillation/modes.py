@@ -148,16 +148,20 @@ class Mode:
         """Return w at times t (n,), given the waves (n,) of the main oscillation and of the first mode."""
         a, b = self.turns
         if self.kind == "mode":
-            reach = np.clip(t, *self.span) - 0.5 * (self.span[0] + self.span[1])
-            return rotating(
-                np.exp(-self.decay.value * reach), 2.0 * math.pi * self.frequency.value * (t - self.span[0])
+            reach, angle = (
+                0.5 * (self.span[1] - self.span[0]),
+                2.0 * math.pi * self.frequency.value * (t - self.span[0]),
             )
+            return rotating(np.exp(-self.decay.value * reach * self._x(t)), angle)
         factors = [main if b > 0 else np.conj(main)] * abs(b) + ([] if first is None else [first] * a)
         return np.asarray(math.prod(factors[1:], start=factors[0]))
 
     def envelope(self, t: F8) -> C16:
         """Return E at times t (n,), m."""
-        return np.asarray(np.polynomial.legendre.legval(self._x(t), self.coefficients))
+        if not self.degree:
+            return np.broadcast_to(self.coefficients, t.shape)
+        parts = np.polynomial.legendre.legval(self._x(t), self.coefficients.view(np.float64).reshape(-1, 2))
+        return np.asarray(parts[0] + 1j * parts[1])
 
     def whole(self, t: F8, wave: C16) -> C16:
         """Return the wave of which products are made: with the envelope, over the amplitude."""
@@ -165,8 +169,11 @@ class Mode:
 
     def columns(self, t: F8, wave: C16) -> F8:
         """Return (n, 2 (degree + 1)): what real and imaginary parts of the coefficients are multiplied by."""
-        turning = np.polynomial.legendre.legvander(self._x(t), self.degree) * np.conj(wave)[:, None]
-        return np.ascontiguousarray(turning).view(np.float64)  # Re (x + iy) w = x Re w - y Im w
+        powers = np.polynomial.legendre.legvander(self._x(t), self.degree).T
+        rows = np.empty((powers.shape[0], 2, t.size))
+        np.multiply(powers, wave.real, out=rows[:, 0])  # Re (x + iy) w = x Re w - y Im w
+        np.multiply(powers, -wave.imag, out=rows[:, 1])
+        return rows.reshape(-1, t.size).T
 
     def _x(self, t: F8) -> F8:
         start, end = self.span

@@ -11,10 +11,20 @@ import numpy as np
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.linear_model import LinearModel, Terms
 from pipeline.numerics.robust import mad_sigma
-from pipeline.numerics.spectrum import Band, Blocks, Peak, false_alarm, spectral_density, strongest, worth_a_look
+from pipeline.numerics.spectrum import (
+    Band,
+    Blocks,
+    Peak,
+    evidence_for,
+    false_alarm,
+    smooth_density,
+    spectral_density,
+    strongest,
+    worth_a_look,
+)
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.modes import C16, Carrier, Mode, Sideways, rotating
+from pipeline.oscillation.modes import C16, Carrier, Mode, Sideways
 from pipeline.track import F8, UNUSABLE
 
 __all__ = ["Params", "find_sideways"]
@@ -110,6 +120,7 @@ class _Search:
         self.main_hz = carrier.angular_frequency / (2.0 * math.pi)
         self.model = LinearModel(blocks.y * blocks.weight, _main_columns(carrier, self.t) * blocks.weight[:, None])
         self.found = list[Mode]()
+        self.waves = dict[tuple[tuple[int, int], float, float], C16]()
 
     def run(self) -> Sideways:
         """Return modes, the strongest first, with their products, then harmonics; all fitted together."""
@@ -147,7 +158,10 @@ class _Search:
         return _rms(mode.envelope(self.t) * self.wave(mode))
 
     def wave(self, mode: Mode) -> C16:
-        return mode.wave(self.t, self.main, self.first)
+        key = (mode.turns, mode.frequency.value, mode.decay.value)
+        if key not in self.waves:
+            self.waves[key] = mode.wave(self.t, self.main, self.first)
+        return self.waves[key]
 
     def hole(self, *holes: tuple[float, float]) -> None:
         self.band = replace(self.band, holes=(*self.band.holes, *holes))
@@ -178,13 +192,18 @@ class _Search:
             return
         terms = self.terms(*trials)
         taken, fallen = list[int](), 0.0
+        least = evidence_for(0.5 * self.params.false_alarm, len(orders))
         for i, trial in enumerate(trials):
             both = [*taken, 2 * i, 2 * i + 1]
-            values, cofactors, fall = terms.only(both).fitted()
-            left = self.blocks.unweighted(self.model.left_by(terms.only(both), values))
-            unit = spectral_density(self.blocks, left, trial.frequency.value, self.band) * self.blocks.samples
-            chance = false_alarm(0.5 * (fall - fallen) / unit, len(orders))
-            if chance <= 0.5 * self.params.false_alarm:
+            together = terms.only(both)
+            values, cofactors, fall = together.fitted()
+            left = self.blocks.unweighted(self.model.left_by(together, values))
+            evidence, f = 0.5 * (fall - fallen) / self.blocks.samples, trial.frequency.value
+            if evidence <= least * smooth_density(left, f * self.blocks.step):
+                continue  # the density is no less than that
+            density = spectral_density(self.blocks, left, f, self.band)
+            if evidence > least * density:
+                unit, chance = density * self.blocks.samples, false_alarm(evidence / density, len(orders))
                 found = replace(trial, false_alarm=chance)
                 self.found.append(self.fitted(found, values[-2:], cofactors[-2:, -2:], unit))
                 taken, fallen = both, fall
@@ -212,9 +231,9 @@ class _Search:
         tau = self.blocks.t - 0.5 * self.blocks.seconds
         longest = 0.5 / self.blocks.seconds
         for _ in range(4):
-            pair = rotating(self.blocks.weight, -2.0 * math.pi * f * tau)
-            both = np.stack([pair, pair * tau], axis=1).view(np.float64)
-            values, cofactors, _ = self.model.terms(both).fitted()
+            angle = 2.0 * math.pi * f * tau
+            pair = np.stack([np.cos(angle), -np.sin(angle)]) * self.blocks.weight
+            values, cofactors, _ = self.model.terms(np.concatenate([pair, pair * tau]).T).fitted()
             z, slope = values.view(np.complex128).tolist()
             ratio = slope / z
             rate, u_rate = -ratio.real, math.sqrt(max(cofactors[2, 2] * unit, 0.0)) / abs(z)
@@ -232,7 +251,7 @@ class _Search:
             coefficients=np.zeros(degrees.size, np.complex128),
         )
         terms = self.terms(trial)
-        falls = np.array([terms.only(slice(2 * count)).fitted()[2] for count in range(1, degrees.size + 1)])
+        falls = terms.falls()[1::2]
         criterion = -falls / unit + 2.0 * (degrees + 1) * math.log(self.blocks.t.size)
         terms = terms.only(slice(2 * (int(np.argmin(criterion)) + 1)))
         values, cofactors, _ = terms.fitted()
