@@ -103,7 +103,6 @@ def measure(*, ports: int, rate_hz: float, seconds: float) -> Figures:
         recorder = Recorder(Path(folder) / "run.wire", LogHeader(sensors=entries, mono_ns=0, unix_ns=0), clock)
         chains = [SensorChain(family, rate_hz=rate_hz) for _ in paths]
         tee = TimedTee(chains)
-        tee.heard_enough()
         tee.start(recorder, chains, 0)
         reader = PortReader([Line(SerialPort(path, BAUD), i) for i, path in enumerate(paths)], tee, clock)
         reader.start()

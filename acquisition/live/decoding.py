@@ -35,8 +35,6 @@ class SensorChain:
     calibration : Calibration, optional
     """
 
-    __slots__ = ("_breaks", "_held", "_next", "calibration", "decoder", "family", "last", "timebase")
-
     def __init__(
         self,
         family: Family,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,20 +24,19 @@ class PortFacts:
     ----------
     device : str
         As ``--port`` takes it.
-    description, maker : str
-        As the operating system names them.
+    description : str
+        As the operating system names it.
     """
 
     device: str
     description: str
-    maker: str
 
 
 def list_ports() -> tuple[PortFacts, ...]:
     """Return the serial ports of this machine, in the order of their names."""
     from serial.tools.list_ports import comports
 
-    found = (PortFacts(p.device, p.description or "", p.manufacturer or "") for p in comports())
+    found = (PortFacts(p.device, p.description or "") for p in comports())
     return tuple(sorted(found, key=lambda port: port.device))
 
 
@@ -84,36 +85,34 @@ class SerialPort:
 
     def read(self, wait_s: float) -> bytes:
         """Return what comes within that time, at once what is there: for an address without a descriptor."""
-        import serial
-
-        try:
-            if self._port.timeout != wait_s:  # RFC 2217 negotiates the whole port anew when it is set
-                self._port.timeout = wait_s
-            data = self._port.read(1)
-            return bytes(data + self._port.read(min(self._port.in_waiting, READ_BYTES))) if data else b""
-        except BlockingIOError:
-            return b""
-        except (serial.SerialException, OSError, TypeError, AttributeError) as error:
-            # pyserial trips over its own closed members where the cable goes in the middle of a call.
-            raise PortError(f"{self.name}: the port has gone ({error})") from error
+        with self._or_gone("the port has gone"):
+            try:
+                if self._port.timeout != wait_s:  # RFC 2217 negotiates the whole port anew when it is set
+                    self._port.timeout = wait_s
+                data = self._port.read(1)
+                return bytes(data + self._port.read(min(self._port.in_waiting, READ_BYTES))) if data else b""
+            except BlockingIOError:
+                return b""
 
     def write(self, data: bytes) -> None:
         """Send bytes whole."""
-        import serial
-
-        try:
+        with self._or_gone("cannot be written to"):
             self._port.write(data)
-        except (serial.SerialException, OSError, TypeError, AttributeError) as error:
-            raise PortError(f"{self.name}: cannot be written to ({error})") from error
 
     def discard_input(self) -> None:
         """Forget what came and was not read."""
+        with self._or_gone("the port has gone"):
+            self._port.reset_input_buffer()
+
+    @contextlib.contextmanager
+    def _or_gone(self, what: str) -> Iterator[None]:
         import serial
 
         try:
-            self._port.reset_input_buffer()
+            yield
         except (serial.SerialException, OSError, TypeError, AttributeError) as error:
-            raise PortError(f"{self.name}: the port has gone ({error})") from error
+            # pyserial trips over its own closed members where the cable goes in the middle of a call.
+            raise PortError(f"{self.name}: {what} ({error})") from error
 
     def close(self) -> None:
         """Close; again does no harm."""

@@ -53,15 +53,12 @@ class ClockFit:
         Its standard uncertainty from the stamps' scatter alone; the host's own crystal comes on top.
     jitter_s : float
         Standard deviation of the host stamps about the line, s.
-    worst_s : float
-        Latest stamp behind the earliest possible one, s.
     readings : int
     """
 
     rate_error_ppm: float
     u_rate_error_ppm: float
     jitter_s: float
-    worst_s: float
     readings: int
 
 
@@ -80,21 +77,6 @@ class Timebase:
     clock runs backward by more than a wrap explains, or shows less than the silence before it lasted) is joined by
     the host clock, and the first reading after it is flagged.
     """
-
-    __slots__ = (
-        "_anchor_s",
-        "_clock",
-        "_count",
-        "_last_host_ns",
-        "_last_raw",
-        "_latest_s",
-        "_longest_s",
-        "_period_s",
-        "_ticks",
-        "gaps",
-        "rate_hz",
-        "restarts",
-    )
 
     def __init__(self, rate_hz: float) -> None:
         if not (math.isfinite(rate_hz) and rate_hz > 0):
@@ -207,18 +189,16 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     """
     n = int(t.size)
     if n < 24 or t[-1] <= t[0]:
-        return ClockFit(math.nan, math.inf, math.nan, math.nan, n)
+        return ClockFit(math.nan, math.inf, math.nan, n)
     x = t - 0.5 * (t[0] + t[-1])
     delay = (host_ns - host_ns[0]) * NANO - (t - t[0])
     candidates = [_through_minima(x, delay), _through_all(x, delay)]
     slope, u_slope = min(candidates, key=lambda line: line[1])
-    around = delay - slope * x
     return ClockFit(
         # Exactly, and not -slope: at 50 ppm the square is many times a long run's uncertainty.
         -slope / (1.0 + slope) * 1e6,
         u_slope * 1e6,
-        float(np.std(around)),
-        float(np.ptp(around)),
+        float(np.std(delay - slope * x)),
         n,
     )
 

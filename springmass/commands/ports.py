@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import describe_bytes, probe
 from acquisition.errors import PortError
-from acquisition.live.reader import Line, PortReader
 from acquisition.live.serial_port import SerialPort, list_ports
-from acquisition.readings import Read
 from springmass.errors import OK
 
 __all__ = ["run"]
@@ -56,28 +54,10 @@ def _listen(device: str) -> tuple[str, list[str]]:
     return describe_bytes(heard), []
 
 
-class _Heard:
-    """Keeps the bytes of a port, and why it went away if it did."""
-
-    def __init__(self) -> None:
-        self.bytes = b""
-        self.why = ""
-
-    def reads(self, reads: Sequence[Read]) -> None:
-        for _, _, data in reads:
-            self.bytes += data
-
-    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:  # noqa: ARG002 - a sink
-        if kind == "lost":
-            self.why = str(facts["why"])
-
-
 def _bytes_of(device: str, baud: int) -> bytes:
-    clock, heard = SystemClock(), _Heard()
-    reader = PortReader([Line(SerialPort(device, baud))], heard, clock)
-    reader.start()
-    clock.sleep_until_ns(clock.now_ns() + int(PROBE_S * 1e9))
-    reader.stop()
-    if heard.why:
-        raise PortError(heard.why)
-    return heard.bytes
+    clock, heard = SystemClock(), b""
+    with contextlib.closing(SerialPort(device, baud)) as port:
+        end_ns = clock.now_ns() + int(PROBE_S * 1e9)
+        while (left_ns := end_ns - clock.now_ns()) > 0:
+            heard += port.read(left_ns * 1e-9)
+    return heard

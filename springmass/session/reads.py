@@ -49,7 +49,7 @@ class Tee:
         self._lock = threading.Lock()
         self._recorder: Recorder | None = None
         self._kept: deque[Read] | None = None
-        self._heard: list[bytearray] | None = [bytearray() for _ in chains]
+        self._heard = [bytearray() for _ in chains]
         self.gone: dict[int, str] = {}
         self.unshown = 0
 
@@ -68,10 +68,9 @@ class Tee:
                 self._recorder.reads(reads)
             if self._kept is not None:
                 self._kept += reads
-            if self._heard is not None:
-                for channel, _, data in reads:
-                    self._heard[channel] += data[: HEARD_BYTES - len(self._heard[channel])]
             for channel, host_ns, data in reads:
+                if len(heard := self._heard[channel]) < HEARD_BYTES:
+                    heard += data[: HEARD_BYTES - len(heard)]
                 chain = self._chains[channel]
                 chain.take(host_ns, data)
                 if len(chain) > HELD_SAMPLES:
@@ -94,12 +93,7 @@ class Tee:
     def heard(self, channel: int) -> bytes:
         """Return the first bytes that a sensor sent."""
         with self._lock:
-            return b"" if self._heard is None else bytes(self._heard[channel])
-
-    def heard_enough(self) -> None:
-        """Keep no first bytes any more: every sensor is known."""
-        with self._lock:
-            self._heard = None
+            return bytes(self._heard[channel])
 
     def keep(self) -> None:
         """Keep reads from here on, for a run that may begin before the moment that starts it."""

@@ -94,7 +94,6 @@ class Session:
                 raise ProgramError(self._not_heard(mute), SENSOR)
             for channel, block in self.poll(0.05):
                 heard[channel] += len(block)
-        self._tee.heard_enough()
 
     def still(self, seconds: float = 3.0) -> StillPoint:
         """Return rest position and noise of the first sensor's next seconds, the bob hanging still."""

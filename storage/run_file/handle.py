@@ -11,7 +11,7 @@ from storage.errors import NotARun, RunClosed, damaged, one_line, reading
 from storage.run_file import layout
 from storage.run_file.header import SCHEMA, Header
 
-__all__ = ["Contents", "open_contents"]
+__all__ = ["Contents", "open_header"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,8 +73,8 @@ class Contents:
             raise damaged(self.path, f"the column {name!r}", "its SHA-256 differs")
 
 
-def open_contents(path: Path) -> Contents:
-    """Open a file that begins as HDF5 does.
+def open_header(path: Path) -> tuple[Any, Header, str]:
+    """Open a file that begins as HDF5 does; return it with its header and that one's digest.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def open_contents(path: Path) -> Contents:
     with reading(path, "the file"):
         file = h5py.File(path, "r")
     try:
-        return Contents(path, file, *_read_header(path, file))
+        return file, *_read_header(path, file)
     except BaseException:
         file.close()
         raise

@@ -22,7 +22,6 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from numpy.typing import NDArray
@@ -34,7 +33,7 @@ from storage.errors import NotARun, damaged, reading
 from storage.run_file import layout
 from storage.run_file import verification as verify
 from storage.run_file.dataset import checked_dataset, lazy_dataset
-from storage.run_file.handle import Contents, open_contents
+from storage.run_file.handle import Contents, open_header
 from storage.run_file.header import Header
 from storage.run_file.layout import CHUNK
 
@@ -76,50 +75,35 @@ def open_run(path: str | os.PathLike[str]) -> Run:
         raise NotARun(path, f"a run file was demanded, got none ({error.strerror})", remedy) from error
     if not is_run(head):
         raise NotARun(path, f"a run file (HDF5) was demanded, got a file that begins with {head!r}", remedy)
-    return Run(open_contents(path))
+    return Run(path, *open_header(path))
 
 
-class Run:
+class Run(Contents):
     """An open run file.
 
     What it says of itself is read at once, samples when they are asked for. Nothing is delivered unchecked:
     every chunk carries a checksum, and every column read to its end is held against its SHA-256. Of the ways to the
     samples, :meth:`blocks` and :meth:`dataset` are lazy, :meth:`samples` and :meth:`load_dataset` whole.
 
-    Parameters
-    ----------
-    contents : Contents
-        The open file; closed by :meth:`close`.
+    Its ``sha256`` is that of the content: of the header, which holds those of all arrays and original files. Two files
+    of the same content have the same, whatever their bytes.
     """
 
-    __slots__ = ("_contents",)
-
-    def __init__(self, contents: Contents) -> None:
-        self._contents = contents
+    __slots__ = ()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
         """Close the file; again does no harm."""
-        self._contents.handle.close()
-
-    @property
-    def path(self) -> Path:
-        """The file."""
-        return self._contents.path
+        self.handle.close()
 
     def __len__(self) -> int:
         """Return the number of samples."""
-        return self._contents.header.samples
+        return self.header.samples
 
     def __repr__(self) -> str:
         return f"<Run {os.fspath(self.path)!r}: {len(self)} samples, {self.info.kind}>"
@@ -127,50 +111,42 @@ class Run:
     @property
     def info(self) -> SourceInfo:
         """The source."""
-        return self._contents.header.info
+        return self.header.info
 
     @property
     def title(self) -> str:
         """The run's title; empty where it has none."""
-        return self._contents.header.title
+        return self.header.title
 
     @property
     def channel(self) -> str:
         """The quantity or column taken as distance."""
-        return self._contents.header.channel
+        return self.header.channel
 
     @property
     def format(self) -> str:
         """The family of recordings that read it; empty where none did."""
-        return self._contents.header.format
+        return self.header.format
 
     @property
     def scene(self) -> Mapping[str, Any] | None:
         """The scene's tables; None where none were given."""
-        return self._contents.header.scene
+        return self.header.scene
 
     @property
     def traps(self) -> tuple[Trap, ...]:
         """What was seen on reading the old file."""
-        return self._contents.header.traps
+        return self.header.traps
 
     @property
     def malformed_rows(self) -> int:
         """Rows of the old file that were not samples."""
-        return self._contents.header.malformed_rows
+        return self.header.malformed_rows
 
     @property
     def provenance(self) -> Mapping[str, Any]:
         """What the writer said of software, configuration and times."""
-        return self._contents.header.provenance
-
-    @property
-    def sha256(self) -> str:
-        """SHA-256 of the content: of the header, which holds those of all arrays and original files.
-
-        Two files of the same content have the same, whatever their bytes.
-        """
-        return self._contents.sha256
+        return self.header.provenance
 
     def blocks(self, size: int = 1024) -> Iterable[Block]:
         """Return the samples in blocks, read as they are asked for.
@@ -195,7 +171,7 @@ class Run:
         """
         if size < 1:
             raise ValueError(f"blocks hold at least 1 sample, got size = {size}")
-        return _Blocks(self._contents, size)
+        return _Blocks(self, size)
 
     def samples(self) -> Block:
         """Return all samples as one block.
@@ -205,12 +181,12 @@ class Run:
         RunDamaged
             If they are not what was written.
         """
-        header, values = self._contents.header, {}
+        header, values = self.header, {}
         for name in (name for name in _BLOCK_COLUMNS if name in header.columns):
-            column = self._contents.column(name)
+            column = self.column(name)
             with reading(self.path, f"the column {name!r} from sample 0"):
                 values[name] = column[:]
-            self._contents.check(name, hashlib.sha256(values[name].data).hexdigest())
+            self.check(name, hashlib.sha256(values[name].data).hexdigest())
         return _block(header, header.first, values)
 
     def dataset(self) -> xarray.Dataset:
@@ -237,7 +213,7 @@ class Run:
         read when the run is closed cannot be read any more (``KeyError``): use the dataset inside the run's
         ``with``, or ``load()`` it there. Closing the dataset leaves the run open.
         """
-        return lazy_dataset(self._contents)
+        return lazy_dataset(self)
 
     def load_dataset(self) -> xarray.Dataset:
         """Return the samples as a dataset in memory, checked and free of the file.
@@ -252,7 +228,7 @@ class Run:
         RunClosed, RunDamaged
             If the run is closed, or the samples are not what was written.
         """
-        return checked_dataset(self._contents, self.samples())
+        return checked_dataset(self, self.samples())
 
     def originals(self) -> tuple[Original, ...]:
         """Return the original files, bit for bit; none where none were kept.
@@ -264,10 +240,10 @@ class Run:
         """
         found = []
         start = 0
-        for entry in self._contents.header.originals:
+        for entry in self.header.originals:
             what = f"the original file {entry.name!r}"
             with reading(self.path, what):
-                data = self._contents.file()[f"{layout.WIRE}/bytes"][start : start + entry.size].tobytes()
+                data = self.file()[f"{layout.WIRE}/bytes"][start : start + entry.size].tobytes()
             original = Original(entry.name, data)
             if original.sha256 != entry.sha256:
                 raise damaged(self.path, what, "its SHA-256 differs")
@@ -285,21 +261,21 @@ class Run:
         """
         for _ in self.blocks(CHUNK):
             pass
-        verify.columns(self._contents, verify.BESIDE_BLOCKS)
+        verify.columns(self, verify.BESIDE_BLOCKS)
         self.originals()
-        verify.fields(self._contents)
-        verify.attributes(self._contents)
+        verify.fields(self)
+        verify.attributes(self)
 
 
 @dataclass(frozen=True, slots=True)
 class _Blocks:
     """The samples of a run in blocks, anew at every iteration."""
 
-    contents: Contents
+    run: Run
     size: int
 
     def __iter__(self) -> Iterator[Block]:
-        run, samples = self.contents, self.contents.header.samples
+        run, samples = self.run, len(self.run)
         names = [name for name in _BLOCK_COLUMNS if name in run.header.columns]
         columns = {name: run.column(name) for name in names}
         digests = {name: hashlib.sha256() for name in names}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -54,18 +54,14 @@ def attributes(contents: Contents) -> None:
     RunDamaged
     """
     for path, expected in layout.attributes(contents.header).items():
-        _attributes_of(contents, path, expected)
-
-
-def _attributes_of(contents: Contents, path: str, expected: Mapping[str, Any]) -> None:
-    with reading(contents.path, f"an attribute of {path}"):
-        carrier = contents.file()[path].attrs
-        found = {name: carrier[name] for name in carrier if name not in DIMENSION_ATTRIBUTES}
-    if odd := sorted(set(found) ^ set(expected)):
-        state = "is missing" if odd[0] in expected else "was added"
-        raise damaged(contents.path, f"the attribute {path}@{odd[0]}", f"it {state}")
-    for name, value in expected.items():
-        _compare(contents, f"the attribute {path}@{name}", found[name], value)
+        with reading(contents.path, f"an attribute of {path}"):
+            carrier = contents.file()[path].attrs
+            found = {name: carrier[name] for name in carrier if name not in DIMENSION_ATTRIBUTES}
+        if odd := sorted(set(found) ^ set(expected)):
+            state = "is missing" if odd[0] in expected else "was added"
+            raise damaged(contents.path, f"the attribute {path}@{odd[0]}", f"it {state}")
+        for name, value in expected.items():
+            _compare(contents, f"the attribute {path}@{name}", found[name], value)
 
 
 def _compare(contents: Contents, what: str, found: Any, value: Any) -> None:

@@ -399,7 +399,7 @@ def test_several_ports_are_read_by_one_thread() -> None:
 
 def test_a_port_that_is_absent_says_which_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
     """One line names the address and the ports of the machine."""
-    monkeypatch.setattr(serial_port, "list_ports", lambda: (PortFacts("/dev/ttyUSB7", "bridge", "maker"),))
+    monkeypatch.setattr(serial_port, "list_ports", lambda: (PortFacts("/dev/ttyUSB7", "bridge"),))
     with pytest.raises(PortError, match=r"no such port; this machine has: /dev/ttyUSB7\. Is the cable in\?") as error:
         SerialPort("/dev/there-is-no-such-port", 9600)
     assert "\n" not in str(error.value)
