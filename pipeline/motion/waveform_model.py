@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pipeline.damping.laws import Law
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.rest import Rest
+from pipeline.numerics import least_squares
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
@@ -154,34 +155,34 @@ class State:
         grid = np.linspace(float(elapsed.min()), float(elapsed.max()), TABLE)
         return np.interp(elapsed, grid, self.law.amplitude(grid, self.theta))
 
-    def _both(self, elapsed: F8) -> tuple[F8, F8]:
-        """Amplitude (m,) and its derivatives (p, m)."""
-        if elapsed.size < 2 * TABLE:
-            amplitude, by = self.law.both(elapsed, self.theta)
-            return amplitude, by.T
-        grid = np.linspace(float(elapsed.min()), float(elapsed.max()), TABLE)
-        amplitude, by = self.law.both(grid, self.theta)
-        return np.interp(elapsed, grid, amplitude), np.array([np.interp(elapsed, grid, column) for column in by.T])
-
     def position(self, elapsed: F8, tau: F8) -> F8:
         """Return the distances (m,) at times from the first sample and the middle, less level and linear columns, m."""
         swing = self.amplitude(elapsed) * np.cos(self.angle(tau))
         return np.asarray(swing + self.values[-1] if self.constant else swing)
 
-    def derivatives(self, elapsed: F8, tau: F8) -> F8:
-        """Return those of the distances by the values, (m, q)."""
+    def evaluate(self, elapsed: F8, tau: F8) -> tuple[F8, F8]:
+        """Return the distances as :meth:`position` does and their derivatives by the values, (m, q)."""
+        grid = elapsed
+        if elapsed.size >= 2 * TABLE:
+            grid = np.linspace(float(elapsed.min()), float(elapsed.max()), TABLE)
+        amplitude, slopes = self.law.both(grid, self.theta)
+        if elapsed.size >= 2 * TABLE:
+            amplitude = np.interp(elapsed, grid, amplitude)
+            slopes = np.array([np.interp(elapsed, grid, column) for column in slopes.T]).T
         angle = self.angle(tau)
-        amplitude, by = self._both(elapsed)
+        cosine = np.cos(angle)
         first = self.theta.size
         rows = np.empty((self.values.size, tau.size))
-        np.multiply(by, np.cos(angle), out=rows[:first])
+        np.multiply(slopes.T, cosine, out=rows[:first])
         np.multiply(-amplitude, np.sin(angle), out=rows[first])
         np.multiply(rows[first], tau, out=rows[first + 1])
         if self.area is not None:
             np.multiply(rows[first], np.interp(tau, *self.area), out=rows[first + 2])
+        position = amplitude * cosine
         if self.constant:
             rows[-1] = 1.0
-        return rows.T
+            position += self.values[-1]
+        return position, rows.T
 
 
 class WaveformModel:
@@ -194,6 +195,11 @@ class WaveformModel:
         Says what the parameters are.
     rows : (n,) bool
         The samples.
+
+    Attributes
+    ----------
+    residuals, jacobian : callable
+        (q,) to (m,), m: model less distance; and to its derivatives (m, q).
 
     Notes
     -----
@@ -211,21 +217,17 @@ class WaveformModel:
         self._state, self._y = state, record.y[index]
         self._elapsed, self._tau, self._basis = record.elapsed[index], record.tau[index], record.basis[index]
         self._inverse = np.linalg.pinv(self._basis.T @ self._basis, hermitian=True)
-
-    def residuals(self, values: F8) -> F8:
-        """Return model less distance (m,), m."""
-        return self._projected(self._left(values))
-
-    def jacobian(self, values: F8) -> F8:
-        """Return the derivatives (m, q) of the residuals."""
-        return self._projected(replace(self._state, values=values).derivatives(self._elapsed, self._tau))
+        # A search asks three times for the derivatives at its start and twice for those at its end.
+        self.residuals, self.jacobian = least_squares.evaluated_once(self._evaluate)
 
     def linear(self, values: F8) -> F8:
         """Return the coefficients (k,) of the basis."""
-        return np.asarray(-self._inverse @ (self._basis.T @ self._left(values)))
+        left = replace(self._state, values=values).position(self._elapsed, self._tau) - self._y
+        return np.asarray(-self._inverse @ (self._basis.T @ left))
 
-    def _left(self, values: F8) -> F8:
-        return replace(self._state, values=values).position(self._elapsed, self._tau) - self._y
+    def _evaluate(self, values: F8) -> tuple[F8, F8]:
+        position, slopes = replace(self._state, values=values).evaluate(self._elapsed, self._tau)
+        return self._projected(position - self._y), self._projected(slopes)
 
     def _projected(self, x: F8) -> F8:
         if not self._basis.size:

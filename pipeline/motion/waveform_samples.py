@@ -60,8 +60,8 @@ class Chooser:
         Both as given where the state is so far from the end that the tangent does not predict what the model leaves.
         """
         record, rows = self._record, before
-        left = record.y - state.position(record.elapsed, record.tau)
-        slope = np.concatenate([state.derivatives(record.elapsed, record.tau), record.basis], axis=1)
+        position, slopes = state.evaluate(record.elapsed, record.tau)
+        left, slope = record.y - position, np.concatenate([slopes, record.basis], axis=1)
         scale = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
         slope /= scale
         normal, right = slope.T @ slope, slope.T @ left
