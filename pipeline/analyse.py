@@ -20,9 +20,8 @@ from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equati
 from pipeline.motion.kinds import Fitted, Windows, by_equation, by_windows, see_windows
 from pipeline.motion.overdamped import Overdamped, find_overdamped, spring_constant
 from pipeline.motion.phase import PhaseFit
-from pipeline.motion.rest import Rest
 from pipeline.motion.smoother import Smoothed, smooth
-from pipeline.motion.waveform import Waveform
+from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_fit import FullFit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length

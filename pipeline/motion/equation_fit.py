@@ -18,8 +18,7 @@ from pipeline.damping.select import Params as DampingParams
 from pipeline.motion.equation_model import STATE
 from pipeline.motion.equation_search import Search, fittable, stop_row
 from pipeline.motion.phase import PhaseFit, wrapped
-from pipeline.motion.rest import Rest
-from pipeline.motion.waveform import Waveform
+from pipeline.motion.waveform import Rest, Waveform
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.oscillation.condition import Conditioned

@@ -11,8 +11,7 @@ from pipeline.damping.select import Params as DampingParams
 from pipeline.motion.equation_fit import EquationFit, moving_part
 from pipeline.motion.phase import Params as PhaseParams
 from pipeline.motion.phase import PhaseFit, fit_phase
-from pipeline.motion.rest import Rest, fit_rest
-from pipeline.motion.waveform import Waveform, reconstruct
+from pipeline.motion.waveform import Rest, Waveform, fit_rest, reconstruct
 from pipeline.motion.waveform_fit import FullFit, fit_record
 from pipeline.motion.waveform_fit import Params as WaveformParams
 from pipeline.oscillation.condition import Conditioned

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.damping.select import LawFit
 from pipeline.errors import AnalysisError
 from pipeline.motion.phase import PhaseFit
-from pipeline.motion.rest import Rest
+from pipeline.motion.waveform import Rest
 from pipeline.numerics.random_walk import Chain
 from pipeline.numerics.spectrum import Blocks, smooth_density
 from pipeline.oscillation.demodulate import Demodulated

@@ -1,18 +1,118 @@
-"""Waveform: the record as rest position, damping law and phase predict it, and the residual."""
+"""Waveform: the rest position against time, and the record as rest position, damping law and phase predict it."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.motion.phase import PhaseFit
-from pipeline.motion.rest import Rest
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.regression import correlation_length, scatter, solve_weighted
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
+from pipeline.oscillation.steps import Step, staircase
 from pipeline.track import F8, UNUSABLE, Track
 
-__all__ = ["Waveform", "reconstruct"]
+__all__ = ["Rest", "Waveform", "fit_rest", "reconstruct"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rest:
+    """The rest position.
+
+    Parameters
+    ----------
+    mean : Estimate
+        Over the record, m.
+    drift_m : float
+        Peak to peak of the smooth curve through the windows' rest positions, m.
+    drifts : bool
+        Whether the curve is far better than a constant.
+    t, curve : (w,) float64, s, m
+        The curve at the windows' centres, steps left out.
+    steps : tuple of Step
+        What the rest position jumps by, in order of time.
+    """
+
+    mean: Estimate
+    drift_m: float
+    drifts: bool
+    t: F8
+    curve: F8
+    steps: tuple[Step, ...] = ()
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is anything but constant."""
+        return self.drifts or bool(self.steps)
+
+    @property
+    def range_m(self) -> float:
+        """Peak to peak of drift and steps together, m."""
+        curve = self.curve if self.drifts else np.zeros(self.t.size)
+        return float(np.ptp(curve + staircase(self.steps, self.t)))
+
+    def at(self, t: F8) -> F8:
+        """Return the rest position at times t (n,), m."""
+        if not self.moves:
+            return np.full(t.size, self.mean.value)
+        level = np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self._before())
+        return np.asarray(level + staircase(self.steps, t))
+
+    def stepping(self, steps: tuple[Step, ...]) -> Rest:
+        """Return the same with steps that had been taken out of the record before.
+
+        The mean becomes that of the whole record; the uncertainty of each step's height enters by the share of the
+        record that follows it.
+        """
+        if not steps:
+            return self
+        after = np.array([float(np.mean(self.t >= step.time.value)) for step in steps])
+        heights = np.array([(step.height.value, step.height.u) for step in steps])
+        mean = Estimate(
+            self.mean.value + float(after @ heights[:, 0]),
+            math.hypot(self.mean.u, *(after * (1.0 - after) * heights[:, 1])),
+            self.mean.unit,
+        )
+        return replace(self, mean=mean, steps=steps)
+
+    def _before(self) -> float:
+        """Rest position before the first step."""
+        return self.mean.value - float(np.mean(staircase(self.steps, self.t)))
+
+
+def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.0) -> Rest:
+    """Fit a constant and a polynomial to the windows' rest positions and keep the constant unless it fails.
+
+    Parameters
+    ----------
+    demodulated : Demodulated
+    degree : int
+        Of the polynomial, fewer where windows are few.
+    evidence : float
+        By how much the polynomial must lower the BIC.
+    """
+    t, offset = demodulated.t, demodulated.offset
+    u = np.maximum(np.sqrt(demodulated.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
+    spread = scatter(t, offset, u, degree=degree)
+    kept = spread.kept
+    constant = solve_weighted(np.ones((int(kept.sum()), 1)), offset[kept], spread.u[kept])
+    mean = float(constant.values[0])
+    order = min(degree, t.size // 4 - 1)
+    length = max(spread.correlation, correlation_length(constant.residual / spread.u[kept]))
+    widened = length * max(1.0, constant.chi2 / max(constant.residual.size - 1, 1))
+    estimate = Estimate(mean, math.sqrt(float(constant.covariance[0, 0]) * widened), "m")
+    if order < 1:
+        return Rest(estimate, 0.0, False, t, np.full(t.size, mean))
+    design = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, order)
+    curve = solve_weighted(design[kept], offset[kept], spread.u[kept])
+    gain = (constant.chi2 - curve.chi2) / spread.correlation - order * math.log(
+        max(kept.sum() / spread.correlation, 2.0)
+    )
+    smooth = design @ curve.values
+    return Rest(estimate, float(np.ptp(smooth)), bool(gain > evidence), t, smooth)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,10 +14,8 @@ from pipeline.damping.evidence import BARE_MENTION
 from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import Damping, LawFit
 from pipeline.motion.phase import PhaseFit, amplitude_integral, backbone_unit, wrapped
-from pipeline.motion.rest import Rest
-from pipeline.motion.waveform import Waveform
-from pipeline.motion.waveform_model import Record, State, WaveformModel
-from pipeline.motion.waveform_samples import Chooser, Rows
+from pipeline.motion.waveform import Rest, Waveform
+from pipeline.motion.waveform_model import Chooser, Record, Rows, State, WaveformModel
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import correlation_length, solve_weighted
@@ -154,7 +152,7 @@ def fit_record(
     a constant one is a parameter like the others.
 
     Residuals beyond four standard deviations (from their median) leave, and the fit is repeated until the samples
-    stay (:class:`pipeline.motion.waveform_samples.Chooser`). Beneath a clipped plateau samples are taken or left by
+    stay (:class:`pipeline.motion.waveform_model.Chooser`). Beneath a clipped plateau samples are taken or left by
     the model, not by their own noise: those that the model sees within 3.5 standard deviations of where samples count
     as clipped are left out, and nothing is biased.
 

@@ -16,7 +16,7 @@ from pipeline.bench.scene import Scene
 from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
-from pipeline.motion.rest import Rest
+from pipeline.motion.waveform import Rest
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated

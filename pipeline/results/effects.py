@@ -16,7 +16,7 @@ from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit, words_on_exponent
-from pipeline.motion.rest import Rest
+from pipeline.motion.waveform import Rest
 from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.disturbances import Disturbances
 

@@ -15,8 +15,7 @@ from pipeline.damping.select import Damping
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit
 from pipeline.motion.overdamped import Overdamped
 from pipeline.motion.phase import PhaseFit, words_on_exponent
-from pipeline.motion.rest import Rest
-from pipeline.motion.waveform import Waveform
+from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_fit import FullFit
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated

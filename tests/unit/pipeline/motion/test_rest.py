@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipeline.motion.rest import fit_rest
+from pipeline.motion.waveform import fit_rest
 from pipeline.oscillation.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]

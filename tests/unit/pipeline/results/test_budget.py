@@ -15,7 +15,7 @@ from pipeline.bench.scene import Scene
 from pipeline.damping.select import fit_damping
 from pipeline.errors import AnalysisError
 from pipeline.motion.phase import fit_phase
-from pipeline.motion.rest import fit_rest
+from pipeline.motion.waveform import fit_rest
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.budget import Budget, Inputs

@@ -15,7 +15,7 @@ from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping.select import fit_damping
 from pipeline.motion.phase import fit_phase
-from pipeline.motion.rest import fit_rest
+from pipeline.motion.waveform import fit_rest
 from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.effects import Effect, tabulate
