@@ -18,11 +18,11 @@ import numpy as np
 
 from acquisition.block import Block
 from acquisition.recordings.recording import Original, Trap
-from storage.errors import RunDamaged, RunExists, one_line
+from storage.errors import RunDamaged, RunExists
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
 from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry
-from storage.wire_log.scanning import Damage, LogContents, NotALog, parse_log
+from storage.wire_log.scanning import Damage, LogContents, NotALog, read_log
 from storage.wire_log.wire_samples import Decoded, decode_log
 
 __all__ = ["RecoverReport", "RecoveredRun", "recover", "run_paths"]
@@ -162,12 +162,8 @@ def recover(
 
 
 def _read(path: Path, stand_in: LogHeader | None) -> _Log:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        demand = f"a wire log was demanded, got no file that can be read ({error.strerror or one_line(error)})"
-        raise NotALog(path, demand, "name a file that springmass record left behind") from error
-    contents = parse_log(data, path)
+    contents = read_log(path)
+    data = contents.data
     header = contents.header or stand_in
     if header is None:
         if not contents.damage.records:

@@ -6,22 +6,18 @@ checksum, the log's own number and a sequence number that goes forward; what lie
 
 from __future__ import annotations
 
-import io
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
 from storage.errors import StorageError, one_line
-from storage.wire_log.records import HEAD_BYTES, MAGIC, MAX_PAYLOAD, Kind, LogHeader, Parts, Record, unframe
+from storage.wire_log.records import HEAD_BYTES, MAGIC, Kind, LogHeader, Parts, Record, unframe
 
 __all__ = ["Damage", "LogContents", "NotALog", "Record", "parse_log", "read_log"]
 
 KEPT_STRETCHES = 100
-_LONGEST = HEAD_BYTES + MAX_PAYLOAD
-_CHUNK = 1 << 20
 _DATA, _END = Kind.DATA, Kind.END  # looked up once, and not for each record
 _NOTES = (Kind.MARK, Kind.EVENT)
 
@@ -80,29 +76,28 @@ class Damage:
 
 
 class LogContents:
-    """A log's records, read anew at every iteration; memory holds about a megabyte of it.
+    """A log's records, found anew at every iteration.
 
     Parameters
     ----------
     path : Path
         For messages.
-    opened : callable
-        Returns a binary stream at the log's first byte.
+    data : bytes
+        The log.
     """
 
-    def __init__(self, path: Path, opened: Callable[[], BinaryIO]) -> None:
+    def __init__(self, path: Path, data: bytes) -> None:
         self.path = path
-        self._opened = opened
+        self.data = data
         self._found: tuple[Damage, tuple[Record, ...]] | None = None
 
     def __iter__(self) -> Iterator[Record]:
-        scan = _Scan(self.path)
+        scan = _Scan(self.data)
         notes = []
-        with self._opened() as stream:
-            for record in scan.records(stream):
-                if record.kind is not _DATA and record.kind in _NOTES:
-                    notes.append(record)
-                yield record
+        for record in scan.records():
+            if record.kind is not _DATA and record.kind in _NOTES:
+                notes.append(record)
+            yield record
         self._found = scan.damage(), tuple(notes)
 
     def _known(self) -> tuple[Damage, tuple[Record, ...]]:
@@ -151,36 +146,27 @@ def read_log(path: str | os.PathLike[str]) -> LogContents:
     Raises
     ------
     NotALog
-        If there is no file that can be opened.
+        If there is no file that can be read.
     """
     path = Path(path)
-
-    def opened() -> BinaryIO:
-        try:
-            return path.open("rb", buffering=0)
-        except OSError as error:
-            reason = error.strerror or one_line(error)
-            demand = f"a wire log was demanded, got no file that opens ({reason})"
-            raise NotALog(path, demand, "name a file that springmass record left behind") from error
-
-    opened().close()
-    return LogContents(path, opened)
+    try:
+        return LogContents(path, path.read_bytes())
+    except OSError as error:
+        demand = f"a wire log was demanded, got no file that can be read ({error.strerror or one_line(error)})"
+        raise NotALog(path, demand, "name a file that springmass record left behind") from error
 
 
 def parse_log(data: bytes, path: str | os.PathLike[str] = "log") -> LogContents:
     """Read a log from memory; ``path`` is what messages call it."""
-    return LogContents(Path(path), lambda: io.BytesIO(data))
+    return LogContents(Path(path), data)
 
 
 class _Scan:
     """One pass over a log."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._window = b""
-        self._at = 0  # index in the window of the next byte not yet accounted for
-        self._base = 0  # offset in the file of the window's first byte
-        self._whole = False  # the window reaches the end of the file
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._at = 0  # the next byte not yet accounted for
         self._log: int | None = None
         self._expected = 0
         self._records = self._lost = self._strays = self._skipped = self._tail = 0
@@ -194,64 +180,36 @@ class _Scan:
         stretches = tuple(self._stretches)
         return Damage(self._records, self._lost, self._skipped, stretches, self._strays, self._tail, self._ended)
 
-    def records(self, stream: BinaryIO) -> Iterator[Record]:
+    def records(self) -> Iterator[Record]:
         """Yield what can be delivered; :meth:`damage` is complete after the last."""
-        self._fill(stream)
-        self._log = _number_of(self._window)
+        self._log = _number_of(self._data)
         while True:
-            self._fill(stream)
-            found = unframe(self._window, self._at, self._log)
+            found = unframe(self._data, self._at, self._log)
             if found is None:
-                if not self._resynchronise(stream):
+                if not self._resynchronise():
                     break
-                continue
-            if (record := self._accept(*found)) is not None:
+            elif (record := self._accept(*found)) is not None:
                 yield record
         self._drop_parts()
 
-    def _fill(self, stream: BinaryIO) -> None:
-        """Have the longest possible record in the window, or the file's end."""
-        if self._whole or len(self._window) - self._at >= _LONGEST:
-            return
-        pieces = [self._window[self._at :]]
-        self._base += self._at
-        self._at = 0
-        size = len(pieces[0])
-        while size < _CHUNK and not self._whole:
-            try:
-                piece = stream.read(_CHUNK)
-            except OSError as error:
-                reason = error.strerror or one_line(error)
-                demand = f"the wire log cannot be read past byte {self._base + size} ({reason})"
-                raise NotALog(self._path, demand, "copy what the disk still gives, and name the copy") from error
-            self._whole = not piece
-            pieces.append(piece)
-            size += len(piece)
-        self._window = b"".join(pieces)
-
-    def _resynchronise(self, stream: BinaryIO) -> bool:
+    def _resynchronise(self) -> bool:
         """Go to the next sound record and count what lies before it; False where there is none."""
-        start = self._base + self._at
-        while True:
-            found = self._window.find(MAGIC, self._at + 1)
-            if found < 0 and self._whole:
-                self._tail = self._base + len(self._window) - start
-                return False
-            # A window's last byte may be the first half of a magic.
-            self._at = found if found >= 0 else max(self._at, len(self._window) - 2)
-            self._fill(stream)
-            if found >= 0 and unframe(self._window, self._at, self._log) is not None:
-                break
-        length = self._base + self._at - start
-        self._skipped += length
+        start, at = self._at, self._data.find(MAGIC, self._at + 1)
+        while at >= 0 and unframe(self._data, at, self._log) is None:
+            at = self._data.find(MAGIC, at + 1)
+        if at < 0:
+            self._tail = len(self._data) - start
+            return False
+        self._at = at
+        self._skipped += at - start
         if len(self._stretches) < KEPT_STRETCHES:
-            self._stretches.append((start, length))
+            self._stretches.append((start, at - start))
         return True
 
     def _accept(
         self, sequence: int, mono_ns: int, log: int, kind: Kind, channel: int, parts: int, payload: bytes
     ) -> Record | None:
-        offset = self._base + self._at
+        offset = self._at
         self._at += HEAD_BYTES + len(payload)
         self._log = log
         missing = (sequence - self._expected) % (1 << 32)
@@ -294,18 +252,18 @@ class _Scan:
         self._parts = []
 
 
-def _number_of(window: bytes) -> int | None:
+def _number_of(data: bytes) -> int | None:
     """Return the number of the log: that of its first record, which was on the disk before the run began.
 
     Where that is lost, most of the sound records decide: the first of them may be one that a device sent, or one of
     an old log whose blocks show through. None where there are none.
     """
-    if (first := unframe(window, 0, None)) is not None:
+    if (first := unframe(data, 0, None)) is not None:
         return first[2]
     numbers: Counter[int] = Counter()
-    at = window.find(MAGIC)
+    at = data.find(MAGIC)
     while at >= 0 and numbers.total() < 1000:
-        found = unframe(window, at, None)
+        found = unframe(data, at, None)
         numbers.update([] if found is None else [found[2]])
-        at = window.find(MAGIC, at + 1 if found is None else at + HEAD_BYTES + len(found[-1]))
+        at = data.find(MAGIC, at + 1 if found is None else at + HEAD_BYTES + len(found[-1]))
     return numbers.most_common(1)[0][0] if numbers else None
