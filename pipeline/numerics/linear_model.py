@@ -52,7 +52,15 @@ class Terms:
         return values, cofactors, float(values @ self.right)
 
     def falls(self) -> F8:
-        """Return (k,): by how much the first, the first two, ... and all terms lower chi-square."""
+        """Return (k,): by how much the first, the first two, ... and all terms lower chi-square.
+
+        Examples
+        --------
+        >>> x = np.arange(4.0)
+        >>> terms = LinearModel(x**2, np.ones((4, 1))).terms(np.stack([x, x**2], axis=1))
+        >>> terms.falls().round(6), round(terms.only([0]).fitted()[2], 6)
+        (array([45., 49.]), 45.0)
+        """
         return np.asarray(np.cumsum(np.linalg.solve(np.linalg.cholesky(self.normal), self.right) ** 2))
 
 
