@@ -24,7 +24,6 @@ Scene = tuple[Problem, float, int, float]
 MIXED = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
 LINEAR = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.0073), 0.05)
 STEP_S, COUNT = 0.01, 12_000
-MEMBERS, SHORT = 4096, 1200
 
 
 def main() -> int:
@@ -53,9 +52,6 @@ def main() -> int:
 def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable[[], object], int]]:
     """Return name, reference, limit, share of our time that counts, the two to be timed, and how often."""
     strang, exact = get_integrator("strang"), get_integrator("exact")
-    rng = np.random.default_rng(1)
-    laws = {"gamma_per_s": rng.uniform(0.0, 0.01, MEMBERS), "beta_per_m_s": rng.uniform(0.0, 0.4, MEMBERS)}
-    ensemble = Problem(Equation.from_laws(rng.uniform(7.0, 10.0, MEMBERS), **laws), 0.05)
     a, b, c, d = flow(8.66, 0.0073, STEP_S)
     pulse = np.zeros(COUNT + 1)
     pulse[0] = 0.05
@@ -80,15 +76,6 @@ def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable
             lambda: exact.run(LINEAR, STEP_S, COUNT),
             lambda: lfilter([1.0, -d], [1.0, -(a + d), a * d - b * c], pulse),
             200,
-        ),
-        (
-            f"a trajectory of {MEMBERS} together",
-            "one alone",
-            0.05,
-            1.0 / MEMBERS,
-            lambda: strang.run(ensemble, STEP_S, SHORT, every=100),
-            lambda: strang.run(MIXED, STEP_S, SHORT, every=100),
-            15,
         ),
         (
             f"choosing for {len(scenes)} scenes",

@@ -39,9 +39,6 @@ def test_every_ratio_can_be_taken(dynamics):
     found = {name: (ours(), theirs()) for name, _, _, _, ours, theirs, _ in dynamics.cases()}
     exact, filtered = found["exact propagator, linear, 120 s"]
     assert abs(exact.y - filtered).max() < 1e-12
-    together, alone = found["a trajectory of 4096 together"]
-    assert together.y.shape == (13, 4096)
-    assert alone.y.shape == (13,)
     choices, runs = found["choosing for 60 scenes"]
     assert [choice.integrator.name in ("exact", "averaged", "strang", "taylor", "rk4") for choice in choices] == [
         True

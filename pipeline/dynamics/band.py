@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from pipeline.bench.scene import Scene
-from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.problem import Problem, effective_mass_kg
 from pipeline.errors import DynamicsError
@@ -95,7 +94,7 @@ def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
     )
 
 
-def draw(scene: Scene, measured: Joint | None = None, *, members: int = MEMBERS, seed: int = 0) -> Problem:
+def draw(scene: Scene, measured: Joint | None = None, *, members: int = MEMBERS, seed: int = 0) -> list[Problem]:
     """Return an ensemble of problems: that of the scene's values, then members drawn from its uncertainties.
 
     Parameters
@@ -143,13 +142,7 @@ def draw(scene: Scene, measured: Joint | None = None, *, members: int = MEMBERS,
             share = effective_mass_kg(member) / effective_mass_kg(scene)
             member = replace(member, spring_constant_n_per_m=replace(constant, value=constant.value * share))
         problems.append(Problem.from_scene(member))
-    return Problem(
-        Equation(
-            **{name: np.array([getattr(one.equation, name) for one in problems]) for name in Equation.__slots__},
-        ),
-        np.array([one.displacement_m for one in problems]),
-        np.array([one.velocity_m_per_s for one in problems]),
-    )
+    return problems
 
 
 def spread(
@@ -170,8 +163,8 @@ def spread(
         As :func:`draw`; and if the run is longer than 50,000 steps of a fifth of a radian.
     """
     ensemble = draw(scene, measured, members=members, seed=seed)
-    equation = ensemble.equation
-    step_s = RADIANS / float(equation.angular_frequency_per_s[0])
+    omegas = np.array([one.equation.angular_frequency_per_s for one in ensemble])
+    step_s = RADIANS / float(omegas[0])
     steps = max(1, math.ceil(seconds / step_s))
     if steps > MOST_STEPS:
         raise DynamicsError(
@@ -180,12 +173,12 @@ def spread(
         )
     parts = []
     for start in range(0, steps, STRETCH):
-        run = STRANG.run(ensemble, step_s, min(STRETCH, steps - start))
+        runs = [STRANG.run(one, step_s, min(STRETCH, steps - start)) for one in ensemble]
         rows = slice(0 if start == 0 else 1, None)  # a stretch begins where the last one ended
-        y, v = run.y[rows], run.v[rows]
-        amplitude = np.hypot(y, v / equation.angular_frequency_per_s)
-        parts.append([amplitude[:, :1].T, _quantiles(y), _quantiles(amplitude)])
-        ensemble = Problem(equation, run.y[-1], run.v[-1])
+        y, v = (np.array([getattr(run, name)[rows] for run in runs]) for name in ("y", "v"))
+        amplitude = np.hypot(y, v / omegas[:, None])
+        parts.append([amplitude[:1], _quantiles(y), _quantiles(amplitude)])
+        ensemble = [Problem(run.problem.equation, run.y[-1], run.v[-1]) for run in runs]
     middle, of_displacement, of_amplitude = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
     names = uncertain(scene, measured).names
     return Band(names, members, seed, step_s * np.arange(steps + 1.0), middle[0], of_displacement, of_amplitude)
@@ -193,7 +186,7 @@ def spread(
 
 def _quantiles(states: F8) -> F8:
     """Quantiles (4, n) of all members but the first, less the first; the hypercube's shares begin as Hazen's do."""
-    return np.asarray(np.quantile(states[:, 1:], SHARES, axis=1, method="hazen") - states[:, 0])
+    return np.asarray(np.quantile(states[1:], SHARES, axis=0, method="hazen") - states[0])
 
 
 def _limited(joint: Joint, values: list[float]) -> dict[str, Any]:

@@ -14,8 +14,7 @@ from pipeline.dynamics.integrators.runge_kutta import RK4
 from pipeline.dynamics.integrators.solve_ivp import SolveIvp
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
-from pipeline.dynamics.pilot import fine_step, in_own_units, predicted_by_pilot
-from pipeline.dynamics.predict import rounding_error
+from pipeline.dynamics.predict import fine_step, in_own_units, predicted_by_pilot, rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
@@ -101,7 +100,6 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     Parameters
     ----------
     problem : Problem
-        Of one trajectory.
     spacing_s : float
         Time from one kept state to the next, s.
     count : int
@@ -147,7 +145,7 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
 def _may_pay(problem: Problem, spacing_s: float, count: int, tolerance: float, most_ns: float) -> bool:
     """Whether Runge-Kutta, which friction keeps from its order, may cost less, as the first of its pilots has it."""
     seconds = spacing_s * count
-    if problem.equation.is_linear or problem.equation.has_friction or not math.isfinite(most_ns):
+    if problem.equation.is_linear or problem.equation.friction_m_per_s2 or not math.isfinite(most_ns):
         return False
     if _LIMIT_NS + _STEP_NS["rk4"] * seconds / fine_step(in_own_units(problem)) >= most_ns:
         return False  # the pilot alone costs more

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -23,17 +22,19 @@ __all__ = [
     "demand_run",
     "demand_times",
     "integrate",
-    "one_by_one",
+    "kept",
     "solved",
+    "with_start",
 ]
 
 SHORTEST_S, LONGEST_S = 1e-100, 1e100
+STRETCH = 1_000_000  # states held until those asked for are taken from them
 
 Step = Callable[[Real, Real], tuple[Real, Real]]
 """One step: displacement and velocity before it to those after it."""
 
 March = Callable[[Problem, float, int, int], tuple[F8, F8]]
-"""A run of a scaled problem: step, number of steps, every which is kept; to displacements and velocities (n, ...)."""
+"""A run of a scaled problem: step, number of steps, every which is kept; to displacements and velocities (n,)."""
 
 StepMaker = Callable[[Equation, Real], Step]
 """Equation and step, s, to the function of one step; of many steps, (n,) float64, it is a step of each."""
@@ -70,7 +71,7 @@ class Integrator(Protocol):
         ...
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem, one or an ensemble.
+        """Solve a problem.
 
         Parameters
         ----------
@@ -94,7 +95,7 @@ class Integrator(Protocol):
         ...
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return the expected largest error of the displacement over the starting amplitude, of the worst member."""
+        """Return the expected largest error of the displacement over the starting amplitude."""
         ...
 
 
@@ -107,9 +108,9 @@ class Trajectory:
     problem : Problem
     spacing_s : float
         Time from one kept state to the next, s.
-    y : (n,) or (n, m) float64, m
+    y : (n,) float64, m
         Displacement from rest.
-    v : (n,) or (n, m) float64, m/s
+    v : (n,) float64, m/s
         Velocity.
     """
 
@@ -124,7 +125,7 @@ class Trajectory:
         return np.asarray(self.spacing_s * np.arange(len(self.y), dtype=np.float64))
 
     def at(self, t: F8) -> F8:
-        """Return displacements (k,) at times between, (k,) in s, of one trajectory; held before and after.
+        """Return displacements (k,) at times between, (k,) in s; held before and after.
 
         A cubic through displacements and velocities: it errs by at most (omega spacing)^4 / 384 of the amplitude. On
         equal spacings in 0.4 of the time of scipy.interpolate.CubicHermiteSpline, which a fit would import first.
@@ -149,7 +150,7 @@ class Trajectory:
         return found
 
     def relative_energy(self) -> F8:
-        """Return the mechanical energy over that of the start, (n,) or (n, m); 1 where there was none.
+        """Return the mechanical energy over that of the start, (n,); 1 where there was none.
 
         Scaled before it is squared, so that it is right for every amplitude that a number can hold.
         """
@@ -157,13 +158,13 @@ class Trajectory:
         with np.errstate(over="ignore", invalid="ignore"):
             now = _energy(scaled, self.y / unit, self.v / unit)
             start = _energy(scaled, np.asarray(scaled.displacement_m), np.asarray(scaled.velocity_m_per_s))
-            relative = np.divide(now, start, out=np.ones_like(now), where=np.broadcast_to(start > 0, now.shape))
+            relative = now / start if start > 0.0 else np.ones_like(now)
         if not np.all(np.isfinite(relative)):
             raise DynamicsError("the energy grew beyond the range of numbers; take fewer steps or another method")
         return relative
 
     def energy_j_per_kg(self) -> F8:
-        """Return the mechanical energy per mass, J/kg, (n,) or (n, m).
+        """Return the mechanical energy per mass, J/kg, (n,).
 
         Raises
         ------
@@ -184,17 +185,11 @@ class Trajectory:
 def _energy(problem: Problem, y: F8, v: F8) -> F8:
     eq = problem.equation
     energy = 0.5 * (v**2 + (eq.angular_frequency_per_s * y) ** 2)
-    return np.asarray(energy + 0.25 * eq.cubic_per_m2_s2 * y**4 if np.any(eq.cubic_per_m2_s2) else energy)
+    return np.asarray(energy + 0.25 * eq.cubic_per_m2_s2 * y**4 if eq.cubic_per_m2_s2 else energy)
 
 
 def integrate(
-    integrator: Integrator,
-    problem: Problem,
-    step_s: float,
-    steps: int,
-    every: int,
-    march: March,
-    together: March | None = None,
+    integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int, march: March
 ) -> Trajectory:
     """Check what is asked, run the march in units of the amplitude, and check what came.
 
@@ -203,19 +198,12 @@ def integrate(
     integrator, problem, step_s, steps, every
         As in :meth:`Integrator.run`.
     march : callable
-        Of one trajectory.
-    together : callable, optional
-        Of all members of an ensemble at once; without it they are run one by one.
 
     Raises
     ------
     DynamicsError
     """
     demand_run(integrator, problem, step_s, steps, every)
-    if problem.is_ensemble:
-        if together is None:
-            return one_by_one(problem, lambda one: integrate(integrator, one, step_s, steps, every, march))
-        march = together
     scaled, unit = problem.scaled()
     with np.errstate(all="ignore"):
         try:
@@ -229,11 +217,17 @@ def integrate(
     return solved(integrator, problem, step_s * every, y, v)
 
 
-def one_by_one(problem: Problem, run: Callable[[Problem], Trajectory]) -> Trajectory:
-    """Return the trajectories of an ensemble's members, each run alone, as one."""
-    runs = [run(one) for one in problem.members()]
-    y, v = (np.stack([getattr(each, name) for each in runs], axis=1) for name in ("y", "v"))
-    return Trajectory(problem, runs[0].spacing_s, y, v)
+def kept(states: Iterator[float], steps: int, every: int) -> F8:
+    """Return every so many of endless states (n, 2): displacement and velocity after each step, in turn."""
+    stretch = every * max(1, STRETCH // every)
+    stretches = (min(stretch, steps - start) for start in range(0, steps, stretch))
+    parts = [np.fromiter(states, np.float64, 2 * n).reshape(n, 2)[every - 1 :: every].copy() for n in stretches]
+    return np.concatenate(parts)
+
+
+def with_start(problem: Problem, y: F8, v: F8) -> tuple[F8, F8]:
+    """Return displacements and velocities (n + 1,) with the start before those (n,) after it."""
+    return np.concatenate([[problem.displacement_m], y]), np.concatenate([[problem.velocity_m_per_s], v])
 
 
 def demand_run(integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int) -> None:
@@ -244,8 +238,6 @@ def demand_run(integrator: Integrator, problem: Problem, step_s: float, steps: i
     DynamicsError
     """
     demand_times(step_s, step_s * steps)
-    if not problem.size:
-        raise DynamicsError("an ensemble has at least one member, got none")
     if steps < 1 or every < 1 or steps % every:
         raise DynamicsError(
             f"the number of steps must be a positive multiple of {max(every, 1)}, of which one is kept, got {steps}"
@@ -274,16 +266,12 @@ def solved(integrator: Integrator, problem: Problem, spacing_s: float, y: F8, v:
     ------
     DynamicsError
     """
-    with np.errstate(all="ignore"):
-        # A sum of squares is finite only if every number is; where it is not, look closer.
-        size = np.vdot(y, y) + np.vdot(v, v)
-    if not math.isfinite(size):
-        fine = np.isfinite(y) & np.isfinite(v)
-        if not fine.all():
-            first = spacing_s * int(np.argmin(fine.reshape(len(y), -1).all(axis=1)))
-            raise DynamicsError(
-                f"{integrator.name} ran beyond the range of numbers by t = {first:g} s; {_remedy(integrator, problem)}"
-            )
+    fine = np.isfinite(y) & np.isfinite(v)
+    if not fine.all():
+        first = spacing_s * int(np.argmin(fine))
+        raise DynamicsError(
+            f"{integrator.name} ran beyond the range of numbers by t = {first:g} s; {_remedy(integrator, problem)}"
+        )
     return Trajectory(problem, spacing_s, y, v)
 
 

@@ -1,25 +1,32 @@
-"""What error to expect of a run before it is made: by rounding, by a repeated step, of an ensemble's worst member."""
+"""What error to expect of a run before it is made: by rounding, and as a pilot run shows it.
+
+A pilot is the whole motion in coarse steps, beside the same in finer ones.
+"""
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.amplitude import amplitude
-from pipeline.dynamics.flow import flows
-from pipeline.dynamics.integrator import Integrator, StepMaker, demand_times
-from pipeline.dynamics.pilot import in_own_units, predicted_by_pilot
+from pipeline.dynamics.equation import Equation
+from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.problem import Problem
-from pipeline.dynamics.stability import step_matrix
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
-__all__ = ["every_member", "predicted_by_average", "rounding_error", "worst_error"]
+__all__ = ["bounded", "fine_step", "in_own_units", "predicted_by_pilot", "rounding_error"]
 
-POINTS = 1500
-STRONG = 0.02  # damping a radian, or cubic spring, beyond which the linear oscillator is no measure of the error
+FINE = 0.25  # radians a step, of the spring, of drag and of quadratic drag together: there the power law holds
+FAR = 0.1  # of the amplitude: an error beyond it follows the power law no more
+PLAIN_SHARES = (1.0, 0.9, 0.5)  # of a pilot's step: where in it a bob turns sets the error of a method that is not told
+STIFF = 10.0  # drag over spring beyond which a pilot cannot have steps that fine all along
+MOST_STIFF_STEPS = 20_000
+FEW_PARTS = 4
+MOST_PARTS = 16  # of a step, for the truth beside it
+MOST_STEPS = 2_000_000  # of a truth in many parts
 
 
 def rounding_error(problem: Problem, seconds: float, steps: float = 0.0) -> float:
@@ -30,139 +37,151 @@ def rounding_error(problem: Problem, seconds: float, steps: float = 0.0) -> floa
     The phase :math:`\\omega t` is a product of rounded numbers: its error is its own size times the relative rounding.
     A step that is repeated repeats the rounding of its coefficients: a fifth of the relative rounding each.
     """
-    phase = float(np.max(problem.equation.angular_frequency_per_s)) * seconds
+    phase = problem.equation.angular_frequency_per_s * seconds
     return float(np.finfo(np.float64).eps) * (4.0 + phase + 0.2 * steps)
 
 
-def worst_error(problem: Problem, step_s: float, seconds: float, of: Callable[[Problem], float]) -> float:
-    """Return the largest predicted error of an ensemble's members, inf where the prediction runs beyond all numbers.
-
-    Raises
-    ------
-    DynamicsError
-        If there is no member, or step or duration are none.
-    """
-    demand_times(step_s, seconds)
-
-    def bounded(one: Problem) -> float:
+def bounded(predict: Callable[[], float]) -> float:
+    """Return a predicted error, inf where the prediction runs beyond all numbers."""
+    with np.errstate(all="ignore"):
         try:
-            error = of(one)
+            error = predict()
         except (OverflowError, ZeroDivisionError):
             return math.inf
-        return math.inf if math.isnan(error) else error
-
-    with np.errstate(all="ignore"):
-        return every_member(problem, bounded, max)
+    return math.inf if math.isnan(error) else error
 
 
-def every_member(problem: Problem, of: Callable[[Problem], float], worst: Callable[..., float]) -> float:
-    """Return the worst of a number over an ensemble's members.
-
-    Raises
-    ------
-    DynamicsError
-        If there is no member.
-    """
-    if not problem.size:
-        raise DynamicsError("an ensemble has at least one member, got none")
-    return worst(of(one) for one in problem.members())
-
-
-def predicted_by_average(
-    method: Integrator, make: StepMaker, solver: Integrator, problem: Problem, step_s: float, seconds: float
+def predicted_by_pilot(
+    integrator: Integrator, solver: Integrator, problem: Problem, step_s: float, seconds: float, pilots: int = 3
 ) -> float:
     """Return the expected largest error of the displacement over the starting amplitude.
 
     Parameters
     ----------
-    method : Integrator
-        Which repeats the step that ``make`` makes.
-    make : callable
-        Equation and step to the function of one step.
+    integrator : Integrator
+        Whose error is asked for.
     solver : Integrator
-        For the truth of a pilot, where damping is too strong for averages.
+        Strang splitting, which makes the truth.
     problem : Problem
-        Of one trajectory.
     step_s, seconds : float
         Of the run that is planned, s.
+    pilots : int
+        How many at most; see Notes.
 
     Notes
     -----
-    On the linear oscillator the step is a matrix, and powers of it against the exact flow are the error itself.
-    Otherwise the eigenvalues of that matrix give the method's own frequency and damping, with which the averaged
-    amplitude law is compared with the true one; what differs within a cycle is taken from the linear oscillator. A
-    turning point that is not located adds friction times step to the velocity, with a sign that scatters.
+    The motion is run from start to end at the planned step h or, where that is finer, at a quarter of a radian, H.
+    The truth beside it is Strang splitting in steps of at most H and of half as much, extrapolated to none. The largest
+    difference counts by :math:`(h/H)^p` with the method's order p. A pilot of the whole motion costs a few steps a
+    radian, and holds whatever adds up along it: the phase, the pace of a cubic spring, the stop.
+
+    A method's own frequency and damping add up too. Where a pilot errs by more than a tenth of the amplitude it no
+    longer follows the power law, and one of a quarter of its step is made, down to the planned step itself.
+
+    What a pilot in another step cannot hold is a resonance of the planned one; for Strang splitting it is added. The
+    error of a method that does not locate turning points scatters with where in a step they lie: there the largest of
+    three pilots counts, and each turning point adds friction times step to the velocity, with a sign that scatters.
     """
-    start = problem.amplitude_m()
-    if start == 0.0:
+    if problem.amplitude_m() == 0.0:
         return 0.0
     problem = in_own_units(problem)
-    steps = max(1, round(seconds / step_s))
-    floor = rounding_error(problem, seconds, steps)
-    if problem.equation.is_linear:
-        error = _linear(make, problem, step_s, steps)
-    else:
-        error = _averaged(method, make, solver, problem, step_s, steps)
-    return error + floor if math.isfinite(error) else math.inf
+    start, omega = problem.amplitude_m(), problem.equation.angular_frequency_per_s
+    fine = fine_step(problem)
+    pilot = max(step_s, min(fine, seconds / 4.0))
+    kinked, plain = _kinked(problem.equation), integrator is not solver and integrator.order > 0
+    # The kink of drag at a turning point keeps a high order from what its power promises.
+    order = min(integrator.order, 3) if kinked else integrator.order
+    if plain and omega * pilot * MOST_STIFF_STEPS < 2.0 * math.pi:
+        return math.inf  # far too stiff for a method with a limit
+    if fine * omega < FINE / STIFF and pilot < seconds / MOST_STIFF_STEPS:
+        pilot, order = seconds / MOST_STIFF_STEPS, min(order, 1)
+    while True:
+        parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
+        if parts > FEW_PARTS and seconds / pilot * parts > MOST_STEPS:
+            return math.inf  # so coarse that to see its error takes many times the run
+        shares = PLAIN_SHARES[:pilots] if plain and kinked and pilot > step_s else (1.0,)
+        errors = [_largest_error(integrator, solver, problem, each * pilot, parts, seconds) / start for each in shares]
+        if not plain or max(errors) <= FAR or pilot <= step_s:
+            break
+        pilot = max(step_s, 0.25 * pilot)
+    error = max(error * (step_s / (share * pilot)) ** order for error, share in zip(errors, shares, strict=True))
+    if plain and pilot > step_s:
+        turns = 1.0 + omega * seconds / math.pi
+        error += problem.equation.friction_m_per_s2 * step_s / (omega * start) * math.sqrt(turns)
+    return error + _resonance(problem, step_s, seconds) if integrator is solver else error
 
 
-def _linear(make: StepMaker, problem: Problem, h: float, steps: int) -> float:
-    """Largest difference between powers of the step's matrix and the flow, on a grid of times."""
-    stride = max(1, steps // POINTS)
-    grown = _orbit(make, problem, h, stride, steps // stride)
-    exact = _exact(problem, h * stride * np.arange(steps // stride + 1, dtype=np.float64))
-    return float(np.max(np.abs(grown - exact)) / problem.amplitude_m())
+@functools.lru_cache(maxsize=8)
+def in_own_units(problem: Problem) -> Problem:
+    """Return the problem in units of its amplitude: the same object for the same, so that its truth is remembered."""
+    return problem.scaled()[0]
 
 
-def _orbit(make: StepMaker, problem: Problem, h: float, stride: int, count: int) -> F8:
-    """Displacements after multiples of a stride of steps."""
-    omega = problem.equation.angular_frequency_per_s
-    matrix = step_matrix(make, omega * h, problem.equation.gamma_per_s / omega)
-    (a, b), (c, d) = np.linalg.matrix_power(matrix, stride).tolist()
-    y, v = problem.displacement_m, problem.velocity_m_per_s / omega
-    found = [y]
-    for _ in range(count):
-        y, v = a * y + b * v, c * y + d * v
-        found.append(y)
-    return np.array(found)
+def _kinked(eq: Equation) -> bool:
+    return bool(eq.drag_per_m > 0.0 or eq.friction_m_per_s2 > 0.0)
 
 
-def _exact(problem: Problem, t: F8) -> F8:
-    a, b, _, _ = flows(problem.equation.angular_frequency_per_s, problem.equation.gamma_per_s, t)
-    return np.asarray(a * problem.displacement_m + b * problem.velocity_m_per_s)
+def _resonance(problem: Problem, step_s: float, seconds: float) -> float:
+    """Return the most that quadratic drag in kicks adds up where N steps make a cycle, N next to an even number.
 
-
-def _averaged(method: Integrator, make: StepMaker, solver: Integrator, problem: Problem, h: float, steps: int) -> float:
+    The kicks see the harmonics of |sin| sin, 8 / (pi k (k^2 - 4)) for odd k. Those next to N act as the first one does:
+    they turn the phase by up to 8 / (pi N^3) of the drag, for as long as they stay in step. Next to 2 N and so on too.
+    Where turning points are located, with friction, there is no such harmonic.
+    """
     eq, start = problem.equation, problem.amplitude_m()
-    gamma, beta, mu = eq.laws()
-    omega = eq.angular_frequency_per_s
-    # The spring as stiff as it is on average at this amplitude.
-    omega = math.sqrt(max(omega**2 + 0.75 * eq.cubic_per_m2_s2 * start**2, 0.1 * omega**2))
-    friction = eq.friction_m_per_s2 * h / (omega * start) * math.sqrt(1.0 + omega * h * steps / math.pi) if mu else 0.0
-    bent = 0.75 * abs(eq.cubic_per_m2_s2) * start * start / omega
-    if gamma + beta * start + bent > STRONG * omega:
-        if h > method.stable_step(problem):
-            return math.inf
-        return predicted_by_pilot(method, solver, problem, h, h * steps) + float(friction)
-    matrix = step_matrix(make, omega * h, gamma / omega)
-    if not np.all(np.isfinite(matrix)):
-        return math.inf
-    values = np.linalg.eigvals(matrix.astype(np.complex128))
-    turning = np.log(values[np.argmax(values.imag)]) / h
-    if turning.imag <= 0.0:
-        return math.inf
-    late = turning.imag - math.sqrt(omega**2 - gamma**2)
-    t = np.linspace(0.0, h * steps, POINTS)
-    true, grown = (amplitude(start, rate, beta, mu, t) for rate in (gamma, -turning.real))
-    bend = 0.375 * eq.cubic_per_m2_s2 / omega
-    phase = late * t
-    if bend:
-        from scipy.integrate import cumulative_trapezoid
+    pace = eq.angular_frequency_per_s**2 - eq.gamma_per_s**2 + 0.75 * eq.cubic_per_m2_s2 * start * start
+    if eq.friction_m_per_s2 or not eq.drag_per_m or pace <= 0.0:
+        return 0.0
+    pace = math.sqrt(pace)
+    gamma, beta, _ = eq.laws()
+    longest = pace * min(seconds, 1.0 / (gamma + beta * start))
+    total = 0.0
+    for multiple in (1, 2, 3):
+        steps = multiple * 2.0 * math.pi / (pace * step_s)
+        off = abs(steps - 2.0 * round(0.5 * steps))
+        total += 8.0 / (math.pi * steps**3) * min(longest, 2.0 / off if off else math.inf)
+    return float(total * eq.drag_per_m * start)
 
-        phase += bend * cumulative_trapezoid(grown**2 - true**2, t, initial=0.0)
-    secular = float(np.max(np.abs(grown * np.exp(1j * phase) - true))) / start
-    # Within a cycle: the linear oscillator's error beyond what a cycle accumulates.
-    cycle = max(1, min(steps, math.ceil(2.0 * math.pi / (omega * h))))
-    short = _linear(make, problem, h, cycle)
-    within = max(0.0, short - abs(np.expm1((turning + gamma - 1j * math.sqrt(omega**2 - gamma**2)) * h * cycle)))
-    return float(secular + within + friction)
+
+def fine_step(problem: Problem) -> float:
+    """Return the step at which Strang's error follows its power law, s."""
+    eq, start = problem.equation, problem.amplitude_m()
+    hard = math.sqrt(eq.angular_frequency_per_s**2 + 3.0 * max(eq.cubic_per_m2_s2, 0.0) * start * start)
+    return float(FINE / (hard + eq.gamma_per_s + 2.0 * eq.drag_per_m * hard * start))
+
+
+@functools.lru_cache(maxsize=8)
+def _largest_error(
+    integrator: Integrator, solver: Integrator, problem: Problem, pilot: float, parts: int, seconds: float
+) -> float:
+    """Return the largest error of a run in steps of the pilot, m."""
+    coarse, truth = _truth(solver, problem, pilot, parts, seconds)
+    if integrator is solver and coarse is not None:
+        found = coarse
+    else:
+        try:
+            found = integrator.run(problem, pilot, len(truth) - 1).y
+        except DynamicsError:
+            return math.inf  # it ran away: that is its error
+    return _peak(np.abs(found - truth))
+
+
+def _peak(error: F8) -> float:
+    """Return the largest of a sampled curve: the top of the parabola through its largest samples."""
+    top = int(np.argmax(error))
+    if not 0 < top < len(error) - 1:
+        return float(error[top])
+    before, most, after = error[top - 1 : top + 2].tolist()
+    bend = before - 2.0 * most + after
+    return float(most - 0.125 * (after - before) ** 2 / bend if bend < 0.0 else most)
+
+
+@functools.lru_cache(maxsize=4)
+def _truth(solver: Integrator, problem: Problem, pilot: float, parts: int, seconds: float) -> tuple[F8 | None, F8]:
+    """Return the displacement in steps of the pilot, if these are fine, and the extrapolated one at the same times.
+
+    Remembered, as every finer step and the next method ask for it again.
+    """
+    steps = max(1, round(seconds / pilot))
+    once, twice = (solver.run(problem, pilot / k, steps * k, every=k).y for k in (parts, 2 * parts))
+    return once if parts == 1 else None, twice + (twice - once) / 3.0

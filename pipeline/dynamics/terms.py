@@ -40,7 +40,6 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
     Parameters
     ----------
     problem : Problem
-        Of one trajectory.
     seconds : float
         How long it is to be solved.
     tolerance : float

@@ -54,7 +54,7 @@ def test_the_error_against_forty_digits_is_the_predicted_one(integrator: Integra
         assert integrator.stable_step(problem) < STEP / parts
         return
     found = error_of(case, integrator.run(problem, STEP / parts, steps * parts, every=parts))
-    located = integrator.name in LOCATED or not problem.equation.has_friction
+    located = integrator.name in LOCATED or not problem.equation.friction_m_per_s2
     assert found <= SHORT.get(integrator.name, 1.3 if located else 12.0) * predicted
 
 
@@ -126,61 +126,6 @@ def test_without_an_order_the_spacing_changes_nothing(name: str) -> None:
     fine, coarse = integrator.run(problem, 0.01, 400), integrator.run(problem, 0.08, 50)
     tolerance = 1e-12 if name not in ("lsoda", "dop853") else 1e-5
     np.testing.assert_allclose(fine.y[::8], coarse.y, atol=0.05 * tolerance)
-
-
-def test_an_ensemble_is_its_members(integrator: Integrator) -> None:
-    """Every member of an ensemble moves as it does alone."""
-    rng = np.random.default_rng(2)
-    size = 5
-    drag = 0.0 if integrator.name == "exact" else rng.uniform(0.0, 0.3, size)
-    equation = Equation.from_laws(
-        rng.uniform(5.0, 12.0, size), gamma_per_s=rng.uniform(0.0, 0.5, size), beta_per_m_s=drag
-    )
-    problem = Problem(equation, rng.uniform(0.01, 0.1, size), rng.uniform(-0.2, 0.2, size))
-    together = integrator.run(problem, 0.01, 200, every=10)
-    assert together.y.shape == together.v.shape == (21, size)
-    for i, one in enumerate(problem.members()):
-        alone = integrator.run(one, 0.01, 200, every=10)
-        tolerance = {"lsoda": 1e-5, "dop853": 1e-5}.get(integrator.name, 1e-12)
-        np.testing.assert_allclose(together.y[:, i], alone.y, rtol=0, atol=0.1 * tolerance)
-        np.testing.assert_allclose(together.v[:, i], alone.v, rtol=0, atol=tolerance)
-
-
-@pytest.mark.parametrize("name", [name for name in INTEGRATORS if name != "exact"])
-def test_an_ensemble_with_friction_and_a_cubic_spring_is_its_members(name: str) -> None:
-    """Turning points within one step of many members are treated as those of one."""
-    integrator = get_integrator(name)
-    rng = np.random.default_rng(3)
-    equation = Equation.from_laws(
-        rng.uniform(6.0, 10.0, 4), beta_per_m_s=0.2, mu_m_per_s=rng.uniform(1e-3, 1e-2, 4), cubic_per_m2_s2=50.0
-    )
-    problem = Problem(equation, 0.05)
-    together = integrator.run(problem, 0.01, 300, every=5)
-    for i, one in enumerate(problem.members()):
-        alone = integrator.run(one, 0.01, 300, every=5)
-        tolerance = {"lsoda": 1e-4, "dop853": 1e-4}.get(name, 1e-9)
-        np.testing.assert_allclose(together.y[:, i], alone.y, rtol=0, atol=0.05 * tolerance)
-
-
-def test_an_ensemble_with_friction_of_every_kind_is_its_members() -> None:
-    """Held from the start or next to never, beyond critical damping, kept at every step or at some: all alike."""
-    rng = np.random.default_rng(4)
-    size = 60
-    equation = Equation(
-        angular_frequency_per_s=rng.uniform(2.0, 12.0, size),
-        gamma_per_s=np.where(rng.random(size) < 0.2, rng.uniform(10.0, 40.0, size), rng.uniform(0.0, 0.5, size)),
-        drag_per_m=rng.uniform(0.0, 2.0, size),
-        friction_m_per_s2=np.where(rng.random(size) < 0.2, 1e-12, 10.0 ** rng.uniform(-4.0, 1.0, size)),
-        cubic_per_m2_s2=np.where(rng.random(size) < 0.5, 0.0, rng.uniform(-20.0, 400.0, size)),
-    )
-    problem = Problem(equation, rng.uniform(-0.1, 0.1, size), np.where(rng.random(size) < 0.5, 0.0, 0.1))
-    strang = get_integrator("strang")
-    every, some = strang.run(problem, 0.02, 396), strang.run(problem, 0.02, 396, every=11)
-    np.testing.assert_array_equal(some.y, every.y[::11])
-    for i, one in enumerate(problem.members()):
-        alone = strang.run(one, 0.02, 396)
-        np.testing.assert_allclose(every.y[:, i], alone.y, rtol=0, atol=1e-10)
-        np.testing.assert_allclose(every.v[:, i], alone.v, rtol=0, atol=1e-9)
 
 
 def test_keeping_fewer_states_changes_none(integrator: Integrator) -> None:

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics.amplitude import amplitude
-from pipeline.dynamics.integrator import Trajectory, integrate
+from pipeline.dynamics.integrator import Trajectory, demand_times, integrate
 from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.pilot import predicted_by_pilot
-from pipeline.dynamics.predict import worst_error
+from pipeline.dynamics.predict import bounded, predicted_by_pilot
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 
@@ -35,7 +34,7 @@ class Averaged:
 
     def refusal(self, problem: Problem) -> str:
         """Return why not, where a cycle changes the amplitude too much to be averaged over."""
-        if all(_weakness(one) <= WEAK for one in problem.members()):
+        if _weakness(problem) <= WEAK:
             return ""
         return f"a cycle can be averaged over where damping takes less than {WEAK:g} per radian; take strang or auto"
 
@@ -49,11 +48,10 @@ class Averaged:
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what a pilot run shows."""
-
-        def of(one: Problem) -> float:
-            return math.inf if self.refusal(one) else predicted_by_pilot(self, STRANG, one, step_s, seconds)
-
-        return worst_error(problem, step_s, seconds, of)
+        demand_times(step_s, seconds)
+        if self.refusal(problem):
+            return math.inf
+        return bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds))
 
 
 AVERAGED = Averaged()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics.flow import flows
-from pipeline.dynamics.integrator import Trajectory, demand_run, demand_times, one_by_one, solved
+from pipeline.dynamics.integrator import Trajectory, demand_run, demand_times, solved
 from pipeline.dynamics.predict import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
@@ -39,8 +39,6 @@ class Exact:
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
         """Evaluate the solution at every kept time; see :class:`Integrator`."""
         demand_run(self, problem, step_s, steps, every)
-        if problem.is_ensemble:
-            return one_by_one(problem, lambda one: self.run(one, step_s, steps, every=every))
         with np.errstate(all="ignore"):  # rates beyond all bounds end at rest
             y, v = _states(problem, step_s * every, steps // every + 1)
         return solved(self, problem, step_s * every, y, v)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from pipeline.dynamics.equation import Equation, Real
-from pipeline.dynamics.integrator import StepMaker, Trajectory, integrate
+from pipeline.dynamics.integrator import StepMaker, Trajectory, demand_times, integrate, kept, with_start
 from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.predict import every_member, predicted_by_average, worst_error
+from pipeline.dynamics.predict import bounded, predicted_by_pilot, rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.stability import limit_by_search
 from pipeline.track import F8
@@ -48,40 +47,36 @@ class OneStep:
 
     def stable_step(self, problem: Problem) -> float:
         """Return the largest step at which neither a small nor the starting motion grows, s."""
-        return every_member(problem, self._limit, min)
-
-    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return the error of phase and damping that the step makes, and what friction adds; see Notes of predict."""
-
-        def of(one: Problem) -> float:
-            return predicted_by_average(self, self.make, STRANG, one, step_s, seconds)
-
-        return worst_error(problem, step_s, seconds, of)
-
-    def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        step = self.make(problem.equation, step_s)
-        y, v = problem.displacement_m, problem.velocity_m_per_s
-        ys, vs = np.empty((2, steps // every + 1))
-        ys[0], vs[0] = y, v
-        for row in range(1, len(ys)):
-            for _ in range(every):
-                y, v = step(y, v)
-            ys[row], vs[row] = y, v
-        return ys, vs
-
-    def _limit(self, problem: Problem) -> float:
         eq = problem.equation
         start = problem.amplitude_m()
         # As stiff as it gets: drag at the greatest speed, the spring at the greatest reach.
         stiffer = 3.0 * eq.cubic_per_m2_s2 * start * start if eq.cubic_per_m2_s2 > 0 else 0.0
-        hard = float(np.sqrt(eq.angular_frequency_per_s**2 + stiffer))
+        hard = math.sqrt(eq.angular_frequency_per_s**2 + stiffer)
         fast = eq.gamma_per_s + eq.drag_per_m * hard * start
         pairs = {(eq.angular_frequency_per_s, eq.gamma_per_s), (hard, eq.gamma_per_s), (hard, fast)}
-        if not (np.isfinite(hard) and np.isfinite(fast)) or fast > 1e12 * hard:
+        if not (math.isfinite(hard) and math.isfinite(fast)) or fast > 1e12 * hard:
             return 0.0
         if self.closed_limit is not None:
             return min(self.closed_limit(omega, gamma) for omega, gamma in pairs)
         return float(min(limit_by_search(self.make, gamma / omega) / omega for omega, gamma in pairs))
+
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return what pilot runs show, and the rounding."""
+        demand_times(step_s, seconds)
+        rounding = rounding_error(problem, seconds, seconds / step_s)
+        return rounding + bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds))
+
+    def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        step = self.make(problem.equation, step_s)
+
+        def states(y: float, v: float) -> Iterator[float]:
+            while True:
+                y, v = step(y, v)
+                yield y
+                yield v
+
+        y, v = kept(states(problem.displacement_m, problem.velocity_m_per_s), steps, every).T
+        return with_start(problem, y, v)
 
 
 def acceleration(eq: Equation) -> Callable[[Real, Real], Real]:

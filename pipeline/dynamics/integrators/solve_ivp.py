@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics.equation import Equation
-from pipeline.dynamics.integrator import Trajectory, integrate
-from pipeline.dynamics.predict import rounding_error, worst_error
+from pipeline.dynamics.integrator import Trajectory, demand_times, integrate
+from pipeline.dynamics.predict import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
@@ -61,17 +61,14 @@ class SolveIvp:
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what the local tolerance grows to."""
-
-        def of(one: Problem) -> float:
-            radians = 1.0 + one.equation.angular_frequency_per_s * seconds
-            return float(rounding_error(one, seconds) + self.grows * radians * self.rtol(one, seconds))
-
-        return worst_error(problem, step_s, seconds, of)
+        demand_times(step_s, seconds)
+        radians = 1.0 + problem.equation.angular_frequency_per_s * seconds
+        return rounding_error(problem, seconds) + self.grows * radians * self.rtol(problem, seconds)
 
     def rtol(self, problem: Problem, seconds: float) -> float:
         """Return the local tolerance that leads to the one at the end."""
         radians = 1.0 + problem.equation.angular_frequency_per_s * seconds
-        return float(min(max(self.tolerance / (self.grows * radians), LEAST_RTOL), 1e-2))
+        return min(max(self.tolerance / (self.grows * radians), LEAST_RTOL), 1e-2)
 
     def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)

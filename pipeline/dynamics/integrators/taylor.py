@@ -21,8 +21,8 @@ from operator import mul
 import numpy as np
 
 from pipeline.dynamics.equation import Equation
-from pipeline.dynamics.integrator import Trajectory, integrate
-from pipeline.dynamics.predict import rounding_error, worst_error
+from pipeline.dynamics.integrator import Trajectory, demand_times, integrate
+from pipeline.dynamics.predict import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
@@ -52,7 +52,7 @@ class Taylor:
     def refusal(self, problem: Problem) -> str:
         """Return why not, where viscous drag is so stiff that the series would take a step for nothing."""
         eq = problem.equation
-        if np.any(eq.gamma_per_s > 1e4 * eq.angular_frequency_per_s):
+        if eq.gamma_per_s > 1e4 * eq.angular_frequency_per_s:
             return "viscous drag this stiff needs a step far below the motion's own time; take strang, exact or auto"
         return ""
 
@@ -66,17 +66,14 @@ class Taylor:
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the tolerance, or the rounding where that is more; inf for more steps than it takes."""
-
-        def of(one: Problem) -> float:
-            one, _ = one.scaled()
-            eq = one.equation
-            # Where drag outweighs the spring its own time is what a step has.
-            stiff = math.sqrt(1.0 + eq.drag_per_m * one.amplitude_m())
-            if (_fastest(one) * stiff + eq.gamma_per_s) * seconds > LONGEST * MOST_STEPS:
-                return math.inf
-            return max(self.tolerance, rounding_error(one, seconds))
-
-        return worst_error(problem, step_s, seconds, of)
+        demand_times(step_s, seconds)
+        problem, _ = problem.scaled()
+        eq = problem.equation
+        # Where drag outweighs the spring its own time is what a step has.
+        stiff = math.sqrt(1.0 + eq.drag_per_m * problem.amplitude_m())
+        if (_fastest(problem) * stiff + eq.gamma_per_s) * seconds > LONGEST * MOST_STEPS:
+            return math.inf
+        return max(self.tolerance, rounding_error(problem, seconds))
 
     def order_of(self, problem: Problem, seconds: float) -> int:
         """Return the number of terms of its series."""
@@ -118,7 +115,7 @@ def _solve(problem: Problem, apart: float, count: int, tolerance: float) -> F8:
     too_long = DynamicsError(
         f"taylor needs more than {MOST_STEPS} steps for {apart * (count - 1):g} s; take a shorter run, strang or auto"
     )
-    if fast * apart * (count - 1) > LONGEST * MOST_STEPS and not eq.has_friction:
+    if fast * apart * (count - 1) > LONGEST * MOST_STEPS and not eq.friction_m_per_s2:
         raise too_long
     row, since = 0, 0.0  # the last state kept, and the time since: a sum of short times rounds little
     for _ in range(MOST_STEPS):

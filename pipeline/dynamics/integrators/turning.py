@@ -6,11 +6,11 @@ scipy.optimize.brentq on a cosine 20, and each of its evaluations is a step.
 
 from __future__ import annotations
 
-import numpy as np
+import itertools
+from collections.abc import Iterator
 
 from pipeline.dynamics.flow import Entries, flow
 from pipeline.dynamics.problem import Problem
-from pipeline.track import F8
 
 __all__ = ["Friction"]
 
@@ -25,7 +25,6 @@ class Friction:
     Parameters
     ----------
     problem : Problem
-        Of one trajectory.
     step_s : float
         At most a radian, so that a step holds one turning point at most.
     """
@@ -43,29 +42,23 @@ class Friction:
         if self._hold > OVERWHELMING * (abs(eq.spring(self.y)) + (self._omega + self._gamma) * abs(self.v)):
             self.v, self._way = 0.0, 0
 
-    def run(self, steps: int) -> F8:
-        """Go on by so many steps, around the turning points that lie within them; return the states (steps, 2)."""
-        kept: list[float] = []
-        left = steps
-        while left and self._way:
-            left = self._straight(left, kept)
-            if left:
-                self._around()
-                kept += (self.y, self.v)
-                left -= 1
-        states = np.empty((steps, 2))
-        states[: steps - left] = np.array(kept).reshape(-1, 2)
-        states[steps - left :] = self.y, self.v
-        return states
+    def states(self) -> Iterator[float]:
+        """Yield displacement and velocity after each step, in turn, without end."""
+        while self._way:
+            yield from self._straight()
+            self._around()
+            yield self.y
+            yield self.v
+        yield from itertools.cycle((self.y, self.v))
 
-    def _straight(self, steps: int, kept: list[float]) -> int:
-        """Step until a turning point lies within the next step; return how many steps are left."""
+    def _straight(self) -> Iterator[float]:
+        """Step until a turning point lies within the next step."""
         a, b, c, d = self._half
-        way, keep = self._way, kept.append
+        way = self._way
         slow, rest = self._eq.drag_per_m * self._h, -way * self._shift
         kick, push = 0.5 * self._h * self._eq.cubic_per_m2_s2, 0.0
         y, v = self.y - rest, self.v
-        while steps:
+        while True:
             y1, v1 = a * y + b * v, c * y + d * v
             if kick:
                 push = kick * (y1 + rest) ** 3
@@ -75,11 +68,9 @@ class Friction:
             if v2 * way <= 0.0:
                 break
             y, v = a * y1 + b * v1, v2
-            keep(y + rest)
-            keep(v)
-            steps -= 1
+            yield y + rest
+            yield v
         self.y, self.v = y + rest, v
-        return steps
 
     def _around(self) -> None:
         """Make one step that holds a turning point."""

@@ -54,7 +54,7 @@ def _symmetric(eq: Equation, h: float) -> Callable[[Real, Real, Real], tuple[Rea
     stiffness, cubic = eq.angular_frequency_per_s**2, eq.cubic_per_m2_s2
     shrink = np.exp(-gamma * h)
     # The time in which quadratic drag acts, shortened by what viscous drag takes of the speed meanwhile.
-    reach = drag * np.where(np.equal(gamma, 0.0), 0.5 * h, -np.expm1(-gamma * h) / np.where(gamma, 2.0 * gamma, 1.0))
+    reach = drag * (-np.expm1(-gamma * h) / (2.0 * gamma) if gamma else 0.5 * h)
     if np.ndim(shrink) == 0:
         shrink, reach = float(shrink), float(reach)
     half = 0.5 * h
