@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
@@ -218,10 +219,14 @@ def integrate(
 
 
 def kept(states: Iterator[float], steps: int, every: int) -> F8:
-    """Return every so many of endless states (n, 2): displacement and velocity after each step, in turn."""
+    """Return every so many of the states after each step, displacement and velocity in turn: (n, 2), to their end."""
     stretch = every * max(1, STRETCH // every)
-    stretches = (min(stretch, steps - start) for start in range(0, steps, stretch))
-    parts = [np.fromiter(states, np.float64, 2 * n).reshape(n, 2)[every - 1 :: every].copy() for n in stretches]
+    parts = []
+    for start in range(0, steps, stretch):
+        found = np.fromiter(itertools.islice(states, 2 * min(stretch, steps - start)), np.float64).reshape(-1, 2)
+        parts.append(found[every - 1 :: every].copy())
+        if len(found) < stretch:
+            break
     return np.concatenate(parts)
 
 

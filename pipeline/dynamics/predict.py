@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.dynamics.amplitude import stopping_time
 from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.problem import Problem
@@ -24,9 +25,8 @@ FAR = 0.1  # of the amplitude: an error beyond it follows the power law no more
 PLAIN_SHARES = (1.0, 0.9, 0.5)  # of a pilot's step: where in it a bob turns sets the error of a method that is not told
 STIFF = 10.0  # drag over spring beyond which a pilot cannot have steps that fine all along
 MOST_STIFF_STEPS = 20_000
-FEW_PARTS = 4
 MOST_PARTS = 16  # of a step, for the truth beside it
-MOST_STEPS = 2_000_000  # of a truth in many parts
+MOST_STEPS = 4_000_000  # of a truth: a million radians
 
 
 def rounding_error(problem: Problem, seconds: float, steps: float = 0.0) -> float:
@@ -95,10 +95,13 @@ def predicted_by_pilot(
         return math.inf  # far too stiff for a method with a limit
     if fine * omega < FINE / STIFF and pilot < seconds / MOST_STIFF_STEPS:
         pilot, order = seconds / MOST_STIFF_STEPS, min(order, 1)
+    # With friction no step of the truth is longer than a radian until the bob is held.
+    held = stopping_time(start, *problem.equation.laws())
+    radians = omega * min(seconds, held) if problem.equation.friction_m_per_s2 else 0.0
     while True:
         parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
-        if parts > FEW_PARTS and seconds / pilot * parts > MOST_STEPS:
-            return math.inf  # so coarse that to see its error takes many times the run
+        if max(seconds / pilot * parts, 2.0 * radians) > MOST_STEPS:
+            return math.inf  # so coarse, or so long, that to see its error takes seconds
         shares = PLAIN_SHARES[:pilots] if plain and kinked and pilot > step_s else (1.0,)
         errors = [_largest_error(integrator, solver, problem, each * pilot, parts, seconds) / start for each in shares]
         if not plain or max(errors) <= FAR or pilot <= step_s:

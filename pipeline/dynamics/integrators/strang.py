@@ -19,6 +19,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrator import Trajectory, demand_times, integrate, kept, with_start
 from pipeline.dynamics.integrators.turning import Friction
@@ -81,7 +83,10 @@ def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8,
             f"at for turning points, got {radians:.3g}; take a shorter step"
         )
     parts = max(1, math.ceil(radians))
-    y, v = kept(Friction(problem, step_s / parts).states(), steps * parts, every * parts).T
+    bob = Friction(problem, step_s / parts)
+    moving = kept(bob.states(), steps * parts, every * parts)
+    held = np.tile((bob.y, bob.v), (steps // every - len(moving), 1))
+    y, v = np.concatenate([moving, held]).T
     return with_start(problem, y, v)
 
 

@@ -20,6 +20,7 @@ from operator import mul
 
 import numpy as np
 
+from pipeline.dynamics.amplitude import stopping_time
 from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrator import Trajectory, demand_times, integrate
 from pipeline.dynamics.predict import rounding_error
@@ -115,7 +116,9 @@ def _solve(problem: Problem, apart: float, count: int, tolerance: float) -> F8:
     too_long = DynamicsError(
         f"taylor needs more than {MOST_STEPS} steps for {apart * (count - 1):g} s; take a shorter run, strang or auto"
     )
-    if fast * apart * (count - 1) > LONGEST * MOST_STEPS and not eq.friction_m_per_s2:
+    # Beyond critical damping friction never quite stops the bob.
+    held = stopping_time(problem.amplitude_m(), *eq.laws()) if eq.gamma_per_s < eq.angular_frequency_per_s else math.inf
+    if fast * min(apart * (count - 1), held) > LONGEST * MOST_STEPS:
         raise too_long
     row, since = 0, 0.0  # the last state kept, and the time since: a sum of short times rounds little
     for _ in range(MOST_STEPS):

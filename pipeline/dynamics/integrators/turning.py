@@ -6,7 +6,6 @@ scipy.optimize.brentq on a cosine 20, and each of its evaluations is a step.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 
 from pipeline.dynamics.flow import Entries, flow
@@ -15,6 +14,7 @@ from pipeline.dynamics.problem import Problem
 __all__ = ["Friction"]
 
 OVERWHELMING = 1e9  # friction over every other force: it stops the bob before anything else acts
+UNSEEN = 1e-17  # of a length: far less than its rounding
 _CLOSE = 1e-12  # of a step: the displacement does not feel it where the velocity is 0
 _MOST = 40
 
@@ -39,17 +39,22 @@ class Friction:
         self._shift = eq.friction_m_per_s2 / eq.angular_frequency_per_s**2
         self._half = flow(self._omega, self._gamma, 0.5 * step_s)
         self._way = eq.direction(self.y, self.v)
+        # Beyond critical damping the bob never turns again: it is held once it no longer changes its place.
+        slow = self._omega * self._omega / (2.0 * self._gamma) if self._gamma > self._omega else 0.0
+        self._still = UNSEEN * slow * self._shift
         if self._hold > OVERWHELMING * (abs(eq.spring(self.y)) + (self._omega + self._gamma) * abs(self.v)):
             self.v, self._way = 0.0, 0
 
     def states(self) -> Iterator[float]:
-        """Yield displacement and velocity after each step, in turn, without end."""
+        """Yield displacement and velocity after each step, in turn, until the bob is held."""
         while self._way:
             yield from self._straight()
+            if self._still and self._moved(self._half, self._h)[1] * self._way >= 0.0:
+                self.v = 0.0
+                return
             self._around()
             yield self.y
             yield self.v
-        yield from itertools.cycle((self.y, self.v))
 
     def _straight(self) -> Iterator[float]:
         """Step until a turning point lies within the next step."""
@@ -65,7 +70,7 @@ class Friction:
                 v1 -= push
             v1 = v1 / (1.0 + slow * v1) - push if v1 > 0.0 else v1 / (1.0 - slow * v1) - push
             v2 = c * y1 + d * v1
-            if v2 * way <= 0.0:
+            if v2 * way <= self._still:
                 break
             y, v = a * y1 + b * v1, v2
             yield y + rest
