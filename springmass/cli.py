@@ -6,6 +6,7 @@ Nothing heavier than argparse is imported before a command is known, so that ``-
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 
@@ -14,26 +15,9 @@ from springmass.errors import INTERRUPTED, OK, SENSOR, SOME_FAILED, UNREADABLE, 
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
 __all__ = ["build_parser", "main"]
-
-# Command to the module that adds its arguments and does its work.
-COMMANDS = {
-    "demo": "replay, analyse and compare the bundled recordings: Table 1 in one command",
-    "analyse": "turn recordings into Table 1, findings and a report",
-    "compare": "compare several runs of one spring: do they agree, and does one damping law hold",
-    "record": "record a run from the bench, so that nothing is lost",
-    "recover": "build a run file from a wire log, however torn",
-    "replay": "play a recording back through the interface of a live sensor",
-    "simulate": "solve the equation of motion of a scene, to a tolerance or by a method of your choice",
-    "convert": "write a recording as a run file, or give back the original inside one",
-    "trade": "measure what accuracy costs on this machine: error over the bound against time",
-    "formats": "list the families of recordings, or say what a file is",
-    "sensors": "list the families of rangefinders with their rate, resolution, range and limits",
-    "ports": "list the serial ports and what speaks on them",
-    "doctor": "check this installation",
-}
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -48,30 +32,9 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"springmass {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    adders = {
-        "demo": _add_demo,
-        "analyse": _add_analyse,
-        "compare": _add_compare,
-        "record": _add_record,
-        "recover": _add_recover,
-        "replay": _add_replay,
-        "simulate": _add_simulate,
-        "convert": _add_convert,
-        "trade": _add_trade,
-        "formats": _add_formats,
-        "sensors": _add_sensors,
-        "ports": _add_ports,
-        "doctor": _add_doctor,
-    }
-    for name, summary in COMMANDS.items():
-        adders[name](
-            commands.add_parser(
-                name,
-                help=summary,
-                description=summary[0].upper() + summary[1:] + ".",
-                formatter_class=_formatter,
-            )
-        )
+    for name, (add, summary) in COMMANDS.items():
+        described = summary[0].upper() + summary[1:] + "."
+        add(commands.add_parser(name, help=summary, description=described, formatter_class=_formatter))
     return parser
 
 
@@ -298,17 +261,13 @@ def _add_recover(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="apply this to echo times instead, m/s")
 
 
-def _add_sensors(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", action="store_true", help="as JSON on stdout")
-
-
 def _add_ports(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-probe", action="store_true", help="only list the ports, open none")
     parser.add_argument("--port", action="append", default=[], metavar="P", help="listen to this address too")
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
 
 
-def _add_doctor(parser: argparse.ArgumentParser) -> None:
+def _add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
 
 
@@ -316,31 +275,27 @@ def _finite(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"must be a finite number, got {text!r}") from None
-    if value != value or value in (float("inf"), float("-inf")):
+        value = math.nan
+    if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"must be a finite number, got {text!r}")
     return value
 
 
-def _share(text: str) -> float:
-    value = _finite(text)
-    if not 0.0 <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"must lie in 0 to 1, got {text!r}")
-    return value
+def _where(holds: Callable[[float], bool], demand: str) -> Callable[[str], float]:
+    """Return the type of a number for which something holds."""
+
+    def number(text: str) -> float:
+        if not holds(value := _finite(text)):
+            raise argparse.ArgumentTypeError(f"{demand}, got {text!r}")
+        return value
+
+    return number
 
 
-def _positive(text: str) -> float:
-    value = _finite(text)
-    if value <= 0:
-        raise argparse.ArgumentTypeError(f"must be positive, got {text!r}")
-    return value
-
-
-def _not_negative(text: str) -> float:
-    value = _finite(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"must not be negative, got {text!r}")
-    return value
+_share = _where(lambda x: 0.0 <= x <= 1.0, "must lie in 0 to 1")
+_echo_share = _where(lambda x: 0.0 <= x <= 0.4, "must lie between 0 and 0.4")
+_positive = _where(lambda x: x > 0.0, "must be positive")
+_not_negative = _where(lambda x: x >= 0.0, "must not be negative")
 
 
 def _count(text: str) -> int:
@@ -350,12 +305,26 @@ def _count(text: str) -> int:
     return value
 
 
-def _echo_share(text: str) -> float:
-    value = _share(text)
-    if value > 0.4:
-        raise argparse.ArgumentTypeError(f"must lie between 0 and 0.4, got {text!r}")
-    return value
-
-
 def _speed(text: str) -> float:
-    return float("inf") if text == "max" else _positive(text)
+    return math.inf if text == "max" else _positive(text)
+
+
+# Command to what adds its arguments, and its help; the module of its name in springmass.commands does its work.
+COMMANDS = {
+    "demo": (_add_demo, "replay, analyse and compare the bundled recordings: Table 1 in one command"),
+    "analyse": (_add_analyse, "turn recordings into Table 1, findings and a report"),
+    "compare": (_add_compare, "compare several runs of one spring: do they agree, and does one damping law hold"),
+    "record": (_add_record, "record a run from the bench, so that nothing is lost"),
+    "recover": (_add_recover, "build a run file from a wire log, however torn"),
+    "replay": (_add_replay, "play a recording back through the interface of a live sensor"),
+    "simulate": (
+        _add_simulate,
+        "solve the equation of motion of a scene, to a tolerance or by a method of your choice",
+    ),
+    "convert": (_add_convert, "write a recording as a run file, or give back the original inside one"),
+    "trade": (_add_trade, "measure what accuracy costs on this machine: error over the bound against time"),
+    "formats": (_add_formats, "list the families of recordings, or say what a file is"),
+    "sensors": (_add_json, "list the families of rangefinders with their rate, resolution, range and limits"),
+    "ports": (_add_ports, "list the serial ports and what speaks on them"),
+    "doctor": (_add_json, "check this installation"),
+}
