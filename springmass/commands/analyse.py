@@ -61,6 +61,7 @@ def _wants_report(options: argparse.Namespace) -> bool:
 
 
 def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | None) -> int:
+    path = analysed.result["input"]["path"]
     if options.json:
         print(json.dumps(analysed.result, allow_nan=False), flush=True)
     else:
@@ -68,11 +69,11 @@ def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | No
     if results is not None:
         _write(analysed, results)
     if not isinstance(analysed.analysis.motion, (Oscillation, Overdamped)):
-        complain(f"{analysed.loaded.path}: no oscillation: {analysed.analysis.motion.why}")
+        complain(f"{path}: no oscillation: {analysed.analysis.motion.why}")
         return UNREADABLE
     wrong = [f["code"] for f in analysed.result["findings"] if f["severity"] == "error"]
     if options.strict and wrong:
-        complain(f"{analysed.loaded.path}: rejected under --strict: {', '.join(wrong)}")
+        complain(f"{path}: rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK
 
@@ -82,7 +83,7 @@ def _print_text(analysed: Analysed) -> None:
     from springmass.report.budgets import budget_text
     from springmass.report.tables import text_table
 
-    print(text_table([analysed.loaded.path.name], [analysed.analysis]))
+    print(text_table([analysed.name], [analysed.analysis]))
     if analysed.classic is not None:
         print(f"\n{classic_text(analysed.classic)}")
     elif told := budget_text(analysed.analysis):
@@ -92,16 +93,9 @@ def _print_text(analysed: Analysed) -> None:
 
 
 def _write(analysed: Analysed, results: Path) -> None:
-    from springmass.report.write import ReportRun, write_report
+    from springmass.report.write import write_report
 
-    run = ReportRun(analysed.loaded.path.name, analysed.analysis, analysed.result["input"], analysed.classic)
-    report = write_report(
-        results,
-        [run],
-        provenance=analysed.result["provenance"],
-        results=[analysed.result],
-    )
-    print(f"report: {report}", file=sys.stderr)
+    print(f"report: {write_report(results, [analysed])}", file=sys.stderr)
 
 
 def _parameters(options: argparse.Namespace) -> dict[str, Any]:

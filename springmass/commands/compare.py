@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 from pipeline.bench.scene import Scene
@@ -35,26 +34,28 @@ def run(options: argparse.Namespace) -> int:
     demand_one_spring(list(zip(names, scenes, strict=True)))
     time_utc = now_utc()
     parameters = _parameters(options)
-    analysed = [
-        analyse_loaded(one, scene, parameters=parameters, accuracy=options.accuracy, time_utc=time_utc)
-        for one, scene in zip(loaded, scenes, strict=True)
+    runs = [
+        analyse_loaded(one, scene, name=name, parameters=parameters, accuracy=options.accuracy, time_utc=time_utc)
+        for name, one, scene in zip(names, loaded, scenes, strict=True)
     ]
-    named = list(zip(names, analysed, strict=True))
-    compared = compare_analysed(named, mass_correlation=options.mass_correlation)
+    compared = compare_analysed(runs, mass_correlation=options.mass_correlation)
     provenance = {
         "version": __version__,
         "accuracy": options.accuracy,
         "parameters": parameters,
         "time_utc": time_utc,
     }
-    result = comparison_json(compared, named, provenance)
+    result = comparison_json(compared, runs, provenance)
     if options.json:
         print(json.dumps(result, allow_nan=False), flush=True)
     else:
-        _print_text(compared, named, result)
+        _print_text(compared, runs)
     if out is not None:
-        _write(out, compared, named, result)
-    wrong = [f"{f['code']}" for f in _all_findings(result) if f["severity"] == "error"]
+        from springmass.report.write import write_report
+
+        print(f"report: {write_report(out, runs, compared=compared, summary=result)}", file=sys.stderr)
+    findings = [*result["findings"], *(f for run in runs for f in run.result["findings"])]
+    wrong = [f["code"] for f in findings if f["severity"] == "error"]
     if options.strict and wrong:
         complain(f"rejected under --strict: {', '.join(dict.fromkeys(wrong))}")
         return REJECTED
@@ -80,36 +81,17 @@ def _scene(loaded: Loaded, given: Scene | None) -> Scene:
     return Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
 
 
-def _print_text(compared: Compared, named: list[tuple[str, Analysed]], result: dict[str, Any]) -> None:
+def _print_text(compared: Compared, runs: list[Analysed]) -> None:
     from springmass.printing import comparison_text, findings_text, wrapped
 
-    print(comparison_text(compared.comparison, [analysed.analysis for _, analysed in named]))
+    print(comparison_text(compared.comparison, [run.analysis for run in runs]))
     for joint in compared.joint:
         print(f"\n{wrapped(joint.message)}")
-    for (name, _), one in zip(named, result["runs"], strict=True):
-        grave = [f for f in one["findings"] if f["severity"] != "info"]
+    for run in runs:
+        grave = [f for f in run.result["findings"] if f["severity"] != "info"]
         if grave:
-            print(f"\n{name}:")
+            print(f"\n{run.name}:")
             print(findings_text(grave))
-
-
-def _write(out: Path, compared: Compared, named: list[tuple[str, Analysed]], result: dict[str, Any]) -> None:
-    from springmass.report.write import ReportRun, write_report
-
-    report = write_report(
-        out,
-        [ReportRun(name, analysed.analysis, analysed.result["input"]) for name, analysed in named],
-        comparison=compared.comparison,
-        joint=compared.joint,
-        summary=result,
-        provenance=result["provenance"],
-        results=result["runs"],
-    )
-    print(f"report: {report}", file=sys.stderr)
-
-
-def _all_findings(result: dict[str, Any]) -> list[dict[str, Any]]:
-    return [*result["findings"], *(f for one in result["runs"] for f in one["findings"])]
 
 
 def _parameters(options: argparse.Namespace) -> dict[str, Any]:

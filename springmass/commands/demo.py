@@ -11,7 +11,7 @@ from springmass.commands.convert import write_loaded
 from springmass.errors import OK
 from springmass.printing import findings_text
 from springmass.report.tables import text_table
-from springmass.report.write import ReportRun, write_report
+from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed, analyse_loaded, make_folder
 from springmass.runs.comparing import compare_analysed
 from springmass.runs.loading import load, read_scene, sample_data
@@ -25,25 +25,14 @@ def run(options: argparse.Namespace) -> int:
     """Replay both recordings into run files, analyse and compare them, print Table 1, write the report."""
     out = make_folder(options.out)
     analysed = [_one(name, out) for name in RUNS]
-    reports = [
-        ReportRun(name, a.analysis, a.result["input"], a.classic) for name, a in zip(RUNS, analysed, strict=True)
-    ]
-    compared = compare_analysed(list(zip(RUNS, analysed, strict=True)))
+    compared = compare_analysed(analysed)
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")
     print(text_table(RUNS, [a.analysis for a in analysed]))
-    for name, one in zip(RUNS, analysed, strict=True):
-        print(f"\n{name.capitalize()}:")
+    for one in analysed:
+        print(f"\n{one.name.capitalize()}:")
         print(findings_text(one.result["findings"]))
     print(f"\n{compared.comparison.message}")
-    report = write_report(
-        out / "demo.results",
-        reports,
-        comparison=compared.comparison,
-        joint=compared.joint,
-        provenance=analysed[0].result["provenance"],
-        results=[a.result for a in analysed],
-    )
-    print(f"\nReport: {report}")
+    print(f"\nReport: {write_report(out / 'demo.results', analysed, compared=compared)}")
     return OK
 
 
@@ -55,4 +44,4 @@ def _one(name: str, out: Path) -> Analysed:
     path = out / f"{name}.h5"
     with Replay(old.samples_in_blocks(), VirtualClock(), info=old.info, speed=None) as source:
         write_loaded(path, old, source, scene=scene.to_mapping(), overwrite=True)
-    return analyse_loaded(load(path), None, parameters={"command": "demo"})
+    return analyse_loaded(load(path), None, name=name, parameters={"command": "demo"})

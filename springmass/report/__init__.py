@@ -7,13 +7,12 @@ row of Table 1 a line in `tables`, the page `templates/report.html.j2`; no numbe
 
 from springmass.report.budgets import budget_csv, budget_text, budgets_of
 from springmass.report.figures import draw, render
-from springmass.report.html import ReportRun, render_html
+from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.tables import TableRow, results_csv, table_rows, text_table
 from springmass.report.write import write_report
 
 __all__ = [
-    "ReportRun",
     "TableRow",
     "budget_csv",
     "budget_tex",

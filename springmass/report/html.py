@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.joint import JointDamping
-from pipeline.numerics.estimate import Estimate
-from pipeline.results.classic import Classic
-from pipeline.results.compare import Comparison
+from pipeline.damping.select import Damping
+from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.track import Track
 from springmass.report.budgets import INPUTS, budgets_of
 from springmass.report.inline import inline_svg
 from springmass.report.tables import law_status, page_unit, pretty, pretty_number, table_rows
 from springmass.report.words import LETTERS, caption, verdict
+from springmass.runs.analysing import Analysed
+from springmass.runs.comparing import Compared
 
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-__all__ = ["ComparedRuns", "ReportRun", "render_html"]
+__all__ = ["render_html"]
 
 _SEVERITIES = {"error": "Error", "warning": "Warning", "info": "Note"}
 _QUALITY = {
@@ -45,64 +46,26 @@ _BIASES = {
 }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ReportRun:
-    """One run of a report.
-
-    Parameters
-    ----------
-    name : str
-    analysis : Analysis
-    input : mapping
-        What was read, to be shown as it is: path, format, sha256, kind, channel, samples, rate_hz,
-        duration_s, and ``title``, the recording's own first line, if it has one.
-    classic : Classic or None
-        The report's own method on the same run, to be set beside.
-    """
-
-    name: str
-    analysis: Analysis
-    input: Mapping[str, Any]
-    classic: Classic | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ComparedRuns:
-    """Several runs of one spring, compared.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    joint : tuple of JointDamping
-    picture : bytes
-        :func:`springmass.report.figures.comparison_figure` as SVG.
-    """
-
-    comparison: Comparison
-    joint: tuple[JointDamping, ...]
-    picture: bytes
-
-
 def render_html(
-    runs: Sequence[ReportRun],
+    runs: Sequence[Analysed],
     pictures: Sequence[Mapping[str, bytes]],
     *,
-    compared: ComparedRuns | None = None,
+    compared: Compared | None = None,
+    overview: bytes = b"",
     provenance: Mapping[str, Any],
-    quality: Sequence[Mapping[str, int]] | None = None,
 ) -> str:
     """Return the report as one self-contained page.
 
     Parameters
     ----------
-    runs : sequence of ReportRun
+    runs : sequence of Analysed
     pictures : sequence of mapping of str to bytes
         SVG files by figure name, one mapping a run.
-    compared : ComparedRuns, optional
+    compared : Compared, optional
+    overview : bytes
+        :func:`springmass.report.figures.comparison_figure` as SVG, where runs were compared.
     provenance : mapping
         Shown as it is, nested mappings flattened.
-    quality : sequence of mapping of str to int, optional
-        Counts to show in place of ``Analysis.quality``, one mapping a run.
 
     Notes
     -----
@@ -113,27 +76,23 @@ def render_html(
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"pretty": pretty, "number": pretty_number, "symbol": _symbol, "input": INPUTS.__getitem__}
     source = files("springmass.report").joinpath("templates/report.html.j2").read_text(encoding="utf-8")
-    counts = quality or [run.analysis.quality for run in runs]
-    parts = [
-        _part(i, run, drawn, counted)
-        for i, (run, drawn, counted) in enumerate(zip(runs, pictures, counts, strict=True))
-    ]
+    parts = [_part(i, run, drawn) for i, (run, drawn) in enumerate(zip(runs, pictures, strict=True))]
     return environment.from_string(source).render(
         title=", ".join(run.name for run in runs),
         parts=parts,
         rows=table_rows([run.analysis for run in runs]),
-        compared=None if compared is None else _compared(compared),
+        compared=None if compared is None else _compared(compared, overview),
         provenance=list(_flattened(provenance)),
     )
 
 
-def _part(index: int, run: ReportRun, pictures: Mapping[str, bytes], quality: Mapping[str, int]) -> dict[str, Any]:
+def _part(index: int, run: Analysed, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     """Everything that the template says of one run."""
-    analysis = run.analysis
+    analysis, quality, given = run.analysis, run.result["quality"], run.result["input"]
     motion = analysis.motion
     return {
         "name": run.name,
-        "subtitle": _subtitle(run),
+        "subtitle": _subtitle(given, analysis.track),
         "kind": analysis.track.kind,
         "findings": _findings(analysis),
         "verdict": verdict(analysis),
@@ -141,13 +100,13 @@ def _part(index: int, run: ReportRun, pictures: Mapping[str, bytes], quality: Ma
             {"name": name, "svg": inline_svg(svg, f"{name}{index}-"), "caption": caption(name, analysis)}
             for name, svg in pictures.items()
         ],
-        "laws": _laws(motion) if isinstance(motion, Oscillation) else None,
+        "laws": _laws_of(motion.damping) if isinstance(motion, Oscillation) else None,
         "budgets": budgets_of(analysis),
         "effects": analysis.effects,
         "quality": [(_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in _ordered(quality)],
         "classic": _classic_rows(run),
         "chi2": None if run.classic is None else run.classic.chi2,
-        "input": list(_flattened(run.input)),
+        "input": list(_flattened(given)),
     }
 
 
@@ -155,8 +114,7 @@ def _ordered(quality: Mapping[str, int]) -> list[str]:
     return [name for name in _QUALITY if name in quality] + [name for name in quality if name not in _QUALITY]
 
 
-def _subtitle(run: ReportRun) -> str:
-    given, track = run.input, run.analysis.track
+def _subtitle(given: Mapping[str, Any], track: Track) -> str:
     duration_s = float(track.t[-1] - track.t[0])
     parts = [
         given.get("format"),
@@ -175,22 +133,32 @@ def _findings(analysis: Analysis) -> list[dict[str, str]]:
     ]
 
 
-def _laws(motion: Oscillation) -> dict[str, Any]:
-    damping = motion.damping
-    units = {
-        name: unit for fit in damping.fits.values() for name, unit in zip(fit.joint.names, fit.joint.units, strict=True)
-    }
+def _laws_of(damping: Damping) -> dict[str, Any]:
+    fitted = {law: fit.joint for law, fit in damping.fits.items()}
+    return _laws(damping, fitted, lambda law: law_status(damping, law))
+
+
+def _laws_across(joint: JointDamping) -> dict[str, Any]:
+    fitted = {law: fit.coefficients for law, fit in joint.fits.items()}
+    return {"message": joint.message, **_laws(joint, fitted, lambda law: _joint_status(joint, law))}
+
+
+def _laws(found: Damping | JointDamping, fitted: Mapping[str, Joint], status: Callable[[str], str]) -> dict[str, Any]:
+    """Lay out every law tried: what was fitted, how well, and what became of it."""
+    units = {name: unit for joint in fitted.values() for name, unit in zip(joint.names, joint.units, strict=True)}
     rows = [
         {
             "name": law,
-            "cells": [_bare(fit.joint[name]) if name in fit.joint.names else None for name in units],
+            "cells": [_bare(fitted[law][name]) if name in fitted[law].names else None for name in units],
             "fit": fit,
-            "bic": _difference(fit.bic - damping.best.bic),
-            "status": law_status(damping, law),
+            "bic": _difference(fit.bic - found.best.bic),
+            "status": status(law),
+            "look": "selected" if status(law) == "selected" else "rejected" if fit.rejected else "",
         }
-        for law, fit in damping.fits.items()
+        for law, fit in found.fits.items()
     ]
-    return {"heads": _heads(units), "rows": rows}
+    heads = [LETTERS.get(name, name) + (f" / {page_unit(unit)}" if unit else "") for name, unit in units.items()]
+    return {"heads": heads, "rows": rows}
 
 
 def _bare(estimate: Estimate) -> Estimate:
@@ -201,7 +169,7 @@ def _difference(bic: float) -> str:
     return pretty_number(bic) if abs(bic) >= 1000.0 else f"{bic:.1f}".replace("-", "−")
 
 
-def _classic_rows(run: ReportRun) -> list[dict[str, Any]] | None:
+def _classic_rows(run: Analysed) -> list[dict[str, Any]] | None:
     if run.classic is None:
         return None
     words = {row.name: row for row in table_rows([run.analysis])}
@@ -216,34 +184,15 @@ def _classic_rows(run: ReportRun) -> list[dict[str, Any]] | None:
     ]
 
 
-def _compared(compared: ComparedRuns) -> dict[str, Any]:
+def _compared(compared: Compared, overview: bytes) -> dict[str, Any]:
     """Everything that the template says of the comparison."""
     found = compared.comparison
     return {
         "found": found,
         "rows": list(zip(found.names, found.each, found.pulls, strict=True)),
-        "figure": inline_svg(compared.picture, "comparison-"),
-        "joint": [_joint(joint) for joint in compared.joint],
+        "figure": inline_svg(overview, "comparison-"),
+        "joint": [_laws_across(joint) for joint in compared.joint],
     }
-
-
-def _joint(joint: JointDamping) -> dict[str, Any]:
-    units = {
-        name: unit
-        for fit in joint.fits.values()
-        for name, unit in zip(fit.coefficients.names, fit.coefficients.units, strict=True)
-    }
-    rows = [
-        {
-            "name": law,
-            "verdict": _joint_status(joint, law),
-            "cells": [_bare(fit.coefficients[name]) if name in fit.coefficients.names else None for name in units],
-            "fit": fit,
-            "bic": _difference(fit.bic - joint.best.bic),
-        }
-        for law, fit in joint.fits.items()
-    ]
-    return {"message": joint.message, "heads": _heads(units), "rows": rows}
 
 
 def _joint_status(joint: JointDamping, law: str) -> str:
@@ -253,10 +202,6 @@ def _joint_status(joint: JointDamping, law: str) -> str:
     if law == joint.selected:
         return "selected"
     return "admissible" if law in joint.admissible else "unlikely"
-
-
-def _heads(units: Mapping[str, str]) -> list[str]:
-    return [LETTERS.get(name, name) + (f" / {page_unit(unit)}" if unit else "") for name, unit in units.items()]
 
 
 def _flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:

@@ -8,31 +8,28 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from pipeline.damping.joint import JointDamping
-from pipeline.results.compare import Comparison
 from springmass.report.budgets import budget_csv
 from springmass.report.figures import MAKERS, comparison_figure, draw, render
-from springmass.report.html import ComparedRuns, ReportRun, render_html
+from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.tables import results_csv
+from springmass.runs.analysing import Analysed
+from springmass.runs.comparing import Compared
 from springmass.runs.json_results import plain
 from storage.atomic import write_whole
 
-__all__ = ["ReportRun", "write_report"]
+__all__ = ["write_report"]
 
 _KINDS: tuple[Literal["svg"], Literal["pdf"]] = ("svg", "pdf")
 
 
 def write_report(
     directory: Path,
-    runs: Sequence[ReportRun],
+    runs: Sequence[Analysed],
     *,
-    comparison: Comparison | None = None,
-    joint: Sequence[JointDamping] = (),
+    compared: Compared | None = None,
     summary: Mapping[str, Any] | None = None,
-    provenance: Mapping[str, Any],
-    results: Sequence[Mapping[str, Any]],
 ) -> Path:
     """Write the report of one run or of several side by side.
 
@@ -40,18 +37,13 @@ def write_report(
     ----------
     directory : Path
         Usually ``NAME.results``; made if it is not there, files of an earlier report are replaced.
-    runs : sequence of ReportRun
+    runs : sequence of Analysed
         One at least.
-    comparison : Comparison, optional
-        Of the runs' spring constants; drawn and tabulated.
-    joint : sequence of JointDamping
-        Damping laws fitted across runs.
+    compared : Compared, optional
+        The runs' spring constants and common damping laws; drawn and tabulated.
     summary : mapping, optional
-        What ``results.json`` holds in place of the results.
-    provenance : mapping
-        Version, parameters, command, time: whatever says how to make this report again.
-    results : sequence of mapping
-        One JSON object a run, in the runs' order; their ``quality`` goes into the page.
+        What ``results.json`` holds in place of the runs' results. Its ``provenance``, else the first run's, goes into
+        the page: version, parameters, time, whatever says how to make this report again.
 
     Returns
     -------
@@ -61,7 +53,7 @@ def write_report(
     Raises
     ------
     ValueError
-        If there is no run, or there are not as many results as runs.
+        If there is no run.
     storage.errors.WriteFailed
         If a file cannot be written.
 
@@ -73,8 +65,8 @@ def write_report(
     where there are several.
     The same arguments give the same bytes.
     """
-    if not runs or len(runs) != len(results):
-        raise ValueError(f"a report needs one run at least and one result for each, got {len(runs)} and {len(results)}")
+    if not runs:
+        raise ValueError("a report needs one run at least, got none")
     directory = Path(directory)
     (directory / "figures").mkdir(parents=True, exist_ok=True)
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
@@ -87,20 +79,20 @@ def write_report(
         motion = directory / f"{stem}motion.csv"
         _put(motion, None if isinstance(smoothed, str) else motion_csv(run.analysis, smoothed))
         pictures.append({name: files["svg"] for name, files in drawn.items()})
+    results = [run.result for run in runs]
     content = plain(summary if summary is not None else results[0] if len(results) == 1 else results)
     write_whole(directory / "results.json", json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
     write_whole(directory / "results.csv", results_csv(names, analyses))
     write_whole(directory / "table.tex", table_tex(names, analyses))
     write_whole(directory / "budget.csv", budget_csv(names, analyses))
     write_whole(directory / "budget.tex", budget_tex(names, analyses))
-    counts = [{**run.analysis.quality, **result.get("quality", {})} for run, result in zip(runs, results, strict=True)]
-    compared = None
-    if comparison is not None:
-        overview = {kind: render(comparison_figure(comparison), kind) for kind in _KINDS}
+    overview = {}
+    if compared is not None:
+        overview = {kind: render(comparison_figure(compared.comparison), kind) for kind in _KINDS}
         for kind, data in overview.items():
             write_whole(directory / "figures" / f"comparison.{kind}", data)
-        compared = ComparedRuns(comparison, tuple(joint), overview["svg"])
-    page = render_html(runs, pictures, compared=compared, provenance=provenance, quality=counts)
+    provenance = (summary or results[0])["provenance"]
+    page = render_html(runs, pictures, compared=compared, overview=overview.get("svg", b""), provenance=provenance)
     return write_whole(directory / "report.html", page)
 
 

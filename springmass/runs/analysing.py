@@ -21,21 +21,23 @@ __all__ = ["Analysed", "analyse_loaded", "distinct_names", "make_folder", "now_u
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysed:
-    """One input with everything that was made of it.
+    """One input with everything that was made of it, ready for a report.
 
     Parameters
     ----------
-    loaded : Loaded
+    name : str
     analysis : Analysis
-    classic : Classic or None
-    result : dict
-        As printed under ``--json``.
+    result : mapping
+        As printed under ``--json``. A report shows its ``input`` as it is, and with it ``title``, the recording's own
+        first line, if it has one.
+    classic : Classic, optional
+        The lab report's own method on the same input, to be set beside.
     """
 
-    loaded: Loaded
+    name: str
     analysis: Analysis
-    classic: Classic | None
-    result: dict[str, Any]
+    result: Mapping[str, Any]
+    classic: Classic | None = None
 
 
 def analyse_loaded(
@@ -43,6 +45,7 @@ def analyse_loaded(
     scene: Scene | None,
     *,
     parameters: Mapping[str, Any],
+    name: str = "",
     accuracy: str = "standard",
     with_classic: bool = False,
     time_utc: str | None = None,
@@ -56,6 +59,8 @@ def analyse_loaded(
         None: the scene that a run file carries, if any.
     parameters : mapping
         Options as resolved, stored with the result.
+    name : str
+        Left out, the file's.
     accuracy : {"fast", "standard", "best"}
         Tier.
     with_classic : bool
@@ -79,7 +84,7 @@ def analyse_loaded(
         parameters={**parameters, "scene": scene.to_mapping()},
         classic=by_classic,
     )
-    return Analysed(loaded, analysis, by_classic, result)
+    return Analysed(name or loaded.path.name, analysis, result, by_classic)
 
 
 def distinct_names(paths: Sequence[str]) -> list[str]:

@@ -68,12 +68,12 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
             )
 
 
-def compare_analysed(named: Sequence[tuple[str, Analysed]], *, mass_correlation: float = 0.0) -> Compared:
+def compare_analysed(runs: Sequence[Analysed], *, mass_correlation: float = 0.0) -> Compared:
     """Compare analysed runs of one spring.
 
     Parameters
     ----------
-    named : sequence of (name, Analysed)
+    runs : sequence of Analysed
         Two at least.
     mass_correlation : float
         Of the errors of two bobs' masses, 0 to 1.
@@ -83,36 +83,34 @@ def compare_analysed(named: Sequence[tuple[str, Analysed]], *, mass_correlation:
     AnalysisError
         If a run does not oscillate or has no bob mass.
     """
-    motions = [(name, _moving(name, analysed)) for name, analysed in named]
+    motions = [(run.name, _moving(run)) for run in runs]
     shares = [m.derived.spring_share_kg for _, m in motions if m.derived.spring_share_kg is not None]
     comparison = compare_springs(
         [
-            SpringRun.of(name, motion.derived, clock=analysed.analysis.track.clock)
-            for (name, motion), (_, analysed) in zip(motions, named, strict=True)
+            SpringRun.of(name, motion.derived, clock=run.analysis.track.clock)
+            for (name, motion), run in zip(motions, runs, strict=True)
         ],
         shared_mass_kg=shares[0] if shares else None,
         mass_correlation=mass_correlation,
     )
     joint = tuple(
         fit_joint([(name, motion.demodulated, motion.damping) for name, motion in group])
-        for group in _of_one_bob(motions, [analysed.analysis.scene for _, analysed in named])
+        for group in _of_one_bob(motions, [run.analysis.scene for run in runs])
     )
     return Compared(comparison, joint, tuple(_findings(comparison, joint)))
 
 
-def comparison_json(
-    compared: Compared, named: Sequence[tuple[str, Analysed]], provenance: Mapping[str, Any]
-) -> dict[str, Any]:
+def comparison_json(compared: Compared, runs: Sequence[Analysed], provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Return a comparison as JSON-able mapping; numbers that are not finite are None.
 
     Parameters
     ----------
     compared : Compared
-    named : sequence of (name, Analysed)
+    runs : sequence of Analysed
     provenance : mapping
     """
     found = compared.comparison
-    derived = [_moving(name, analysed).derived for name, analysed in named]
+    derived = [_moving(run).derived for run in runs]
     each = zip(found.names, derived, found.each, found.own_u, found.pulls, strict=True)
     numbers = ("chi2", "dof", "largest_deviation", "exchanged", "exchanged_chi2", "message")
     content = {
@@ -141,16 +139,16 @@ def comparison_json(
             for joint in compared.joint
         ],
         "findings": compared.findings,
-        "runs": [analysed.result for _, analysed in named],
+        "runs": [run.result for run in runs],
         "provenance": provenance,
     }
     return {key: plain(value) for key, value in content.items()}
 
 
-def _moving(name: str, analysed: Analysed) -> Oscillation:
-    motion = analysed.analysis.motion
+def _moving(run: Analysed) -> Oscillation:
+    motion = run.analysis.motion
     if not isinstance(motion, Oscillation):
-        raise AnalysisError(f"{name}: no oscillation to compare: {motion.why}")
+        raise AnalysisError(f"{run.name}: no oscillation to compare: {motion.why}")
     return motion
 
 

@@ -23,7 +23,6 @@ from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.results.findings import Finding
 from pipeline.track import UNUSABLE, Track
 from springmass.report import (
-    ReportRun,
     budget_csv,
     budget_tex,
     budget_text,
@@ -43,6 +42,8 @@ from springmass.report.inline import inline_svg
 from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.tables import law_status, pretty, pretty_number
 from springmass.report.words import caption
+from springmass.runs.analysing import Analysed
+from springmass.runs.comparing import Compared
 
 PROVENANCE = {"version": "0.1.0", "parameters": {"cycles": {"false_alarm": 1e-6}}, "command": "analyse <run>"}
 SCENE = Scene(
@@ -88,20 +89,20 @@ def still() -> Analysis:
     return analyse(Track.from_arrays(t, 0.3 + 1e-4 * rng.standard_normal(800)))
 
 
-def run_of(analysis: Analysis, name: str = "run", **given: Any) -> ReportRun:
+def run_of(analysis: Analysis, name: str = "run", **given: Any) -> Analysed:
     """Return a run as a caller hands it over."""
-    return ReportRun(name, analysis, {"path": f"{name}.txt", "format": "csv", **given})
+    read = {"path": f"{name}.txt", "format": "csv", **given}
+    return Analysed(name, analysis, {"input": read, "quality": analysis.quality, "provenance": PROVENANCE})
 
 
-def written(directory: Path, *runs: ReportRun, **options: Any) -> str:
+def written(directory: Path, *runs: Analysed, **options: Any) -> str:
     """Write a report and return its page."""
-    options.setdefault("results", [{"quality": run.analysis.quality} for run in runs])
-    page = write_report(directory, runs, provenance=PROVENANCE, **options)
+    page = write_report(directory, runs, **options)
     assert page == directory / "report.html"
     return page.read_text("utf-8")
 
 
-def page_of(*runs: ReportRun) -> str:
+def page_of(*runs: Analysed) -> str:
     """Return the page without its figures, which take most of the time."""
     return render_html(runs, [{} for _ in runs], provenance=PROVENANCE)
 
@@ -322,15 +323,19 @@ def test_page_numbers_are_typeset() -> None:
 
 def test_json_is_strict(tmp_path: Path) -> None:
     """What is no number becomes null, numpy's numbers plain ones; one run gives an object, several a list."""
-    result = {"a": float("nan"), "b": [np.float64("inf"), np.int64(3), np.bool_(True)], "c": Path("x"), "d": None}
-    written(tmp_path / "one", run_of(still()), results=[result])
+    run, odd = (
+        run_of(still()),
+        {"a": float("nan"), "b": [np.float64("inf"), np.int64(3), np.bool_(True)], "c": Path("x"), "d": None},
+    )
+    written(tmp_path / "one", dataclasses.replace(run, result={**run.result, **odd}))
 
     def refuse(constant: str) -> None:
         raise AssertionError(f"{constant} is not JSON")
 
     text = (tmp_path / "one/results.json").read_text("utf-8")
-    assert json.loads(text, parse_constant=refuse) == {"a": None, "b": [None, 3, True], "c": "x", "d": None}
-    written(tmp_path / "two", run_of(still(), "a"), run_of(still(), "b"), results=[result, {}])
+    found = json.loads(text, parse_constant=refuse)
+    assert {key: found[key] for key in odd} == {"a": None, "b": [None, 3, True], "c": "x", "d": None}
+    written(tmp_path / "two", run_of(still(), "a"), run_of(still(), "b"))
     assert len(json.loads((tmp_path / "two/results.json").read_text("utf-8"))) == 2
 
 
@@ -381,7 +386,7 @@ def test_several_runs_stand_side_by_side(tmp_path: Path) -> None:
     mass = Estimate(0.2176, 5e-5, "kg")
     springs = [SpringRun(run.name, run.analysis.estimates["angular_frequency"], mass) for run in runs]
     comparison = compare_springs(springs)
-    page = written(tmp_path, *runs, comparison=comparison)
+    page = written(tmp_path, *runs, compared=Compared(comparison, (), ()))
     assert page.count("<th>same</th>") >= 2
     assert page.count("Phase plot") == 2
     assert html.escape(comparison.message.replace("+-", "±")) in page
@@ -445,8 +450,8 @@ def test_inlining_leaves_the_text_of_a_figure_alone() -> None:
     assert "<?xml" not in element
 
 
-def test_a_report_needs_a_result_for_each_run(tmp_path: Path) -> None:
-    """Runs and results that do not match are refused before anything is written."""
-    with pytest.raises(ValueError, match="one result for each"):
-        write_report(tmp_path / "x", [run_of(still())], provenance={}, results=[])
+def test_a_report_needs_a_run(tmp_path: Path) -> None:
+    """Nothing to report is refused before anything is written."""
+    with pytest.raises(ValueError, match="one run at least"):
+        write_report(tmp_path / "x", [])
     assert not (tmp_path / "x").exists()
