@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pipeline.analyse import Params
+from pipeline.analyse import STANDARD, Params
 from pipeline.damping.select import Params as DampingParams
 from pipeline.errors import AnalysisError
 from pipeline.motion.waveform_fit import Params as WaveformParams
@@ -13,7 +13,6 @@ from pipeline.oscillation.disturbances import Params as DisturbancesParams
 __all__ = ["PRESETS", "TIERS", "params_for"]
 
 FAST_LAWS = ("none", "linear", "quadratic", "linear+quadratic")
-STANDARD = Params()
 PRESETS = {
     "fast": replace(
         STANDARD,

@@ -42,7 +42,7 @@ from pipeline.results.sample_findings import count_quality, find_clusters, judge
 from pipeline.results.scene_findings import judge_scene
 from pipeline.track import U8, Track
 
-__all__ = ["Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]
+__all__ = ["STANDARD", "Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,6 +67,9 @@ class Params:
     full: fullfits.Params | None = None
     relaxation: relaxations.Params = field(default_factory=relaxations.Params)
     motion: equations.Params = field(default_factory=equations.Params)
+
+
+STANDARD = Params()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,7 +212,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     0.757010 +- 0.000022 s
     """
     track.demand_length()
-    scene, params = scene or Scene(), params or Params()
+    scene, params = scene or Scene(), params or STANDARD
     if track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     conditioned = condition(track, params.condition)

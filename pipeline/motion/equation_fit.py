@@ -12,22 +12,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.damping.laws import LAWS
+from pipeline.damping.laws import LAWS, Drag
 from pipeline.damping.select import Damping
 from pipeline.damping.select import Params as DampingParams
 from pipeline.motion.equation_model import STATE
-from pipeline.motion.equation_search import Search, fittable, stop_row
+from pipeline.motion.equation_search import Search
 from pipeline.motion.phase import PhaseFit, wrapped
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.track import U8, Quality
+from pipeline.track import F8, U8, Quality
 
 __all__ = ["EquationFit", "EquationMisfit", "Params", "fit_equation", "moving_part"]
 
 STATE_UNITS = ("m", "m", "m/s", "rad/s")
+BLOCK = 25  # samples over which a bob is seen to move or not
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +134,7 @@ def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
 
     A bob that friction stops early leaves a record in whose spectrum the oscillation drowns.
     """
-    if (stop := stop_row(conditioned)) is None:
+    if (stop := _stop_row(conditioned)) is None:
         return None
     rows = np.flatnonzero(conditioned.used)
     if not np.count_nonzero(rows < stop) < share * rows.size:
@@ -141,6 +142,31 @@ def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
     track = conditioned.track
     cut = replace(track, t=track.t[:stop], y=track.y[:stop], flags=track.flags[:stop], velocity=None)
     return replace(conditioned, track=cut, flags=conditioned.flags[:stop])
+
+
+def _stop_row(conditioned: Conditioned) -> int | None:
+    """Index of the sample by which the bob has stopped for good; None where it moves to the end, or never."""
+    rows = np.flatnonzero(conditioned.used)
+    count = rows.size // BLOCK
+    if count < 8 or not conditioned.noise_m > 0.0:
+        return None
+    y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
+    noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)
+    end = float(np.median(y[blocks[-max(count // 10, 2) :]]))
+    # Most bobs move at the end of their record, and the last blocks say so.
+    if _away(y[blocks[-4:]], end).max() > 2.0 * noise:
+        return None
+    moving = np.flatnonzero(_away(y[blocks], end) > 2.0 * noise)
+    # A few blocks that deep noise lifts are no motion: of those before the stop a share must stand off.
+    if moving.size < 3 or moving.size < 0.3 * (moving[-1] + 1):
+        return None
+    return int(blocks[int(moving[-1]) + 2, 0])
+
+
+def _away(blocks: F8, end: float) -> F8:
+    """Median distance of each block's samples from where the record ends, m."""
+    # The middle one of an odd number; the library's median takes ten times as long for a few blocks.
+    return np.asarray(np.partition(np.abs(blocks - end), BLOCK // 2, axis=1)[:, BLOCK // 2])
 
 
 def fit_equation(
@@ -185,9 +211,10 @@ def fit_equation(
     """
     params, laws = params or Params(), laws or DampingParams()
     ratio = damping.best.rate_at_start() / demodulated.angular_frequency
-    if not _required(damping, demodulated, ratio, params, stopped=stopped):
+    names = _fittable(damping)
+    if not names or not _required(damping, demodulated, ratio, params, stopped=stopped):
         return None
-    search = Search.of(conditioned, demodulated, damping, params.clip_sigmas)
+    search = Search.of(conditioned, demodulated, damping, names, _stop_row(conditioned), params.clip_sigmas)
     search.clean()
     if not search.noise_m <= params.misfit * search.expected_m:
         return EquationMisfit(
@@ -204,9 +231,13 @@ def fit_equation(
     return found
 
 
+def _fittable(damping: Damping) -> list[str]:
+    """Names of the laws to be fitted that have an equation of motion, the richest last."""
+    names = [n for n in LAWS if (n in damping.fits or n in damping.unfitted) and isinstance(LAWS[n], Drag)]
+    return sorted((n for n in names if n != "none"), key=lambda name: len(LAWS[name].parameters))
+
+
 def _required(damping: Damping, demodulated: Demodulated, ratio: float, params: Params, *, stopped: bool) -> bool:
-    if not fittable(damping):
-        return False
     if stopped or ratio > params.always:
         return True
     if damping.selected in ("none", "linear"):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.damping.evidence import choose, least_chi2, weigh
-from pipeline.damping.laws import LAWS, Drag
+from pipeline.damping.laws import LAWS
 from pipeline.damping.minimum import Minimum
 from pipeline.damping.select import Damping, LawFit
 from pipeline.damping.select import Params as DampingParams
@@ -22,60 +22,50 @@ from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, UNUSABLE
 
-__all__ = ["Search", "fittable", "stop_row"]
+__all__ = ["Search"]
 
 NAMES = (*STATE, *COEFFICIENTS)
 PRECISION = 0.01  # of the standard uncertainties, at which a fit stops
 FEW = 6  # windows under which the laws of the amplitude say too little to start from
 COARSE, ROUGH, FIRST_STEPS = 0.2, 0.1, 12  # step in rad, precision and most steps while a start is looked for
 HOPELESS = 1000.0  # rise of chi-square, to first order, from which a law is not fitted any more
-BLOCK = 25  # samples over which a bob is seen to move or not
-
-
-def stop_row(conditioned: Conditioned) -> int | None:
-    """Index of the sample by which the bob has stopped for good; None where it moves to the end, or never."""
-    rows = np.flatnonzero(conditioned.used)
-    count = rows.size // BLOCK
-    if count < 8 or not conditioned.noise_m > 0.0:
-        return None
-    y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
-    noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)
-    end = float(np.median(y[blocks[-max(count // 10, 2) :]]))
-    # Most bobs move at the end of their record, and the last blocks say so.
-    if _away(y[blocks[-4:]], end).max() > 2.0 * noise:
-        return None
-    moving = np.flatnonzero(_away(y[blocks], end) > 2.0 * noise)
-    # A few blocks that deep noise lifts are no motion: of those before the stop a share must stand off.
-    if moving.size < 3 or moving.size < 0.3 * (moving[-1] + 1):
-        return None
-    return int(blocks[int(moving[-1]) + 2, 0])
-
-
-def _away(blocks: F8, end: float) -> F8:
-    """Median distance of each block's samples from where the record ends, m."""
-    # The middle one of an odd number; the library's median takes ten times as long for a few blocks.
-    return np.asarray(np.partition(np.abs(blocks - end), BLOCK // 2, axis=1)[:, BLOCK // 2])
-
-
-def fittable(damping: Damping) -> list[str]:
-    """Names of the laws to be fitted that have an equation of motion, the richest last."""
-    names = [n for n in LAWS if (n in damping.fits or n in damping.unfitted) and isinstance(LAWS[n], Drag)]
-    return sorted((n for n in names if n != "none"), key=lambda name: len(LAWS[name].parameters))
 
 
 class Search:
-    """One record: what is compared, and with which samples."""
+    """One record: what is compared, and with which samples.
 
-    def __init__(self, conditioned: Conditioned, used: NDArray[np.bool_], damping: Damping, theta: F8) -> None:
-        self.conditioned, self.damping = conditioned, damping
-        self.richest = fittable(damping)[-1]
+    Parameters
+    ----------
+    conditioned : Conditioned
+    used : (n,) bool
+        The samples to begin with.
+    damping : Damping
+        The laws of the amplitude.
+    theta : (7,) float64
+        Rest position, displacement, velocity, angular frequency and the coefficients to begin with.
+    laws : list of str
+        Names of the laws to be fitted, the richest last.
+    stop : int or None
+        Index of the sample by which the bob has stopped for good.
+    """
+
+    def __init__(
+        self,
+        conditioned: Conditioned,
+        used: NDArray[np.bool_],
+        damping: Damping,
+        theta: F8,
+        laws: list[str],
+        stop: int | None,
+    ) -> None:
+        self.conditioned, self.damping, self.laws = conditioned, damping, laws
+        self.richest = laws[-1]
         self.theta = theta
         quantum = (conditioned.quantum_m or 0.0) / math.sqrt(12.0)
         floor = 1e-9 * float(np.hypot(theta[1], theta[2] / theta[3]))
         self.expected_m = self.noise_m = max(conditioned.noise_m, quantum, floor)
         self.clip_sigmas, self.step = 4.0, STEP
         # Samples of a bob at rest show noise alone, and in their number hide what the moving ones do not fit.
-        stop = stop_row(conditioned)
         self.stopped = stop is not None
         self.within = conditioned.used & (np.arange(used.size) < (used.size if stop is None else stop))
         self.used = used & self.within
@@ -86,7 +76,15 @@ class Search:
         self.size_m = float(np.hypot(theta[1], theta[2] / theta[3]))
 
     @classmethod
-    def of(cls, conditioned: Conditioned, demodulated: Demodulated, damping: Damping, clip_sigmas: float) -> Search:
+    def of(
+        cls,
+        conditioned: Conditioned,
+        demodulated: Demodulated,
+        damping: Damping,
+        laws: list[str],
+        stop: int | None,
+        clip_sigmas: float,
+    ) -> Search:
         """Start from the windows: of their false echoes, those that the model explains come back later."""
         omega, first = demodulated.angular_frequency, damping.best.joint.values[0]
         angle = float(demodulated.phase[0]) - omega * (float(demodulated.t[0]) - damping.t0)
@@ -96,6 +94,8 @@ class Search:
             (demodulated.flags & UNUSABLE) == 0,
             damping,
             np.array([rest, first * math.cos(angle), -first * omega * math.sin(angle), omega, 0.0, 0.0, 0.0]),
+            laws,
+            stop,
         )
         task.clip_sigmas = clip_sigmas
         task.step = COARSE
@@ -106,7 +106,7 @@ class Search:
     def first(self, demodulated: Demodulated) -> F8:
         """Return the richest law's fit from the best two of what the amplitude's laws, or a grid of them, say."""
         starts = []
-        for name in fittable(self.damping):
+        for name in self.laws:
             law, fit = LAWS[name], self.damping.fits.get(name)
             if fit is None and demodulated.t.size < len(law.parameters):
                 continue
@@ -140,7 +140,7 @@ class Search:
         start = theta.copy()
         start[len(STATE) :] = 0.0
         start[slot] = float(np.maximum(theta[len(STATE) :], 0.0) @ share)
-        names = [n for n in fittable(self.damping) if "mu" in LAWS[n].parameters and n != self.richest]
+        names = [n for n in self.laws if "mu" in LAWS[n].parameters and n != self.richest]
         return [self.full(name, self.fit(name, start, ROUGH, FIRST_STEPS).values) for name in names]
 
     def exchanged(self, theta: F8) -> list[F8]:
@@ -232,13 +232,13 @@ class Search:
 
     def choose(self, laws: DampingParams) -> tuple[Damping, least_squares.Fit] | None:
         """Fit every law and choose among them; None where no fit converged."""
-        unfitted = {n: "it has no equation of motion" for n in self.damping.fits if n not in fittable(self.damping)}
+        unfitted = {n: "it has no equation of motion" for n in self.damping.fits if n not in self.laws}
         whole = self.fit(self.richest, self.theta)
         # Where the richest law ended at a term that drives, say, the way from there to the others is no straight one.
         own = self.weigh({self.richest: whole}, laws) if np.all(np.isfinite(whole.covariance)) else {}
         holds = bool(own) and not own[self.richest].rejected
         fits: dict[str, least_squares.Fit] = {}
-        for name in reversed(fittable(self.damping)):
+        for name in reversed(self.laws):
             start, rise = self.without(name, whole) if holds else (self.full(self.richest, whole.values), 0.0)
             if rise > HOPELESS * self.correlation:
                 unfitted[name] = f"in the equation of motion it would raise chi-square by about {rise:.2g}"
