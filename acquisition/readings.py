@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from acquisition.block import F8, I8, U8, Flag
 
-__all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "Readings", "join"]
+__all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "Readings"]
 
 NAN = math.nan
 
@@ -103,8 +101,3 @@ class Readings(tuple[Reading, ...]):
 
 NO_READINGS = Readings()
 """What a decoder returns where no frame was completed."""
-
-
-def join(parts: Iterable[Readings]) -> Readings:
-    """Return readings one after the other as one."""
-    return Readings(chain.from_iterable(parts))

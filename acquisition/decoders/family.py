@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
 from acquisition.errors import SensorError
@@ -145,17 +145,5 @@ class Family:
 
     def describe(self) -> dict[str, Any]:
         """Return what ``springmass sensors --json`` prints."""
-        return {
-            "name": self.name,
-            "title": self.title,
-            "baud": self.baud,
-            "rate_hz": self.rate_hz,
-            "resolution_m": self.resolution_m,
-            "range_m": list(self.range_m),
-            "polled": self.poll is not None,
-            "has_device_time": self.has_device_time,
-            "self_framing": self.self_framing,
-            "options": dict(self.options),
-            "limits": self.limits,
-            "source": self.source,
-        }
+        shown = (item.name for item in fields(self) if item.name not in ("decoder", "encoder", "poll"))
+        return {name: getattr(self, name) for name in shown} | {"polled": self.poll is not None}

@@ -5,30 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Protocol
 
+from acquisition.decoders.lines import LineSplitter
+from acquisition.decoders.sum_frames import SumFrames
 from acquisition.readings import Reading, Readings
 
-__all__ = ["FramedDecoder", "Frames"]
-
-
-class Frames(Protocol):
-    """Cuts a stream: a :class:`acquisition.decoders.lines.LineSplitter` or a ``sum_frames.SumFrames``."""
-
-    faults: dict[str, int]
-
-    @property
-    def pending(self) -> int:
-        """Bytes of the frame that has begun."""
-        ...
-
-    def split(self, data: bytes) -> list[bytes]:
-        """Return the frames that these bytes complete."""
-        ...
-
-    def flush(self) -> None:
-        """Forget the frame that has begun."""
-        ...
+__all__ = ["FramedDecoder"]
 
 
 class FramedDecoder(ABC):
@@ -36,10 +18,11 @@ class FramedDecoder(ABC):
 
     Parameters
     ----------
-    frames : Frames
+    frames : LineSplitter or SumFrames
+        What cuts the stream.
     """
 
-    def __init__(self, frames: Frames) -> None:
+    def __init__(self, frames: LineSplitter | SumFrames) -> None:
         self._frames = frames
 
     @property
@@ -54,8 +37,8 @@ class FramedDecoder(ABC):
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
         """Return the readings whose frames these bytes complete, all stamped with the read that completed them."""
-        found = [self.reading(host_ns, frame) for frame in self._frames.split(data)]
-        return Readings(reading for reading in found if reading is not None)
+        frames = self._frames.split(data)
+        return Readings([found for frame in frames if (found := self.reading(host_ns, frame)) is not None])
 
     def flush(self) -> None:
         """Forget a half-received frame."""

@@ -18,7 +18,7 @@ from acquisition.block import Flag
 from acquisition.decoders.example import FAMILY as EXAMPLE
 from acquisition.decoders.family import Decoder, Family, Polled
 from acquisition.decoders.registry import families, get_family
-from acquisition.readings import COLUMNS, Readings, join
+from acquisition.readings import COLUMNS, Readings
 
 N = 24
 _I = np.arange(N)
@@ -150,7 +150,7 @@ every_framed_case = of([case for case in CASES if case.member.self_framing])  # 
 def run(case: Case, *reads: bytes) -> tuple[Readings, Decoder]:
     """Feed reads to a fresh decoder, return all it gave and the decoder."""
     decoder = case.decoder()
-    return join([decoder.feed(1_000 + i, data) for i, data in enumerate(reads)]), decoder
+    return Readings(row for i, data in enumerate(reads) for row in decoder.feed(1_000 + i, data)), decoder
 
 
 def columns(readings: Readings, rows: slice = slice(None)) -> dict[str, bytes]:
@@ -446,7 +446,7 @@ def test_a_polled_sensor_is_asked_in_turn(case: Case) -> None:
     every = int(case.options.get("temperature_every", 0))
     for lost in (frozenset[int](), frozenset({0, 7, 8, 15, 21}), frozenset(range(0, 40, 3))):
         talk = list(conversation(case, lost))
-        readings = join([given for _, given in talk])
+        readings = Readings(reading for _, given in talk for reading in given)
         asked = [request for request, _ in talk]
         assert len(readings) == asked.count(poll.request)
         assert not readings.flags.any()

@@ -29,7 +29,7 @@ from acquisition.live import serial_port
 from acquisition.live.decoding import SensorChain
 from acquisition.live.reader import Line, PortReader
 from acquisition.live.serial_port import PortFacts, SerialPort, list_ports
-from acquisition.readings import Read, Readings, join
+from acquisition.readings import Read, Readings
 from acquisition.simulated.pseudo_terminal import Faults, VirtualPort
 from acquisition.simulated.rangefinder import Shot, VirtualRangefinder, VirtualSensor
 
@@ -109,7 +109,7 @@ class Keeper:
     @property
     def rows(self) -> Readings:
         """All readings so far."""
-        return join(self.readings)
+        return Readings(reading for readings in self.readings for reading in readings)
 
 
 @dataclass

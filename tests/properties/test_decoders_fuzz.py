@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, probe
-from acquisition.readings import COLUMNS, Readings, join
+from acquisition.readings import COLUMNS, Readings
 
 FAMILIES = {family.name: family for family in families()}
 MOST_PENDING = 512
@@ -120,7 +120,7 @@ def decode(family: Family, data: bytes, cuts: Iterable[int] = ()) -> Readings:
     assert all(count >= 0 for count in decoder.faults.values())
     decoder.flush()
     assert decoder.pending == 0
-    return join(parts)
+    return Readings(reading for part in parts for reading in part)
 
 
 def same(one: Readings, other: Readings) -> bool:
