@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+import mmap
 import os
 import stat
-from typing import TYPE_CHECKING, BinaryIO, Protocol, runtime_checkable
+from typing import BinaryIO, Protocol, runtime_checkable
 
 from acquisition.errors import FormatError
 from acquisition.recordings.inspection import Survey
 from acquisition.recordings.recording import Recording
 from acquisition.recordings.tables.text import is_text
-
-if TYPE_CHECKING:
-    import mmap
 
 __all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "read_bytes", "read_head"]
 
@@ -20,7 +18,6 @@ HEAD_BYTES = 8192
 """How much of a file a format sees to recognise it."""
 
 _LONGEST_LINE = 1 << 20
-_AT_ONCE = 1 << 24  # a shorter text may well be read before it is looked at
 _MARKUP = b"\xef\xbb\xbf \t\r\n"  # XML may well stand in one line
 
 
@@ -144,14 +141,10 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
             if limit is not None:
                 return head[:limit]
             by_lines = is_text(head) and not head.lstrip(_MARKUP).startswith(b"<")
-            if by_lines and os.fstat(file.fileno()).st_size > _AT_ONCE:
-                _demand_lines_of_file(name, file)
-                by_lines = False
-            file.seek(0)
-            data = file.read()
             if by_lines:
-                _demand_lines(name, data)
-            return data
+                _demand_lines(name, file)
+            file.seek(0)
+            return file.read()
     except OSError as error:
         raise FormatError(
             name, f"cannot be opened ({error.strerror or error})", "check its name and permissions"
@@ -160,20 +153,13 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
         raise FormatError(repr(name), f"is no file name ({error})", "check its name") from error
 
 
-def _demand_lines_of_file(name: str, file: BinaryIO) -> None:
-    """Demand lines before a file of any size is read into memory."""
-    import mmap
-
+def _demand_lines(name: str, file: BinaryIO) -> None:
+    """Give up at the first MiB that holds no line end, before a file of any size is read into memory."""
     with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
-        _demand_lines(name, text)
-
-
-def _demand_lines(name: str, text: bytes | mmap.mmap) -> None:
-    """Give up at the first MiB that holds no line end."""
-    for start in range(0, len(text) - _LONGEST_LINE + 1, _LONGEST_LINE):
-        stop = start + _LONGEST_LINE
-        if text.find(b"\n", start, stop) < 0 and text.find(b"\r", start, stop) < 0:
-            before = text[:start]
-            line = 1 + (before.count(b"\n") or before.count(b"\r"))
-            demand = "expected lines of text, got a line of more than 1 MiB"
-            raise FormatError(name, demand, "this is no text recording; export it again", line=line)
+        for start in range(0, len(text) - _LONGEST_LINE + 1, _LONGEST_LINE):
+            stop = start + _LONGEST_LINE
+            if text.find(b"\n", start, stop) < 0 and text.find(b"\r", start, stop) < 0:
+                before = text[:start]
+                line = 1 + (before.count(b"\n") or before.count(b"\r"))
+                demand = "expected lines of text, got a line of more than 1 MiB"
+                raise FormatError(name, demand, "this is no text recording; export it again", line=line)

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from acquisition.errors import FormatError, UnknownFormat
-from acquisition.recordings.tables.text import decode, is_text, unify
+from acquisition.recordings.tables.text import head_lines
 
 __all__ = ["refuse"]
 
 _TEXT = 'export time and position as text, tab separated, under a line "Time (s)<TAB>Distance (m)"'
 _AS_CSV = 'export the data as text: in phyphox "Export data", then "CSV (Comma, decimal point)"; in a spreadsheet "CSV"'
 _ZIP = b"PK\x03\x04"
-
-
-@dataclass(frozen=True, slots=True)
-class _Family:
-    title: str
-    matches: Callable[[bytes], bool]
-    remedy: str
 
 
 def _is_hdf5(head: bytes) -> bool:
@@ -30,14 +22,16 @@ def _is_xlsx(head: bytes) -> bool:
     return head.startswith(_ZIP) and (b"[Content_Types].xml" in head or b"xl/" in head)
 
 
+def _begins(with_bytes: bytes) -> Callable[[bytes], bool]:
+    return lambda head: head.startswith(with_bytes)
+
+
 _FAMILIES = (
-    _Family("an HDF5 file", _is_hdf5, "if it is a run file, open it as a run; it is not an old recording"),
-    _Family("an Excel workbook (xlsx)", _is_xlsx, _AS_CSV),
-    _Family("an Excel workbook (xls)", lambda head: head.startswith(bytes.fromhex("d0cf11e0a1b11ae1")), _AS_CSV),
-    _Family(
-        "a zip archive", lambda head: head.startswith(_ZIP), "unpack it and name a file inside, a CSV of phyphox say"
-    ),
-    _Family("a TDMS index", lambda head: head.startswith(b"TDSh"), "name the .tdms file beside it"),
+    ("an HDF5 file", _is_hdf5, "if it is a run file, open it as a run; it is not an old recording"),
+    ("an Excel workbook (xlsx)", _is_xlsx, _AS_CSV),
+    ("an Excel workbook (xls)", _begins(bytes.fromhex("d0cf11e0a1b11ae1")), _AS_CSV),
+    ("a zip archive", _begins(_ZIP), "unpack it and name a file inside, a CSV of phyphox say"),
+    ("a TDMS index", _begins(b"TDSh"), "name the .tdms file beside it"),
 )
 
 
@@ -57,11 +51,10 @@ def refuse(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
     UnknownFormat
         Naming what the file is where that is known.
     """
-    for family in _FAMILIES:
-        if family.matches(head):
-            return UnknownFormat(path, f"expected a recording, got {family.title}", family.remedy)
-    text = unify(decode(head)) if is_text(head) else ""
-    if not text.strip("\0 \n\t"):
+    for title, matches, remedy in _FAMILIES:
+        if matches(head):
+            return UnknownFormat(path, f"expected a recording, got {title}", remedy)
+    if not "".join(head_lines(head)).strip("\0 \t"):
         return UnknownFormat(path, "expected a recording, got binary data or nothing", _TEXT)
     if head.count(b"\n") + head.count(b"\r") == 0 and len(head) > 4096:
         return UnknownFormat(path, "expected lines of text, got one line without end", _TEXT)

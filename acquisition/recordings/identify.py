@@ -25,19 +25,20 @@ __all__ = ["formats", "get_format", "inspect", "open_recording", "sniff"]
 
 GROUP = "springmass.formats"
 
-_TABLE: dict[str, tuple[str, str]] = {
-    "motion-sensor": ("acquisition.recordings.families.motion_sensor", "FORMAT"),
-    "lvm": ("acquisition.recordings.families.lvm", "FORMAT"),
-    "tdms": ("acquisition.recordings.families.tdms", "FORMAT"),
-    "capstone": ("acquisition.recordings.families.capstone", "FORMAT"),
-    "datastudio": ("acquisition.recordings.families.datastudio", "FORMAT"),
-    "vernier": ("acquisition.recordings.families.vernier", "FORMAT"),
-    "logger-pro": ("acquisition.recordings.families.logger_pro", "FORMAT"),
-    "phyphox": ("acquisition.recordings.families.phyphox", "FORMAT"),
-    "tracker": ("acquisition.recordings.families.tracker", "FORMAT"),
-    "csv": ("acquisition.recordings.families.csv_units", "FORMAT"),
-    "bare": ("acquisition.recordings.families.bare", "FORMAT"),
+_TABLE = {
+    "motion-sensor": "motion_sensor",
+    "lvm": "lvm",
+    "tdms": "tdms",
+    "capstone": "capstone",
+    "datastudio": "datastudio",
+    "vernier": "vernier",
+    "logger-pro": "logger_pro",
+    "phyphox": "phyphox",
+    "tracker": "tracker",
+    "csv": "csv_units",
+    "bare": "bare",
 }
+"""The module in ``families`` of each name."""
 
 
 def formats() -> tuple[Format, ...]:
@@ -158,8 +159,7 @@ def _every() -> Iterator[Format]:
 
 
 def _built_in(name: str) -> Format:
-    module, attribute = _TABLE[name]
-    return cast(Format, getattr(import_module(module), attribute))
+    return cast(Format, import_module(f"acquisition.recordings.families.{_TABLE[name]}").FORMAT)
 
 
 def _entry_points() -> dict[str, EntryPoint]:

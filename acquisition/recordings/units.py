@@ -9,37 +9,16 @@ LENGTHS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
 TIMES = {"s": 0, "ms": -3, "us": -6}
 """Times by the power of ten that makes them seconds."""
 
-_WORDS = {
-    "µm": "um",
-    "μm": "um",
-    "micrometer": "um",
-    "micrometre": "um",
-    "millimeter": "mm",
-    "millimetre": "mm",
-    "centimeter": "cm",
-    "centimetre": "cm",
-    "meter": "m",
-    "metre": "m",
-    "metri": "m",
-    "米": "m",
-    "厘米": "cm",
-    "毫米": "mm",
-    "sec": "s",
-    "second": "s",
-    "seconde": "s",
-    "sekunde": "s",
-    "sekunden": "s",
-    "segundo": "s",
-    "secondi": "s",
-    "secondo": "s",
-    "秒": "s",
-    "毫秒": "ms",
-    "msec": "ms",
-    "millisecond": "ms",
-    "µs": "us",
-    "μs": "us",
-    "microsecond": "us",
+_SPELLINGS = {
+    "um": ("µm", "μm", "micrometer", "micrometre"),
+    "mm": ("millimeter", "millimetre", "毫米"),
+    "cm": ("centimeter", "centimetre", "厘米"),
+    "m": ("meter", "metre", "metri", "米"),
+    "us": ("µs", "μs", "microsecond"),
+    "ms": ("msec", "millisecond", "毫秒"),
+    "s": ("sec", "second", "seconde", "sekunde", "sekunden", "segundo", "secondi", "secondo", "秒"),
 }
+_WORDS = {word: symbol for symbol, words in _SPELLINGS.items() for word in words}
 
 
 def unit_words(unit: str) -> str:

@@ -19,7 +19,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import takewhile
 
 from acquisition.errors import FormatError
 from acquisition.recordings.tables.contents import Channel, Contents, Formula, Sheet, name_and_unit, numbered_apart
@@ -192,18 +191,14 @@ def _formula(segment: _Header, column: int) -> Formula | None:
 
 def _start_time(segment: _Header, column: int) -> str:
     date, time = (segment.of_column(key, column) or segment.first_of(key) for key in ("Date", "Time"))
-    if not _is_digits(date, "/", [4, 2, 2]) or int(date[:4]) <= 1904:
+    day = re.fullmatch(r"(\d{4})/(\d\d)/(\d\d)", date, re.ASCII)
+    if day is None or int(day[1]) <= 1904:
         return ""
-    start, clock = date.replace("/", "-"), time[:8]
-    if not _is_digits(clock, ":", [2, 2, 2]):
+    start = "-".join(day.groups())
+    clock = re.match(r"(\d\d:\d\d:\d\d)(?:[.,](\d{1,6}))?", time, re.ASCII)
+    if clock is None:
         return start
-    fraction = "".join(takewhile(str.isdecimal, time[9:15])) if time[8:9] in (".", ",") else ""
-    return f"{start}T{clock}.{fraction}" if fraction else f"{start}T{clock}"
-
-
-def _is_digits(text: str, mark: str, sizes: list[int]) -> bool:
-    """Tell whether a text is so many digits between marks; a pattern would be compiled for the one line it is for."""
-    return [len(part) for part in text.split(mark)] == sizes and text.replace(mark, "").isdecimal()
+    return f"{start}T{clock[1]}.{clock[2]}" if clock[2] else f"{start}T{clock[1]}"
 
 
 def _title(top: _Header, segment: _Header) -> str:

@@ -23,9 +23,8 @@ from acquisition.recordings.tables.contents import (
     is_time,
     name_and_unit,
     split_heading,
-    under_first_line,
 )
-from acquisition.recordings.tables.sheet import ColumnFormat
+from acquisition.recordings.tables.sheet import ColumnFormat, headed_format
 from acquisition.recordings.tables.text import decode, head_lines, parse_number, text_of
 
 if TYPE_CHECKING:
@@ -50,19 +49,21 @@ def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
     return headings, mark
 
 
+def _why(headings: tuple[Heading, ...], mark: str) -> str:  # noqa: ARG001
+    return f'line 1 is quoted headings that begin with "{headings[0].name} ({headings[0].unit})"'
+
+
 def _evidence(head: bytes) -> str:
-    lines = head_lines(head)
-    if _ROOT.match("\n".join(lines)):
+    if _ROOT.match("\n".join(head_lines(head))):
         return "it is XML with the root <phyphox>"
-    headings, _ = _headings(lines[0])
-    return f'line 1 is quoted headings that begin with "{headings[0].name} ({headings[0].unit})"' if headings else ""
+    return _CSV.evidence(head)
 
 
 def _contents(path: str, data: bytes) -> Contents:
     text = text_of(path, data)
     if _ROOT.match(decode(text.data[text.start : text.start + 8192])):
         return _of_xml(path, text.data[text.start : text.stop])
-    return under_first_line(path, data, _headings, '"Time (s)","Distance (m)", in quotes')
+    return _CSV.contents(path, data)
 
 
 def _of_xml(path: str, data: bytes) -> Contents:
@@ -104,15 +105,15 @@ def _channels(root: Element, buffers: Mapping[str, F8]) -> Iterator[Channel]:
             if is_time(name):
                 time = values
                 continue
-            if time is not None and time.size != values.size:
-                size = max(time.size, values.size)
-                yield Channel(name, unit, Arrays(_longer(time, size), _longer(values, size)), run)
-            else:
-                yield Channel(name, unit, Arrays(time, values), run)
+            size = max(values.size, 0 if time is None else time.size)
+            own_time = None if time is None else _longer(time, size)
+            yield Channel(name, unit, Arrays(own_time, _longer(values, size)), run)
 
 
 def _longer(values: F8, size: int) -> F8:
     return np.concatenate((values, np.full(size - values.size, np.nan)))
 
 
-FORMAT = ColumnFormat("phyphox", "phyphox export as CSV, or saved state as XML", _evidence, _contents)
+_TITLE = "phyphox export as CSV, or saved state as XML"
+_CSV = headed_format("phyphox", _TITLE, _headings, _why, '"Time (s)","Distance (m)", in quotes')
+FORMAT = ColumnFormat("phyphox", _TITLE, _evidence, _contents)

@@ -3,36 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import F8, I8, U8, Flag
 
-__all__ = ["Grid", "Rate", "find_rate", "median", "place_unread", "snap", "time_flags"]
+__all__ = ["Grid", "Rate", "find_rate", "place_unread", "snap", "time_flags"]
 
 _USUAL_RATES_HZ = (100.0, 60.0, 125.0, 50.0, 20.0, 25.0, 30.0, 40.0, 10.0, 200.0, 250.0, 500.0, 1000.0)
 _SHARE_ON_GRID = 0.5
 _PROBE = 8192
 _BLOCK = 16384
-
-
-def median(values: NDArray[Any]) -> float:
-    """Return the median of at least one number, none of them NaN.
-
-    By hand, for numpy.median imports numpy.ma: 10 ms of a cold start of 150.
-
-    Examples
-    --------
-    >>> median(np.array([3.0, 1.0, 2.0])), median(np.array([4, 1, 2, 3]))
-    (2.0, 2.5)
-    """
-    half = values.size // 2
-    if values.size % 2:
-        return float(np.partition(values, half)[half])
-    low, high = np.partition(values, (half - 1, half))[half - 1 : half + 1].tolist()
-    return float(0.5 * (low + high))
 
 
 class Grid(NamedTuple):
@@ -132,18 +115,18 @@ def _probe(apart: F8) -> F8:
 
 def _every_point(apart: F8, grid: Grid) -> bool:
     """Tell whether times come one grid point after the other, not one every few."""
-    return median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0
+    return bool(np.median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0)
 
 
 def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     """Return the usual step of increasing times, s, and its relative half width, over ever longer spans."""
     every = max(1, apart.size // (4 * _PROBE))
-    step = max(median(apart[1::every] - apart[:-1:every]), resolution)
+    step = max(float(np.median(apart[1::every] - apart[:-1:every])), resolution)
     span, relative_u = 1, resolution / step
     while (span := span * 4) < apart.size and relative_u > 1e-6:
         lengths = apart[span::every] - apart[:-span:every]
         steps = np.rint(lengths / step)
-        step = median(lengths / np.maximum(steps, 1))
+        step = float(np.median(lengths / np.maximum(steps, 1)))
         relative_u = resolution / (span * step)
     if apart.size > 2:  # the whole length, where the steps in it can be counted
         length = float(apart[-1] - apart[0])

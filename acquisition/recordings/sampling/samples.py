@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8, U8, Flag
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import median, place_unread, snap, time_flags
+from acquisition.recordings.sampling.nominal import place_unread, snap, time_flags
 from acquisition.recordings.sampling.timing import Timing
 
 __all__ = [
@@ -33,73 +33,74 @@ _FAR_M, _FAR_SPREADS = 0.5, 10.0
 _SAMPLE = 65536
 _FEWEST = 50  # distances; with fewer, a common step may be chance
 _ZEROS = 10
-_SOME_ROWS = 8192
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """Rows of a file as samples to be.
+    """One channel's rows as samples to be.
 
     Parameters
     ----------
-    bad : (n,) bool
-        Rows that could not be read.
+    printed : (n,) float64, s, or None
+        Times as printed; None where there are none.
+    value : (n,) float64
+        In the channel's unit times the power of ten asked for; NaN where unread or absent.
+    bad, remark : (n,) bool
+        Rows that could not be read, and rows of text between samples, which are none.
     line : callable
         Gives the one-based line of a row.
+    time_resolution, resolution : float
+        Last printed digit of a time, s, and of a value; the latter 0 where it is binary.
+    tolerance : (n,) float64, s, or None
+        Half the last digit of each time, where a header's formula is to be held against them.
     cut : bool
         Whether the last row stops midway.
     last_cell : str
         The first cell of the last row.
     decimals : int
         Decimals that a time is printed with.
-    remark : (n,) bool or None
-        Rows of text between samples, which are none; None where there is no such row.
+    behind : tuple of (n,) float64
+        The columns behind the value, of a sheet whose rows have a width.
     """
 
+    printed: F8 | None
+    value: F8
     bad: NDArray[np.bool_]
+    remark: NDArray[np.bool_]
     line: Callable[[int], int]
+    time_resolution: float
+    resolution: float
+    tolerance: F8 | None = None
     cut: bool = False
     last_cell: str = ""
     decimals: int = 0
-    remark: NDArray[np.bool_] | None = None
+    behind: tuple[F8, ...] = ()
 
     @property
-    def samples(self) -> int:
-        """How many rows are no remarks."""
-        return int(self.bad.size if self.remark is None else np.count_nonzero(~self.remark))
-
-    def numbers(self) -> Iterator[tuple[slice, I8]]:
-        """Yield some rows after the other with their numbers as samples, counted without remarks.
-
-        The number of a remark is that of the row before. What is calculated of some rows stays in the cache.
-        """
-        before = 0
-        for start in range(0, self.bad.size, _SOME_ROWS):
-            rows = slice(start, min(start + _SOME_ROWS, self.bad.size))
-            if self.remark is None:
-                yield rows, np.arange(rows.start, rows.stop)
-            else:
-                number = np.cumsum(~self.remark[rows]) + (before - 1)
-                before = int(number[-1]) + 1
-                yield rows, number
+    def numbers(self) -> I8:
+        """Numbers of the rows as samples, counted without remarks; that of a remark is that of the row before."""
+        return np.cumsum(~self.remark) - 1
 
 
-def place(printed: F8, rows: Rows, timing: Timing) -> F8:
-    """Return the time of each row, s: snapped to the grid; of a bad row where it is told, else NaN.
+def place(rows: Rows, timing: Timing) -> F8:
+    """Return the time of each row, s: of its number, or as printed and snapped to the grid; of a bad row where it is
+    told, else NaN.
 
-    Where no row is bad, the times printed are overwritten with those returned if they can be.
+    The times printed are overwritten.
     """
-    bad = rows.bad
-    any_bad = bool(bad.any())
-    t = printed.copy() if any_bad else np.require(printed, requirements="W")
-    if timing.grid is not None:
-        if not any_bad:
-            return snap(t, timing.grid, timing.resolution_s, out=t)[0]
-        t[~bad] = snap(printed[~bad], timing.grid, timing.resolution_s)[0]
-    if not any_bad:
+    bad, t, grid = rows.bad, rows.printed, timing.grid
+    if grid is not None and (timing.by_row or t is None):
+        t = grid.time(rows.numbers)
+        t[rows.remark] = np.nan
         return t
+    if t is None:
+        raise ValueError("without times only a grid has times of rows")
+    if not bad.any():
+        return t if grid is None else snap(t, grid, timing.resolution_s, out=t)[0]
+    if grid is not None:
+        t[~bad] = snap(t[~bad], grid, timing.resolution_s)[0]
     expected = {bad.size - 1: rows.last_cell} if bad[-1] else {}
-    return place_unread(t, bad, timing.grid, expected, rows.decimals)
+    return place_unread(t, bad, grid, expected, rows.decimals)
 
 
 def within(values: F8, limit: float) -> bool:
@@ -227,8 +228,8 @@ def _far(distance: F8) -> NDArray[np.int64]:
     some = _some(distance)
     if some.size < _ZEROS:
         return np.empty(0, np.int64)
-    middle = median(some)
-    limit = _FAR_M + _FAR_SPREADS * median(np.abs(some - middle))
+    middle = np.median(some)
+    limit = _FAR_M + _FAR_SPREADS * np.median(np.abs(some - middle))
     if np.fmax.reduce(distance) <= middle + limit and np.fmin.reduce(distance) >= middle - limit:
         return np.empty(0, np.int64)
     return np.flatnonzero(np.abs(distance - middle) > limit)

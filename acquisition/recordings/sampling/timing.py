@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -72,14 +72,13 @@ def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | N
             raise NeedsAnswer(path, demand, "record longer, or give rate_hz (--rate-hz)")
         origin = float(printed[0]) if printed.size else 0.0
         return Timing(rate_hz, Grid(rate_hz, origin), resolution, certain=False, given=True)
+    steps = _jitter(printed) if rate.grid is None else None
     if rate_hz is not None:
-        steps = _jitter(printed) if rate.grid is None else None
         allowed = rate_hz * (1.5 * rate.relative_u + 1e-6 + (0.01 if steps else 0.0))
         if abs(rate.rate_hz - rate_hz) > allowed:
             demand = f"rate_hz {rate_hz:g} was given, but the times say {rate.rate_hz:.6g} Hz"
             raise FormatError(path, demand, "leave the rate out or correct it")
         return Timing(rate_hz, rate.grid, resolution, certain=True, given=True, steps_s=steps)
-    steps = _jitter(printed) if rate.grid is None else None
     return Timing(rate.rate_hz, rate.grid, resolution, rate.certain, steps_s=steps)
 
 
@@ -99,7 +98,7 @@ def time_by_formula(
     step_s: float,
     printed: F8 | None,
     tolerance: F8 | None,
-    numbers: Iterable[tuple[slice, I8]],
+    numbers: I8,
     rate_hz: float | None,
 ) -> Timing | None:
     """Take a header's times ``start_s + i step_s``, if the column of times agrees within its rounding.
@@ -108,8 +107,8 @@ def time_by_formula(
     ----------
     printed, tolerance : (n,) float64, s, or None
         Times of the rows, NaN where unread, and half the last digit of each; None: no column.
-    numbers : iterable of (slice, int64 array)
-        The i of some rows after the other.
+    numbers : (n,) int64
+        The i of each row.
 
     Returns
     -------
@@ -119,15 +118,10 @@ def time_by_formula(
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
     if printed is not None and tolerance is not None:
-        for rows, number in numbers:
-            expected = start_s + step_s * number
-            apart = printed[rows] - expected
-            np.abs(apart, out=apart)
-            if apart.max() <= tolerance[rows].min() * 1.0001:  # the usual case; never true of a NaN
-                continue
-            slack = 1e-9 * np.maximum(np.abs(expected), step_s)
-            if (apart > tolerance[rows] * 1.0001 + slack).any():  # never true of a NaN either
-                return None
+        expected = start_s + step_s * numbers
+        slack = 1e-9 * np.maximum(np.abs(expected), step_s)
+        if (np.abs(printed - expected) > tolerance * 1.0001 + slack).any():  # never true of a NaN
+            return None
     rate = 1.0 / step_s
     rounded = float(f"{rate:.9g}")
     rate = rounded if math.isclose(rounded, rate, rel_tol=1e-12) else rate
@@ -166,15 +160,6 @@ def clock_traps(timing: Timing) -> Iterator[Trap]:
         yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the likeliest: {why}")
 
 
-def row_times(timing: Timing, numbers: Iterable[tuple[slice, I8]], out: F8) -> F8:
-    """Put the times of rows, by their numbers on a nominal clock, into an array, s; return it."""
-    if timing.grid is None:
-        raise ValueError("only a grid has times of rows")
-    for rows, number in numbers:
-        out[rows] = timing.grid.time(number)
-    return out
-
-
 def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int) -> F8:
     """Return half the last printed digit of each time, s; of those with exponents at least that.
 
@@ -191,7 +176,5 @@ def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int)
     usual = int(form[0]) if form.size else 0
     if 0 <= usual < exponent and (form == usual).all():
         return np.broadcast_to(np.float64(0.5 * 10.0 ** (shift - usual)), form.size)
-    decimals = np.where(form >= exponent, form - exponent, np.maximum(form, 0))
-    half = 0.5 * 10.0 ** (shift - decimals)
-    scaled = 0.5 * 10.0 ** -decimals.astype(float) * np.abs(printed)
-    return np.where(form >= exponent, scaled, half)
+    decimals = np.where(form < 0, 0.0, form % exponent)
+    return 0.5 * 10.0**-decimals * np.where(form >= exponent, np.abs(printed), 10.0**shift)

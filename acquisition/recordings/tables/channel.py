@@ -16,7 +16,6 @@ from acquisition.recordings.sampling.samples import Rows, flags_of, place, row_t
 from acquisition.recordings.sampling.timing import (
     Timing,
     clock_traps,
-    row_times,
     time_by_column,
     time_by_formula,
     time_by_rate,
@@ -26,40 +25,10 @@ from acquisition.recordings.tables.contents import Arrays, Channel, Sheet
 from acquisition.recordings.tables.table import EMPTY, EXPONENT, UNREAD, Table, read_table
 from acquisition.recordings.units import time_power
 
-__all__ = ["Pulled", "Sampled", "pull", "sample"]
+__all__ = ["Sampled", "pull", "sample"]
 
 _LONGEST_S = 1e10
 _T = TypeVar("_T", bound=np.generic)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pulled:
-    """One channel's numbers.
-
-    Parameters
-    ----------
-    printed : (n,) float64, s, or None
-        Times as printed; None where there are none.
-    tolerance : (n,) float64, s, or None
-        Half the last digit of each time, where a header's formula is to be held against them.
-    value : (n,) float64
-        In the channel's unit times the power of ten asked for; NaN where unread or absent.
-    rows : Rows
-    time_resolution : float
-        Last printed digit of a time, s.
-    resolution : float
-        Last printed digit of a value; 0 where it is binary.
-    behind : tuple of (n,) float64
-        The columns behind the value, of a sheet whose rows have a width.
-    """
-
-    printed: F8 | None
-    tolerance: F8 | None
-    value: F8
-    rows: Rows
-    time_resolution: float
-    resolution: float
-    behind: tuple[F8, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +63,7 @@ class Sampled:
     behind: tuple[F8, ...]
 
 
-def pull(path: str, channel: Channel, power: int) -> Pulled:
+def pull(path: str, channel: Channel, power: int) -> Rows:
     """Read a channel's times and values.
 
     Parameters
@@ -115,14 +84,14 @@ def pull(path: str, channel: Channel, power: int) -> Pulled:
     return _from_sheet(path, channel, channel.source, power)
 
 
-def _from_arrays(arrays: Arrays, power: int) -> Pulled:
+def _from_arrays(arrays: Arrays, power: int) -> Rows:
     value = arrays.values / 10.0**-power if power else arrays.values.copy()
     t = None if arrays.t is None else arrays.t.copy()  # channels may share it, and it will be written to
     bad = np.zeros(value.size, bool) if t is None else ~np.isfinite(t)
     if bad.any():
         value[bad] = np.nan
     largest = 0.0 if t is None else float(np.fmax.reduce(np.abs(t), initial=0.0))
-    return Pulled(t, None, value, Rows(bad, _no_line), max(float(np.spacing(largest)), 1e-12), 0.0)
+    return Rows(t, value, bad, np.zeros_like(bad), _no_line, max(float(np.spacing(largest)), 1e-12), 0.0)
 
 
 def _no_line(row: int) -> int:  # noqa: ARG001
@@ -130,7 +99,7 @@ def _no_line(row: int) -> int:  # noqa: ARG001
     return 0
 
 
-def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Pulled:
+def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Rows:
     time, shift = channel.time, _time_power(path, channel)
     # The first column of a sheet tells rows from remarks, whoever's it is, unless it is left empty.
     row = next(sheet.text.lines(sheet.start), None)
@@ -164,7 +133,7 @@ def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Pulled
     printed = tolerance = None
     time_resolution = 0.0
     if at is not None:
-        printed = _kept(table.values[at], kept)
+        printed = np.require(_kept(table.values[at], kept), requirements="W")
         time_resolution = _resolution(printed, table.decimals[at], table.exponents[at], shift)
         if channel.formula is not None:
             tolerance = tolerance_of(printed, _kept(table.form[at], kept), shift, EXPONENT)
@@ -182,9 +151,21 @@ def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Pulled
         raise _no_rows(path, channel, sheet, bad.size, line(0))
     cut = table.cut and bool(bad[-1]) and bool(keep[-1])
     decimals = 0 if at is None else table.decimals[at]
-    rows = Rows(bad, line, cut, table.last_cell, decimals, remark if remark.any() else None)
     resolution = _resolution(value, table.decimals[own], table.exponents[own], power)
-    return Pulled(printed, tolerance, value, rows, time_resolution, resolution, table.values[own + 1 :])
+    return Rows(
+        printed,
+        value,
+        bad,
+        remark,
+        line,
+        time_resolution,
+        resolution,
+        tolerance,
+        cut,
+        table.last_cell,
+        decimals,
+        table.values[own + 1 :],
+    )
 
 
 def _no_rows(path: str, channel: Channel, sheet: Sheet, lines: int, line: int) -> FormatError:
@@ -227,15 +208,15 @@ def _resolution(values: F8, decimals: int, exponents: bool, shift: int) -> float
     return float(f"1e{shift - decimals}")
 
 
-def sample(path: str, channel: Channel, pulled: Pulled, rate_hz: float | None, zeros: int = 0) -> Sampled:
-    """Put a channel's values at their times; what was pulled is used up.
+def sample(path: str, channel: Channel, rows: Rows, rate_hz: float | None, zeros: int = 0) -> Sampled:
+    """Put a channel's values at their times; the rows are used up.
 
     Parameters
     ----------
     path : str
         For messages.
     channel : Channel
-    pulled : Pulled
+    rows : Rows
     rate_hz : float or None
         The rate, where it is given.
     zeros : int
@@ -248,15 +229,8 @@ def sample(path: str, channel: Channel, pulled: Pulled, rate_hz: float | None, z
     FormatError
         If the rate given contradicts the file, or all values are NaN.
     """
-    timing, traps = _timing(path, channel, pulled, rate_hz)
-    rows, value, bad = pulled.rows, pulled.value, pulled.rows.bad
-    if pulled.printed is None or timing.by_row:
-        room = np.empty(value.size) if pulled.printed is None else np.require(pulled.printed, requirements="W")
-        t = row_times(timing, rows.numbers(), out=room)
-        if rows.remark is not None:
-            t[rows.remark] = np.nan
-    else:
-        t = place(pulled.printed, rows, timing)
+    timing, traps = _timing(path, channel, rows, rate_hz)
+    value, bad, t = rows.value, rows.bad, place(rows, timing)
     told = np.isfinite(t)
     where = None if told.all() else np.flatnonzero(told)
     t, value = _kept(t, where), _kept(value, where)
@@ -272,22 +246,21 @@ def sample(path: str, channel: Channel, pulled: Pulled, rate_hz: float | None, z
         flags[0] &= ~np.uint8(Flag.MISSING)
     found = (*row_traps(rows, told, zeros), *sample_traps(flags, t, timing.rate_hz, line))
     malformed = int(np.count_nonzero(bad))
-    behind = tuple(column[~bad] if malformed else column for column in pulled.behind)
-    return Sampled(t, value, flags, timing, pulled.resolution, (*traps, *found), line, malformed, behind)
+    behind = tuple(column[~bad] if malformed else column for column in rows.behind)
+    return Sampled(t, value, flags, timing, rows.resolution, (*traps, *found), line, malformed, behind)
 
 
-def _timing(path: str, channel: Channel, pulled: Pulled, rate_hz: float | None) -> tuple[Timing, tuple[Trap, ...]]:
+def _timing(path: str, channel: Channel, rows: Rows, rate_hz: float | None) -> tuple[Timing, tuple[Trap, ...]]:
     traps: list[Trap] = []
-    formula, printed, bad = channel.formula, pulled.printed, pulled.rows.bad
+    formula, printed, bad = channel.formula, rows.printed, rows.bad
     timing = None
     if formula is not None:
-        count = pulled.rows.samples
+        count = int(np.count_nonzero(~rows.remark))
         if formula.samples is not None and formula.samples != count:
             message = f"the header declares {formula.samples} samples, {count} rows are there; all are kept"
             traps.append(Trap("stale_header", message, abs(formula.samples - count)))
         whole = np.where(bad, np.nan, printed) if printed is not None and bad.any() else printed
-        numbers = pulled.rows.numbers()
-        timing = time_by_formula(path, formula.start_s, formula.step_s, whole, pulled.tolerance, numbers, rate_hz)
+        timing = time_by_formula(path, formula.start_s, formula.step_s, whole, rows.tolerance, rows.numbers, rate_hz)
         if timing is None:
             said = f"the header says {formula.start_s:g} s + i * {formula.step_s:g} s"
             if printed is None:
@@ -296,7 +269,7 @@ def _timing(path: str, channel: Channel, pulled: Pulled, rate_hz: float | None) 
                 message = f"{said}, the column of times says otherwise and is believed"
                 traps.append(Trap("stale_header", message, printed.size))
     if timing is None and printed is not None:
-        timing = time_by_column(path, printed[~bad] if bad.any() else printed, pulled.time_resolution, rate_hz)
+        timing = time_by_column(path, printed[~bad] if bad.any() else printed, rows.time_resolution, rate_hz)
         if not channel.time_unit and formula is None:
             traps.append(Trap("unit_assumed", "the times have no unit: read as seconds"))
     if timing is None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from acquisition.block import F8
-from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.errors import NeedsAnswer
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.tables.text import Text, text_of
+from acquisition.recordings.tables.text import Text
 from acquisition.recordings.units import length_power, unit_words
 from acquisition.source import ClockKind
 
@@ -26,7 +26,6 @@ __all__ = [
     "name_and_unit",
     "numbered_apart",
     "split_heading",
-    "under_first_line",
 ]
 
 _TIME_WORDS = frozenset(
@@ -280,35 +279,6 @@ class Heading:
     name: str
     unit: str
     run: str = ""
-
-
-def under_first_line(
-    path: str, data: bytes, headings_of: Callable[[str], tuple[tuple[Heading, ...], str]], example: str
-) -> Contents:
-    """Return the channels of a text whose first line is headings, and all below it rows.
-
-    Parameters
-    ----------
-    path : str
-        For messages.
-    data : bytes
-    headings_of : callable
-        From the first line to its headings, none where it is of another family, and what separates cells.
-    example : str
-        Headings as the family writes them.
-
-    Raises
-    ------
-    FormatError
-        If the first line holds no such headings.
-    """
-    text = text_of(path, data)
-    first = next(text.lines(), None)
-    headings, mark = headings_of(first.text) if first else ((), "")
-    channels = () if first is None else channels_of(Sheet(text, first.next, text.stop, 2, mark), headings)
-    if not channels:
-        raise FormatError(path, f"expected headings like {example}", "export the run again", line=1)
-    return Contents(channels, zeros=text.zeros)
 
 
 def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind = "device") -> tuple[Channel, ...]:

@@ -13,8 +13,8 @@ from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.samples import value_traps
 from acquisition.recordings.sampling.timing import check_rate
 from acquisition.recordings.tables.channel import pull, sample
-from acquisition.recordings.tables.contents import Channel, Contents, Heading, choose, under_first_line
-from acquisition.recordings.tables.text import head_lines, says_simulated
+from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet, channels_of, choose
+from acquisition.recordings.tables.text import head_lines, says_simulated, text_of
 from acquisition.recordings.units import LENGTHS, length_power, unit_words
 from acquisition.source import Kind, SourceInfo
 
@@ -120,7 +120,13 @@ def headed_format(
         return why(headings, mark) if headings else ""
 
     def contents(path: str, data: bytes) -> Contents:
-        return under_first_line(path, data, headings_of, example)
+        text = text_of(path, data)
+        first = next(text.lines(), None)
+        headings, mark = headings_of(first.text) if first else ((), "")
+        channels = () if first is None else channels_of(Sheet(text, first.next, text.stop, 2, mark), headings)
+        if not channels:
+            raise FormatError(path, f"expected headings like {example}", "export the run again", line=1)
+        return Contents(channels, zeros=text.zeros)
 
     return ColumnFormat(name, title, evidence, contents)
 
