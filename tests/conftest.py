@@ -22,6 +22,12 @@ settings.register_profile(
 settings.load_profile("springmass")
 
 
+@pytest.fixture(autouse=True)
+def a_page_of_one_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wrap what the program prints at 100 columns, whatever terminal or test runner is around."""
+    monkeypatch.setenv("COLUMNS", "100")
+
+
 def _load(name: str) -> ModuleType:
     """Import a helper that lies beside this file, whatever the working directory is."""
     path = Path(__file__).with_name(f"{name}.py")
