@@ -14,9 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
-from pipeline.damping.law_fit import LawFit, Rejection
+from pipeline.damping.law_fit import LawFit, Minimum, Rejection
 from pipeline.damping.laws import LAWS, Law
-from pipeline.damping.minimum import Minimum
 from pipeline.numerics.estimate import Joint
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8

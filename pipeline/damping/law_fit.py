@@ -1,4 +1,4 @@
-"""One damping law on one record: its parameters, and what follows from them with their uncertainty."""
+"""One damping law on one record: where its chi-square is least, and what follows from there with its uncertainty."""
 
 from __future__ import annotations
 
@@ -10,12 +10,39 @@ from typing import Literal
 import numpy as np
 
 from pipeline.damping.laws import Law
+from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.regression import covariance_of
 from pipeline.track import F8
 
-__all__ = ["LawFit", "Rejection", "mean_squared_rate", "rates_of"]
+__all__ = ["LawFit", "Minimum", "Rejection", "mean_squared_rate", "minimum_of", "rates_of"]
 
 Rejection = Literal["", "misfit", "negative", "not converged"]
+
+# A hundredth of a standard uncertainty is left. One method is enough: a law that MINPACK loses has no chance.
+OPTIONS = least_squares.Params(precision=0.01, steps=40, again=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Minimum:
+    """Where the fit of one law ended.
+
+    Parameters
+    ----------
+    theta : (p,) float64
+    covariance : (p, p) float64
+        :math:`(J^T J)^{-1}` from the points' standard uncertainties; infinite where they do not determine the law.
+    chi2 : float
+    converged : bool
+    tried : str
+        What was tried, for a fit that did not converge.
+    """
+
+    theta: F8
+    covariance: F8
+    chi2: float
+    converged: bool
+    tried: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,13 +135,8 @@ class LawFit:
 
 def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
     """Return a law's -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
-    steps = 1e-6 * np.maximum(np.abs(theta[1:]), 1e-9)
-    gradient = np.zeros((theta.size, amplitude.size))
-    for k, step in enumerate(steps.tolist(), start=1):
-        shift = np.zeros(theta.size)
-        shift[k] = step
-        gradient[k] = (law.rate(amplitude, theta + shift) - law.rate(amplitude, theta - shift)) / (2.0 * step)
-    variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
+    gradient = least_squares.central_differences(lambda at: law.rate(amplitude, at), theta)
+    variance = np.einsum("ni,ij,nj->n", gradient, covariance, gradient)
     return law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
@@ -128,3 +150,45 @@ def mean_squared_rate(fit: LawFit, amplitude: F8) -> float:
     power = float(amplitude @ amplitude)
     rate = fit.law.rate(amplitude, fit.joint.values)
     return float(rate @ rate) / power if power > 0.0 else 0.0
+
+
+def minimum_of(law: Law, t: F8, y: F8, u: F8) -> Minimum:
+    """Fit a law to points by weighted least squares, from the law's own guess.
+
+    Parameters
+    ----------
+    law : Law
+        With no more parameters than there are points.
+    t, y, u : (n,) float64
+        Times in s in ascending order, amplitudes and their standard uncertainties in m.
+
+    Returns
+    -------
+    Minimum
+        Not finite where the law's numbers ran out of range.
+
+    Notes
+    -----
+    Amplitudes are counted in units of their root mean square, so that no power of a metre disturbs the search.
+    """
+    length = math.sqrt(float(y @ y) / y.size) or 1.0
+    at, inverse_u = y / u, length / u
+
+    def both(theta: F8) -> tuple[F8, F8]:
+        amplitude, by = law.both(t, theta)
+        return amplitude * inverse_u - at, by * inverse_u[:, None]
+
+    def in_metres(theta: F8) -> F8:
+        return law.rescaled(theta, 1.0 / length)
+
+    residuals, jacobian = least_squares.evaluated_once(both)
+    fit = least_squares.minimise(residuals, law.guess(t, y / length), jacobian, OPTIONS)
+    with np.errstate(all="ignore"):
+        theta = in_metres(fit.values)
+        if fit.converged:
+            turn = least_squares.central_differences(in_metres, fit.values)
+            return Minimum(theta, turn @ fit.covariance @ turn.T, fit.cost, True, "")
+        covariance = covariance_of(law.jacobian(t, theta) / u[:, None])
+    return Minimum(
+        theta, covariance, fit.cost, False, f"{fit.steps} steps of Levenberg-Marquardt from the law's own guess"
+    )

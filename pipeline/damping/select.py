@@ -9,9 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pipeline.damping.evidence import choose, least_chi2, weigh
-from pipeline.damping.law_fit import LawFit, mean_squared_rate
+from pipeline.damping.law_fit import LawFit, Minimum, mean_squared_rate, minimum_of
 from pipeline.damping.laws import LAWS, Law
-from pipeline.damping.minimum import Minimum, minima_of
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Scatter, correlation_length, scatter
@@ -166,21 +165,43 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
         noise = np.hypot(noise, amplitude * demodulated.decay * t)
     # Perfect data still carry rounding: without a floor chi-square would divide by nothing.
     noise = np.maximum(noise, 1e-12 * float(np.max(amplitude)) + TINY)
-    spread = scatter(t, amplitude, noise)
+    points = _Points(t0, t, amplitude, noise, scatter(t, amplitude, noise))
+    found = _fit_laws(points, params.laws, params)
+    return found if found.admissible or not params.otherwise else _fit_laws(points, params.otherwise, params)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Points:
+    """Amplitudes (n,) at times (n,) since t0, their noise, their scatter, and the laws fitted to them so far."""
+
+    t0: float
+    t: F8
+    amplitude: F8
+    noise: F8
+    spread: Scatter
+    minima: dict[str, Minimum] = field(default_factory=dict)
+
+    def minimum(self, law: Law) -> Minimum:
+        """Return the fit of a law, which is made once."""
+        if law.name not in self.minima:
+            kept = self.spread.kept
+            self.minima[law.name] = minimum_of(law, self.t[kept], self.amplitude[kept], self.spread.u[kept])
+        return self.minima[law.name]
+
+
+def _fit_laws(points: _Points, names: Sequence[str], params: Params) -> Damping:
+    """Fit some of the laws and choose among them."""
     unfitted: dict[str, str] = {}
-    laws = _affordable(params.laws, int(np.count_nonzero(spread.kept)), unfitted)
-    fits = _fit_all(laws, t, amplitude, spread, params, unfitted)
-    if fits and (closer := _corner(fits, t, amplitude, noise, spread)) is not None:
-        spread = closer
-        fits = _fit_all(laws, t, amplitude, spread, params, unfitted)
+    laws = _affordable(names, int(np.count_nonzero(points.spread.kept)), unfitted)
+    fits = _weigh_all(laws, points, params, unfitted)
+    if fits and (closer := _corner(fits, points)) is not None:
+        points = replace(points, spread=closer, minima={})
+        fits = _weigh_all(laws, points, params, unfitted)
     if not fits:
         raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
-    selected, admissible = choose(
-        fits, params.evidence, lambda name: fits[name].amplitude(np.array([0.0, float(t[-1])]))
-    )
-    if not admissible and params.otherwise:
-        return fit_damping(demodulated, t0, replace(params, laws=params.otherwise, otherwise=()))
-    return Damping(t0, fits, selected, admissible, spread, unfitted)
+    ends = np.array([0.0, float(points.t[-1])])
+    selected, admissible = choose(fits, params.evidence, lambda name: fits[name].amplitude(ends))
+    return Damping(points.t0, fits, selected, admissible, points.spread, unfitted)
 
 
 def _affordable(names: Sequence[str], points: int, unfitted: dict[str, str]) -> list[Law]:
@@ -194,18 +215,14 @@ def _affordable(names: Sequence[str], points: int, unfitted: dict[str, str]) -> 
     return laws
 
 
-def _fit_all(
-    laws: Sequence[Law], t: F8, amplitude: F8, spread: Scatter, params: Params, unfitted: dict[str, str]
-) -> dict[str, LawFit]:
+def _weigh_all(laws: Sequence[Law], points: _Points, params: Params, unfitted: dict[str, str]) -> dict[str, LawFit]:
     """Fit the laws; those whose numbers ran out of range, which no law with a chance does, are listed as unfitted."""
-    if not laws:
-        return {}
-    t, y, u = t[spread.kept], amplitude[spread.kept], spread.u[spread.kept]
-    found = {law.name: fit for law, fit in zip(laws, minima_of(laws, t, y, u), strict=True)}
+    spread = points.spread
+    t, y, u = points.t[spread.kept], points.amplitude[spread.kept], spread.u[spread.kept]
     sound = {}
     for law in laws:
-        if (why := _astray(law, found[law.name], t, y)) is None:
-            sound[law.name] = found[law.name]
+        if (why := _astray(law, points.minimum(law), t, y)) is None:
+            sound[law.name] = points.minimum(law)
             unfitted.pop(law.name, None)
         else:
             unfitted[law.name] = why
@@ -246,16 +263,15 @@ def _astray(law: Law, fit: Minimum, t: F8, y: F8) -> str | None:
     return "its numbers ran out of range" if astray else None
 
 
-def _corner(fits: Mapping[str, LawFit], t: F8, amplitude: F8, noise: F8, spread: Scatter) -> Scatter | None:
+def _corner(fits: Mapping[str, LawFit], points: _Points) -> Scatter | None:
     """The scatter about a law that follows the points much closer than the smooth curve does, if there is one."""
     fit = min(fits.values(), key=lambda fit: fit.reduced_chi2)
-    if spread.excess == 0.0 or not fit.reduced_chi2 < 0.25:
+    if points.spread.excess == 0.0 or not fit.reduced_chi2 < 0.25:
         return None
-    residual = amplitude - fit.amplitude(t)
-    typical = mad_sigma(residual)
-    excess = math.sqrt(max(typical**2 - float(np.median(noise)) ** 2, 0.0))
-    excess = excess if typical > 1.3 * float(np.median(noise)) else 0.0
-    u = np.hypot(noise, excess)
+    residual = points.amplitude - fit.amplitude(points.t)
+    typical, noise = mad_sigma(residual), float(np.median(points.noise))
+    excess = math.sqrt(typical**2 - noise**2) if typical > 1.3 * noise else 0.0
+    u = np.hypot(points.noise, excess)
     kept = np.abs(residual) <= 5.0 * u
     if np.count_nonzero(kept) < 0.8 * kept.size:
         return None

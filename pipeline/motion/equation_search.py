@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.damping.evidence import choose, least_chi2, weigh
+from pipeline.damping.law_fit import Minimum
 from pipeline.damping.laws import LAWS
-from pipeline.damping.minimum import Minimum
 from pipeline.damping.select import Damping, LawFit
 from pipeline.damping.select import Params as DampingParams
 from pipeline.motion.equation_model import COEFFICIENTS, STATE, STEP, FreeMotion
