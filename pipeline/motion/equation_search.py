@@ -27,7 +27,7 @@ __all__ = ["Search"]
 NAMES = (*STATE, *COEFFICIENTS)
 PRECISION = 0.01  # of the standard uncertainties, at which a fit stops
 FEW = 6  # windows under which the laws of the amplitude say too little to start from
-COARSE, ROUGH, FIRST_STEPS = 0.2, 0.1, 12  # step in rad, precision and most steps while a start is looked for
+COARSE, ROUGH, FIRST_STEPS = 0.2, 0.1, 30  # step in rad, precision and most steps while a start is looked for
 HOPELESS = 1000.0  # rise of chi-square, to first order, from which a law is not fitted any more
 
 
@@ -216,7 +216,7 @@ class Search:
         theta[self.slots(name)] = values
         return theta
 
-    def fit(self, name: str, start: F8, precision: float = PRECISION, steps: int = 30) -> least_squares.Fit:
+    def fit(self, name: str, start: F8, precision: float = PRECISION, steps: int = 60) -> least_squares.Fit:
         """Fit one law to the samples used, in units of their noise."""
         model, slots = self.model(), self.slots(name)
         y = self.conditioned.track.y[self.used]

@@ -24,6 +24,7 @@ OTHERS = (
     "pankaj9um__PHY224/undamped_point_data_set2.txt",
     "kamjha__PHY224/position_osc.txt",
 )
+FRICTION = "caspar__PhysicsLab/Q1.txt"
 TICK_M = 4.3e-5
 
 pytestmark = pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs ../shared/recordings")
@@ -282,3 +283,13 @@ def test_disc_drag_falls_with_amplitude() -> None:
     assert float(np.interp(0.015, curve.x, curve.y)) == pytest.approx(7.8, abs=1.5)
     law = np.interp(curve.x_points, curve.x, curve.y)
     assert np.mean(np.abs(curve.y_points - law) < 2 * curve.u_points) > 0.8
+
+
+def test_a_pendulum_that_friction_stops() -> None:
+    """Six periods in volts, counted as metres: friction by the equation of motion, T = 9.20 s."""
+    rows = [line.split("\t") for line in (RECORDINGS / FRICTION).read_text("utf-8").splitlines()]
+    t, y = np.array([[float(cell) for cell in row] for row in rows if len(row) == 2 and row[0][:1].isdigit()]).T
+    result = analyse(Track.from_arrays(t, y))
+    assert motion_of(result).damping.selected == "friction"
+    assert "strongly_damped" in codes(result)
+    assert result.estimates["period"].value == pytest.approx(9.2004, abs=0.008)
