@@ -96,6 +96,8 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
 
 def _usual(stated: F8) -> tuple[float | None, bool]:
     """Return the usual error, m, and whether it is constant."""
+    if stated.size and bool((stated == stated[0]).all()):
+        return float(stated[0]), True  # no copy of a column of millions
     finite = stated[np.isfinite(stated)]
     if not finite.size:
         return None, False
