@@ -20,6 +20,7 @@ __all__ = ["DecayFit", "best_decay", "critical_decay", "lone_exponential"]
 # A hundredth of a standard uncertainty is left. One attempt is enough: starts are many.
 ROUGH = least_squares.Params(precision=0.1, steps=15, again=False)
 FINE = least_squares.Params(precision=0.01, steps=40, again=False)
+FAR = 20.0
 FINISHED = 2  # of the starts, the best, also where the steps were too few
 EACH = 2  # starts of each kind of damping
 DIFFERENCE = 1e-5  # of a rate, by which it is moved for the covariance
@@ -111,10 +112,13 @@ def critical_decay(tau: F8, y: F8, near: DecayFit) -> DecayFit | None:
 
 
 def lone_exponential(tau: F8, y: F8, noise: float, rate: float) -> tuple[float, float]:
-    """Fit :math:`o + p e^{-rt}` from a rate, 1/s, and return r and chi-square."""
+    """Fit :math:`o + p e^{-rt}` from a rate, 1/s, and return r and chi-square.
 
-    end = _search(_exponential, tau, y, noise, np.array([math.log(rate)]), FINE)
-    return math.exp(end.values[0]), end.cost
+    Where the record shows no such rate the search runs away; it is followed for :data:`FAR` powers of e.
+    """
+    start = math.log(rate)
+    end = _search(_exponential, tau, y, noise, np.array([start]), FINE)
+    return math.exp(min(max(float(end.values[0]), start - FAR), start + FAR)), end.cost
 
 
 def _decay(tau: F8, y: F8, noise: float, start: F8) -> DecayFit | None:

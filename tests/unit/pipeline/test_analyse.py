@@ -367,6 +367,7 @@ def test_any_times_are_analysed_or_refused(data: st.DataObject) -> None:
 @example(seed=0, seconds=3.0, omega=1.0, sigma_m=0.0, gamma=1.0, step_m=0.01, holes=0.875, echoes=0.25)
 @example(seed=0, seconds=2.0, omega=1.0, sigma_m=0.0, gamma=2.0, step_m=0.01, holes=0.75, echoes=0.25)
 @example(seed=0, seconds=2.0, omega=1.0, sigma_m=0.0, gamma=0.0, step_m=0.0, holes=0.875, echoes=0.25)
+@example(seed=0, seconds=8.0, omega=8.5, sigma_m=0.0, gamma=1.0, step_m=0.0, holes=0.0, echoes=0.25)
 def test_any_oscillation_is_analysed_or_refused(
     synthetic: ModuleType,
     seed: int,
