@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pipeline.bench.air import air_density
+from pipeline.bench.air import TYPICAL_HUMIDITY, TYPICAL_PRESSURE, TYPICAL_TEMPERATURE, air_density
 from pipeline.bench.scene import Scene
-from pipeline.numerics.estimate import Estimate
 
 __all__ = ["ADDED_MASS_SHAPE", "added_mass_kg", "scene_air_density"]
 
@@ -26,11 +25,7 @@ def added_mass_kg(scene: Scene) -> float:
 def scene_air_density(scene: Scene) -> float:
     """Return the density of a scene's air, kg/m^3; where it says nothing, of air at 20 degC, 101,325 Pa and 50 %."""
     return air_density(
-        _value(scene.air_temperature_c, 20.0),
-        _value(scene.air_pressure_pa, 101325.0),
-        _value(scene.air_relative_humidity, 0.5),
+        (scene.air_temperature_c or TYPICAL_TEMPERATURE).value,
+        (scene.air_pressure_pa or TYPICAL_PRESSURE).value,
+        (scene.air_relative_humidity or TYPICAL_HUMIDITY).value,
     )
-
-
-def _value(estimate: Estimate | None, otherwise: float) -> float:
-    return otherwise if estimate is None else estimate.value
