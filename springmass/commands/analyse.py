@@ -6,7 +6,6 @@ import argparse
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from acquisition.errors import AcquisitionError
 from pipeline.analyse import Oscillation, Overdamped
@@ -14,10 +13,13 @@ from pipeline.errors import PipelineError
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder
+from springmass.runs.json_results import picked
 from springmass.runs.loading import load, read_scene
 from storage.errors import StorageError
 
 __all__ = ["run"]
+
+PARAMETERS = ("accuracy", "method", "velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "strict")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -36,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
             analysed = analyse_loaded(
                 loaded,
                 scene,
-                parameters=_parameters(options),
+                parameters=picked(options, PARAMETERS),
                 accuracy=options.accuracy,
                 with_classic=options.method == "classic",
             )
@@ -96,8 +98,3 @@ def _write(analysed: Analysed, results: Path) -> None:
     from springmass.report.write import write_report
 
     print(f"report: {write_report(results, [analysed])}", file=sys.stderr)
-
-
-def _parameters(options: argparse.Namespace) -> dict[str, Any]:
-    names = ("accuracy", "method", "velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "strict")
-    return {name: getattr(options, name) for name in names}

@@ -5,17 +5,18 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from typing import Any
 
 from pipeline.bench.scene import Scene
-from springmass import __version__
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain
-from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc
+from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
-from springmass.runs.loading import Loaded, load, read_scene
+from springmass.runs.json_results import picked, provenance_of
+from springmass.runs.loading import load, read_scene
 
 __all__ = ["run"]
+
+PARAMETERS = ("accuracy", "mass_correlation", "channel", "run", "rate_hz", "unit", "from_s", "to_s", "strict")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -30,22 +31,16 @@ def run(options: argparse.Namespace) -> int:
     out = None if options.out is None else make_folder(options.out)
     cut = {"from_s": options.from_s, "to_s": options.to_s}
     loaded = [load(path, **completions(options), **cut) for path in options.input]
-    scenes = [_scene(one, scene) for one, scene in zip(loaded, given, strict=True)]
+    scenes = [scene_of(one, scene) for one, scene in zip(loaded, given, strict=True)]
     demand_one_spring(list(zip(names, scenes, strict=True)))
     time_utc = now_utc()
-    parameters = _parameters(options)
+    parameters = picked(options, PARAMETERS)
     runs = [
         analyse_loaded(one, scene, name=name, parameters=parameters, accuracy=options.accuracy, time_utc=time_utc)
         for name, one, scene in zip(names, loaded, scenes, strict=True)
     ]
     compared = compare_analysed(runs, mass_correlation=options.mass_correlation)
-    provenance = {
-        "version": __version__,
-        "accuracy": options.accuracy,
-        "parameters": parameters,
-        "time_utc": time_utc,
-    }
-    result = comparison_json(compared, runs, provenance)
+    result = comparison_json(compared, runs, provenance_of(options.accuracy, parameters, time_utc))
     if options.json:
         print(json.dumps(result, allow_nan=False), flush=True)
     else:
@@ -75,12 +70,6 @@ def _given_scenes(options: argparse.Namespace) -> list[Scene | None]:
     return scenes * count if len(scenes) == 1 else scenes
 
 
-def _scene(loaded: Loaded, given: Scene | None) -> Scene:
-    if given is not None:
-        return given
-    return Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
-
-
 def _print_text(compared: Compared, runs: list[Analysed]) -> None:
     from springmass.printing import comparison_text, findings_text, wrapped
 
@@ -92,8 +81,3 @@ def _print_text(compared: Compared, runs: list[Analysed]) -> None:
         if grave:
             print(f"\n{run.name}:")
             print(findings_text(grave))
-
-
-def _parameters(options: argparse.Namespace) -> dict[str, Any]:
-    names = ("accuracy", "mass_correlation", "channel", "run", "rate_hz", "unit", "from_s", "to_s", "strict")
-    return {name: getattr(options, name) for name in names}

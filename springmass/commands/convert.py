@@ -10,10 +10,9 @@ from typing import Any
 
 from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
-from springmass import __version__
 from springmass.commands import completions
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError
-from springmass.runs.analysing import now_utc
+from springmass.runs.analysing import made_now
 from springmass.runs.loading import Loaded, load, read_scene
 from storage.atomic import write_whole
 from storage.run_file.writing import write_run
@@ -109,12 +108,7 @@ def write_loaded(path: Path, loaded: Loaded, blocks: Any, *, scene: Any = None, 
         traps=loaded.traps,
         malformed_rows=loaded.malformed_rows,
         format=loaded.recorded_format,
-        provenance={
-            **loaded.provenance,
-            "software": "springmass",
-            "version": __version__,
-            "created_utc": now_utc(),
-        },
+        provenance={**loaded.provenance, **made_now()},
         overwrite=overwrite,
     )
 

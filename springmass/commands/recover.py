@@ -6,9 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from springmass import __version__
 from springmass.errors import OK
-from springmass.runs.analysing import now_utc
+from springmass.runs.analysing import made_now
 from storage.recover import recover
 
 __all__ = ["run"]
@@ -21,7 +20,7 @@ def run(options: argparse.Namespace) -> int:
         None if options.output is None else Path(options.output),
         overwrite=options.overwrite,
         speed_of_sound_m_per_s=options.speed_of_sound,
-        provenance={"software": "springmass", "version": __version__, "created_utc": now_utc()},
+        provenance=made_now(),
     )
     for line in report.describe():
         print(line, file=sys.stderr)

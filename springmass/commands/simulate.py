@@ -21,9 +21,8 @@ from pipeline.dynamics.choose import Choice
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Joint
 from pipeline.track import F8
-from springmass import __version__
 from springmass.errors import OK, USAGE, ProgramError
-from springmass.runs.analysing import make_folder, now_utc
+from springmass.runs.analysing import made_now, make_folder
 from springmass.runs.loading import load, read_scene
 from springmass.runs.simulation import (
     Against,
@@ -119,7 +118,7 @@ def _write(
     simulation: Simulation, against: Against | None, band: Band | None, scene: Scene, options: argparse.Namespace
 ) -> Path:
     """Write run file, figures, tables and JSON into NAME.simulated; return the folder."""
-    from springmass.report.figures import render
+    from springmass.report.figures import save
     from springmass.report.simulation_figures import against_figure, band_figure, draw_simulation
     from storage.atomic import write_whole
 
@@ -144,8 +143,7 @@ def _write(
             for old in (pictures / f"{title}.svg", pictures / f"{title}.pdf", folder / f"{title}.csv"):
                 old.unlink(missing_ok=True)
     for title, figure in figures.items():
-        for kind in ("svg", "pdf"):
-            write_whole(pictures / f"{title}.{kind}", render(figure, kind))
+        save(figure, pictures, title)
     for title, columns in tables.items():
         write_whole(folder / f"{title}.csv", _table(columns))
     write_whole(folder / "simulation.json", json.dumps(told, indent=2) + "\n")
@@ -179,9 +177,7 @@ def _write_run(
         scene=scene.to_mapping(),
         title=f"{Path(options.scene).name} by {simulation.choice.integrator.name}",
         provenance={
-            "software": "springmass",
-            "version": __version__,
-            "created_utc": now_utc(),
+            **made_now(),
             "configuration": {"rest_m": rest, **told},
         },
         overwrite=True,

@@ -6,12 +6,17 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from springmass import __version__
 from springmass.commands import completions
 from springmass.errors import OK, USAGE, ProgramError
 from springmass.runs.analysing import make_folder
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["run"]
 
@@ -62,14 +67,9 @@ def _simulated(options: argparse.Namespace) -> int:
     trade = measure(truth, found, seeds, timer=time.perf_counter, progress=_progress(seeds))
     content = trade_json(trade, absent, __version__)
     if out is not None:
-        from springmass.report.figures import render
         from springmass.trade.drawing import trade_figure
-        from storage.atomic import write_whole
 
-        figure = trade_figure({q: trade.points(q) for q in trade.bound}, labels=LABELS)
-        write_whole(out / "trade.svg", render(figure, "svg"))
-        write_whole(out / "trade.pdf", render(figure, "pdf"))
-        write_whole(out / "trade.json", json.dumps(content, indent=2) + "\n")
+        _write(out, "trade", trade_figure({q: trade.points(q) for q in trade.bound}, labels=LABELS), content)
     print(json.dumps(content) if options.json else trade_text(trade, absent))
     return OK
 
@@ -107,15 +107,17 @@ def _integrators(options: argparse.Namespace) -> int:
     rows = measure_integrators(time.perf_counter, progress=lambda scene: print(f"trade: {scene}", file=sys.stderr))
     content = integrators_json(rows, __version__)
     if out is not None:
-        from springmass.report.figures import render
-        from storage.atomic import write_whole
-
-        figure = integrators_figure(rows)
-        write_whole(out / "integrators.svg", render(figure, "svg"))
-        write_whole(out / "integrators.pdf", render(figure, "pdf"))
-        write_whole(out / "integrators.json", json.dumps(content, indent=2) + "\n")
+        _write(out, "integrators", integrators_figure(rows), content)
     print(json.dumps(content) if options.json else integrators_text(rows))
     return OK
+
+
+def _write(out: Path, name: str, figure: Figure, content: Mapping[str, Any]) -> None:
+    from springmass.report.figures import save
+    from storage.atomic import write_whole
+
+    save(figure, out, name)
+    write_whole(out / f"{name}.json", json.dumps(content, indent=2) + "\n")
 
 
 def _own(options: argparse.Namespace) -> int:

@@ -51,26 +51,10 @@ def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
         + r" \\"
         for row in table_rows(analyses)
     ]
-    heads = " & ".join(["Quantity & Symbol", *map(_tex_text, names)]) + r" \\"
-    return "\n".join(
-        [
-            r"% needs \usepackage{booktabs} and \usepackage{siunitx}, version 3",
-            r"\begin{table}",
-            r"  \centering",
-            r"  \caption{Results of the oscillation experiment; in parentheses the standard uncertainty"
-            " ($k = 1$) of the last digits.}",
-            r"  \label{tab:springmass}",
-            rf"  \begin{{tabular}}{{ll{'l' * len(names)}}}",
-            r"    \toprule",
-            f"    {heads}",
-            r"    \midrule",
-            *(f"    {line}" for line in body),
-            r"    \bottomrule",
-            r"  \end{tabular}",
-            r"\end{table}",
-            "",
-        ]
+    caption = (
+        "Results of the oscillation experiment; in parentheses the standard uncertainty ($k = 1$) of the last digits."
     )
+    return _framed(caption, ["Quantity", "Symbol", *map(_tex_text, names)], body, [r"  \label{tab:springmass}"])
 
 
 def budget_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
@@ -91,21 +75,30 @@ def _budget_table(name: str, analysis: Analysis) -> str:
         for c in row.contributions:
             given = "--" if c.input is None else _tex_quantity(c.input)
             cells = [*heads, _tex_text(INPUTS[c.name]), c.kind, given, rf"\qty{{{100 * c.share:.1f}}}{{\percent}}"]
-            lines.append("    " + " & ".join(cells) + r" \\")
+            lines.append(" & ".join(cells) + r" \\")
             heads = ["", ""]
-        lines.append(r"    \addlinespace")
+        lines.append(r"\addlinespace")
+    caption = (
+        f"Uncertainty budget of {_tex_text(name)}: share of each input in the variance, "
+        "from the record's own scatter (A) or from elsewhere (B)."
+    )
+    return _framed(caption, ["Quantity", "Result", "Input", "Type", "Value", "Share"], lines[:-1])
+
+
+def _framed(caption: str, heads: Sequence[str], body: Sequence[str], label: Sequence[str] = ()) -> str:
+    """Set the lines of a table under its heads, all columns to the left."""
     return "\n".join(
         [
             r"% needs \usepackage{booktabs} and \usepackage{siunitx}, version 3",
             r"\begin{table}",
             r"  \centering",
-            rf"  \caption{{Uncertainty budget of {_tex_text(name)}: share of each input in the variance, "
-            "from the record's own scatter (A) or from elsewhere (B).}",
-            r"  \begin{tabular}{llllll}",
+            rf"  \caption{{{caption}}}",
+            *label,
+            rf"  \begin{{tabular}}{{{'l' * len(heads)}}}",
             r"    \toprule",
-            r"    Quantity & Result & Input & Type & Value & Share \\",
+            rf"    {' & '.join(heads)} \\",
             r"    \midrule",
-            *lines[:-1],
+            *(f"    {line}" for line in body),
             r"    \bottomrule",
             r"  \end{tabular}",
             r"\end{table}",

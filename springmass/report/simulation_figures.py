@@ -14,23 +14,22 @@ import numpy as np
 
 from pipeline.dynamics import Trajectory, get_integrator
 from pipeline.dynamics.band import Band
-from pipeline.dynamics.stability import limits, runs_bounded
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
-from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, style
+from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, VERMILLION, blank, legend_row, style
 from springmass.runs.simulation import Against, Simulation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["EULERS", "SIMULATION_FIGURES", "against_figure", "band_figure", "draw_simulation", "stability_figure"]
+__all__ = ["EULERS", "against_figure", "band_figure", "draw_simulation"]
 
-SIMULATION_FIGURES = ("position", "velocity", "energy", "phase", "error")
 EULERS = (("forward-euler", "forward Euler", VERMILLION), ("symplectic-euler", "symplectic Euler", BLUE))
 PERIODS, TURNS = 14, 6  # drawn against time, and in a phase plot
 POINTS = 1500
 GROWN = 1e6  # times the starting amplitude: beyond it a curve says nothing more
+DASHED: dict[str, Any] = {"color": "#000000", "lw": 0.9, "ls": (0, (2, 1.5))}  # what is exact, or expected
 WIDTH, LEFT, GAP, RIGHT, BOTTOM, TOP = 7.2, 0.68, 0.72, 0.12, 0.45, 0.62
 
 
@@ -62,9 +61,8 @@ def against_figure(against: Against) -> Figure:
     against : Against
     """
     with style():
-        figure = _blank(WIDTH, 4.0)
-        above = figure.add_axes((LEFT / WIDTH, 0.42, (WIDTH - LEFT - RIGHT) / WIDTH, 0.47))
-        below = figure.add_axes((LEFT / WIDTH, 0.12, (WIDTH - LEFT - RIGHT) / WIDTH, 0.27), sharex=above)
+        figure, (above, below) = _stacked(4.0, (0.42, 0.47), (0.12, 0.27))
+        below.sharex(above)
         dense: dict[str, Any] = {"rasterized": against.t.size > POINTS}
         if against.band is not None:
             _shade(above, against.t, against.predicted + against.band)
@@ -72,7 +70,7 @@ def against_figure(against: Against) -> Figure:
         above.plot(against.t, against.predicted * 1e3, color="#000000", lw=0.6, label="predicted", **dense)
         above.set_ylabel("distance / mm")
         above.tick_params(labelbottom=False)
-        above.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
+        legend_row(above, 4)
         if against.band is not None:
             _shade(below, against.t, against.band)
         left = (against.measured - against.predicted) * 1e3
@@ -99,23 +97,19 @@ def band_figure(simulation: Simulation, band: Band) -> Figure:
     whole = band.t[band.t <= end]
     amplitude, of_amplitude = band.amplitude_at(whole)
     with style():
-        figure = _blank(WIDTH, 5.6)
-        panels = [
-            figure.add_axes((LEFT / WIDTH, at, (WIDTH - LEFT - RIGHT) / WIDTH, 0.23)) for at in (0.7, 0.385, 0.075)
-        ]
-        motion, course, width = panels
+        figure, (motion, course, width) = _stacked(5.6, (0.7, 0.23), (0.385, 0.23), (0.075, 0.23))
         middle = simulation.trajectory.at(last)
         _shade(motion, last, middle + band.displacement_at(last))
         motion.plot(last, middle * 1e3, color="#000000", lw=0.8, label="the scene's values")
         motion.set_ylabel("displacement / mm")
-        motion.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+        legend_row(motion, 3)
         _shade(course, whole, of_amplitude)
         course.plot(whole, amplitude * 1e3, color="#000000", lw=0.8)
         course.set_ylabel("amplitude / mm")
         _shade(width, whole, band.displacement_at(whole))
         width.set_ylabel("band / mm")
         width.set_xlabel("time / s")
-        for panel, t in zip(panels, (last, whole, whole), strict=True):
+        for panel, t in ((motion, last), (course, whole), (width, whole)):
             panel.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else float(t[0]) + 1.0)
         return figure
 
@@ -123,16 +117,8 @@ def band_figure(simulation: Simulation, band: Band) -> Figure:
 def _shade(panel: Axes, t: F8, levels: F8) -> None:
     """Fill between the quantiles (4, n), m, of 95 and of 68 %."""
     for low, high, share, alpha in ((0, 3, 95, 0.25), (1, 2, 68, 0.45)):
-        panel.fill_between(
-            t,
-            levels[low] * 1e3,
-            levels[high] * 1e3,
-            color=ORANGE,
-            alpha=alpha,
-            lw=0.0,
-            label=f"{share} %",
-            rasterized=t.size > POINTS,
-        )
+        look: dict[str, Any] = {"color": ORANGE, "alpha": alpha, "lw": 0.0, "rasterized": t.size > POINTS}
+        panel.fill_between(t, levels[low] * 1e3, levels[high] * 1e3, label=f"{share} %", **look)
 
 
 def _euler(simulation: Simulation, name: str) -> Trajectory:
@@ -156,36 +142,24 @@ def _shown(simulation: Simulation, run: Trajectory, periods: int) -> slice:
     return slice(0, min(len(run.y), int(periods * _periods(simulation) / run.spacing_s) + 1))
 
 
-def _pair(height: float, labels: tuple[str, str], *, share: bool = False) -> tuple[Figure, list[Axes]]:
+def _stacked(height: float, *rows: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    """Make panels under each other, each from a share of the figure's height upwards over another."""
+    figure, wide = blank(WIDTH, height), (WIDTH - LEFT - RIGHT) / WIDTH
+    return figure, [figure.add_axes((LEFT / WIDTH, at, wide, tall)) for at, tall in rows]
+
+
+def _pair(height: float, labels: tuple[str, str]) -> tuple[Figure, list[Axes]]:
     """Make two panels beside each other, each under its method's name."""
-    figure = _blank(WIDTH, height + BOTTOM + TOP)
-    wide = (WIDTH - LEFT - GAP - RIGHT) / 2.0
-    axes: list[Axes] = []
+    whole, wide = height + BOTTOM + TOP, (WIDTH - LEFT - GAP - RIGHT) / 2.0
+    figure, axes = blank(WIDTH, whole), []
     for i, (_, words, _) in enumerate(EULERS):
         at = (LEFT + i * (wide + GAP)) / WIDTH
-        panel = figure.add_axes(
-            (at, BOTTOM / (height + BOTTOM + TOP), wide / WIDTH, height / (height + BOTTOM + TOP)),
-            sharey=axes[0] if share and axes else None,
-        )
+        panel = figure.add_axes((at, BOTTOM / whole, wide / WIDTH, height / whole))
         panel.set_title(words, loc="left", fontsize=9.0, pad=18)
         panel.set_xlabel(labels[0])
         axes.append(panel)
     axes[0].set_ylabel(labels[1])
     return figure, axes
-
-
-def _legend(panel: Axes) -> None:
-    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.15, columnspacing=1.2)
-
-
-def _blank(width: float, height: float) -> Figure:
-    """Return a figure of this size, inches, that belongs to no window."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height))
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def _against_time(simulation: Simulation, runs: Sequence[Trajectory], what: str, factor: float, label: str) -> Figure:
@@ -194,11 +168,9 @@ def _against_time(simulation: Simulation, runs: Sequence[Trajectory], what: str,
         rows = _shown(simulation, run, PERIODS)
         t = run.t[rows]
         panel.plot(t, getattr(run, what)[rows] * factor, color=colour, lw=1.0, label=words)
-        panel.plot(
-            t, getattr(simulation.truth, what)[rows] * factor, color="#000000", lw=0.9, ls=(0, (2, 1.5)), label="exact"
-        )
+        panel.plot(t, getattr(simulation.truth, what)[rows] * factor, label="exact", **DASHED)
         panel.set_xlim(float(t[0]), float(t[-1]))
-        _legend(panel)
+        legend_row(panel, 2, pad=0.15, columnspacing=1.2)
     return figure
 
 
@@ -206,20 +178,18 @@ def _energy(simulation: Simulation, runs: Sequence[Trajectory], mass_kg: float |
     label = "energy / mJ" if mass_kg is not None else "energy per mass / (mJ/kg)"
     figure, axes = _pair(2.3, ("time / s", label))
     for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
-        for each, shade, dashes, name in (
-            (run, colour, "-", words),
-            (simulation.truth, "#000000", (0, (2, 1.5)), "exact"),
-        ):
-            t, energy = _energies(each, run, mass_kg)
-            panel.plot(t, energy, color=shade, lw=1.0 if dashes == "-" else 0.9, ls=dashes, label=name)
+        t, energy = _energies(run, run, mass_kg)
+        panel.plot(t, energy, color=colour, lw=1.0, label=words)
+        top = float(np.max(energy))
+        _, energy = _energies(simulation.truth, run, mass_kg)
+        panel.plot(t, energy, label="exact", **DASHED)
         low, high = (float(f(energy[energy > 0])) if np.any(energy > 0) else 1.0 for f in (np.min, np.max))
-        top = float(np.max(panel.lines[0].get_ydata()))
         if top > 20.0 * high or (low > 0 and high > 20.0 * low):
             panel.set_yscale("log")
         else:
             panel.set_ylim(0.0, 1.08 * max(top, high))
         panel.set_xlim(0.0, float(t[-1]))
-        _legend(panel)
+        legend_row(panel, 2, pad=0.15, columnspacing=1.2)
     return figure
 
 
@@ -241,69 +211,30 @@ def _phase(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
         panel.plot(run.y[rows] * 1e3, run.v[rows], color=colour, lw=1.2, label="computed")
         panel.plot(exact.y[rows] * 1e3, exact.v[rows], color="#000000", lw=0.6, label="exact")
         panel.plot(run.y[:1] * 1e3, run.v[:1], "o", ms=3.0, color="#000000", label="start")
-        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.15, columnspacing=1.0)
+        legend_row(panel, 3, pad=0.15, columnspacing=1.0)
     return figure
 
 
 def _error(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
     """Running maxima: an error crosses zero twice a period."""
-    figure = _blank(WIDTH, 3.2)
+    figure = blank(WIDTH, 3.2)
     panel = figure.add_axes((LEFT / WIDTH, 0.14, (WIDTH - LEFT - 2 * RIGHT) / WIDTH, 0.74))
     start = simulation.problem.amplitude_m() or 1.0
     choice = simulation.choice
-    curves = [(run, words, colour, "-") for run, (_, words, colour) in zip(runs, EULERS, strict=True)]
+    curves = [(run, words, colour) for run, (_, words, colour) in zip(runs, EULERS, strict=True)]
     if choice.integrator.name not in [name for name, *_ in EULERS]:
-        curves.append((simulation.trajectory, choice.integrator.words, GREEN, "-"))
-    for run, words, colour, dashes in curves:
+        curves.append((simulation.trajectory, choice.integrator.words, GREEN))
+    for run, words, colour in curves:
         error = np.maximum.accumulate(np.abs(run.y - simulation.truth.y[: len(run.y)])) / start
         drawn = np.flatnonzero((error > 0) & (error < GROWN))
         thinned = np.linspace(0, drawn.size - 1, min(drawn.size, POINTS)).astype(np.intp)
         rows = drawn[np.unique(thinned)]
-        panel.plot(run.t[rows], error[rows], color=colour, ls=dashes, label=words)
+        panel.plot(run.t[rows], error[rows], color=colour, label=words)
     if 0.0 < choice.predicted_error < GROWN:
-        panel.axhline(choice.predicted_error, color="#000000", lw=0.8, ls=(0, (2, 1.5)), label="predicted")
+        panel.axhline(choice.predicted_error, label="predicted", **{**DASHED, "lw": 0.8})
     panel.set_yscale("log")
     panel.set_xlim(0.0, float(simulation.truth.t[-1]))
     panel.set_ylabel("largest error so far / amplitude")
     panel.set_xlabel("time / s")
-    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.15, columnspacing=1.2)
+    legend_row(panel, 2, pad=0.15, columnspacing=1.2)
     return figure
-
-
-def stability_figure() -> Figure:
-    """Draw the stability map: the largest stable step against damping as theory has it, and runs on both sides.
-
-    Raises
-    ------
-    ValueError
-        If a run contradicts its line.
-    """
-    ratios = np.geomspace(0.01, 100.0, 161)
-    asked = np.geomspace(0.02, 60.0, 8)
-    looks = (
-        ("forward-euler", VERMILLION),
-        ("symplectic-euler", BLUE),
-        ("verlet", GREEN),
-        ("yoshida4", PURPLE),
-        ("rk4", ORANGE),
-    )
-    with style():
-        figure = _blank(WIDTH, 3.8)
-        panel = figure.add_axes((LEFT / WIDTH, 0.13, (WIDTH - LEFT - RIGHT) / WIDTH, 0.76))
-        panel.set_xscale("log")
-        panel.set_yscale("log")
-        for name, colour in looks:
-            method = get_integrator(name)
-            panel.plot(ratios, limits(method, ratios), color=colour, label=name)
-            for ratio, limit in zip(asked.tolist(), limits(method, asked).tolist(), strict=True):
-                for share, bounded, marker in ((0.97, True, "o"), (1.03, False, "x")):
-                    if runs_bounded(method, share * limit, ratio) != bounded:
-                        raise ValueError(f"{name} at gamma/omega {ratio:g}: a run contradicts its limit {limit:g}")
-                    # Drawn farther from the line than it was run, to be seen apart.
-                    at = limit * (0.9 if bounded else 1.11)
-                    panel.plot([ratio], [at], marker, ms=3.2 if bounded else 4.0, color=colour, mew=1.0)
-        panel.set_xlabel("damping ratio gamma / omega")
-        panel.set_ylabel("largest stable step / radians")
-        panel.set_xlim(ratios[0], ratios[-1])
-        panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, borderaxespad=0.2, columnspacing=1.2)
-        return figure

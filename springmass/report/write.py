@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from springmass.report.budgets import budget_csv
-from springmass.report.figures import MAKERS, comparison_figure, draw, render
+from springmass.report.figures import KINDS, MAKERS, comparison_figure, draw, render
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
@@ -20,8 +20,6 @@ from springmass.runs.json_results import plain
 from storage.atomic import write_whole
 
 __all__ = ["write_report"]
-
-_KINDS: tuple[Literal["svg"], Literal["pdf"]] = ("svg", "pdf")
 
 
 def write_report(
@@ -74,7 +72,7 @@ def write_report(
     for stem, run in zip(_stems(names), runs, strict=True):
         smoothed = smoothed_or_why(run.analysis)
         figures = draw(run.analysis, smoothed)
-        drawn = {name: {kind: render(figure, kind) for kind in _KINDS} for name, figure in figures.items()}
+        drawn = {name: {kind: render(figure, kind) for kind in KINDS} for name, figure in figures.items()}
         _write_figures(directory / "figures", stem, drawn)
         motion = directory / f"{stem}motion.csv"
         _put(motion, None if isinstance(smoothed, str) else motion_csv(run.analysis, smoothed))
@@ -88,7 +86,7 @@ def write_report(
     write_whole(directory / "budget.tex", budget_tex(names, analyses))
     overview = {}
     if compared is not None:
-        overview = {kind: render(comparison_figure(compared.comparison), kind) for kind in _KINDS}
+        overview = {kind: render(comparison_figure(compared.comparison), kind) for kind in KINDS}
         for kind, data in overview.items():
             write_whole(directory / "figures" / f"comparison.{kind}", data)
     provenance = (summary or results[0])["provenance"]
@@ -98,7 +96,7 @@ def write_report(
 
 def _write_figures(folder: Path, stem: str, drawn: Mapping[str, Mapping[Literal["svg", "pdf"], bytes]]) -> None:
     for name in MAKERS:
-        for kind in _KINDS:
+        for kind in KINDS:
             _put(folder / f"{stem}{name}.{kind}", drawn[name][kind] if name in drawn else None)
 
 

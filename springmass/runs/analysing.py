@@ -12,11 +12,12 @@ from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.results.classic import Classic, classic
+from springmass import __version__
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.json_results import result_of
 from springmass.runs.loading import Loaded
 
-__all__ = ["Analysed", "analyse_loaded", "distinct_names", "make_folder", "now_utc"]
+__all__ = ["Analysed", "analyse_loaded", "distinct_names", "made_now", "make_folder", "now_utc", "scene_of"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,8 +73,7 @@ def analyse_loaded(
     ------
     pipeline.errors.AnalysisError, pipeline.errors.SceneError
     """
-    if scene is None:
-        scene = Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
+    scene = scene_of(loaded, scene)
     analysis = analyse(loaded.track, scene, params_for(accuracy))
     by_classic = classic(loaded.track, scene) if with_classic else None
     result = result_of(
@@ -85,6 +85,11 @@ def analyse_loaded(
         classic=by_classic,
     )
     return Analysed(name or loaded.path.name, analysis, result, by_classic)
+
+
+def scene_of(loaded: Loaded, given: Scene | None) -> Scene:
+    """Return the scene that was given for an input, else the one that it carries."""
+    return given or Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
 
 
 def distinct_names(paths: Sequence[str]) -> list[str]:
@@ -120,6 +125,11 @@ def make_folder(path: str | Path) -> Path:
             f"{folder}: a folder for results was demanded, {error.strerror}; name another with --out", USAGE
         ) from error
     return folder
+
+
+def made_now() -> dict[str, str]:
+    """Return what a run file says of its making: program, version and time."""
+    return {"software": "springmass", "version": __version__, "created_utc": now_utc()}
 
 
 def now_utc() -> str:

@@ -17,7 +17,7 @@ from pipeline.results.findings import Finding, by_severity
 from springmass import __version__
 from springmass.runs.loading import Loaded
 
-__all__ = ["SCHEMA", "all_findings", "input_of", "picked", "plain", "result_of"]
+__all__ = ["SCHEMA", "all_findings", "input_of", "picked", "plain", "provenance_of", "result_of"]
 
 SCHEMA = 1
 # How grave it is that a reader saw this; what is not named here is for information.
@@ -71,14 +71,14 @@ def result_of(
         "damping": _damping(analysis, wanted=classic is None),
         "effects": analysis.effects,
         "findings": all_findings(loaded, analysis),
-        "provenance": {
-            "version": __version__,
-            "accuracy": accuracy,
-            "parameters": dict(parameters),
-            "time_utc": time_utc,
-        },
+        "provenance": provenance_of(accuracy, parameters, time_utc),
     }
     return {key: plain(value) for key, value in content.items()}
+
+
+def provenance_of(accuracy: str, parameters: Mapping[str, Any], time_utc: str) -> dict[str, Any]:
+    """Return the ``provenance`` object: how to make this result again."""
+    return {"version": __version__, "accuracy": accuracy, "parameters": dict(parameters), "time_utc": time_utc}
 
 
 def input_of(loaded: Loaded) -> dict[str, Any]:

@@ -141,20 +141,20 @@ def measure(
             if seed < 0:
                 continue  # imports and caches are paid once, before the measurement
             times[i].append(spent)
-            if found is not None:
+            if not isinstance(found, str):
                 errors[i].append({q: (e.value - true[q]) / bound[q] for q, e in found.items() if q in true})
         if progress is not None:
             progress(seed + 1)
     return Trade(truth, seeds, bound, tuple(_row(*each) for each in zip(methods, times, errors, strict=True)))
 
 
-def _timed(method: Method, track: Track, timer: Callable[[], float]) -> tuple[Mapping[str, Estimate] | None, float]:
-    """Run a method; None where it gave up."""
+def _timed(method: Method, track: Track, timer: Callable[[], float]) -> tuple[Mapping[str, Estimate] | str, float]:
+    """Run a method: what it finds, or why it gave up, and the time, s."""
     start = timer()
     try:
-        found: Mapping[str, Estimate] | None = method.run(track)
-    except FAILURES:
-        found = None  # counted, and printed beside its errors
+        found: Mapping[str, Estimate] | str = method.run(track)
+    except FAILURES as error:
+        found = " ".join(str(error).split())
     return found, timer() - start
 
 
@@ -176,14 +176,6 @@ def own_record(
     """Run every method on one record: what it finds, or why it gave up, and the least time of some rounds, s."""
     results = []
     for method in methods:
-        times = []
-        found: Mapping[str, Estimate] | str = ""
-        for _ in range(rounds):
-            start = timer()
-            try:
-                found = method.run(track)
-            except FAILURES as error:
-                found = " ".join(str(error).split())
-            times.append(timer() - start)
-        results.append((method, found, min(times)))
+        tries = [_timed(method, track, timer) for _ in range(rounds)]
+        results.append((method, tries[-1][0], min(spent for _, spent in tries)))
     return results

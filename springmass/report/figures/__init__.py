@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.motion.smoother import Smoothed
 from springmass.report.figures.amplitude import amplitude_figure
-from springmass.report.figures.canvas import render
+from springmass.report.figures.canvas import KINDS, render, save
 from springmass.report.figures.comparison import comparison_figure
 from springmass.report.figures.energy_drag import drag_figure, energy_figure
 from springmass.report.figures.phase_plot import phase_figure
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "KINDS",
     "MAKERS",
     "amplitude_figure",
     "comparison_figure",
@@ -35,6 +36,7 @@ __all__ = [
     "phase_figure",
     "position_figure",
     "render",
+    "save",
 ]
 
 MAKERS: dict[str, Callable[[Analysis], Figure | None]] = {

@@ -10,6 +10,7 @@ import io
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.track import F8
+from storage.atomic import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,33 +30,30 @@ __all__ = [
     "DENSE_POINTS",
     "GREEN",
     "GREY",
+    "KINDS",
     "ORANGE",
     "PURPLE",
     "RIGHT",
     "SKY",
     "VERMILLION",
     "WIDTH",
+    "blank",
     "error_bars",
     "finish_residual",
     "legend_above",
+    "legend_row",
     "model_phase",
     "moving",
     "panels",
     "render",
+    "save",
     "share",
     "style",
     "thinned",
 ]
 
-BLUE, SKY, ORANGE, GREEN, VERMILLION, PURPLE = (
-    "#0072B2",
-    "#56B4E9",
-    "#E69F00",
-    "#009E73",
-    "#D55E00",
-    "#CC79A7",
-)
-GREY = "#7f7f7f"
+BLUE, SKY, ORANGE, GREEN = "#0072B2", "#56B4E9", "#E69F00", "#009E73"
+VERMILLION, PURPLE, GREY = "#D55E00", "#CC79A7", "#7f7f7f"
 _SETTINGS: dict[Any, Any] = {
     "font.family": ["DejaVu Sans"],
     "font.size": 9.0,
@@ -78,6 +77,7 @@ _SETTINGS: dict[Any, Any] = {
 WIDTH = 7.2  # inches, as all lengths here
 LEFT, RIGHT, BOTTOM = 0.72, 0.12, 0.45
 DENSE_POINTS = 2500
+KINDS: tuple[Literal["svg"], Literal["pdf"]] = ("svg", "pdf")
 
 
 def render(figure: Figure, kind: Literal["svg", "pdf"]) -> bytes:
@@ -97,6 +97,12 @@ def render(figure: Figure, kind: Literal["svg", "pdf"]) -> bytes:
         _shrink_wide_numbers(figure)
         figure.savefig(out, format=kind, metadata=metadata[kind])
     return out.getvalue()
+
+
+def save(figure: Figure, folder: Path, name: str) -> None:
+    """Write a figure as SVG and as PDF, each file whole or not at all."""
+    for kind in KINDS:
+        write_whole(folder / f"{name}.{kind}", render(figure, kind))
 
 
 def _shrink_wide_numbers(figure: Figure) -> None:
@@ -121,16 +127,27 @@ def style() -> Iterator[None]:
         yield
 
 
+def blank(width: float, height: float) -> Figure:
+    """Return a figure of this size, inches, that belongs to no window."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def legend_row(panel: Axes, columns: int, *, pad: float = 0.2, **look: Any) -> None:
+    """Put a legend of so many columns above a panel, left edges aligned."""
+    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=pad, **look)
+
+
 def panels(
     rows: Sequence[tuple[float, float]], *, width: float = WIDTH, right: float = RIGHT, top: float = 0.12
 ) -> tuple[Figure, list[Axes]]:
     """Make panels under each other, each of a height and a gap above it in inches, left edges aligned."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     height = BOTTOM + top + sum(sum(row) for row in rows)
-    figure = Figure(figsize=(width, height))
-    FigureCanvasAgg(figure)
+    figure = blank(width, height)
     axes, at = [], height - top
     for tall, gap in rows:
         at -= tall + gap
@@ -195,16 +212,8 @@ def share(above: Axes, below: Axes, start: float, end: float) -> None:
 
 def error_bars(panel: Axes, t: F8, y: F8, u: F8, label: str) -> None:
     """Set points with their standard uncertainties."""
-    look: dict[str, Any] = {
-        "fmt": "o",
-        "ms": 3.4,
-        "mew": 0,
-        "color": SKY,
-        "ecolor": BLUE,
-        "elinewidth": 0.9,
-        "capsize": 1.5,
-    }
-    panel.errorbar(t, y, yerr=u, label=label, **look)
+    look: dict[str, Any] = {"ms": 3.4, "mew": 0, "color": SKY, "ecolor": BLUE, "elinewidth": 0.9, "capsize": 1.5}
+    panel.errorbar(t, y, yerr=u, fmt="o", label=label, **look)
 
 
 def model_phase(motion: Oscillation, t: F8) -> tuple[F8, F8]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.results.compare import Comparison
-from springmass.report.figures.canvas import BLUE, BOTTOM, RIGHT, SKY, VERMILLION, WIDTH, style
+from springmass.report.figures.canvas import BLUE, BOTTOM, RIGHT, SKY, VERMILLION, WIDTH, blank, legend_row, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,9 +30,6 @@ def comparison_figure(comparison: Comparison) -> Figure:
     The thin bar is the whole standard uncertainty, the thick one what the run does not share with others. Runs that
     were found exchanged stand out.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     count = len(comparison.names)
     rows = np.arange(count)[::-1].astype(float)
     k = np.array([each.value for each in comparison.each])
@@ -42,8 +39,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     tall = ROW * (count + 0.6)
     width, height = (WIDTH - NAME_COLUMN - GAP - RIGHT) / WIDTH, BOTTOM + tall + TOP
     with style():
-        figure = Figure(figsize=(WIDTH, height))
-        FigureCanvasAgg(figure)
+        figure = blank(WIDTH, height)
         left = figure.add_axes((NAME_COLUMN / WIDTH, BOTTOM / height, 0.6 * width, tall / height))
         start = NAME_COLUMN / WIDTH + 0.6 * width + GAP / WIDTH
         right = figure.add_axes((start, BOTTOM / height, 0.4 * width, tall / height))
@@ -60,7 +56,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
         left.set_xlabel("spring constant / (N/m)")
         left.ticklabel_format(axis="x", useOffset=False)
         left.locator_params(axis="x", nbins=5)
-        left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2, handlelength=1.5)
+        legend_row(left, 3, handlelength=1.5)
         pulls = np.array(comparison.pulls)
         right.axvline(0.0, color="#000000", lw=0.8)
         right.hlines(rows, 0.0, pulls, colors=colours, lw=1.2)
