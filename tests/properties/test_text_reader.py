@@ -272,8 +272,8 @@ def test_short_pages_are_read_as_plain_python_reads_rows(
         read_both(rows_oracle, body, columns, delimiter, newline)
         paged = [read_table(text, range(columns), delimiter, width=width) for width in (columns, None)]
         patch.setattr(table_module, "_SINGLE_ROWS", 1000)
-        patch.setattr(table_module._Rows, "_read_whole", lambda *_: None)
-        patch.setattr(table_module._Rows, "_read_mixed", lambda *_: None)
+        patch.setattr(table_module, "read_fixed", lambda *_: None)
+        patch.setattr(table_module, "read_mixed", lambda *_: None)
         singly = [read_table(text, range(columns), delimiter, width=width) for width in (columns, None)]
     # Neither where a page ends nor who reads a row makes a difference.
     for one, other in zip([*whole, *paged], [*singly, *singly], strict=True):

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8, U8, Flag
 
-__all__ = ["Grid", "Rate", "find_rate", "place_unread", "snap", "time_flags"]
+__all__ = ["Grid", "Rate", "find_rate", "median", "place_unread", "snap", "time_flags"]
 
 _USUAL_RATES_HZ = (100.0, 60.0, 125.0, 50.0, 20.0, 25.0, 30.0, 40.0, 10.0, 200.0, 250.0, 500.0, 1000.0)
 _SHARE_ON_GRID = 0.5
-_PROBE = 8192
+_PROBE = 2048
 _BLOCK = 16384
 
 
@@ -106,6 +106,13 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
     return Rate(best.rate_hz, relative_u, best, certain)
 
 
+def median(values: NDArray[np.number]) -> float:
+    """Return the median of finite numbers; numpy's imports numpy.ma for it, a tenth of a cold start."""
+    low, high = (values.size - 1) // 2, values.size // 2
+    part = np.partition(values, (low, high))
+    return float(part[low] + part[high]) / 2
+
+
 def _probe(apart: F8) -> F8:
     """Return times enough to tell grids apart: all of a short record; of a long one both ends and some between."""
     if apart.size <= 4 * _PROBE:
@@ -115,18 +122,18 @@ def _probe(apart: F8) -> F8:
 
 def _every_point(apart: F8, grid: Grid) -> bool:
     """Tell whether times come one grid point after the other, not one every few."""
-    return bool(np.median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0)
+    return median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0
 
 
 def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     """Return the usual step of increasing times, s, and its relative half width, over ever longer spans."""
-    every = max(1, apart.size // (4 * _PROBE))
-    step = max(float(np.median(apart[1::every] - apart[:-1:every])), resolution)
+    every = max(1, apart.size // _PROBE)
+    step = max(median(apart[1::every] - apart[:-1:every]), resolution)
     span, relative_u = 1, resolution / step
     while (span := span * 4) < apart.size and relative_u > 1e-6:
         lengths = apart[span::every] - apart[:-span:every]
         steps = np.rint(lengths / step)
-        step = float(np.median(lengths / np.maximum(steps, 1)))
+        step = median(lengths / np.maximum(steps, 1))
         relative_u = resolution / (span * step)
     if apart.size > 2:  # the whole length, where the steps in it can be counted
         length = float(apart[-1] - apart[0])

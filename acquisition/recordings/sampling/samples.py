@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8, U8, Flag
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import place_unread, snap, time_flags
+from acquisition.recordings.sampling.nominal import median, place_unread, snap, time_flags
 from acquisition.recordings.sampling.timing import Timing
 
 __all__ = [
@@ -226,12 +226,10 @@ def _some(values: F8) -> F8:
 def _far(distance: F8) -> NDArray[np.int64]:
     """Return the samples that lie far off the median, compared with how far the others do."""
     some = _some(distance)
-    if some.size < _ZEROS:
+    if some.size < _ZEROS or np.fmax.reduce(distance) - np.fmin.reduce(distance) <= _FAR_M:
         return np.empty(0, np.int64)
-    middle = np.median(some)
-    limit = _FAR_M + _FAR_SPREADS * np.median(np.abs(some - middle))
-    if np.fmax.reduce(distance) <= middle + limit and np.fmin.reduce(distance) >= middle - limit:
-        return np.empty(0, np.int64)
+    middle = median(some)
+    limit = _FAR_M + _FAR_SPREADS * median(np.abs(some - middle))
     return np.flatnonzero(np.abs(distance - middle) > limit)
 
 

@@ -1,12 +1,8 @@
 """Rows of numbers: the one reader of cells behind every text format.
 
-Rows are read by :func:`numpy.loadtxt`, a page of whole lines at a time. What it reads as a number and a recording does
-not, what it refuses, and how many decimals each cell prints, is judged here: a page that is not regular is halved until
-its regular rows are read together and a few others one by one.
-
-Columns of fixed point go through loadtxt as whole numbers, their points taken out: 12,000 rows of three columns take it
-0.9 ms so, and 6.5 ms as decimal fractions (pandas 2.3 ms on the same cores). One division then puts the point back, and
-whatever power of ten makes SI units, rounded once, as ``float()`` rounds.
+Rows are read a page of whole lines at a time: :mod:`acquisition.recordings.tables.regular` reads lines alike together.
+A page that is not regular is halved until its regular rows are read together and a few others one by one. Numbers that
+lost some of their digits are told by how many the others of their column print.
 """
 
 from __future__ import annotations
@@ -14,33 +10,32 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.block import F8, I8
-from acquisition.recordings.tables.text import Text, parse_number, printed_decimals
+from acquisition.block import B1, F8, I8
+from acquisition.recordings.tables.regular import (
+    EMPTY,
+    EXPONENT,
+    I1,
+    UNREAD,
+    Alike,
+    read_fixed,
+    read_mixed,
+    read_single,
+    unified,
+)
+from acquisition.recordings.tables.text import Text, parse_number
 
-__all__ = ["EMPTY", "EXPONENT", "NAN", "UNREAD", "Table", "read_table"]
-
-EXPONENT = 64
-"""Added to the decimals in a form where the number has an exponent."""
-NAN, EMPTY, UNREAD = -1, -2, -3
-
-I1 = NDArray[np.int8]
-Mask = NDArray[np.bool_]
+__all__ = ["EMPTY", "EXPONENT", "UNREAD", "Table", "read_table"]
 
 _PAGE_BYTES = 1 << 16
 _MIXED_ROWS = 512  # more rows that are not all of fixed point are halved: most of them may be
 _SINGLE_ROWS = 32  # so few are read one by one
-_MOST_DIGITS = 15  # whole numbers of so many digits and powers of ten up to 10^22 are exact in binary, so that their
-_MOST_POWER = 22  # quotient is rounded once
-_LONGEST_EXPONENT = len("e-99")
 _UNIFORM = 0.9  # a column that prints the same number of decimals in this share of its rows always does
 _MANY, _STRIPPED = 40, 0.03
 _LINE_END = re.compile(rb"\r\n?|\n")
-_NEWLINE, _BLANK, _MINUS, _POINT, _ZERO, _E, _LOWER = (*(ord(c) for c in "\n -.0e"), 0x20)
+_LF, _CR, _ZERO = (np.uint8(ord(c)) for c in "\n\r0")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,8 +68,8 @@ class Table:
 
     values: tuple[F8, ...]
     form: tuple[I1, ...]
-    bad: Mask
-    text: Mask
+    bad: B1
+    text: B1
     decimals: tuple[int, ...]
     exponents: tuple[bool, ...]
     last_cell: str
@@ -132,11 +127,18 @@ def read_table(
     start = text.start if start is None else start
     stop = text.stop if stop is None else stop
     data = text.data
-    most = data.count(b"\n", start, stop) + data.count(b"\r", start, stop) + 1
-    rows = _Rows(tuple(columns), delimiter, width, tuple(shifts) or (0,) * len(columns), most)
+    rows = _Rows(tuple(columns), delimiter, width, tuple(shifts) or (0,) * len(columns), _most(data, start, stop))
     for page in _pages(data, start, stop):
         rows.take(page)
     return rows.table(first_line, ended=start >= stop or data[stop - 1 : stop] in (b"\n", b"\r"))
+
+
+def _most(data: bytes, start: int, stop: int) -> int:
+    """Return how many rows there are at the most: memory beyond them is never touched."""
+    raw = np.frombuffer(data, np.uint8)
+    pages = (raw[at : min(at + _PAGE_BYTES, stop)] for at in range(start, stop, _PAGE_BYTES))
+    # bytes.count() takes six times as long; what stands between LF and CR in ASCII is rare.
+    return 1 + sum(int(np.count_nonzero((page - _LF) <= _CR - _LF)) for page in pages)
 
 
 def _pages(data: bytes, start: int, stop: int) -> Iterator[bytes]:
@@ -154,31 +156,6 @@ def _pages(data: bytes, start: int, stop: int) -> Iterator[bytes]:
         start = end
 
 
-def _unified(page: bytes, delimiter: str) -> bytes:
-    """End lines by LF, separate by one tab instead of white space, take quotes off cells, put points for commas."""
-    if b"\r" in page:
-        page = page.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if not page.endswith(b"\n"):
-        page += b"\n"
-    if b'"' in page:
-        mark = re.escape((delimiter or "\t").encode())
-        page = re.sub(rb'(?<![^%b\n])"([^"%b\n]*)"(?![^%b\n])' % (mark, mark, mark), rb"\1", page)
-    if not delimiter:
-        page = page.replace(b" ", b"\t")
-        while b"\t\t" in page:
-            page = page.replace(b"\t\t", b"\t")
-        page = page.replace(b"\t\n", b"\n").replace(b"\n\t", b"\n").removeprefix(b"\t")
-    return page if delimiter in (",", ".") else page.replace(b",", b".")
-
-
-class _Column(NamedTuple):
-    """One column of some rows: its numbers, their forms, and which print a zero as their last decimal."""
-
-    values: F8
-    form: I1 | int
-    zero: Mask
-
-
 class _Rows:
     """Gathers rows, one page after the other."""
 
@@ -191,23 +168,23 @@ class _Rows:
         self.form = [np.empty(most, np.int8) for _ in columns]
         self.bad = np.zeros(most, bool)
         self.text = np.zeros(most, bool)
-        # How many numbers of each form a column holds, and how many of them end in a zero.
+        # How many numbers of each form a column holds, and whether any of them ends in a zero.
         self.counts = np.zeros((len(columns), 2 * EXPONENT), np.int64)
-        self.zeros = np.zeros((len(columns), 2 * EXPONENT), np.int64)
+        self.padded = np.zeros((len(columns), 2 * EXPONENT), bool)
         self.rows = 0
         self.skipped: list[int] = []
         self.last: list[str] = []
 
     def take(self, lines: bytes) -> None:
         """Read some lines."""
-        found = self._read_whole(lines)
+        asked = self.mark, self.columns, self.width, self.shifts
+        found = read_fixed(lines, *asked)
         if found is None:
-            lines = _unified(lines, self.delimiter)
+            lines = unified(lines, self.delimiter)
             rows = lines.count(b"\n")
-            found = self._read_mixed(lines) if rows <= _MIXED_ROWS else None
+            found = read_mixed(lines, *asked) if rows <= _MIXED_ROWS else None
         if found is not None:
-            self._add(found)
-            self._note_last(lines)
+            self._add(found, lines)
         elif rows <= _SINGLE_ROWS:
             for line in lines.decode("ascii", "replace").split("\n")[:-1]:
                 self._take_single(line)
@@ -217,112 +194,21 @@ class _Rows:
             self.take(lines[:middle])
             self.take(lines[middle:])
 
-    def _read_whole(self, lines: bytes) -> list[_Column] | None:
-        """Read lines of fixed point, each column with as many decimals throughout; None where they are anything else.
-
-        What is left of such lines without digits and signs is the same for each: separators, and a point a cell.
-        """
-        skeleton = lines.translate(None, b"0123456789+-")
-        first = skeleton[: skeleton.find(b"\n") + 1]
-        ended = lines.endswith(b"\n") and self.mark not in "+-."
-        if not ended or skeleton != first * (len(skeleton) // len(first)):
-            return None
-        cells = lines[: lines.find(b"\n")].decode("ascii", "replace").rstrip("\r").split(self.mark)
-        if self.width not in (None, len(cells)) or max(self.columns) >= len(cells):
-            return None
-        printed = [cells[column] for column in self.columns]
-        decimals = [printed_decimals(cell) for cell in printed]
-        if any(
-            parse_number(cell) is None or ("." in cell) != (n > 0) for cell, n in zip(printed, decimals, strict=True)
-        ):
-            return None
-        raw = np.frombuffer(lines, np.uint8)
-        marks = np.flatnonzero((raw == ord(self.mark)) | (raw == _NEWLINE))
-        length = np.concatenate((marks[:1], np.diff(marks) - 1)).reshape(-1, len(cells))
-        ends = marks.reshape(length.shape)
-        if first.endswith(b"\r\n"):
-            ends[:, -1] -= 1
-            length[:, -1] -= 1
-        if length.max() > _MOST_DIGITS:
-            return None
-        for column, places in zip(self.columns, decimals, strict=True):
-            point = places > 0
-            if length[:, column].min() <= places + point:
-                return None
-            if point and (raw[ends[:, column] - places - 1] != _POINT).any():
-                return None
-        whole = self._load(lines.translate(None, b".\r"), np.int64)
-        powers = [places - shift for places, shift in zip(decimals, self.shifts, strict=True)]
-        if whole is None or max(map(abs, powers)) > _MOST_POWER:
-            return None
-        found = []
-        for k, (column, places, power) in enumerate(zip(self.columns, decimals, powers, strict=True)):
-            number, end = whole[:, k], ends[:, column]
-            values = number / 10.0**power if power >= 0 else number * 10.0**-power
-            zeros = np.flatnonzero(number == 0)
-            if zeros.size:
-                values[zeros[raw[(end - length[:, column])[zeros]] == _MINUS]] = -0.0
-            found.append(_Column(values, places, raw[end - 1] == _ZERO))
-        return found
-
-    def _read_mixed(self, lines: bytes) -> list[_Column] | None:
-        """Read lines of as many cells each, those asked for numbers of any form; None where they are anything else."""
-        raw = np.frombuffer(lines, np.uint8)
-        mark, rows = ord(self.mark), lines.count(b"\n")
-        marks = np.flatnonzero((raw == mark) | (raw == _NEWLINE))
-        cells = marks.size // rows
-        if marks.size != rows * cells or max(self.columns) >= cells:
-            return None
-        ends = marks.reshape(rows, cells)
-        if (raw[ends[:, -1]] != _NEWLINE).any():
-            return None
-        # loadtxt strips every kind of white space, which is damage here: a number beside it may have lost digits.
-        if np.count_nonzero(raw < _BLANK) != (ends.size if mark < _BLANK else rows):
-            return None
-        if self.width is not None and (cells < self.width or (np.diff(ends[:, self.width - 1 :]) != 1).any()):
-            return None
-        bounds = [(_begins(ends, column), ends[:, column]) for column in self.columns]
-        if any(((end == begin) | (raw[end - 1] == _BLANK)).any() for begin, end in bounds):
-            return None
-        table = self._load(lines, np.float64)
-        if table is None or np.isinf(table).any():  # the word, or a number that overflows
-            return None
-        points, letters = np.flatnonzero(raw == _POINT), np.flatnonzero((raw | _LOWER) == _E)
-        found = []
-        for values, (begin, end), shift in zip(table.T, bounds, self.shifts, strict=True):
-            power = _last(letters, begin, end)
-            if (end - power > _LONGEST_EXPONENT).any(where=power >= 0):
-                return None
-            ahead = np.where(power >= 0, power, end)
-            point = _last(points, begin, ahead)
-            form = np.where(point >= 0, np.minimum(ahead - point - 1, EXPONENT - 1), 0) + EXPONENT * (power >= 0)
-            form[np.isnan(values)] = NAN
-            if shift:  # read again, to be rounded once
-                places = zip(begin.tolist(), end.tolist(), strict=True)
-                values = np.array([_single(lines[at:stop].decode("ascii").strip(" "), shift)[0] for at, stop in places])
-            found.append(_Column(values, form.astype(np.int8), raw[ahead - 1] == _ZERO))
-        return found
-
-    def _load(self, lines: bytes, dtype: type[np.generic]) -> NDArray[Any] | None:
-        """Hand lines that are not empty to numpy.loadtxt; None where a cell asked for is no number, or not ASCII."""
-        try:
-            rows = lines.decode("ascii").split("\n")
-            return np.loadtxt(rows, dtype, None, self.mark, usecols=self.columns, ndmin=2)
-        except ValueError:
-            return None
-
-    def _add(self, columns: list[_Column]) -> None:
-        """Append rows that are all sound."""
+    def _add(self, columns: list[Alike], lines: bytes) -> None:
+        """Append rows that are all sound; keep the cells of the last."""
         rows = slice(self.rows, self.rows + columns[0].values.size)
-        for k, (values, form, zero) in enumerate(columns):
+        raw = np.frombuffer(lines, np.uint8)
+        for k, (values, form, last) in enumerate(columns):
             self.values[k][rows], self.form[k][rows] = values, form
             if isinstance(form, int):
                 self.counts[k, form] += values.size
-                self.zeros[k, form] += np.count_nonzero(zero)
+                self.padded[k, form] |= self.padded[k, form] or (raw[last] == _ZERO).any()
             else:
                 self.counts[k] += np.bincount(form[form >= 0], minlength=2 * EXPONENT)
-                self.zeros[k] += np.bincount(form[zero & (form >= 0)], minlength=2 * EXPONENT)
+                self.padded[k, form[(raw[last] == _ZERO) & (form >= 0)]] = True
         self.rows = rows.stop
+        line = lines[lines.rfind(b"\n", 0, -1) + 1 : -1]
+        self.last = [cell.strip(" ") for cell in line.decode("ascii", "replace").rstrip("\r").split(self.mark)]
 
     def _take_single(self, line: str) -> None:
         """Read one line."""
@@ -334,7 +220,7 @@ class _Rows:
         wanted = [cells[column] if column < len(cells) else "" for column in self.columns]
         forms = []
         for k, (cell, shift) in enumerate(zip(wanted, self.shifts, strict=True)):
-            value, form = _single(cell, shift)
+            value, form = read_single(cell, shift)
             self.values[k][row], self.form[k][row] = value, form
             forms.append(form)
         self.text[row] = bool(cells[0]) and parse_number(cells[0]) is None
@@ -346,12 +232,7 @@ class _Rows:
             for k, (cell, form) in enumerate(zip(wanted, forms, strict=True)):
                 if form >= 0:
                     self.counts[k, form] += 1
-                    self.zeros[k, form] += cell.lower().partition("e")[0].endswith("0")
-
-    def _note_last(self, lines: bytes) -> None:
-        """Keep the cells of the last line."""
-        last = lines[lines.rfind(b"\n", 0, -1) + 1 : -1]
-        self.last = [cell.strip(" ") for cell in last.decode("ascii", "replace").rstrip("\r").split(self.mark)]
+                    self.padded[k, form] |= cell.lower().partition("e")[0].endswith("0")
 
     def table(self, first_line: int, *, ended: bool) -> Table:
         """Return the rows taken, with numbers that were cut marked."""
@@ -385,22 +266,22 @@ class _Rows:
             skipped=np.array(self.skipped, np.int64),
         )
 
-    def _fixed(self, k: int, usual: int, exponent: bool) -> bool:
+    def _always(self, k: int, usual: int, exponent: bool) -> bool:
         """Tell whether a column always prints the same number of decimals."""
         counts = self.counts[k]
         numbers = int(counts[: 2 * EXPONENT if exponent else EXPONENT].sum())
         others = numbers - int(counts[usual])
         # Where zeros at the end are not printed, a tenth of the numbers is shorter and none ends in zero.
-        padded = usual % EXPONENT and self.zeros[k, usual]
+        padded = usual % EXPONENT and self.padded[k, usual]
         stripped = others >= _STRIPPED * numbers and numbers >= _MANY and not padded
         return others <= (1 - _UNIFORM) * numbers and not stripped
 
-    def _cut(self, k: int, form: I1, usual: int, exponent: bool) -> Mask | None:
+    def _cut(self, k: int, form: I1, usual: int, exponent: bool) -> B1 | None:
         """Find numbers that lost some of their decimals, or grew others; None where there is none."""
-        if self.counts[k].sum() == self.counts[k][usual] or not self._fixed(k, usual, exponent):
+        if self.counts[k].sum() == self.counts[k][usual] or not self._always(k, usual, exponent):
             return None
         # Where exponents are the exception, a number with one is as good as any.
-        differs: Mask = (form >= 0) & (form != usual) & (exponent | (form < EXPONENT))
+        differs: B1 = (form >= 0) & (form != usual) & (exponent | (form < EXPONENT))
         return differs if differs.any() else None
 
     def _is_cut_last(self, k: int, form: I1, usual: int) -> bool:
@@ -412,40 +293,15 @@ class _Rows:
         """
         if len(self.last) > self.columns[k] + 1 or form[-1] < 0:
             return False
-        if usual not in (0, EXPONENT) and self._fixed(k, usual, usual >= EXPONENT):
+        if usual not in (0, EXPONENT) and self._always(k, usual, usual >= EXPONENT):
             return int(form[-1]) != usual
         return self.rows > 1
-
-
-def _begins(ends: I8, column: int) -> I8:
-    """Return where the cells of a column begin, from where all cells of each row end."""
-    return ends[:, column - 1] + 1 if column else np.concatenate(([0], ends[:-1, -1] + 1))
-
-
-def _last(places: I8, begin: I8, end: I8) -> I8:
-    """Return the last of increasing places that lies within each cell; -1 where none does."""
-    if not places.size:
-        return np.full(begin.size, -1)
-    found = places[np.searchsorted(places, end) - 1]  # before the first one this is the last of all, behind the cell
-    return np.where((found >= begin) & (found < end), found, -1)
 
 
 def _unquoted(cell: str) -> str:
     """Take blanks off a cell, and a pair of quotes."""
     cell = cell.strip(" ")
     return cell[1:-1].strip(" ") if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell
-
-
-def _single(cell: str, shift: int) -> tuple[float, int]:
-    """Read one cell by itself; return its number, NaN where it is none, and its form."""
-    if not cell:
-        return np.nan, EMPTY
-    value = parse_number(cell, shift)
-    if value is None:
-        return np.nan, UNREAD
-    if value != value:
-        return value, NAN
-    return value, min(printed_decimals(cell), EXPONENT - 1) + (EXPONENT if "e" in cell.lower() else 0)
 
 
 def _most_frequent(counts: I8) -> int:
