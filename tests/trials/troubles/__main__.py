@@ -1,0 +1,48 @@
+"""Analyse records of every kind of trouble and print what became of them.
+
+``python -m tests.trials.troubles --seeds 8 --tier standard``; ends with exit code 1 where a limit is not met.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+
+from pipeline.accuracy import TIERS
+from tests.trials.troubles.judge import Verdict, try_one
+from tests.trials.troubles.kinds import KINDS
+from tests.trials.troubles.table import as_markdown, as_text, summed, total
+
+
+def main() -> int:
+    """Run the trials that were asked for."""
+    parser = argparse.ArgumentParser(prog="python -m tests.trials.troubles", description=__doc__)
+    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="records a kind (default 20)")
+    parser.add_argument("--tier", choices=TIERS, default="standard")
+    parser.add_argument("--only", default="", metavar="TEXT", help="kinds whose name or cause holds this")
+    parser.add_argument("--each", action="store_true", help="a line for every record too")
+    parser.add_argument("--markdown", action="store_true", help="the table as the documentation has it")
+    options = parser.parse_args()
+    warnings.simplefilter("error")
+    chosen = [kind for kind in KINDS if options.only in kind.name or options.only == kind.cause]
+    verdicts: list[Verdict] = []
+    for kind in chosen:
+        print(kind.name, file=sys.stderr, flush=True)
+        for seed in range(options.seeds):
+            verdicts.append(one := try_one(kind, seed, options.tier))
+            if options.each:
+                print(_each(one), flush=True)
+    lines = summed(chosen, verdicts)
+    print((as_markdown if options.markdown else as_text)(lines))
+    print(f"\n{options.tier}: {total(lines)}")
+    return int(any(not line.holds for line in lines))
+
+
+def _each(one: Verdict) -> str:
+    numbers = ", ".join(f"{name} {g.error:+.3g} u {g.u:.2g} z {g.z:.1f}" for name, g in one.given.items())
+    return f"{one.kind} #{one.seed}: {one.word}; {numbers}; {' '.join(one.warnings)} ({' '.join(one.notes)})"
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,165 @@
+"""The verdict on a record: are its numbers right within their uncertainties, and if not, is the trouble named."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.accuracy import params_for
+from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.bench.scene import Scene
+from pipeline.errors import AnalysisError
+from pipeline.results.findings import Finding
+from pipeline.track import Track
+from springmass.runs.json_results import all_findings
+from springmass.runs.loading import load
+from tests.trials.troubles.record import Kind, Record
+
+__all__ = ["LIMIT", "Given", "Verdict", "try_one"]
+
+LIMIT = 4.0  # stated uncertainties beyond which a number is wrong
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """One estimate held against the truth.
+
+    Parameters
+    ----------
+    error, u, u_own : float
+        What it is off by, its stated uncertainty, and what the record's own scatter contributes to that.
+    """
+
+    error: float
+    u: float
+    u_own: float
+
+    @property
+    def z(self) -> float:
+        """The error in stated uncertainties; infinite where something exact is wrong."""
+        if not np.isfinite(self.error):
+            return float("inf")
+        return abs(self.error) / self.u if self.u > 0 else (0.0 if self.error == 0 else float("inf"))
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What became of one record.
+
+    Parameters
+    ----------
+    kind : str
+    seed : int
+    given : mapping of str to Given
+        The estimates that have a truth.
+    warnings : tuple of str
+        Codes of the findings that are warnings or errors.
+    notes : tuple of str
+        Codes of the others.
+    refused : bool
+        Whether none of the estimates that have a truth was given.
+    named : bool
+        Whether a warning names the kind.
+    cpu_s : float
+        Processor time of the analysis.
+    """
+
+    kind: str
+    seed: int
+    given: Mapping[str, Given]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    refused: bool
+    named: bool
+    cpu_s: float
+
+    @property
+    def worst(self) -> float:
+        """The greatest error in stated uncertainties."""
+        return max((one.z for one in self.given.values()), default=0.0)
+
+    @property
+    def right(self) -> bool:
+        """Whether numbers are given and every one lies within the limit."""
+        return not self.refused and self.worst <= LIMIT
+
+    @property
+    def confident_wrong(self) -> bool:
+        """Whether a number is off by more than the limit and no warning names the kind."""
+        return self.worst > LIMIT and not self.named
+
+    @property
+    def word(self) -> str:
+        """The verdict in a word."""
+        if self.right:
+            return "right"
+        if self.named:
+            return "named"
+        return "refused" if self.refused else "confident wrong"
+
+
+def try_one(kind: Kind, seed: int, tier: str) -> Verdict:
+    """Make the record of a seed, analyse it and judge.
+
+    Parameters
+    ----------
+    kind : Kind
+    seed : int
+    tier : {"fast", "standard", "best"}
+    """
+    record = kind.make(seed)
+    began = time.process_time()
+    try:
+        analysis, findings = _analysed(record, tier)
+    except AnalysisError as error:
+        spent = time.process_time() - began
+        # A refusal names the trouble if it does so by a finding's code; its sentence is not searched for words.
+        code = getattr(error, "code", "")
+        return Verdict(kind.name, seed, {}, (code,) if code else (), (), True, code in kind.codes, spent)
+    spent = time.process_time() - began
+    warnings = tuple(dict.fromkeys(f.code for f in findings if f.severity != "info"))
+    notes = tuple(dict.fromkeys(f.code for f in findings if f.severity == "info"))
+    given = _held_against(analysis, record)
+    sought = [name for name in record.truth if name != "offset"]
+    refused = bool(sought) and not any(name in given for name in sought)
+    return Verdict(kind.name, seed, given, warnings, notes, refused, bool(kind.codes & set(warnings)), spent)
+
+
+def _analysed(record: Record, tier: str) -> tuple[Analysis, tuple[Finding, ...]]:
+    scene = Scene.from_mapping(record.scene)
+    if record.text is None:
+        found = analyse(Track.from_arrays(record.t, record.y), scene, params_for(tier))
+        return found, found.findings
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "trial_position.txt"
+        path.write_bytes(record.text)
+        loaded = load(path)
+        found = analyse(loaded.track, scene, params_for(tier))
+        return found, all_findings(loaded, found)
+
+
+def _held_against(analysis: Analysis, record: Record) -> dict[str, Given]:
+    begin = _beginning(analysis)
+    own = analysis.motion.derived.statistical if isinstance(analysis.motion, Oscillation) else analysis.estimates
+    held = {}
+    for name, truth in record.truth.items():
+        stated = analysis.estimates.get(name)
+        if stated is not None:
+            true = truth(begin) if callable(truth) else truth
+            held[name] = Given(stated.value - true, stated.u, own[name].u)
+    if "period" not in record.truth and "period" in analysis.estimates:
+        # Nothing moves that has a period: whatever stands there is wrong, however wide.
+        held["period"] = Given(float("inf"), 1.0, 1.0)
+    return held
+
+
+def _beginning(analysis: Analysis) -> float:
+    """The moment that amplitude and damping rate are stated for, s."""
+    if isinstance(analysis.motion, Oscillation):
+        return analysis.motion.phase.t0
+    return float(analysis.track.t[np.flatnonzero(analysis.conditioned.used)[0]])

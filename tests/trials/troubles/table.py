@@ -1,0 +1,133 @@
+"""The table of the trials: a line for each kind, and what all of them come to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.trials.troubles.judge import LIMIT, Verdict
+from tests.trials.troubles.record import Kind
+
+__all__ = ["CURED", "Line", "as_markdown", "as_text", "summed", "total"]
+
+CURED = 3.0  # greatest median u, over the rms error, of a kind that is to be cured
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One kind at one tier.
+
+    Parameters
+    ----------
+    kind : Kind
+    verdicts : sequence of Verdict
+    """
+
+    kind: Kind
+    verdicts: Sequence[Verdict]
+
+    def count(self, word: str) -> int:
+        """Return how many records had this verdict."""
+        return sum(one.word == word for one in self.verdicts)
+
+    @property
+    def n(self) -> int:
+        """How many records."""
+        return len(self.verdicts)
+
+    @property
+    def wide(self) -> tuple[float, str]:
+        """The greatest median u over the rms error of the estimates within the limit, and which estimate's it is."""
+        ratios = [(0.0, "")]
+        for name in dict.fromkeys(name for one in self.verdicts for name in one.given if name not in self.kind.spread):
+            held = [one.given[name] for one in self.verdicts if name in one.given and one.given[name].z <= LIMIT]
+            if len(held) > max(2, self.n // 2):
+                rms = math.sqrt(float(np.mean([one.error**2 for one in held])))
+                if rms > 0.0:
+                    ratios.append((float(np.median([one.u_own for one in held])) / rms, name))
+        return max(ratios)
+
+    @property
+    def median_z(self) -> float:
+        """The median over the records of the greatest error in stated uncertainties."""
+        return float(np.median([one.worst for one in self.verdicts]))
+
+    @property
+    def worst(self) -> str:
+        """The estimate that is off farthest, with the most by which, of records not named."""
+        off = [(g.z, name) for one in self.verdicts if not one.named for name, g in one.given.items()]
+        z, name = max(off, default=(0.0, ""))
+        return f"{name} {z:.1f}" if z > LIMIT else ""
+
+    @property
+    def warnings(self) -> str:
+        """The codes of warnings, the most frequent first, with how often."""
+        codes = [code for one in self.verdicts for code in one.warnings]
+        shares = sorted(dict.fromkeys(codes), key=lambda code: -codes.count(code))
+        return ", ".join(f"{code} {codes.count(code)}" for code in shares)
+
+    @property
+    def seconds(self) -> float:
+        """Median processor time of an analysis."""
+        return float(np.median([one.cpu_s for one in self.verdicts]))
+
+    @property
+    def holds(self) -> bool:
+        """Whether the kind is within the limits that hold for every single kind."""
+        if self.count("confident wrong") > self.n // 10:
+            return False
+        if self.kind.plain and any(one.warnings for one in self.verdicts):
+            return False
+        return self.count("refused") <= self.n // 10 and not (self.kind.cure and self.wide[0] > CURED)
+
+
+def summed(kinds: Sequence[Kind], verdicts: Sequence[Verdict]) -> list[Line]:
+    """Return a line for every kind that has a verdict."""
+    lines = [Line(kind, [one for one in verdicts if one.kind == kind.name]) for kind in kinds]
+    return [line for line in lines if line.verdicts]
+
+
+def total(lines: Sequence[Line]) -> str:
+    """Return what all lines come to, in a sentence."""
+    n = sum(line.n for line in lines)
+    wrong, refused = (sum(line.count(word) for line in lines) for word in ("confident wrong", "refused"))
+    plain = [one for line in lines if line.kind.plain for one in line.verdicts]
+    alarms = sum(bool(one.warnings) for one in plain)
+    return (
+        f"{len(lines)} kinds, {n} records: confident wrong {wrong} ({wrong / n:.1%}), right or named "
+        f"{n - wrong - refused} ({1.0 - (wrong + refused) / n:.1%}), refused without a name {refused}; "
+        f"{sum(not line.holds for line in lines)} kinds beyond a limit; "
+        f"false alarms on {alarms} of {len(plain)} plain records"
+    )
+
+
+def as_text(lines: Sequence[Line]) -> str:
+    """Return the table for a terminal, the worst kinds marked."""
+    head = f"  {'kind':<42}{'n':>4}{'wrong':>6}{'right':>6}{'named':>6}{'refus':>6}{'u/rms':>7}{'|z|':>8}{'s':>7}"
+    rows = [head]
+    for line in lines:
+        ratio, name = line.wide
+        counts = "".join(f"{line.count(w):>6}" for w in ("confident wrong", "right", "named", "refused"))
+        cure = f"{ratio:.1f}" + ("*" if line.kind.cure else " ")
+        notes = [line.worst, f"wide: {name}" if line.kind.cure and ratio > CURED else "", line.warnings]
+        rows.append(
+            f"{' ' if line.holds else '!'} {line.kind.name:<42}{line.n:>4}{counts}{cure:>7}{line.median_z:>8.1f}"
+            f"{line.seconds:>7.2f}  {'; '.join(note for note in notes if note)}"
+        )
+    return "\n".join(rows)
+
+
+def as_markdown(lines: Sequence[Line]) -> str:
+    """Return the table for a page of the documentation."""
+    rows = [
+        "| kind | records | right | named | wrong, not named | refused | median u over rms error | median \\|z\\| |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for line in lines:
+        counts = " | ".join(str(line.count(w)) for w in ("right", "named", "confident wrong", "refused"))
+        ratio = f"{line.wide[0]:.1f}" if line.kind.cure else ""
+        rows.append(f"| {line.kind.name} | {line.n} | {counts} | {ratio} | {line.median_z:.1f} |")
+    return "\n".join(rows)
