@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pipeline.bench.air import TYPICAL_HUMIDITY, TYPICAL_PRESSURE, TYPICAL_TEMPERATURE, air_density
 from pipeline.bench.scene import Scene
+from pipeline.numerics.estimate import Estimate
 
-__all__ = ["ADDED_MASS_SHAPE", "added_mass_kg", "scene_air_density"]
+__all__ = ["ADDED_MASS_SHAPE", "added_mass_kg", "scene_air", "scene_air_density"]
 
 ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc: added mass over rho a^3
 
@@ -22,10 +23,15 @@ def added_mass_kg(scene: Scene) -> float:
     return ADDED_MASS_SHAPE * scene_air_density(scene) * (0.5 * scene.disc_diameter_m.value) ** 3
 
 
+def scene_air(scene: Scene) -> tuple[Estimate, Estimate, Estimate]:
+    """Return temperature, degC, pressure, Pa, and relative humidity of a scene's air, typical where it is silent."""
+    return (
+        scene.air_temperature_c or TYPICAL_TEMPERATURE,
+        scene.air_pressure_pa or TYPICAL_PRESSURE,
+        scene.air_relative_humidity or TYPICAL_HUMIDITY,
+    )
+
+
 def scene_air_density(scene: Scene) -> float:
     """Return the density of a scene's air, kg/m^3; where it says nothing, of air at 20 degC, 101,325 Pa and 50 %."""
-    return air_density(
-        (scene.air_temperature_c or TYPICAL_TEMPERATURE).value,
-        (scene.air_pressure_pa or TYPICAL_PRESSURE).value,
-        (scene.air_relative_humidity or TYPICAL_HUMIDITY).value,
-    )
+    return air_density(*(each.value for each in scene_air(scene)))

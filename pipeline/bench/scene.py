@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from pipeline.bench.air import saturation_pressure
@@ -140,11 +140,6 @@ class Scene:
         if self.sensor_position is not None:
             tables.setdefault("sensor", {})["position"] = self.sensor_position
         return tables
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether nothing at all is known."""
-        return all(getattr(self, f.name) is None for f in fields(self))
 
 
 def _check_vapour(scene: Scene, where: str) -> None:

@@ -38,22 +38,8 @@ __all__ = [
     "get_integrator",
 ]
 
-INTEGRATORS: dict[str, Integrator] = {
-    each.name: each
-    for each in (
-        FORWARD_EULER,
-        SYMPLECTIC_EULER,
-        VERLET,
-        YOSHIDA4,
-        RK4,
-        EXACT,
-        STRANG,
-        TAYLOR,
-        LSODA,
-        DOP853,
-        AVERAGED,
-    )
-}
+_EACH = (FORWARD_EULER, SYMPLECTIC_EULER, VERLET, YOSHIDA4, RK4, EXACT, STRANG, TAYLOR, LSODA, DOP853, AVERAGED)
+INTEGRATORS: dict[str, Integrator] = {each.name: each for each in _EACH}
 
 
 def get_integrator(name: str) -> Integrator:

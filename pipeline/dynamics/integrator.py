@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -14,19 +15,7 @@ from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
-__all__ = [
-    "Integrator",
-    "March",
-    "Step",
-    "StepMaker",
-    "Trajectory",
-    "demand_run",
-    "demand_times",
-    "integrate",
-    "kept",
-    "solved",
-    "with_start",
-]
+__all__ = ["Integrator", "Step", "StepMaker", "Trajectory", "demand_times", "kept", "with_start"]
 
 SHORTEST_S, LONGEST_S = 1e-100, 1e100
 STRETCH = 1_000_000  # states held until those asked for are taken from them
@@ -34,45 +23,46 @@ STRETCH = 1_000_000  # states held until those asked for are taken from them
 Step = Callable[[Real, Real], tuple[Real, Real]]
 """One step: displacement and velocity before it to those after it."""
 
-March = Callable[[Problem, float, int, int], tuple[F8, F8]]
-"""A run of a scaled problem: step, number of steps, every which is kept; to displacements and velocities (n,)."""
-
 StepMaker = Callable[[Equation, Real], Step]
 """Equation and step, s, to the function of one step; of many steps, (n,) float64, it is a step of each."""
 
 
-class Integrator(Protocol):
+@dataclass(frozen=True, slots=True)
+class Integrator(ABC):
     """A way to solve the equation of motion.
 
-    ``name`` is what the command line takes, ``words`` name it in a sentence, ``order`` is the power of the step with
-    which the error falls; 0 where the step is only the spacing of what is kept.
+    Parameters
+    ----------
+    name : str
+        What the command line takes.
+    words : str
+        Its name in a sentence.
+    order : int
+        Power of the step with which the error falls; 0 where the step is only the spacing of what is kept.
     """
 
-    def __hash__(self) -> int:
-        """Predictions are remembered by method."""
-        ...
+    name: str
+    words: str
+    order: int
 
-    @property
-    def name(self) -> str:
-        """Name on the command line."""
-        ...
-
-    @property
-    def words(self) -> str:
-        """Name in a sentence."""
-        ...
-
-    @property
-    def order(self) -> int:
-        """Power of the step with which the error falls."""
-        ...
-
-    def refusal(self, problem: Problem) -> str:
+    def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - some take only certain problems
         """Return why it cannot solve this problem; empty where it can."""
-        ...
+        return ""
+
+    def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - for some it depends on the problem
+        """Return the largest step that does not make a free motion grow, s; inf for any, 0 for none."""
+        return math.inf
+
+    @abstractmethod
+    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return the expected largest error of the displacement over the starting amplitude."""
+
+    @abstractmethod
+    def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        """Return displacements and velocities (n,) of a problem in units of its amplitude, every so many steps."""
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem.
+        """Solve a problem: check what is asked, march in units of the amplitude, check what came.
 
         Parameters
         ----------
@@ -89,15 +79,37 @@ class Integrator(Protocol):
         DynamicsError
             If step or number of steps cannot be, the method cannot solve this problem, or the numbers ran away.
         """
-        ...
+        demand_times(step_s, step_s * steps)
+        if steps < 1 or every < 1 or steps % every:
+            raise DynamicsError(
+                f"the number of steps must be a positive multiple of {max(every, 1)}, of which one is kept, got {steps}"
+            )
+        why = self.refusal(problem)
+        if why:
+            raise DynamicsError(f"{self.name} cannot solve this: {why}")
+        scaled, unit = problem.scaled()
+        with np.errstate(all="ignore"):
+            try:
+                y, v = self.march(scaled, step_s, steps, every)
+            except (OverflowError, ZeroDivisionError) as error:
+                raise DynamicsError(
+                    f"{self.name} ran beyond the range of numbers ({error}); {self._remedy(problem)}"
+                ) from error
+            y *= unit
+            v *= unit
+        fine = np.isfinite(y) & np.isfinite(v)
+        if not fine.all():
+            first = step_s * every * int(np.argmin(fine))
+            raise DynamicsError(
+                f"{self.name} ran beyond the range of numbers by t = {first:g} s; {self._remedy(problem)}"
+            )
+        return Trajectory(problem, step_s * every, y, v)
 
-    def stable_step(self, problem: Problem) -> float:
-        """Return the largest step that does not make a free motion grow, s; inf for any, 0 for none."""
-        ...
-
-    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return the expected largest error of the displacement over the starting amplitude."""
-        ...
+    def _remedy(self, problem: Problem) -> str:
+        limit = self.stable_step(problem)
+        if 0 < limit < np.inf:
+            return f"take a step of at most {limit:.3g} s, or strang"
+        return "take a shorter run, or strang or auto"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,58 +176,11 @@ class Trajectory:
             raise DynamicsError("the energy grew beyond the range of numbers; take fewer steps or another method")
         return relative
 
-    def energy_j_per_kg(self) -> F8:
-        """Return the mechanical energy per mass, J/kg, (n,).
-
-        Raises
-        ------
-        DynamicsError
-            If it leaves the range in which numbers keep their digits; :meth:`relative_energy` does not.
-        """
-        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            energy = _energy(self.problem, self.y, self.v)
-        moving = (np.abs(self.y) > 0) | (np.abs(self.v) > 0)
-        if not np.all(np.isfinite(energy)) or np.any(moving & (energy < np.finfo(np.float64).tiny)):
-            raise DynamicsError(
-                f"an energy between {np.finfo(np.float64).tiny:.2g} and {np.finfo(np.float64).max:.2g} J/kg was "
-                "demanded, the amplitude makes it leave that range; ask for the relative energy"
-            )
-        return energy
-
 
 def _energy(problem: Problem, y: F8, v: F8) -> F8:
     eq = problem.equation
     energy = 0.5 * (v**2 + (eq.angular_frequency_per_s * y) ** 2)
     return np.asarray(energy + 0.25 * eq.cubic_per_m2_s2 * y**4 if eq.cubic_per_m2_s2 else energy)
-
-
-def integrate(
-    integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int, march: March
-) -> Trajectory:
-    """Check what is asked, run the march in units of the amplitude, and check what came.
-
-    Parameters
-    ----------
-    integrator, problem, step_s, steps, every
-        As in :meth:`Integrator.run`.
-    march : callable
-
-    Raises
-    ------
-    DynamicsError
-    """
-    demand_run(integrator, problem, step_s, steps, every)
-    scaled, unit = problem.scaled()
-    with np.errstate(all="ignore"):
-        try:
-            y, v = march(scaled, step_s, steps, every)
-        except (OverflowError, ZeroDivisionError) as error:
-            raise DynamicsError(
-                f"{integrator.name} ran beyond the range of numbers ({error}); {_remedy(integrator, problem)}"
-            ) from error
-        y *= unit
-        v *= unit
-    return solved(integrator, problem, step_s * every, y, v)
 
 
 def kept(states: Iterator[float], steps: int, every: int) -> F8:
@@ -235,23 +200,6 @@ def with_start(problem: Problem, y: F8, v: F8) -> tuple[F8, F8]:
     return np.concatenate([[problem.displacement_m], y]), np.concatenate([[problem.velocity_m_per_s], v])
 
 
-def demand_run(integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int) -> None:
-    """Refuse a run that cannot be.
-
-    Raises
-    ------
-    DynamicsError
-    """
-    demand_times(step_s, step_s * steps)
-    if steps < 1 or every < 1 or steps % every:
-        raise DynamicsError(
-            f"the number of steps must be a positive multiple of {max(every, 1)}, of which one is kept, got {steps}"
-        )
-    why = integrator.refusal(problem)
-    if why:
-        raise DynamicsError(f"{integrator.name} cannot solve this: {why}")
-
-
 def demand_times(step_s: float, seconds: float) -> None:
     """Refuse a step or a duration that is none, or at which numbers end.
 
@@ -262,26 +210,3 @@ def demand_times(step_s: float, seconds: float) -> None:
     for name, value in (("step", step_s), ("duration", seconds)):
         if not SHORTEST_S <= value <= LONGEST_S:
             raise DynamicsError(f"the {name} must be between {SHORTEST_S:g} and {LONGEST_S:g} s, got {value!r}")
-
-
-def solved(integrator: Integrator, problem: Problem, spacing_s: float, y: F8, v: F8) -> Trajectory:
-    """Return the trajectory of these states if every number is finite.
-
-    Raises
-    ------
-    DynamicsError
-    """
-    fine = np.isfinite(y) & np.isfinite(v)
-    if not fine.all():
-        first = spacing_s * int(np.argmin(fine))
-        raise DynamicsError(
-            f"{integrator.name} ran beyond the range of numbers by t = {first:g} s; {_remedy(integrator, problem)}"
-        )
-    return Trajectory(problem, spacing_s, y, v)
-
-
-def _remedy(integrator: Integrator, problem: Problem) -> str:
-    limit = integrator.stable_step(problem)
-    if 0 < limit < np.inf:
-        return f"take a step of at most {limit:.3g} s, or strang"
-    return "take a shorter run, or strang or auto"

@@ -7,17 +7,8 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
-from pipeline.bench.air import (
-    TYPICAL_HUMIDITY,
-    TYPICAL_PRESSURE,
-    TYPICAL_TEMPERATURE,
-    U_DENSITY,
-    U_SOUND,
-    U_VISCOSITY,
-    air_density,
-    air_viscosity,
-    speed_of_sound,
-)
+from pipeline.bench.added_mass import scene_air
+from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
@@ -44,16 +35,13 @@ class Ambient:
     """
 
     def __init__(self, scene: Scene, inputs: Inputs, *, u_temperature_k: float) -> None:
-        given = scene.air_temperature_c
-        self.known = given is not None
-        if given is None:
-            celsius = TYPICAL_TEMPERATURE
-        else:
-            celsius = Estimate(given.value, given.u or u_temperature_k, "degC")
+        celsius, pressure, humidity = scene_air(scene)
+        self.known = scene.air_temperature_c is not None
+        celsius = Estimate(celsius.value, celsius.u or u_temperature_k, "degC")
         self._inputs = inputs
         self._temperature = inputs.add("air_temperature", celsius, "B")
-        self._pressure = inputs.add("air_pressure", scene.air_pressure_pa or TYPICAL_PRESSURE, "B")
-        self._humidity = inputs.add("relative_humidity", scene.air_relative_humidity or TYPICAL_HUMIDITY, "B")
+        self._pressure = inputs.add("air_pressure", pressure, "B")
+        self._humidity = inputs.add("relative_humidity", humidity, "B")
         self._density_formula = inputs.add("density_formula", Estimate(1.0, U_DENSITY), "B")
         self._viscosity_formula = inputs.add("viscosity_formula", Estimate(1.0, U_VISCOSITY), "B")
 

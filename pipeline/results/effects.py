@@ -10,14 +10,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.bench.added_mass import added_mass_kg, scene_air_density
+from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
 from pipeline.bench.air import air_viscosity, speed_of_sound
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.waveform import Rest
-from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.disturbances import Disturbances
 
 __all__ = ["Effect", "tabulate"]
@@ -93,10 +92,6 @@ def tabulate(
     )
 
 
-def _value(estimate: Estimate | None, otherwise: float) -> float:
-    return otherwise if estimate is None else estimate.value
-
-
 def _masses(scene: Scene, u_k: float) -> Iterator[Effect]:
     if scene.bob_mass_kg is None:
         for name in ("spring_mass", "added_mass"):
@@ -104,26 +99,17 @@ def _masses(scene: Scene, u_k: float) -> Iterator[Effect]:
         return
     mass = scene.bob_mass_kg.value
     if scene.spring_mass_kg is None:
-        yield Effect(
-            "spring_mass", None, None, "1", False, "the scene gives no spring mass; a third of it would add to the bob"
-        )
+        why = "the scene gives no spring mass; a third of it would add to the bob"
+        yield Effect("spring_mass", None, None, "1", False, why)
     else:
-        yield _mass_effect(
-            "spring_mass", scene.spring_mass_kg.value / 3.0 / mass, u_k, "a third of the spring's mass swings along"
-        )
+        share = scene.spring_mass_kg.value / 3.0 / mass
+        yield _mass_effect("spring_mass", share, u_k, "a third of the spring's mass swings along")
     if scene.disc_diameter_m is None:
-        yield Effect(
-            "added_mass",
-            None,
-            None,
-            "1",
-            False,
-            "the scene names no disc; the bob alone carries a negligible mass of air",
-        )
+        why = "the scene names no disc; the bob alone carries a negligible mass of air"
+        yield Effect("added_mass", None, None, "1", False, why)
     else:
-        yield _mass_effect(
-            "added_mass", added_mass_kg(scene) / mass, u_k, "the disc carries (8/3) rho a^3 of air along"
-        )
+        share = added_mass_kg(scene) / mass
+        yield _mass_effect("added_mass", share, u_k, "the disc carries (8/3) rho a^3 of air along")
 
 
 def _mass_effect(name: str, share: float, u_k: float, what: str) -> Effect:
@@ -142,7 +128,7 @@ def _drags(scene: Scene, damping: Damping, omega: float) -> Iterator[Effect]:
     if scene.disc_diameter_m is not None and scene.bob_mass_kg is not None:
         radius, mass = 0.5 * scene.disc_diameter_m.value, scene.bob_mass_kg.value
         # Creeping flow past a disc broadside on: F = 16 eta a v.
-        predicted_gamma = 8.0 * air_viscosity(_value(scene.air_temperature_c, 20.0)) * radius / mass
+        predicted_gamma = 8.0 * air_viscosity(scene_air(scene)[0].value) * radius / mass
         b = 0.5 * STEADY_DISC_DRAG * scene_air_density(scene) * math.pi * radius**2
         predicted_beta = 4.0 * b * omega / (3.0 * math.pi * mass)
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
@@ -218,11 +204,7 @@ def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
     if scene.air_temperature_c is None:
         why = f"the scene gives no air temperature, so its 0.18 %/K stand in no uncertainty: {why}"
         return Effect("speed_of_sound", None, None, "1", False, why)
-    actual = speed_of_sound(
-        scene.air_temperature_c.value,
-        _value(scene.air_pressure_pa, 101325.0),
-        _value(scene.air_relative_humidity, 0.5),
-    )
+    actual = speed_of_sound(*(each.value for each in scene_air(scene)))
     whose = "of the record" if instrument.speed_of_sound_m_per_s else "that old recordings take for granted"
     why += f"; relative to the {record:g} m/s {whose}; the air's uncertainty stands in theirs"
     if instrument.speed_of_sound_m_per_s:

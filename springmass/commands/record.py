@@ -20,6 +20,7 @@ from acquisition.decoders.registry import get_family
 from acquisition.errors import CalibrationError
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration, StillPoint
 from acquisition.live.serial_port import SerialPort
+from pipeline.bench.added_mass import scene_air
 from pipeline.bench.air import speed_of_sound
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
@@ -280,9 +281,7 @@ def _calibration(options: argparse.Namespace, scene: Scene | None) -> Calibratio
     if options.speed_of_sound is not None:
         speed = options.speed_of_sound
     elif scene is not None and scene.air_temperature_c is not None:
-        pressure = scene.air_pressure_pa.value if scene.air_pressure_pa else 101325.0
-        humidity = scene.air_relative_humidity.value if scene.air_relative_humidity else 0.5
-        speed = speed_of_sound(scene.air_temperature_c.value, pressure, humidity)
+        speed = speed_of_sound(*(each.value for each in scene_air(scene)))
     else:
         speed = SPEED_OF_SOUND_M_PER_S
     try:

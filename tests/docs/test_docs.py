@@ -198,7 +198,7 @@ def test_every_key_of_a_scene_is_documented() -> None:
     assert len(documented) == len(attributes)
     for table, key in documented:
         value: object = "below" if key == "position" else 0.5
-        assert not Scene.from_mapping({table: {key: value}}).is_empty
+        assert Scene.from_mapping({table: {key: value}}) != Scene()
 
 
 def test_laws_formats_and_columns_are_documented() -> None:

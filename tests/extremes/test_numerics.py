@@ -169,15 +169,11 @@ def test_every_amplitude_moves_alike(name: str, size: float) -> None:
     np.testing.assert_allclose(run.relative_energy(), one.relative_energy(), rtol=10 * tolerance)
 
 
-def test_an_energy_that_no_number_holds_is_refused() -> None:
-    """At 1e155 m it is infinite, at 1e-160 m it has no digits left, at 1e-310 m it is 0: an error, not that number."""
+def test_a_relative_energy_is_right_where_no_number_holds_the_energy() -> None:
+    """At 1e155 m the energy is infinite, at 1e-160 m it has no digits left, at 1e-310 m it is 0."""
     for size in (1e155, 1e-160, 1e-310):
         run = get_integrator("exact").run(Problem(FREE, size), 0.01, 100)
-        with pytest.raises(DynamicsError, match="relative energy"):
-            run.energy_j_per_kg()
         np.testing.assert_allclose(run.relative_energy(), 1.0, rtol=1e-4)
-    fine = get_integrator("exact").run(Problem(FREE, 0.05), 0.01, 100).energy_j_per_kg()
-    np.testing.assert_allclose(fine, 0.5 * (OMEGA * 0.05) ** 2, rtol=1e-13)
 
 
 @pytest.mark.parametrize("name", ["critical", "nearly critical", "overdamped", "a thousand times overdamped"])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics.amplitude import amplitude
-from pipeline.dynamics.integrator import Trajectory, demand_times, integrate
+from pipeline.dynamics.integrator import Integrator, demand_times
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.predict import bounded, predicted_by_pilot
 from pipeline.dynamics.problem import Problem
@@ -25,7 +25,7 @@ WEAK = 0.3  # damping rate over frequency up to which a cycle can be averaged ov
 
 
 @dataclass(frozen=True, slots=True)
-class Averaged:
+class Averaged(Integrator):
     """The averaged amplitude model."""
 
     name: str = "averaged"
@@ -38,20 +38,41 @@ class Averaged:
             return ""
         return f"a cycle can be averaged over where damping takes less than {WEAK:g} per radian; take strang or auto"
 
-    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Evaluate the model at every kept time; see :class:`Integrator`."""
-        return integrate(self, problem, step_s, steps, every, _march)
-
-    def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - every integrator has the same signature
-        """Return inf: it takes no steps."""
-        return math.inf
-
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what a pilot run shows."""
         demand_times(step_s, seconds)
         if self.refusal(problem):
             return math.inf
         return bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds))
+
+    def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        """Evaluate the model at every kept time."""
+        eq = problem.equation
+        gamma, beta, mu = eq.laws()
+        t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
+        damped = math.sqrt((eq.angular_frequency_per_s - gamma) * (eq.angular_frequency_per_s + gamma))
+        y, v = problem.displacement_m, problem.velocity_m_per_s
+        # Displacement and velocity tell amplitude and phase only together with the rate at which it falls.
+        start, rate = problem.amplitude_m(), gamma
+        bend = 0.375 * eq.cubic_per_m2_s2 / eq.angular_frequency_per_s
+        turn = damped
+        for _ in range(MOST_TURNS):
+            before = start
+            rate = gamma + beta * start + (mu / start if start > 0.0 else 0.0)
+            turn = damped + bend * start**2
+            start = math.hypot(y, (v + rate * y) / turn)
+            if abs(start - before) <= 1e-16 * start:
+                break
+        phase = math.atan2(-(v + rate * y) / turn, y)
+        a = amplitude(start, gamma, beta, mu, t)
+        falling = np.where(a > 0, mu + (gamma + beta * a) * a, 0.0)
+        angle = phase + damped * t
+        if bend:
+            from scipy.integrate import cumulative_trapezoid
+
+            angle = angle + bend * cumulative_trapezoid(a**2, dx=step_s * every, initial=0.0)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        return a * cosine, -falling * cosine - a * (damped + bend * a**2) * sine
 
 
 AVERAGED = Averaged()
@@ -63,32 +84,3 @@ def _weakness(problem: Problem) -> float:
     start = problem.amplitude_m()
     held = mu / start if start > 0.0 else 0.0
     return float((gamma + beta * start + held) / problem.equation.angular_frequency_per_s)
-
-
-def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-    eq = problem.equation
-    gamma, beta, mu = eq.laws()
-    t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
-    damped = math.sqrt((eq.angular_frequency_per_s - gamma) * (eq.angular_frequency_per_s + gamma))
-    y, v = problem.displacement_m, problem.velocity_m_per_s
-    # Displacement and velocity tell amplitude and phase only together with the rate at which it falls.
-    start, rate = problem.amplitude_m(), gamma
-    bend = 0.375 * eq.cubic_per_m2_s2 / eq.angular_frequency_per_s
-    turn = damped
-    for _ in range(MOST_TURNS):
-        before = start
-        rate = gamma + beta * start + (mu / start if start > 0.0 else 0.0)
-        turn = damped + bend * start**2
-        start = math.hypot(y, (v + rate * y) / turn)
-        if abs(start - before) <= 1e-16 * start:
-            break
-    phase = math.atan2(-(v + rate * y) / turn, y)
-    a = amplitude(start, gamma, beta, mu, t)
-    falling = np.where(a > 0, mu + (gamma + beta * a) * a, 0.0)
-    angle = phase + damped * t
-    if bend:
-        from scipy.integrate import cumulative_trapezoid
-
-        angle = angle + bend * cumulative_trapezoid(a**2, dx=step_s * every, initial=0.0)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return a * cosine, -falling * cosine - a * (damped + bend * a**2) * sine

@@ -6,13 +6,12 @@ adds up from sample to sample.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.dynamics.flow import flows
-from pipeline.dynamics.integrator import Trajectory, demand_run, demand_times, solved
+from pipeline.dynamics.integrator import Integrator, demand_times
 from pipeline.dynamics.predict import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
@@ -23,7 +22,7 @@ BLOCK = 128  # states of a block from its first by one matrix each; a block's fi
 
 
 @dataclass(frozen=True, slots=True)
-class Exact:
+class Exact(Integrator):
     """The linear oscillator's own solution, evaluated at each time."""
 
     name: str = "exact"
@@ -36,16 +35,9 @@ class Exact:
             return ""
         return "it knows spring and viscous drag only, this scene has more; take strang, taylor or auto"
 
-    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Evaluate the solution at every kept time; see :class:`Integrator`."""
-        demand_run(self, problem, step_s, steps, every)
-        with np.errstate(all="ignore"):  # rates beyond all bounds end at rest
-            y, v = _states(problem, step_s * every, steps // every + 1)
-        return solved(self, problem, step_s * every, y, v)
-
-    def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - every integrator has the same signature
-        """Return inf: it is exact for any step."""
-        return math.inf
+    def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        """Evaluate the solution at every kept time; rates beyond all bounds end at rest."""
+        return _states(problem, step_s * every, steps // every + 1)
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the rounding of the phase."""

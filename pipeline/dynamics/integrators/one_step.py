@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from pipeline.dynamics.equation import Equation, Real
-from pipeline.dynamics.integrator import StepMaker, Trajectory, demand_times, integrate, kept, with_start
+from pipeline.dynamics.integrator import Integrator, StepMaker, demand_times, kept, with_start
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.predict import bounded, predicted_by_pilot, rounding_error
 from pipeline.dynamics.problem import Problem
@@ -18,32 +18,19 @@ __all__ = ["OneStep", "acceleration"]
 
 
 @dataclass(frozen=True, slots=True)
-class OneStep:
+class OneStep(Integrator):
     """An explicit method of fixed step without location of events.
 
     Parameters
     ----------
-    name, words, order
-        As in :class:`pipeline.dynamics.integrator.Integrator`.
     make : callable
         Equation and step, s, to the function of one step; of many steps, (n,) float64, it is a step of each.
     closed_limit : callable, optional
         Frequency, 1/s, and damping, 1/s, to the largest stable step, s; without it the limit is searched for.
     """
 
-    name: str
-    words: str
-    order: int
     make: StepMaker = field(repr=False)
     closed_limit: Callable[[float, float], float] | None = field(default=None, repr=False)
-
-    def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - every integrator has the same signature
-        """Return nothing: it takes every problem, well or badly."""
-        return ""
-
-    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Repeat the step; see :class:`Integrator`."""
-        return integrate(self, problem, step_s, steps, every, self._march)
 
     def stable_step(self, problem: Problem) -> float:
         """Return the largest step at which neither a small nor the starting motion grows, s."""
@@ -66,7 +53,8 @@ class OneStep:
         rounding = rounding_error(problem, seconds, seconds / step_s)
         return rounding + bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds))
 
-    def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+    def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        """Repeat the step."""
         step = self.make(problem.equation, step_s)
 
         def states(y: float, v: float) -> Iterator[float]:

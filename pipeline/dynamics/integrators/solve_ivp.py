@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics.equation import Equation
-from pipeline.dynamics.integrator import Trajectory, demand_times, integrate
+from pipeline.dynamics.integrator import Integrator, demand_times
 from pipeline.dynamics.predict import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
@@ -25,13 +24,11 @@ LEAST_RTOL = 3e-14  # scipy raises anything less to a hundred roundings
 
 
 @dataclass(frozen=True, slots=True)
-class SolveIvp:
+class SolveIvp(Integrator):
     """One method of solve_ivp.
 
     Parameters
     ----------
-    name : str
-    words : str
     method : str
         As solve_ivp calls it.
     grows : float
@@ -40,24 +37,9 @@ class SolveIvp:
         Error over the amplitude at the end of the run that is aimed at.
     """
 
-    name: str
-    words: str
     method: str
     grows: float
     tolerance: float = 1e-6
-    order: int = 0
-
-    def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - every integrator has the same signature
-        """Return nothing: it takes every problem, and gives up where that takes too long."""
-        return ""
-
-    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem; see :class:`Integrator`."""
-        return integrate(self, problem, step_s, steps, every, self._march)
-
-    def stable_step(self, problem: Problem) -> float:  # noqa: ARG002
-        """Return inf: it chooses its own step."""
-        return math.inf
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what the local tolerance grows to."""
@@ -70,7 +52,8 @@ class SolveIvp:
         radians = 1.0 + problem.equation.angular_frequency_per_s * seconds
         return min(max(self.tolerance / (self.grows * radians), LEAST_RTOL), 1e-2)
 
-    def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+    def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        """Solve at every kept time, and give up where that takes too long."""
         t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
         rtol = self.rtol(problem, float(t[-1]))
         with warnings.catch_warnings():
@@ -153,5 +136,5 @@ def _turning(way: int) -> Callable[[float, F8], float]:
     return turning
 
 
-LSODA = SolveIvp("lsoda", "scipy's solve_ivp, LSODA", "LSODA", 0.9)
-DOP853 = SolveIvp("dop853", "scipy's solve_ivp, DOP853", "DOP853", 10.0)
+LSODA = SolveIvp("lsoda", "scipy's solve_ivp, LSODA", 0, "LSODA", 0.9)
+DOP853 = SolveIvp("dop853", "scipy's solve_ivp, DOP853", 0, "DOP853", 10.0)

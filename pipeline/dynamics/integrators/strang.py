@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics.flow import flow
-from pipeline.dynamics.integrator import Trajectory, demand_times, integrate, kept, with_start
+from pipeline.dynamics.integrator import Integrator, demand_times, kept, with_start
 from pipeline.dynamics.integrators.turning import Friction
 from pipeline.dynamics.predict import bounded, predicted_by_pilot, rounding_error
 from pipeline.dynamics.problem import Problem
@@ -36,20 +36,12 @@ LONGEST_WITH_FRICTION = 1e6  # radians a step
 
 
 @dataclass(frozen=True, slots=True)
-class Strang:
+class Strang(Integrator):
     """Strang splitting."""
 
     name: str = "strang"
     words: str = "Strang splitting with exact sub-flows"
     order: int = 2
-
-    def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - every integrator has the same signature
-        """Return nothing: it takes every problem."""
-        return ""
-
-    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem; see :class:`Integrator`."""
-        return integrate(self, problem, step_s, steps, every, _march)
 
     def stable_step(self, problem: Problem) -> float:
         """Return inf, as both sub-flows only lose energy; with a cubic term, whose kick can add some, its limit, s."""
@@ -67,27 +59,27 @@ class Strang:
             return rounding
         return rounding + bounded(lambda: predicted_by_pilot(self, self, problem, step_s, seconds))
 
-
-def _march(problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-    eq = problem.equation
-    if not eq.friction_m_per_s2:
-        y, v = kept(_states(problem, step_s), steps, every).T
-        # What is kept is half an oscillator short of the end of its step.
-        a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * step_s)
-        return with_start(problem, a * y + b * v, c * y + d * v)
-    # Within a step a bob may turn once: no step longer than a radian.
-    radians = eq.angular_frequency_per_s * step_s
-    if radians > LONGEST_WITH_FRICTION:
-        raise DynamicsError(
-            f"with friction a step of strang is at most {LONGEST_WITH_FRICTION:g} radians, as each of them is looked "
-            f"at for turning points, got {radians:.3g}; take a shorter step"
-        )
-    parts = max(1, math.ceil(radians))
-    bob = Friction(problem, step_s / parts)
-    moving = kept(bob.states(), steps * parts, every * parts)
-    held = np.tile((bob.y, bob.v), (steps // every - len(moving), 1))
-    y, v = np.concatenate([moving, held]).T
-    return with_start(problem, y, v)
+    def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        """Split every step; with friction, from turning point to turning point."""
+        eq = problem.equation
+        if not eq.friction_m_per_s2:
+            y, v = kept(_states(problem, step_s), steps, every).T
+            # What is kept is half an oscillator short of the end of its step.
+            a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * step_s)
+            return with_start(problem, a * y + b * v, c * y + d * v)
+        # Within a step a bob may turn once: no step longer than a radian.
+        radians = eq.angular_frequency_per_s * step_s
+        if radians > LONGEST_WITH_FRICTION:
+            raise DynamicsError(
+                f"with friction a step of strang is at most {LONGEST_WITH_FRICTION:g} radians, as each of them is "
+                f"looked at for turning points, got {radians:.3g}; take a shorter step"
+            )
+        parts = max(1, math.ceil(radians))
+        bob = Friction(problem, step_s / parts)
+        moving = kept(bob.states(), steps * parts, every * parts)
+        held = np.tile((bob.y, bob.v), (steps // every - len(moving), 1))
+        y, v = np.concatenate([moving, held]).T
+        return with_start(problem, y, v)
 
 
 def _states(problem: Problem, h: float) -> Iterator[float]:

@@ -22,7 +22,7 @@ import numpy as np
 
 from pipeline.dynamics.amplitude import stopping_time
 from pipeline.dynamics.equation import Equation
-from pipeline.dynamics.integrator import Trajectory, demand_times, integrate
+from pipeline.dynamics.integrator import Integrator, demand_times
 from pipeline.dynamics.predict import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
@@ -35,7 +35,7 @@ MOST_STEPS = 200_000
 
 
 @dataclass(frozen=True, slots=True)
-class Taylor:
+class Taylor(Integrator):
     """Adaptive Taylor series.
 
     Parameters
@@ -45,10 +45,10 @@ class Taylor:
         kept.
     """
 
-    tolerance: float = 1e-13
     name: str = "taylor"
     words: str = "adaptive Taylor series with turning points located"
     order: int = 0
+    tolerance: float = 1e-13
 
     def refusal(self, problem: Problem) -> str:
         """Return why not, where viscous drag is so stiff that the series would take a step for nothing."""
@@ -56,14 +56,6 @@ class Taylor:
         if eq.gamma_per_s > 1e4 * eq.angular_frequency_per_s:
             return "viscous drag this stiff needs a step far below the motion's own time; take strang, exact or auto"
         return ""
-
-    def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem; see :class:`Integrator`."""
-        return integrate(self, problem, step_s, steps, every, self._march)
-
-    def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - every integrator has the same signature
-        """Return inf: it chooses its own step."""
-        return math.inf
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the tolerance, or the rounding where that is more; inf for more steps than it takes."""
@@ -80,7 +72,8 @@ class Taylor:
         """Return the number of terms of its series."""
         return _order(_local(problem, seconds, self.tolerance))
 
-    def _march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+    def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        """Solve from turning point to turning point."""
         states = _solve(problem, step_s * every, steps // every + 1, self.tolerance)
         return states[:, 0], states[:, 1]
 

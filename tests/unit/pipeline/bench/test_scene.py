@@ -43,21 +43,21 @@ def test_every_key_of_the_reference_scene_is_read() -> None:
         beta_per_m_s=Estimate(0.235, 0.0, "1/(m s)"),
         mu_m_per_s=Estimate(0.0, 0.0, "m/s"),
     )
-    assert not scene.is_empty
+    assert scene != Scene()
 
 
 def test_nothing_known_is_empty() -> None:
     """No tables, and tables without keys, leave every quantity None."""
     for tables in ({}, {"bob": {}, "sensor": {}}):
         scene = Scene.from_mapping(tables)
-        assert scene.is_empty
+        assert scene == Scene()
         assert scene == Scene()
         assert scene.to_mapping() == {}
 
 
 def test_position_alone_is_something() -> None:
     """A scene that only says where the sensor is, is not empty."""
-    assert not Scene.from_mapping({"sensor": {"position": "above"}}).is_empty
+    assert Scene.from_mapping({"sensor": {"position": "above"}}) != Scene()
 
 
 # table, key, value, words that the message must hold besides file, table, key and value
