@@ -10,7 +10,6 @@ import numpy as np
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.damping import select as dampings
-from pipeline.damping.select import Damping
 from pipeline.errors import AnalysisError
 from pipeline.motion import equation_fit as equations
 from pipeline.motion import overdamped as relaxations
@@ -19,10 +18,7 @@ from pipeline.motion import waveform_fit as fullfits
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equation
 from pipeline.motion.kinds import Fitted, Windows, by_equation, by_windows, see_windows
 from pipeline.motion.overdamped import Overdamped, find_overdamped, spring_constant
-from pipeline.motion.phase import PhaseFit
 from pipeline.motion.smoother import Smoothed, smooth
-from pipeline.motion.waveform import Rest, Waveform
-from pipeline.motion.waveform_fit import FullFit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.threads import one_thread
@@ -32,14 +28,11 @@ from pipeline.oscillation import demodulate as demodulation
 from pipeline.oscillation import disturbances as separation
 from pipeline.oscillation.condition import Conditioned, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
-from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.disturbances import Disturbances
 from pipeline.results import derive as derivation
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
-from pipeline.results.findings import Finding, by_severity, judge, judge_fits, judge_overdamped
+from pipeline.results.findings import Finding, by_severity, judge, judge_fits, judge_overdamped, judge_scene
 from pipeline.results.sample_findings import count_quality, find_clusters, judge_samples
-from pipeline.results.scene_findings import judge_scene
 from pipeline.track import U8, Track
 
 __all__ = ["STANDARD", "Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]
@@ -73,18 +66,11 @@ STANDARD = Params()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Oscillation:
-    """What the stages found in a record that oscillates, strongly damped or not."""
+class Oscillation(Fitted):
+    """What the stages found in a record that oscillates, strongly damped or not: the fit, and what follows."""
 
     cycles: Cycles
-    demodulated: Demodulated
-    damping: Damping
-    phase: PhaseFit
-    rest: Rest
-    waveform: Waveform
     derived: Derived
-    disturbances: Disturbances
-    full: FullFit | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +84,9 @@ class Still:
     """
 
     why: str
+
+
+Motion = Oscillation | Overdamped | Still
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,7 +111,7 @@ class Analysis:
     scene: Scene
     params: Params
     conditioned: Conditioned
-    motion: Oscillation | Overdamped | Still
+    motion: Motion
     effects: tuple[Effect, ...]
     findings: tuple[Finding, ...]
     estimates: Mapping[str, Estimate]
@@ -161,24 +150,8 @@ class Analysis:
         return smooth(self.track, motion.demodulated, motion.phase, motion.rest, motion.disturbances)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Record:
-    """What every branch begins from."""
-
-    conditioned: Conditioned
-    scene: Scene
-    params: Params
-
-    def analysis(
-        self,
-        motion: Oscillation | Overdamped | Still,
-        effects: tuple[Effect, ...],
-        findings: tuple[Finding, ...],
-        estimates: Mapping[str, Estimate],
-    ) -> Analysis:
-        """Return the analysis with what one branch found."""
-        track = self.conditioned.track
-        return Analysis(track, self.scene, self.params, self.conditioned, motion, effects, findings, estimates)
+Found = tuple[Motion, tuple[Effect, ...], tuple[Finding, ...], Mapping[str, Estimate]]
+"""What one branch finds: the last four attributes of an analysis."""
 
 
 @one_thread
@@ -216,19 +189,18 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     if track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     conditioned = condition(track, params.condition)
-    record = _Record(conditioned, scene, params)
     windows = see_windows(conditioned, params.cycles, params.demodulate, params.disturbances, params.damping)
     solved = _solve_equation(windows, params)
-    relaxed = None
-    if _may_be_overdamped(windows, solved, params):
-        relaxed = find_overdamped(conditioned, params.relaxation)
+    relaxed = find_overdamped(conditioned, params.relaxation) if _may_be_overdamped(windows, solved, params) else None
     if isinstance(relaxed, Overdamped):
-        return _overdamped(record, relaxed)
-    if isinstance(windows, NoOscillation):
-        return _still(record, relaxed or windows)
-    if isinstance(solved, EquationFit):
-        return _oscillation(record, windows.cycles, by_equation(windows, solved), solved)
-    return _oscillation(record, windows.cycles, by_windows(windows, params.phase, params.full), solved)
+        found = _overdamped(conditioned, scene, relaxed)
+    elif isinstance(windows, NoOscillation):
+        found = _still(conditioned, relaxed or windows)
+    elif isinstance(solved, EquationFit):  # strongly damped
+        found = _oscillation(windows, by_equation(windows, solved), solved, scene, params)
+    else:
+        found = _oscillation(windows, by_windows(windows, params.phase, params.full), solved, scene, params)
+    return Analysis(conditioned.track, scene, params, conditioned, *found)
 
 
 def _solve_equation(windows: Windows | NoOscillation, params: Params) -> EquationFit | EquationMisfit | None:
@@ -256,51 +228,44 @@ def _may_be_overdamped(
 
 
 def _oscillation(
-    record: _Record, cycles: Cycles, fitted: Fitted, solved: EquationFit | EquationMisfit | None
-) -> Analysis:
+    windows: Windows, fitted: Fitted, solved: EquationFit | EquationMisfit | None, scene: Scene, params: Params
+) -> Found:
     """What follows from an oscillation, however it was fitted."""
-    track, scene, params = record.conditioned.track, record.scene, record.params
+    track, cycles = windows.conditioned.track, windows.cycles
     demodulated, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
     disturbances = fitted.disturbances
     rest = fitted.rest.stepping(disturbances.steps)
     waveform = fitted.waveform.with_disturbances(disturbances)
     instrument = Instrument.of(track, u_crystal=params.derive.u_clock_nominal)
-    effects = tabulate(
-        scene,
-        damping,
-        phase,
-        rest,
-        noise_m=demodulated.noise_m,
-        instrument=instrument,
-        disturbances=disturbances,
-    )
+    noise_m = demodulated.noise_m
+    effects = tabulate(scene, damping, phase, rest, noise_m=noise_m, instrument=instrument, disturbances=disturbances)
     derived = derive(demodulated, damping, phase, rest, scene, effects, instrument=instrument, params=params.derive)
     clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]))
     findings = by_severity(
         judge(cycles, demodulated, damping, phase, rest, waveform, disturbances),
-        judge_samples(record.conditioned, demodulated.flags, demodulated.noise_m, clusters),
+        judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters),
         judge_scene(scene, effects),
         judge_fits(fitted.full, solved),
     )
-    motion = Oscillation(cycles, demodulated, damping, phase, rest, waveform, derived, disturbances, fitted.full)
-    return record.analysis(motion, effects, findings, derived.estimates)
+    motion = Oscillation(demodulated, disturbances, damping, phase, rest, waveform, fitted.full, cycles, derived)
+    return motion, effects, findings, derived.estimates
 
 
-def _overdamped(record: _Record, found: Overdamped) -> Analysis:
+def _overdamped(conditioned: Conditioned, scene: Scene, found: Overdamped) -> Found:
     """A motion that damping ends within a few cycles or without any."""
-    estimates = {**_at_rest(record), **found.estimates, **spring_constant(found, record.scene)}
-    return record.analysis(found, (), _findings(record, judge_overdamped(found)), estimates)
+    estimates = {**_at_rest(conditioned), **found.estimates, **spring_constant(found, scene)}
+    return found, (), _findings(conditioned, judge_overdamped(found)), estimates
 
 
-def _still(record: _Record, why: NoOscillation) -> Analysis:
+def _still(conditioned: Conditioned, why: NoOscillation) -> Found:
     """A record without any motion to fit."""
     finding = Finding("no_oscillation", "error", why.why)
-    return record.analysis(Still(why.why), (), _findings(record, finding), _at_rest(record))
+    return Still(why.why), (), _findings(conditioned, finding), _at_rest(conditioned)
 
 
-def _at_rest(record: _Record) -> dict[str, Estimate]:
+def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:
     """Mean and noise of the samples used."""
-    y, noise_m = record.conditioned.track.y[record.conditioned.used], record.conditioned.noise_m
+    y, noise_m = conditioned.track.y[conditioned.used], conditioned.noise_m
     if not y.size:
         raise AnalysisError("no usable sample is left; see the counts of flagged samples")
     # Where the distance steps or creeps, neighbours say the same: their number would make the mean look certain.
@@ -311,6 +276,5 @@ def _at_rest(record: _Record) -> dict[str, Estimate]:
     }
 
 
-def _findings(record: _Record, first: Finding) -> tuple[Finding, ...]:
-    conditioned = record.conditioned
+def _findings(conditioned: Conditioned, first: Finding) -> tuple[Finding, ...]:
     return first, *judge_samples(conditioned, conditioned.flags, conditioned.noise_m)

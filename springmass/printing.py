@@ -26,7 +26,8 @@ def findings_text(findings: Sequence[Mapping[str, Any]]) -> str:
     """
     if not findings:
         return "No findings."
-    return "\n".join(_entry(f["severity"], f["code"], f["message"]) for f in findings)
+    told = (f"{_MARKS[f['severity']]} {f['code']}: {f['message']}" for f in findings)
+    return "\n".join(wrapped(one, " " * 8) for one in told)
 
 
 def classic_text(classic: Classic) -> str:
@@ -63,7 +64,3 @@ def wrapped(text: str, indent: str = "") -> str:
     """Return text wrapped to the terminal, at most a hundred columns, lines after the first indented."""
     width = min(shutil.get_terminal_size((100, 24)).columns, 100)
     return textwrap.fill(text, width, subsequent_indent=indent, break_on_hyphens=False)
-
-
-def _entry(severity: str, code: str, message: str) -> str:
-    return wrapped(f"{_MARKS[severity]} {code}: {message}", " " * 8)

@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from pipeline.dynamics import Equation, Integrator, Problem, get_integrator
+from pipeline.errors import DynamicsError
 from springmass import analyse, load, read_scene, sample_data
 from springmass.report.figures import amplitude_figure, render
-from springmass.report.simulation_figures import stability_figure
+from springmass.report.figures.canvas import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    WIDTH,
+    blank,
+    legend_row,
+    style,
+)
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RUN_STEPS = 4000
 HERE = Path(__file__).resolve().parent
 
 
@@ -21,6 +41,65 @@ def main(folder: Path = HERE) -> list[Path]:
     stability = folder / "stability.svg"
     stability.write_bytes(render(stability_figure(), "svg"))
     return [target, stability]
+
+
+def largest_step(integrator: Integrator, ratio: float) -> float:
+    """Return the largest stable omega h at a damping ratio gamma / omega."""
+    return integrator.stable_step(Problem(Equation(angular_frequency_per_s=1.0, gamma_per_s=float(ratio)), 1.0))
+
+
+def runs_bounded(integrator: Integrator, x: float, ratio: float) -> bool:
+    """Return whether a run of many steps of x = omega h ends with no more energy than it began with.
+
+    A step just inside the limit may swell before it settles, so the energy is looked at after the first half only.
+    """
+    problem = Problem(Equation(angular_frequency_per_s=1.0, gamma_per_s=ratio), 1.0)
+    try:
+        run = integrator.run(problem, x, RUN_STEPS, every=RUN_STEPS // 2)
+        middle, end = run.relative_energy()[1:]
+    except DynamicsError:
+        return False
+    return bool(end <= middle * (1.0 + 1e-9) and math.isfinite(end))
+
+
+def stability_figure() -> Figure:
+    """Draw the stability map: the largest stable step against damping as theory has it, and runs on both sides.
+
+    Raises
+    ------
+    ValueError
+        If a run contradicts its line.
+    """
+    ratios = np.geomspace(0.01, 100.0, 161)
+    asked = np.geomspace(0.02, 60.0, 8)
+    looks = (
+        ("forward-euler", VERMILLION),
+        ("symplectic-euler", BLUE),
+        ("verlet", GREEN),
+        ("yoshida4", PURPLE),
+        ("rk4", ORANGE),
+    )
+    with style():
+        figure = blank(WIDTH, 3.8)
+        panel = figure.add_axes((0.68 / WIDTH, 0.13, (WIDTH - 0.8) / WIDTH, 0.76))
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        for name, colour in looks:
+            method = get_integrator(name)
+            panel.plot(ratios, [largest_step(method, ratio) for ratio in ratios], color=colour, label=name)
+            for ratio in asked.tolist():
+                limit = largest_step(method, ratio)
+                for share, bounded, marker in ((0.97, True, "o"), (1.03, False, "x")):
+                    if runs_bounded(method, share * limit, ratio) != bounded:
+                        raise ValueError(f"{name} at gamma/omega {ratio:g}: a run contradicts its limit {limit:g}")
+                    # Drawn farther from the line than it was run, to be seen apart.
+                    at = limit * (0.9 if bounded else 1.11)
+                    panel.plot([ratio], [at], marker, ms=3.2 if bounded else 4.0, color=colour, mew=1.0)
+        panel.set_xlabel("damping ratio gamma / omega")
+        panel.set_ylabel("largest stable step / radians")
+        panel.set_xlim(ratios[0], ratios[-1])
+        legend_row(panel, 5, columnspacing=1.2)
+        return figure
 
 
 if __name__ == "__main__":

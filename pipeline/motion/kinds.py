@@ -74,7 +74,7 @@ class Fitted:
     phase: PhaseFit
     rest: Rest
     waveform: Waveform
-    full: FullFit | None = None
+    full: FullFit | None
 
 
 def see_windows(
@@ -139,7 +139,7 @@ def by_windows(windows: Windows, phases: PhaseParams, waveforms: WaveformParams 
     phase, rest = fit_phase(demodulated, damping, phases), fit_rest(demodulated)
     waveform = reconstruct(disturbances.conditioned.track, demodulated, phase, rest)
     if waveforms is None:
-        return Fitted(demodulated, disturbances, damping, phase, rest, waveform)
+        return Fitted(demodulated, disturbances, damping, phase, rest, waveform, None)
     # The record without modes and with their columns: as good as the whole record with them, for the columns span
     # what was taken out.
     extra = disturbances.columns(windows.conditioned.track.t)
@@ -162,4 +162,4 @@ def by_equation(windows: Windows, solved: EquationFit) -> Fitted:
     phase, rest = solved.phase(demodulated), solved.rest(demodulated)
     # The equation was fitted to the whole record.
     nothing = Disturbances.nothing(windows.conditioned)
-    return Fitted(demodulated, nothing, solved.damping, phase, rest, solved.waveform)
+    return Fitted(demodulated, nothing, solved.damping, phase, rest, solved.waveform, None)

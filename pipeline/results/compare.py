@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -102,9 +102,9 @@ class Comparison:
     dof: int
     agree: bool
     largest_deviation: float
-    exchanged: tuple[str, ...]
-    exchanged_chi2: float | None
-    message: str
+    exchanged: tuple[str, ...] = ()
+    exchanged_chi2: float | None = None
+    message: str = ""
 
 
 def compare_springs(
@@ -163,46 +163,18 @@ def compare_springs(
     shared = shared_mass_kg or Estimate(0.0, 0.0, "kg")
     _check(runs, shared)
     masses = [run.mass_kg for run in runs]
-    fit = _common_constant(runs, masses, shared, mass_correlation)
-    dof = len(runs) - 1
-    limit = chi2_quantile(probability, dof)
-    agree = fit.chi2 <= limit
-    exchanged: tuple[str, ...] = ()
-    exchanged_chi2 = None
-    if not agree:
-        nearest = max(limit, NEARER * fit.chi2)
+    limit = chi2_quantile(probability, len(runs) - 1)
+    found = _common_constant(runs, masses, shared, mass_correlation, limit)
+    if not found.agree:
+        nearest = max(limit, NEARER * found.chi2)
         for i, j in itertools.combinations(range(len(runs)), 2):
             trial = masses.copy()
             trial[i], trial[j] = trial[j], trial[i]
-            chi2 = _common_constant(runs, trial, shared, mass_correlation).chi2
+            chi2 = _common_constant(runs, trial, shared, mass_correlation, limit).chi2
             if chi2 <= nearest:
-                nearest, exchanged, exchanged_chi2 = chi2, (runs[i].name, runs[j].name), chi2
-    names = tuple(run.name for run in runs)
-    message = _message(names, fit, agree, exchanged, agree_then=exchanged_chi2 is not None and exchanged_chi2 <= limit)
-    return Comparison(
-        names,
-        fit.mean,
-        fit.each,
-        fit.own_u,
-        fit.pulls,
-        fit.chi2,
-        dof,
-        agree,
-        fit.deviation,
-        exchanged,
-        exchanged_chi2,
-        message,
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Common:
-    mean: Estimate
-    each: tuple[Estimate, ...]
-    own_u: tuple[float, ...]
-    pulls: tuple[float, ...]
-    chi2: float
-    deviation: float
+                nearest = chi2
+                found = replace(found, exchanged=(runs[i].name, runs[j].name), exchanged_chi2=chi2)
+    return replace(found, message=_message(found, limit))
 
 
 def _check(runs: Sequence[SpringRun], shared: Estimate) -> None:
@@ -219,8 +191,9 @@ def _check(runs: Sequence[SpringRun], shared: Estimate) -> None:
 
 
 def _common_constant(
-    runs: Sequence[SpringRun], masses: Sequence[Estimate], shared: Estimate, mass_correlation: float
-) -> _Common:
+    runs: Sequence[SpringRun], masses: Sequence[Estimate], shared: Estimate, mass_correlation: float, limit: float
+) -> Comparison:
+    """Compare the runs with these masses, as they stand; they agree up to a limit of chi-square."""
     squared = np.array([run.angular_frequency.value**2 for run in runs])
     k = squared * np.array([mass.value + shared.value for mass in masses])
     of_omega = 2.0 * k * np.array([run.angular_frequency.u / run.angular_frequency.value for run in runs])
@@ -244,27 +217,31 @@ def _common_constant(
         for i, j in itertools.combinations(range(len(runs)), 2)
     ]
     each = tuple(Estimate(float(x), math.sqrt(v), "N/m") for x, v in zip(k, np.diag(covariance), strict=True))
-    return _Common(
+    chi2 = float(residual @ inverse @ residual)
+    return Comparison(
+        tuple(run.name for run in runs),
         Estimate(mean, weight**-0.5, "N/m"),
         each,
         tuple(map(float, own)),
         tuple(map(float, residual / u_residual)),
-        float(residual @ inverse @ residual),
+        chi2,
+        len(runs) - 1,
+        chi2 <= limit,
         float(max(deviations)),
     )
 
 
-def _message(names: tuple[str, ...], fit: _Common, agree: bool, exchanged: tuple[str, ...], *, agree_then: bool) -> str:
-    together = ", ".join(names)
-    if agree:
+def _message(found: Comparison, limit: float) -> str:
+    together = ", ".join(found.names)
+    if found.agree:
         return (
-            f"One spring: {together} agree on k = {fit.mean} "
-            f"(largest difference {fit.deviation:.1f} standard uncertainties)."
+            f"One spring: {together} agree on k = {found.spring_constant} "
+            f"(largest difference {found.largest_deviation:.1f} standard uncertainties)."
         )
-    text = f"Not one spring as recorded: {together} differ by {fit.deviation:.1f} standard uncertainties."
-    if exchanged:
+    text = f"Not one spring as recorded: {together} differ by {found.largest_deviation:.1f} standard uncertainties."
+    if found.exchanged_chi2 is not None:
         text += (
-            f" With the masses (or the periods) of {exchanged[0]} and {exchanged[1]} exchanged they "
-            f"{'agree' if agree_then else 'come together'}: check which record belongs to which bob."
+            f" With the masses (or the periods) of {' and '.join(found.exchanged)} exchanged they "
+            f"{'agree' if found.exchanged_chi2 <= limit else 'come together'}: check which record belongs to which bob."
         )
     return text

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS
 from pipeline.damping.mixture import MixedDrag, find_mixed
 from pipeline.damping.select import Damping
@@ -20,15 +21,9 @@ from pipeline.motion.waveform_fit import FullFit
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
+from pipeline.results.effects import Effect
 
-__all__ = [
-    "Finding",
-    "Severity",
-    "by_severity",
-    "judge",
-    "judge_fits",
-    "judge_overdamped",
-]
+__all__ = ["Finding", "Severity", "by_severity", "judge", "judge_fits", "judge_overdamped", "judge_scene"]
 
 GRAVITY_M_PER_S2 = 9.81
 
@@ -95,6 +90,37 @@ def judge_fits(full: FullFit | None, solved: EquationFit | EquationMisfit | None
     elif solved is not None:
         findings.append(Finding("not_converged", "warning", solved.why))
     return tuple(findings)
+
+
+def judge_scene(scene: Scene, effects: tuple[Effect, ...]) -> tuple[Finding, ...]:
+    """Return what to know of the inputs that results were derived from.
+
+    Parameters
+    ----------
+    scene : Scene
+    effects : tuple of Effect
+        Say whether the spring's mass is in the model.
+
+    Examples
+    --------
+    >>> bare = Scene.from_mapping({"bob": {"mass_kg": 0.2}})
+    >>> judge_scene(bare, ())[0].code
+    'uncertainty_missing'
+    """
+    springs = any(effect.name == "spring_mass" and effect.included for effect in effects)
+    used = {
+        "[bob] mass_kg": scene.bob_mass_kg,
+        "[spring] mass_kg": scene.spring_mass_kg if springs else None,
+        "[disc] diameter_m": scene.disc_diameter_m,
+    }
+    exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
+    if not exact:
+        return ()
+    message = (
+        f"the scene states {', '.join(exact)} without an uncertainty: taken as exact, so what is derived from "
+        f"{'it' if len(exact) == 1 else 'them'} is less certain than its u says; write {{ value = ..., u = ... }}"
+    )
+    return (Finding("uncertainty_missing", "warning", message),)
 
 
 def judge(

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.joint import JointDamping
 from pipeline.damping.select import Damping
-from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.estimate import Joint
 from pipeline.track import Track
 from springmass.report.budgets import INPUTS, budgets_of
-from springmass.report.inline import inline_svg
 from springmass.report.tables import law_status, page_unit, pretty, pretty_number, table_rows
 from springmass.report.words import LETTERS, caption, verdict
 from springmass.runs.analysing import Analysed
@@ -21,7 +22,7 @@ from springmass.runs.comparing import Compared
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-__all__ = ["render_html"]
+__all__ = ["inline_svg", "render_html"]
 
 _SEVERITIES = {"error": "Error", "warning": "Warning", "info": "Note"}
 _QUALITY = {
@@ -90,6 +91,7 @@ def _part(index: int, run: Analysed, pictures: Mapping[str, bytes]) -> dict[str,
     """Everything that the template says of one run."""
     analysis, quality, given = run.analysis, run.result["quality"], run.result["input"]
     motion = analysis.motion
+    ordered = [*(name for name in _QUALITY if name in quality), *(name for name in quality if name not in _QUALITY)]
     return {
         "name": run.name,
         "subtitle": _subtitle(given, analysis.track),
@@ -103,15 +105,11 @@ def _part(index: int, run: Analysed, pictures: Mapping[str, bytes]) -> dict[str,
         "laws": _laws_of(motion.damping) if isinstance(motion, Oscillation) else None,
         "budgets": budgets_of(analysis),
         "effects": analysis.effects,
-        "quality": [(_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in _ordered(quality)],
+        "quality": [(_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in ordered],
         "classic": _classic_rows(run),
         "chi2": None if run.classic is None else run.classic.chi2,
         "input": list(_flattened(given)),
     }
-
-
-def _ordered(quality: Mapping[str, int]) -> list[str]:
-    return [name for name in _QUALITY if name in quality] + [name for name in quality if name not in _QUALITY]
 
 
 def _subtitle(given: Mapping[str, Any], track: Track) -> str:
@@ -149,7 +147,7 @@ def _laws(found: Damping | JointDamping, fitted: Mapping[str, Joint], status: Ca
     rows = [
         {
             "name": law,
-            "cells": [_bare(fitted[law][name]) if name in fitted[law].names else None for name in units],
+            "cells": [replace(fitted[law][name], unit="") if name in fitted[law].names else None for name in units],
             "fit": fit,
             "bic": _difference(fit.bic - found.best.bic),
             "status": status(law),
@@ -159,10 +157,6 @@ def _laws(found: Damping | JointDamping, fitted: Mapping[str, Joint], status: Ca
     ]
     heads = [LETTERS.get(name, name) + (f" / {page_unit(unit)}" if unit else "") for name, unit in units.items()]
     return {"heads": heads, "rows": rows}
-
-
-def _bare(estimate: Estimate) -> Estimate:
-    return Estimate(estimate.value, estimate.u)
 
 
 def _difference(bic: float) -> str:
@@ -226,3 +220,57 @@ def _symbol(symbol: str) -> Markup:
         if mark
         else Markup("<i>") + escape(letter) + Markup("</i>")
     )
+
+
+def inline_svg(svg: bytes, prefix: str) -> Markup:
+    """Return an SVG file as an element for a page: names of its own, coordinates to a hundredth of a point.
+
+    Parameters
+    ----------
+    svg : bytes
+        As :func:`springmass.report.figures.render` makes it.
+    prefix : str
+        Of every id, so that figures on one page do not take each other's clip paths.
+    """
+    from markupsafe import Markup
+
+    text = svg.decode()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
+    text = re.sub(r' xmlns(:xlink)?="[^"]*"| version="1.1"', "", text).replace("xlink:href", "href")
+    used = dict.fromkeys(re.findall(r'(?:href="|url\()#([^")]+)', text))
+    short = {name: f"{prefix}{i}" for i, name in enumerate(used)}
+
+    def renamed(found: re.Match[str]) -> str:
+        # Groups are named as well, but nobody calls them.
+        return f' id="{short[found[1]]}"' if found[1] in short else ""
+
+    text = re.sub(r' id="([^"]*)"', renamed, text)
+    text = re.sub(r'(href="|url\()#([^")]+)', lambda found: f"{found[1]}#{short[found[2]]}", text)
+    # A style for "*" would reach the whole page from here.
+    text = re.sub(r"<style[^>]*>.*?</style>", "", text, flags=re.DOTALL)
+    text = re.sub(r"<defs>\s*</defs>", "", text)
+    text = re.sub(r"<[^>]+>", _rounded, text)
+    text = _shared_styles(text)
+    return Markup(re.sub(r">\s+<", "><", text).strip())
+
+
+def _rounded(tag: re.Match[str]) -> str:
+    # Text between tags, such as 0.0025 at an axis, is not touched, nor are pixels.
+    if tag[0].startswith("<image"):
+        return tag[0]
+    shorter = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0])
+    return re.sub(r"\s+", " ", shorter)
+
+
+def _shared_styles(text: str) -> str:
+    """Move the style of a run of equal markers to one group around them."""
+    one = r'<use href="[^"]*" x="[^"]*" y="[^"]*" style="[^"]*" ?/>'
+
+    def grouped(found: re.Match[str]) -> str:
+        styles = set(re.findall(r'style="([^"]*)"', found[0]))
+        if len(styles) != 1:
+            return found[0]
+        return f'<g style="{styles.pop()}">' + re.sub(r' style="[^"]*"', "", found[0]) + "</g>"
+
+    return re.sub(rf"{one}(?:\s*{one})+", grouped, text)

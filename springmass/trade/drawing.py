@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from springmass.report.figures.canvas import BLUE, GREY, VERMILLION, panels, style
+from springmass.report.figures.canvas import BLUE, GREY, VERMILLION, legend_row, panels, style
 from springmass.trade.front import Point, front
 
 if TYPE_CHECKING:
@@ -107,18 +107,9 @@ def _keys(axis: Axes) -> None:
     marks = [("D", VERMILLION, VERMILLION), ("o", BLUE, BLUE), ("o", BLUE, "#ffffff")]
     handles = [Line2D([], [], marker=m, ls="", ms=5, mew=1.0, color=colour, mfc=face) for m, colour, face in marks]
     handles += [Line2D([], [], color=BLUE, lw=0.9), Line2D([], [], color=GREY, lw=0.8, ls=(0, (4, 2)))]
-    axis.legend(
-        handles,
-        ["springmass tier", "reference", "hollow: beaten in time and error", "Pareto front", "bound"],
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=len(handles),
-        borderaxespad=0.2,
-        columnspacing=1.4,
-        handletextpad=0.4,
-        handlelength=1.5,
-        markerscale=1.0,
-    )
+    labels = ["springmass tier", "reference", "hollow: beaten in time and error", "Pareto front", "bound"]
+    look = {"columnspacing": 1.4, "handletextpad": 0.4, "handlelength": 1.5, "markerscale": 1.0}
+    legend_row(axis, len(handles), handles=handles, labels=labels, **look)
 
 
 class _Names:

@@ -22,26 +22,14 @@ from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.results.findings import Finding
 from pipeline.track import UNUSABLE, Track
-from springmass.report import (
-    budget_csv,
-    budget_tex,
-    budget_text,
-    budgets_of,
-    draw,
-    render,
-    results_csv,
-    table_rows,
-    table_tex,
-    text_table,
-    write_report,
-)
-from springmass.report.budgets import INPUTS
-from springmass.report.figures import comparison_figure, motion_figure
-from springmass.report.html import render_html
-from springmass.report.inline import inline_svg
+from springmass.report.budgets import INPUTS, budget_csv, budget_text, budgets_of
+from springmass.report.figures import comparison_figure, draw, motion_figure, render
+from springmass.report.html import inline_svg, render_html
+from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
-from springmass.report.tables import law_status, pretty, pretty_number
+from springmass.report.tables import law_status, pretty, pretty_number, results_csv, table_rows, text_table
 from springmass.report.words import caption
+from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
 
