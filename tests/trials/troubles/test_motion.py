@@ -1,0 +1,114 @@
+"""The trials' own integrator follows what can be solved by hand, and their verdicts what can be counted by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.trials.troubles.judge import Given, Verdict, try_one
+from tests.trials.troubles.kinds import KINDS, PLAIN, TROUBLES
+from tests.trials.troubles.motion import Bob, swing
+from tests.trials.troubles.record import CODES
+from tests.trials.troubles.table import Line
+
+GENERIC = {"correlated_residuals", "law_rejected", "not_converged", "laws_not_separable", "nominal_clock"}
+
+
+def verdict(*, z: float, named: bool = False, refused: bool = False) -> Verdict:
+    """Return a verdict on one estimate."""
+    given = {} if refused else {"period": Given(z, 1.0, 1.0)}
+    return Verdict("made up", 0, given, (), (), refused, named, 0.0)
+
+
+def test_linear_drag_follows_the_solution_by_hand() -> None:
+    """A linearly damped bob lies within two parts in ten thousand of the solution by hand, for forty periods."""
+    omega, gamma, phase = 8.3, 0.02, 0.7
+    damped = math.sqrt(omega**2 - gamma**2)
+    # The start of swing is displacement and velocity of an undamped bob; of a damped one they give another amplitude.
+    x, v = 0.05 * math.cos(phase), -0.05 * omega * math.sin(phase)
+    sine = (v + gamma * x) / damped
+    t = np.linspace(0.0, 30.0, 3001)
+    motion = swing(Bob(omega=omega, amplitude=0.05, phase=phase, gamma=gamma), 30.0, start=0.0)
+    by_hand = np.exp(-gamma * t) * (x * np.cos(damped * t) + sine * np.sin(damped * t))
+    assert motion.position(t) == pytest.approx(by_hand, abs=2e-4 * 0.05)
+    assert motion.period(0.0, 30.0) == pytest.approx(2.0 * math.pi / damped, rel=1e-6)
+    assert motion.amplitude(10.0) == pytest.approx(math.exp(-gamma * 10.0) * math.hypot(x, sine), rel=1e-6)
+    assert motion.rate(10.0) == pytest.approx(gamma, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("bob", "rate"),
+    [
+        (Bob(beta=0.4), lambda a: 0.4 * a),
+        (Bob(gamma=0.01, beta=0.2), lambda a: 0.01 + 0.2 * a),
+        (Bob(c=0.07, n=1.5), lambda a: 0.07 * a**0.5),
+        (Bob(mu=3e-4), lambda a: 3e-4 / a),
+    ],
+    ids=["quadratic", "mixed", "power", "friction"],
+)
+def test_the_amplitude_falls_as_the_law_says(bob: Bob, rate: Callable[[float], float]) -> None:
+    """The rate read off the turning points is the averaged law's at the amplitude there, within a thousandth."""
+    motion = swing(bob, 30.0)
+    for t in (0.0, 15.0, 29.0):
+        assert motion.rate(t) == pytest.approx(rate(motion.amplitude(t)), rel=1e-3)
+
+
+def test_friction_holds_the_bob_where_the_spring_is_weaker() -> None:
+    """Dry friction ends the motion after the half swings that it takes, within its dead band."""
+    omega, mu = 8.0, 4e-3
+    motion = swing(Bob(omega=omega, amplitude=0.05, mu=mu), 60.0, start=0.0)
+    band = 0.5 * math.pi * mu / omega  # where friction holds against the spring, m
+    swings = math.ceil((0.05 - band) / (2.0 * band))
+    assert motion.t[-1] == pytest.approx(swings * math.pi / omega, rel=0.01)
+    assert abs(motion.x[-1]) <= band
+    assert motion.position(np.array([100.0])) == pytest.approx(motion.x[-1])
+
+
+def test_there_are_kinds_enough_and_each_has_its_name() -> None:
+    """At least sixty kinds of trouble, no name twice, every listed cause met, and no generic code names any."""
+    names = [kind.name for kind in KINDS]
+    assert len(TROUBLES) >= 60
+    assert len(set(names)) == len(names)
+    assert {kind.cause for kind in KINDS} == set(CODES)
+    assert not GENERIC & set().union(*CODES.values())
+
+
+def test_a_seed_makes_the_same_record_again() -> None:
+    """Two makings of one seed agree to the bit, two seeds do not."""
+    first, again, other = PLAIN[0].make(0), PLAIN[0].make(0), PLAIN[0].make(3)
+    assert np.array_equal(first.y, again.y)
+    assert not np.array_equal(first.y, other.y)
+
+
+@pytest.mark.parametrize(
+    ("one", "word"),
+    [
+        (verdict(z=3.9), "right"),
+        (verdict(z=4.1), "confident wrong"),
+        (verdict(z=4.1, named=True), "named"),
+        (verdict(z=0.0, refused=True), "refused"),
+        (verdict(z=0.0, refused=True, named=True), "named"),
+    ],
+    ids=["right", "wrong", "named", "refused", "refused by name"],
+)
+def test_a_verdict_is_one_of_four(one: Verdict, word: str) -> None:
+    """A number within four uncertainties is right, one beyond is named or wrong; without any, the record is refused."""
+    assert one.word == word
+
+
+def test_a_huge_uncertainty_does_not_pass() -> None:
+    """A kind to be cured is beyond the limits where its uncertainty is ten times its error."""
+    wide = [Verdict("made up", seed, {"period": Given(0.1, 1.0, 1.0)}, (), (), False, False, 0.0) for seed in range(4)]
+    assert Line(PLAIN[0], wide).wide[0] == pytest.approx(10.0)
+    assert not Line(replace(PLAIN[0], cure=True), wide).holds
+
+
+def test_a_plain_record_is_right() -> None:
+    """A record without trouble is analysed, and its four numbers lie within four uncertainties."""
+    found = try_one(PLAIN[0], 0, "standard")
+    assert found.word == "right"
+    assert set(found.given) == {"period", "offset", "amplitude", "damping_rate"}
