@@ -88,11 +88,11 @@ class PhaseFit:
             total += bend[0] * _integral_at(t, self.middle, self.damping, self.exponent)
         return np.asarray(total)
 
-    def rate(self, t: F8) -> F8:
-        """Return the model's angular frequency at times t (n,), rad/s."""
-        omega = np.full(t.size, self.coefficients[1])
+    def rate(self, amplitude: F8) -> F8:
+        """Return the model's angular frequency at amplitudes (n,), m, of its law, rad/s."""
+        omega = np.full(amplitude.size, self.coefficients[1])
         if self.coefficients.size == 3:
-            omega += self.coefficients[2] * np.abs(self.damping.best.amplitude(t - self.t0)) ** self.exponent
+            omega += self.coefficients[2] * np.abs(amplitude) ** self.exponent
         return omega
 
 
@@ -129,27 +129,30 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
     kept = spread.kept
     u = spread.u[kept]
     middle = float(np.average(t[kept], weights=1.0 / u**2))
-    straight = solve_weighted(_design(t[kept], middle, damping, None), phase[kept], u)
+    # The start's row comes last.
+    points = np.append(t, damping.t0)
+    line = design = _design(points, middle, damping, None)
+    straight = solve_weighted(line[:-1][kept], phase[kept], u)
     bent, exponent = None, EXPONENTS[0]
-    if t[kept].size >= 8 and damping.selected != "none":
-        trial = solve_weighted(_design(t[kept], middle, damping, exponent), phase[kept], u)
-        gain = (straight.chi2 - trial.chi2) / spread.correlation - math.log(t[kept].size / spread.correlation)
+    if u.size >= 8 and damping.selected != "none":
+        curve = _design(points, middle, damping, exponent)
+        trial = solve_weighted(curve[:-1][kept], phase[kept], u)
+        gain = (straight.chi2 - trial.chi2) / spread.correlation - math.log(u.size / spread.correlation)
         if gain > params.evidence:
-            bent = trial
+            bent, design = trial, curve
             for other in EXPONENTS[1:]:
-                trial = solve_weighted(_design(t[kept], middle, damping, other), phase[kept], u)
+                curve = _design(points, middle, damping, other)
+                trial = solve_weighted(curve[:-1][kept], phase[kept], u)
                 least = params.another_exponent if exponent == EXPONENTS[0] else 0.0
                 if (bent.chi2 - trial.chi2) / spread.correlation > least:
-                    bent, exponent = trial, other
+                    bent, design, exponent = trial, curve, other
     widened, length = _widening(straight, u, spread, params)
     covariance = straight.covariance * widened
     model = bent or straight
     start = np.array([1.0, damping.t0 - middle])
-    at_start = float(
-        (_design(np.array([damping.t0]), middle, damping, None if bent is None else exponent) @ model.values)[0]
-    )
-    residual = phase - _design(t, middle, damping, None) @ straight.values
-    free = max(t[kept].size - model.values.size, 1)
+    at_start = float(design[-1] @ model.values)
+    residual = phase - line[:-1] @ straight.values
+    free = max(u.size - model.values.size, 1)
     return PhaseFit(
         damping.t0,
         Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),

@@ -92,8 +92,8 @@ class _Carried:
         # A law may end at zero; the walk carries on from a thousandth.
         amplitude = np.maximum(amplitude, 1e-3 * largest)
         decay = law.law.rate(amplitude, law.joint.values) / amplitude
-        angle = phase.total(t)
-        return cls(amplitude / largest, np.cos(angle), np.sin(angle), phase.rate(t), decay)
+        angle, rate = phase.total(t), phase.rate(phase.damping.best.amplitude(t - phase.t0))
+        return cls(amplitude / largest, np.cos(angle), np.sin(angle), rate, decay)
 
     def rows(self) -> tuple[F8, F8, F8]:
         """Position, velocity and acceleration of a walk of 1 in either dimension, (2, n) each."""

@@ -166,6 +166,6 @@ def reconstruct(track: Track, demodulated: Demodulated, phase: PhaseFit, rest: R
     angle = phase.total(track.t)
     cosine, sine = np.cos(angle), np.sin(angle)
     position = rest.at(track.t) + amplitude * cosine
-    velocity = -law.law.rate(amplitude, law.joint.values) * cosine - amplitude * phase.rate(track.t) * sine
+    velocity = -law.law.rate(amplitude, law.joint.values) * cosine - amplitude * phase.rate(amplitude) * sine
     residual = track.y - position
     return Waveform(position, velocity, residual, float(np.sqrt(np.mean(residual[used] ** 2))))

@@ -18,7 +18,7 @@ from typing import Literal, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.numerics.regression import pseudo_inverse
+from pipeline.numerics.regression import decompose
 from pipeline.track import F8
 
 __all__ = ["Fit", "Params", "central_differences", "evaluated_once", "minimise"]
@@ -207,11 +207,11 @@ class _Search:
         """Go downhill from one start by one of scipy's methods, and judge where it ended."""
         from scipy.optimize import least_squares, leastsq
 
-        largest = np.zeros(theta.size)
+        largest, start = np.zeros(theta.size), theta.tobytes()
 
         def values(at: F8) -> F8:
             # A copy: MINPACK works in the array that it gets first.
-            return residual.copy() if np.array_equal(at, theta) else self.residuals(at)
+            return residual.copy() if at.tobytes() == start else self.residuals(at)
 
         @_remembering
         def slopes(at: F8) -> F8:
@@ -241,8 +241,8 @@ class _Search:
         noise = np.sqrt(cost * count / max(residual.size - count, 1))
         rounding = 8.0 * EPS * float(np.linalg.norm(norms * values))
         lost = np.flatnonzero(norms <= LOST * largest)
-        inverse, independent = pseudo_inverse(slope, DEPENDENT)
-        offset = float(np.linalg.norm(slope @ (inverse @ residual)))
+        left, root, independent = decompose(slope, DEPENDENT)
+        offset = float(np.linalg.norm(left.T @ residual))
         precision = max(self.params.precision, STALLED) if stopped else self.params.precision
         converged = offset <= max(precision * noise, rounding)
         if not converged:
@@ -253,7 +253,7 @@ class _Search:
         elif not independent:
             ended = f"a minimum after {steps} steps, but there parameters depend on each other"
         else:
-            return Fit(values, inverse @ inverse.T, residual, cost, True, f"a minimum after {steps} steps", steps)
+            return Fit(values, root @ root.T, residual, cost, True, f"a minimum after {steps} steps", steps)
         return _failed(values, residual, f"{ended}: {_shown(values)}", steps)
 
 

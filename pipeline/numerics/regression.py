@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.robust import mad_sigma
+from pipeline.numerics.robust import mad_sigma, median
 from pipeline.track import F8
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "chi2_quantile",
     "correlation_length",
     "covariance_of",
-    "pseudo_inverse",
+    "decompose",
     "scatter",
     "solve_weighted",
 ]
@@ -77,15 +77,15 @@ def solve_weighted(design: F8, y: F8, u: F8) -> Line:
     Where columns depend on each other the solution is the shortest one, in columns of unit length.
     """
     weight = 1.0 / u
-    inverse, _ = pseudo_inverse(design * weight[:, None])
-    values = inverse @ (y * weight)
+    left, root, _ = decompose(design * weight[:, None])
+    values = root @ (left.T @ (y * weight))
     residual = y - design @ values
     deviation = residual * weight
-    return Line(values, inverse @ inverse.T, residual, float(deviation @ deviation))
+    return Line(values, root @ root.T, residual, float(deviation @ deviation))
 
 
-def pseudo_inverse(matrix: F8, least: float = 1e-13) -> tuple[F8, bool]:
-    """Invert a matrix of more rows than columns, whose columns may have any units.
+def decompose(matrix: F8, least: float = 1e-13) -> tuple[F8, F8, bool]:
+    """Return the factors of the pseudo-inverse of a matrix of more rows than columns, which may have any units.
 
     Parameters
     ----------
@@ -95,17 +95,19 @@ def pseudo_inverse(matrix: F8, least: float = 1e-13) -> tuple[F8, bool]:
 
     Returns
     -------
-    inverse : (p, n) float64
-        Times its transpose it is :math:`(J^T J)^{-1}`.
+    left : (n, k) float64
+        Orthonormal columns that span the matrix's.
+    root : (p, k) float64
+        Times its transpose it is :math:`(J^T J)^{-1}`, times that of ``left`` the pseudo-inverse.
     independent : bool
         Whether no singular value counted as zero.
     """
-    scale = np.linalg.norm(matrix, axis=0)
+    scale = np.sqrt(np.einsum("np,np->p", matrix, matrix))
     scale[scale == 0.0] = 1.0
     left, singular, right = np.linalg.svd(matrix / scale, full_matrices=False)
-    seen = singular > least * singular[0]
-    inverse = (right[seen].T / singular[seen]) @ left[:, seen].T / scale[:, None]
-    return inverse, bool(np.count_nonzero(seen) == scale.size)
+    # Singular values come in falling order.
+    seen = int(np.count_nonzero(singular > least * singular[0]))
+    return left[:, :seen], (right[:seen] / singular[:seen, None]).T / scale[:, None], seen == scale.size
 
 
 def covariance_of(jacobian: F8) -> F8:
@@ -124,8 +126,8 @@ def covariance_of(jacobian: F8) -> F8:
     unknown = np.full((jacobian.shape[1],) * 2, np.inf)
     if not np.all(np.isfinite(np.linalg.norm(jacobian, axis=0))):
         return unknown
-    inverse, independent = pseudo_inverse(jacobian)
-    return inverse @ inverse.T if independent else unknown
+    _, root, independent = decompose(jacobian)
+    return root @ root.T if independent else unknown
 
 
 def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
@@ -171,7 +173,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
 
 
 def _excess(residual: F8, u: F8, spread: float) -> float:
-    typical = float(np.median(u))
+    typical = median(u)
     # Under twice its own error a difference of variances is none: the median deviation is known to 1.17/sqrt(2n).
     doubt = 1.0 + 2.0 * 1.17 / math.sqrt(2.0 * residual.size)
     if spread <= typical * doubt:
@@ -188,10 +190,10 @@ def correlation_length(residual: F8) -> float:
     power = float(centred @ centred)
     if power == 0.0:
         return 1.0
-    total = 1.0
+    total, least = 1.0, 2.0 / math.sqrt(n)
     for lag in range(1, n // 3):
-        rho = float(centred[lag:] @ centred[:-lag]) / power
-        if rho < 2.0 / math.sqrt(n):
+        rho = float(np.dot(centred[lag:], centred[:-lag])) / power
+        if rho < least:
             break
         total += 2.0 * rho
     return total

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.numerics.robust import MAD_TO_SIGMA, mad_sigma
+from pipeline.numerics.robust import MAD_TO_SIGMA, mad_sigma, median
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.windows import Solution, Tuning, Windows, quantile, retune, solve, unwrap
@@ -216,7 +216,7 @@ def _spread(windows: Windows, solution: Solution) -> F8:
 
 def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
     """The spread that is typical of the record's windows."""
-    return max(float(np.median(spread[solution.good])) if solution.good.any() else 0.0, windows.tiny)
+    return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
 
 
 def _clip(windows: Windows, basis: F8, solution: Solution, params: Params) -> tuple[Solution, F8]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics.least_squares import minimise
+from pipeline.numerics.robust import median
 from pipeline.oscillation.condition import Conditioned
 from pipeline.track import F8
 
@@ -63,7 +64,7 @@ class Windows:
         rows = np.minimum(bounds[:-1, None] + slots[None, :], bounds[-1] - 1)
         usable = used[rows] & inside
         t, y = track.t[rows], track.y[rows]
-        level = float(np.median(track.y[used]))
+        level = median(track.y[used])
         tiny = 1e-12 * float(np.max(np.abs(track.y[used] - level))) + 1e-150
         centre = np.where(usable, t, 0.0).sum(axis=1) / np.maximum(usable.sum(axis=1), 1)
         # The middle of the window, not of its usable samples, so that centres stay one period apart.
@@ -239,7 +240,7 @@ def _u_amplitude(windows: Windows, solution: Solution) -> F8:
     """Standard uncertainty of each window's amplitude, m, at the noise that is typical of the record."""
     counts = np.maximum(windows.usable.sum(axis=1), 4.0)
     squares = np.sum(windows.usable * solution.residual**2, axis=1) / (counts - 3.0)
-    typical = float(np.median(squares[solution.good]))
+    typical = median(squares[solution.good])
     return np.asarray(np.sqrt(0.5 * typical * (solution.inverse[:, 1, 1] + solution.inverse[:, 2, 2])))
 
 

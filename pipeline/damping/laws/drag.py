@@ -87,7 +87,7 @@ class Drag:
         """Return amplitude and jacobian, which share most of their work."""
         full = self._full(theta)
         flow = _flow(t, *full)
-        return flow.amplitude, _slopes(t, flow, *full)[:, self.slots]
+        return flow.amplitude, _slopes(t, flow, *full)[self.slots].T
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
         """Return mu + gamma A + beta A^2; nothing where there is no amplitude left."""
@@ -167,6 +167,8 @@ def _flow(t: F8, start: float, mu: float, gamma: float, beta: float) -> _Flow:
         cosh = 0.5 * fall + 0.5
         numerator = (start if gamma < 0.0 else start * fall) - (mu + lesser * start) * sinh
         denominator = (fall if gamma < 0.0 else 1.0) + (lesser + beta * start) * sinh
+        if numerator.min() > 0.0 and denominator.min() > 0.0:
+            return _Flow(numerator / denominator, denominator, cosh, sinh, fall, square, None)
         # Zero is reached before a pole where beta is not negative: a pole is then on the side of negative amplitudes.
         lost = (denominator <= 0.0) & (beta < 0.0)
         ends = np.where(lost, np.inf, np.where((numerator <= 0.0) | (denominator <= 0.0), 0.0, np.nan))
@@ -185,23 +187,23 @@ def _turning_ends(pace: float, angle: F8, start: float, mu: float, gamma: float,
 
 
 def _slopes(t: F8, flow: _Flow, start: float, mu: float, gamma: float, beta: float) -> F8:
-    """Derivatives (n, 4) of the amplitude by A0, mu, gamma and beta."""
+    """Derivatives (4, n) of the amplitude by A0, mu, gamma and beta."""
     # Everything below carries the factor e^(-2st) that D^-2 brings along.
     elapsed = flow.fall * t
     squares = _integral_of_squares(t, flow, elapsed)
     cosines = elapsed + flow.square * squares
     mixed = 0.5 * flow.sinh * flow.sinh
     pull, push = mu + 0.5 * gamma * start, beta * start + 0.5 * gamma
-    slopes = np.empty((t.size, 4))
+    slopes = np.empty((4, t.size))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         over = -1.0 / (flow.denominator * flow.denominator)
-        slopes[:, 0] = -over * flow.fall
-        slopes[:, 1] = over * (cosines + push * (2.0 * mixed + push * squares))
-        slopes[:, 2] = over * (start * cosines + (start * push - pull) * mixed - pull * push * squares)
-        slopes[:, 3] = over * (start * start * cosines - pull * (2.0 * start * mixed - pull * squares))
+        slopes[0] = -over * flow.fall
+        slopes[1] = over * (cosines + push * (2.0 * mixed + push * squares))
+        slopes[2] = over * (start * cosines + (start * push - pull) * mixed - pull * push * squares)
+        slopes[3] = over * (start * start * cosines - pull * (2.0 * start * mixed - pull * squares))
     if flow.ends is not None:
         # After the stop nothing depends on anything; beyond a pole there is nothing to depend.
-        slopes = np.where(np.isnan(flow.ends)[:, None], slopes, flow.ends[:, None])
+        slopes = np.where(np.isnan(flow.ends), slopes, flow.ends)
     return slopes
 
 
@@ -209,12 +211,14 @@ def _integral_of_squares(t: F8, flow: _Flow, elapsed: F8) -> F8:
     """e^(-2st) times the integral of S^2 from 0 to t; a series where the closed form would cancel."""
     z = flow.square * t * t
     small = np.abs(z) < 0.05
-    series = 1.0 / 3.0 + z * (1.0 / 15.0 + z * (2.0 / 315.0 + z * (1.0 / 2835.0 + z * 2.0 / 155925.0)))
-    if small.all():
-        return np.asarray(elapsed * t * t * series)
+    series = elapsed * t * t
+    if small.any():
+        series *= 1.0 / 3.0 + z * (1.0 / 15.0 + z * (2.0 / 315.0 + z * (1.0 / 2835.0 + z * 2.0 / 155925.0)))
+        if small.all():
+            return np.asarray(series)
     with np.errstate(over="ignore", invalid="ignore"):
         closed = (flow.sinh * flow.cosh - elapsed) / (2.0 * flow.square)
-        return np.asarray(np.where(small, elapsed * t * t * series, closed))
+        return np.asarray(np.where(small, series, closed))
 
 
 def amplitudes(t: F8, theta: F8) -> F8:
