@@ -155,11 +155,13 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
     share = math.sqrt(n / (n - degree - 1))
     total, excess, kept = u, 0.0, everything
     for _ in range(4):
-        line = solve_weighted(design[kept], y[kept], total[kept])
-        residual = y - design @ line.values
+        weight = 1.0 / total[kept]
+        values = np.linalg.lstsq(design[kept] * weight[:, None], y[kept] * weight, rcond=None)[0]
+        residual = y - design @ values
         # The smaller of two measures: the median is deaf to outliers, the root mean square knows flat patterns.
         typical = mad_sigma(residual)
-        spread = share * min(typical, float(np.sqrt(np.mean(residual[kept] ** 2))))
+        believed = residual[kept]
+        spread = share * min(typical, math.sqrt(float(believed @ believed) / believed.size))
         excess = _excess(residual, u, spread)
         settled = excess == 0.0 and total is u
         total = np.hypot(u, excess) if excess else u

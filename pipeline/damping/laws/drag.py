@@ -87,7 +87,7 @@ class Drag:
         """Return amplitude and jacobian, which share most of their work."""
         full = self._full(theta)
         flow = _flow(t, *full)
-        return flow.amplitude, _slopes(t, flow, *full)[self.slots].T
+        return flow.amplitude, _slopes(t, flow, self.slots, *full).T
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
         """Return mu + gamma A + beta A^2; nothing where there is no amplitude left."""
@@ -186,21 +186,24 @@ def _turning_ends(pace: float, angle: F8, start: float, mu: float, gamma: float,
     return np.where(angle >= math.atan2(pace, -beta * start - 0.5 * gamma), np.inf, np.nan)
 
 
-def _slopes(t: F8, flow: _Flow, start: float, mu: float, gamma: float, beta: float) -> F8:
-    """Derivatives (4, n) of the amplitude by A0, mu, gamma and beta."""
+def _slopes(t: F8, flow: _Flow, slots: list[int], start: float, mu: float, gamma: float, beta: float) -> F8:
+    """Derivatives (p, n) of the amplitude by those of A0, mu, gamma and beta that a law has, A0 first."""
     # Everything below carries the factor e^(-2st) that D^-2 brings along.
     elapsed = flow.fall * t
     squares = _integral_of_squares(t, flow, elapsed)
     cosines = elapsed + flow.square * squares
     mixed = 0.5 * flow.sinh * flow.sinh
     pull, push = mu + 0.5 * gamma * start, beta * start + 0.5 * gamma
-    slopes = np.empty((4, t.size))
+    # Of the integrals of D^2, ND and N^2: what C^2, CS and S^2 count in them.
+    shares = ((1.0, 2.0 * push, push * push), (start, start * push - pull, -pull * push))
+    shares = (*shares, (start * start, -2.0 * start * pull, pull * pull))
+    slopes = np.empty((len(slots), t.size))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         over = -1.0 / (flow.denominator * flow.denominator)
         slopes[0] = -over * flow.fall
-        slopes[1] = over * (cosines + push * (2.0 * mixed + push * squares))
-        slopes[2] = over * (start * cosines + (start * push - pull) * mixed - pull * push * squares)
-        slopes[3] = over * (start * start * cosines - pull * (2.0 * start * mixed - pull * squares))
+        for row, slot in zip(slopes[1:], slots[1:], strict=True):
+            of_cosines, of_mixed, of_squares = shares[slot - 1]
+            row[:] = over * (of_cosines * cosines + of_mixed * mixed + of_squares * squares)
     if flow.ends is not None:
         # After the stop nothing depends on anything; beyond a pole there is nothing to depend.
         slopes = np.where(np.isnan(flow.ends), slopes, flow.ends)
