@@ -195,8 +195,8 @@ def _slopes(t: F8, flow: _Flow, slots: list[int], start: float, mu: float, gamma
     mixed = 0.5 * flow.sinh * flow.sinh
     pull, push = mu + 0.5 * gamma * start, beta * start + 0.5 * gamma
     # Of the integrals of D^2, ND and N^2: what C^2, CS and S^2 count in them.
-    shares = ((1.0, 2.0 * push, push * push), (start, start * push - pull, -pull * push))
-    shares = (*shares, (start * start, -2.0 * start * pull, pull * pull))
+    by_mu, by_gamma = (1.0, 2.0 * push, push * push), (start, start * push - pull, -pull * push)
+    shares = by_mu, by_gamma, (start * start, -2.0 * start * pull, pull * pull)
     slopes = np.empty((len(slots), t.size))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         over = -1.0 / (flow.denominator * flow.denominator)
