@@ -32,8 +32,13 @@ def _released(still_s: float, *, hung: bool, seconds: float = 20.0) -> Make:
             # No hand holds still to less than a few tenths of a millimetre.
             before = before + 3e-4 * np.sin(2 * math.pi * 1.3 * b.t + b.rng.uniform(0, 6))
         x = np.where(b.t < at, before, motion.position(b.t))
-        b.motion = motion
-        return b.record(b.rest_m + x + b.noise(), period=motion.period(at, seconds))
+        return b.record(
+            b.rest_m + x + b.noise(),
+            "offset",
+            period=motion.period(at, seconds),
+            amplitude=lambda t: motion.amplitude(max(t, at)),
+            damping_rate=lambda t: motion.rate(max(t, at)),
+        )
 
     return make
 
@@ -227,10 +232,10 @@ def _steered(how: str) -> Make:
             "aside": {"drive": 0.4, "drive_omega": omega * 0.8},
             "sweep": {"drive": 0.1, "drive_omega": omega * 0.9, "drive_chirp": omega * 0.2 / 40.0},
         }[how]
-        free = Bench(seed, f"driven {how}", seconds=40.0, omega=omega)
         b = Bench(seed, f"driven {how}", seconds=40.0, omega=omega, **drive)
-        # The period asked for is the bob's own.
-        return b.record(b.distance() + b.noise(), "offset", period=free.truth()["period"])
+        # Two periods stand side by side where the force is aside; else the period is what ran.
+        period = 2.0 * math.pi / omega if how == "aside" else b.motion.period(0.0, b.seconds)
+        return b.record(b.distance() + b.noise(), "offset", period=period)
 
     return make
 

@@ -36,6 +36,7 @@ CODES: Mapping[str, frozenset[str]] = {
     "interleaved": frozenset({"interleaved", "interleaved_records", "two_records"}),
     "impossible": frozenset({"implausible_motion", "implausible_distance", "out_of_range", "wrong_unit"}),
     "came_to_rest": frozenset({"at_rest", "handled"}),
+    "hours": frozenset({"at_rest", "handled", "quantised"}),
     "rows_lost": frozenset({"rows_lost", "phase_slip", "phase_jump", "restarted", "touched", "handled"}),
     "handled": frozenset({"at_rest", "handled", "restarted"}),
     "restarted": frozenset({"restarted", "handled", "touched", "phase_slip", "phase_jump", "at_rest"}),

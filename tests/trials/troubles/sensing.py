@@ -190,6 +190,12 @@ def _heavy_tails(seed: int) -> Record:
     return b.record(b.distance() + 3e-4 * b.rng.standard_t(3, b.t.size))
 
 
+def _many_periods(seed: int) -> Record:
+    """Well over a thousand periods of a bob that is hardly damped."""
+    b = Bench(seed, "many", seconds=1200.0, rate_hz=20.0, gamma=4e-4, beta=0.01)
+    return b.record(b.distance() + b.noise())
+
+
 def _quiet_at_rest(seed: int) -> Record:
     """Hours of a finely stepped sensor whose noise does not reach over one step once the bob hangs still."""
     b = Bench(seed, "day", seconds=900.0, rate_hz=10.0, omega=4.2, gamma=0.012, sigma_m=3e-6)
@@ -247,5 +253,6 @@ KINDS = (
     Kind(name="noise: correlated, 0.9", cause="correlated", make=_coloured(0.9)),
     Kind(name="noise: correlated, 0.98", cause="correlated", make=_coloured(0.98)),
     Kind(name="noise: heavy tails", cause="noise", make=_heavy_tails, cure=True),
-    Kind(name="rest: hours, between two steps", cause="quantised", make=_quiet_at_rest),
+    Kind(name="rest: hours, between two steps", cause="hours", make=_quiet_at_rest),
+    Kind(name="long: 1,600 periods", cause="nothing", make=_many_periods, cure=True),
 )
