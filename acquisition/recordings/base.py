@@ -22,19 +22,11 @@ _MARKUP = b"\xef\xbb\xbf \t\r\n"  # XML may well stand in one line
 
 
 class Format(Protocol):
-    """A family of recordings, told by content and never by suffix.
-
-    Attributes
-    ----------
-    name : str
-        As the registry and the command line call it.
-    title : str
-        One line for people.
-    """
+    """A family of recordings, told by content and never by suffix."""
 
     @property
     def name(self) -> str:
-        """Name in the registry."""
+        """As the registry and the command line call it."""
         ...
 
     @property

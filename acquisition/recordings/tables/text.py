@@ -96,11 +96,6 @@ class Text:
             found.append(line)
         return found
 
-    @property
-    def ended(self) -> bool:
-        """Whether the last line has its end."""
-        return self.data[self.stop - 1 : self.stop] in (b"\n", b"\r")
-
 
 def text_of(path: str, data: bytes) -> Text:
     """Return the text of a file.
