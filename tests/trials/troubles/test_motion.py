@@ -102,7 +102,7 @@ def test_a_verdict_is_one_of_four(one: Verdict, word: str) -> None:
 
 def test_a_huge_uncertainty_does_not_pass() -> None:
     """A kind to be cured is beyond the limits where its uncertainty is ten times its error."""
-    wide = [Verdict("made up", seed, {"period": Given(0.1, 1.0, 1.0)}, (), (), False, False, 0.0) for seed in range(4)]
+    wide = [Verdict("made up", seed, {"period": Given(0.1, 1.0, 1.0)}, (), (), False, False, 0.0) for seed in range(20)]
     assert Line(PLAIN[0], wide).wide[0] == pytest.approx(10.0)
     assert not Line(replace(PLAIN[0], cure=True), wide).holds
 
