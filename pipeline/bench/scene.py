@@ -141,6 +141,12 @@ class Scene:
             tables.setdefault("sensor", {})["position"] = self.sensor_position
         return tables
 
+    @property
+    def tells_of_bench(self) -> bool:
+        """Whether it says what hangs there or in which air, and not of the sensor or a simulation alone."""
+        told = (self.bob_mass_kg, self.spring_mass_kg, self.disc_diameter_m, self.air_temperature_c)
+        return any(x is not None for x in (*told, self.air_pressure_pa, self.air_relative_humidity))
+
 
 def _check_vapour(scene: Scene, where: str) -> None:
     """Refuse air that holds more vapour than its pressure allows: each value alone may be possible."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
+from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.dynamics.equation import Equation, double
 from pipeline.errors import DynamicsError, SceneError
 from pipeline.numerics.estimate import Estimate
@@ -148,7 +149,7 @@ class Problem:
 
 
 def effective_mass_kg(scene: Scene) -> float:
-    """Return bob, a third of the spring, and the air that the disc carries along, kg.
+    """Return bob, the spring's share, and the air that the disc carries along, kg.
 
     Raises
     ------
@@ -157,7 +158,7 @@ def effective_mass_kg(scene: Scene) -> float:
     """
     if scene.bob_mass_kg is None:
         raise SceneError("scene: a mass that oscillates needs [bob] mass_kg; add it to the scene")
-    return scene.bob_mass_kg.value + _value(scene.spring_mass_kg) / 3.0 + added_mass_kg(scene)
+    return oscillating_mass_kg(_value(scene.spring_mass_kg), scene.bob_mass_kg.value + added_mass_kg(scene))
 
 
 def _value(estimate: Estimate | None) -> float:

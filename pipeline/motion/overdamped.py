@@ -11,6 +11,7 @@ import numpy as np
 
 from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
+from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.motion.decay import DecayFit, best_decay, critical_decay, lone_exponential
 from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.condition import Conditioned
@@ -275,15 +276,14 @@ def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
 
     Notes
     -----
-    :math:`k = \\omega_0^2 (m + m_s/3 + m_a)` with the undamped frequency; the spring's share and the air carried
-    along count where the scene names them.
+    :math:`k = \\omega_0^2 M` with the undamped frequency and the mass M that oscillates: bob, the air that a disc
+    carries along, and the spring's share (:func:`pipeline.bench.spring.oscillating_mass_kg`).
     """
     if scene.bob_mass_kg is None:
         return {}
-    mass, squares = scene.bob_mass_kg.value + added_mass_kg(scene), scene.bob_mass_kg.u**2
-    if scene.spring_mass_kg is not None:
-        mass += scene.spring_mass_kg.value / 3.0
-        squares += (scene.spring_mass_kg.u / 3.0) ** 2
+    spring = scene.spring_mass_kg or unstated_spring_kg(scene)
+    mass = oscillating_mass_kg(spring.value, scene.bob_mass_kg.value + added_mass_kg(scene))
+    u_mass = math.hypot(scene.bob_mass_kg.u, spring.u / 3.0)
     k = found.squared_frequency.value * mass
-    relative = math.hypot(math.sqrt(squares) / mass, found.squared_frequency.u / found.squared_frequency.value)
+    relative = math.hypot(u_mass / mass, found.squared_frequency.u / found.squared_frequency.value)
     return {"spring_constant": Estimate(k, k * relative, "N/m")}

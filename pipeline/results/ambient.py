@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +11,7 @@ from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.budget import Inputs, estimate_of
+from pipeline.results.budget import Inputs, estimate_of, function_of
 
 __all__ = ["Ambient"]
 
@@ -36,6 +35,7 @@ class Ambient:
 
     def __init__(self, scene: Scene, inputs: Inputs, *, u_temperature_k: float) -> None:
         celsius, pressure, humidity = scene_air(scene)
+        self._sonic = scene.tells_of_bench
         self.known = scene.air_temperature_c is not None
         celsius = Estimate(celsius.value, celsius.u or u_temperature_k, "degC")
         self._inputs = inputs
@@ -48,11 +48,11 @@ class Ambient:
     @cached_property
     def density(self) -> Any:
         """Density of the air, kg/m^3."""
-        return _of(air_density, self._temperature, self._pressure, self._humidity) * self._density_formula
+        return function_of(air_density, self._temperature, self._pressure, self._humidity) * self._density_formula
 
     def viscosity(self) -> Any:
         """Return the dynamic viscosity of the air, Pa s."""
-        return _of(air_viscosity, self._temperature) * self._viscosity_formula
+        return function_of(air_viscosity, self._temperature, self._pressure) * self._viscosity_formula
 
     def scale(self, instrument: Instrument) -> Any:
         """Return the factor on all distances: 1, with what the speed of sound or a calibration leaves uncertain.
@@ -61,23 +61,18 @@ class Ambient:
         -----
         A calibrated scale has the calibration's uncertainty and no other. Else the speed of sound is uncertain with
         temperature, pressure, humidity and its formula; and where the record was made with another speed than the
-        scene's air has, the difference, which is not corrected, is the half-width of a rectangle.
+        scene's air has, the difference, which is not corrected, is the half-width of a rectangle. A bench whose air
+        has no stated temperature has a room's, 20 +- 3 degC. Where no bench is told of, nothing says that the distances
+        are an echo's: their scale is taken as it stands.
         """
         if instrument.u_scale > 0:
             return self._inputs.add("calibrated_scale", Estimate(1.0, instrument.u_scale), "B")
-        if not self.known:
+        if not self._sonic:
             return 1.0
-        sound = _of(speed_of_sound, self._temperature, self._pressure, self._humidity)
+        sound = function_of(speed_of_sound, self._temperature, self._pressure, self._humidity)
         actual = estimate_of(sound, "m/s").value
         factor = sound / actual * self._inputs.add("speed_of_sound_formula", Estimate(1.0, U_SOUND), "B")
         if instrument.speed_of_sound_m_per_s is not None:
             half = abs(actual / instrument.speed_of_sound_m_per_s - 1.0)
             factor *= self._inputs.add("recorded_speed_of_sound", Estimate(1.0, half / math.sqrt(3.0)), "B")
         return factor
-
-
-def _of(formula: Callable[..., float], *xs: Any) -> Any:
-    """Return a formula of variables as a variable, its derivatives by central differences."""
-    from uncertainties import wrap
-
-    return wrap(formula)(*xs)

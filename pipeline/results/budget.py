@@ -7,14 +7,14 @@ ordinary arithmetic knows what it came from, correlations included.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
 
-__all__ = ["Budget", "Contribution", "Inputs", "Kind", "estimate_of"]
+__all__ = ["Budget", "Contribution", "Inputs", "Kind", "estimate_of", "function_of"]
 
 Kind = Literal["A", "B"]
 
@@ -186,3 +186,10 @@ def estimate_of(x: Any, unit: str) -> Estimate:
     from uncertainties import nominal_value, std_dev
 
     return Estimate(float(nominal_value(x)), float(std_dev(x)), unit)
+
+
+def function_of(formula: Callable[..., float], *xs: Any) -> Any:
+    """Return a formula of variables as a variable, its derivatives by central differences."""
+    from uncertainties import wrap
+
+    return wrap(formula)(*xs)

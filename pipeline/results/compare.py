@@ -9,14 +9,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.bench.scene import Scene
+from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.results.derive import Derived
+from pipeline.track import F8
 
 __all__ = ["Comparison", "SpringRun", "compare_springs"]
 
-NEARER = 0.01  # of chi-square: so much less with two runs exchanged is no chance
+NEARER = 0.01  # of the tension: so much less with two runs exchanged is no chance
+SOLVED = 0.5  # of what the spring's mass was uncertain by before: what runs leave of it when they tell it
+LARGEST_SPRING = 0.6  # of the lightest bob: a spring that heavy is seen to be, and weighed
+GAUSS_NEWTON_STEPS = 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,15 +71,19 @@ class SpringRun:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Whether runs agree on one spring constant.
+    """Whether runs agree on one spring.
 
     Parameters
     ----------
     names : tuple of str
     spring_constant : Estimate
         Generalised mean, N/m, shared errors included.
+    spring_mass : Estimate
+        Of the spring itself, kg: as stated and as the runs allow, or what they solve for.
+    spring_mass_stated : bool
+        Whether the bench weighed it. Where it did not, the runs' masses give it together with the constant.
     each : tuple of Estimate
-        Of the runs, shared errors included.
+        Of the runs with that spring, N/m, shared errors included.
     own_u : tuple of float
         Of the runs, what they do not share, N/m.
     pulls : tuple of float
@@ -81,8 +91,9 @@ class Comparison:
     chi2 : float
         Of the runs about their mean.
     dof : int
+        Runs less the constant, and less the spring's mass where they solve for it: 0 tests nothing.
     agree : bool
-        Whether chi-square lies within its 99.7 % quantile.
+        Whether chi-square lies within its 99.7 % quantile, and the spring's mass where springs' masses lie.
     largest_deviation : float
         Greatest difference of two runs over its standard uncertainty, in which shared errors cancel.
     exchanged : tuple of str
@@ -95,6 +106,8 @@ class Comparison:
 
     names: tuple[str, ...]
     spring_constant: Estimate
+    spring_mass: Estimate
+    spring_mass_stated: bool
     each: tuple[Estimate, ...]
     own_u: tuple[float, ...]
     pulls: tuple[float, ...]
@@ -102,15 +115,15 @@ class Comparison:
     dof: int
     agree: bool
     largest_deviation: float
-    exchanged: tuple[str, ...] = ()
-    exchanged_chi2: float | None = None
-    message: str = ""
+    exchanged: tuple[str, ...]
+    exchanged_chi2: float | None
+    message: str
 
 
 def compare_springs(
     runs: Sequence[SpringRun],
     *,
-    shared_mass_kg: Estimate | None = None,
+    spring_mass_kg: Estimate | None = None,
     mass_correlation: float = 0.0,
     probability: float = 0.997,
 ) -> Comparison:
@@ -120,8 +133,8 @@ def compare_springs(
     ----------
     runs : sequence of SpringRun
         Two at least.
-    shared_mass_kg : Estimate, optional
-        What swings in every run: a third of the spring's mass, kg. Its error is the same in all of them.
+    spring_mass_kg : Estimate, optional
+        Of the spring, kg, the same in every run; left out it is not known, and solved for as far as the runs allow.
     mass_correlation : float
         Of the errors of any two runs' own masses, 0 to 1: 1 where one balance's calibration is all that is uncertain.
     probability : float
@@ -136,12 +149,15 @@ def compare_springs(
 
     Notes
     -----
-    Generalised least squares for one constant. Errors that the runs share, of the clock, of the spring's mass and of
-    the balance, fill the covariance off its diagonal:
-    :math:`V_{ij} = \\delta_{ij} u_i^2 + \\omega_i^2\\omega_j^2 u^2(m_s/3) + 4 u_{c,i} u_{c,j} k^2
-    + r\\,\\omega_i^2\\omega_j^2 u(m_i) u(m_j)`, the clock's term where two runs share it.
-    They move all constants together, so they count in the mean's uncertainty and hardly in the test. The distances'
-    scale is in no spring constant.
+    Generalised least squares for the constant k and the spring's mass s in
+    :math:`k = \\omega_i^2 M(s, m_i)`, M the mass that oscillates
+    (:func:`pipeline.bench.spring.oscillating_mass_kg`), with the covariance of the left over right sides
+    :math:`V_{ij} = \\delta_{ij} u_i^2 + 4 u_{c,i} u_{c,j} k^2 + r\\,\\omega_i^2\\omega_j^2 u(m_i) u(m_j)`: errors
+    that runs share, of the clock (where two share it) and of the balance, stand off its diagonal, move all constants
+    together and so hardly enter the test. The stated mass of the spring is one observation more. One that nobody
+    stated is observed as :func:`pipeline.bench.spring.unstated_spring_kg` of the lightest bob, so wide that runs of
+    different masses overrule it; it takes a degree of freedom then, and two runs solve for it without testing it. The
+    distances' scale is in no spring constant.
 
     Where the runs disagree every pair is exchanged in turn, and the pair is named that brings all runs into agreement,
     or a hundred times nearer to it: exchanged records need not agree to the last digit.
@@ -160,24 +176,62 @@ def compare_springs(
         raise ValueError(f"a comparison needs two runs at least, got {len(runs)}")
     if not 0.0 <= mass_correlation <= 1.0:
         raise ValueError(f"mass_correlation must lie in 0 to 1, got {mass_correlation}")
-    shared = shared_mass_kg or Estimate(0.0, 0.0, "kg")
-    _check(runs, shared)
+    _check(runs, spring_mass_kg)
     masses = [run.mass_kg for run in runs]
-    limit = chi2_quantile(probability, len(runs) - 1)
-    found = _common_constant(runs, masses, shared, mass_correlation, limit)
-    if not found.agree:
-        nearest = max(limit, NEARER * found.chi2)
+    fit = _fit(runs, masses, spring_mass_kg, mass_correlation, probability)
+    exchanged: tuple[str, ...] = ()
+    best = fit
+    if not fit.agree:
+        nearest = NEARER * fit.tension
         for i, j in itertools.combinations(range(len(runs)), 2):
             trial = masses.copy()
             trial[i], trial[j] = trial[j], trial[i]
-            chi2 = _common_constant(runs, trial, shared, mass_correlation, limit).chi2
-            if chi2 <= nearest:
-                nearest = chi2
-                found = replace(found, exchanged=(runs[i].name, runs[j].name), exchanged_chi2=chi2)
-    return replace(found, message=_message(found, limit))
+            other = _fit(runs, trial, spring_mass_kg, mass_correlation, probability)
+            if other.tension <= max(nearest, 1.0) and (not exchanged or other.tension < best.tension):
+                best, exchanged = other, (runs[i].name, runs[j].name)
+    reweighed = None
+    if not fit.agree and spring_mass_kg is not None:
+        free = _fit(runs, masses, None, mass_correlation, probability)
+        reweighed = free if free.agree and free.solved else None
+    return Comparison(
+        tuple(run.name for run in runs),
+        fit.constant,
+        fit.spring,
+        spring_mass_kg is not None,
+        fit.each,
+        fit.own_u,
+        fit.pulls,
+        fit.chi2,
+        fit.dof,
+        fit.agree,
+        fit.deviation,
+        exchanged,
+        best.chi2 if exchanged else None,
+        _message(runs, fit, spring_mass_kg, exchanged, best, reweighed),
+    )
 
 
-def _check(runs: Sequence[SpringRun], shared: Estimate) -> None:
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """One constant and one spring's mass for all runs."""
+
+    constant: Estimate
+    spring: Estimate
+    solved: bool  # whether the runs say more of the spring's mass than was known before
+    each: tuple[Estimate, ...]
+    own_u: tuple[float, ...]
+    pulls: tuple[float, ...]
+    chi2: float
+    dof: int
+    tension: float  # of the runs and of the spring's mass, over its limit: 1 and less agrees
+    deviation: float
+
+    @property
+    def agree(self) -> bool:
+        return self.tension <= 1.0
+
+
+def _check(runs: Sequence[SpringRun], spring: Estimate | None) -> None:
     for run in runs:
         for what, x in (("angular frequency", run.angular_frequency), ("mass", run.mass_kg)):
             if not (math.isfinite(x.value) and x.value > 0):
@@ -186,62 +240,144 @@ def _check(runs: Sequence[SpringRun], shared: Estimate) -> None:
                 raise AnalysisError(f"{run.name}: the uncertainty of its {what} must not be negative, got {x.u:g}")
         if not (math.isfinite(run.u_clock) and run.u_clock >= 0):
             raise AnalysisError(f"{run.name}: the clock's uncertainty must not be negative, got {run.u_clock:g}")
-    if not all(math.isfinite(x) and x >= 0 for x in (shared.value, shared.u)):
-        raise AnalysisError(f"the spring's share must not be negative, nor its uncertainty, got {shared}")
+    if spring is not None and not all(math.isfinite(x) and x >= 0 for x in (spring.value, spring.u)):
+        raise AnalysisError(f"the spring's mass must not be negative, nor its uncertainty, got {spring}")
 
 
-def _common_constant(
-    runs: Sequence[SpringRun], masses: Sequence[Estimate], shared: Estimate, mass_correlation: float, limit: float
-) -> Comparison:
-    """Compare the runs with these masses, as they stand; they agree up to a limit of chi-square."""
+def _fit(
+    runs: Sequence[SpringRun],
+    masses: Sequence[Estimate],
+    stated: Estimate | None,
+    mass_correlation: float,
+    probability: float,
+) -> _Fit:
+    loads = np.array([mass.value for mass in masses])
+    lightest = Scene(bob_mass_kg=Estimate(float(loads.min()), 0.0, "kg"))
+    spring = stated or unstated_spring_kg(lightest)
     squared = np.array([run.angular_frequency.value**2 for run in runs])
-    k = squared * np.array([mass.value + shared.value for mass in masses])
-    of_omega = 2.0 * k * np.array([run.angular_frequency.u / run.angular_frequency.value for run in runs])
-    of_mass = squared * np.array([mass.u for mass in masses])
-    own = np.hypot(of_omega, of_mass * math.sqrt(1.0 - mass_correlation))
-    own = np.maximum(own, 1e-15 * k)
-    # Shared relative errors at the common value: taken at each value they would favour the smallest.
-    of_clock = 2.0 * float(np.mean(k)) * np.array([run.u_clock for run in runs])
-    one_clock = np.array([[a.clock == b.clock for b in runs] for a in runs])
-    common = shared.u**2 * np.outer(squared, squared) + np.where(one_clock, np.outer(of_clock, of_clock), 0.0)
-    common += mass_correlation * np.outer(of_mass, of_mass)
-    covariance = np.diag(own**2) + common
-    inverse = np.linalg.inv(covariance)
-    weight = float(np.sum(inverse))
-    mean = float(np.sum(inverse @ k) / weight)
-    residual = k - mean
-    # The mean holds each run: the difference to it is known better than the run itself.
-    u_residual = np.sqrt(np.maximum(np.diag(covariance) - 1.0 / weight, np.finfo(float).tiny))
+    covariance, own = _covariance(runs, masses, squared * _oscillating(spring.value, loads), mass_correlation)
+    known = np.diag([0.0, spring.u**-2 if spring.u > 0 else 0.0])
+    s, state = spring.value, np.zeros((2, 2))
+    k, slope, x = squared, squared, np.zeros(2)
+    for _ in range(GAUSS_NEWTON_STEPS):
+        step_kg = 1e-4 * float(loads.min())
+        k, above, below = (squared * _oscillating(s + h, loads) for h in (0.0, step_kg, -step_kg))
+        slope = (above - below) / (2.0 * step_kg) if spring.u > 0 else np.zeros_like(k)
+        # k_i(s) + slope (s' - s) = k': linear in the constant k' and the spring's mass s'.
+        design = np.column_stack([np.ones_like(k), -slope])
+        weighted = np.linalg.solve(covariance, design)
+        normal = design.T @ weighted + known
+        if spring.u == 0:
+            normal[1, 1] = 1.0
+        state = np.linalg.inv(normal)
+        right = weighted.T @ (k - slope * s)
+        right[1] += known[1, 1] * spring.value if spring.u > 0 else spring.value
+        x = state @ right
+        moved, s = abs(float(x[1]) - s), float(x[1])
+        if moved <= 1e-9 * float(loads.min()):
+            break
+    residual = k + slope * (x[1] - s) - x[0]
+    u_spring = math.sqrt(state[1, 1]) if spring.u > 0 else 0.0
+    solved = stated is None and u_spring < SOLVED * spring.u
+    if stated is None and not solved:
+        # Bobs too alike: the constant without the spring, and what it may weigh in the uncertainty.
+        fixed = _fit(runs, masses, Estimate(spring.value, 0.0, "kg"), mass_correlation, probability)
+        of_spring = float(np.mean(slope)) * spring.u
+        constant = Estimate(fixed.constant.value, math.hypot(fixed.constant.u, of_spring), "N/m")
+        return replace(fixed, constant=constant, spring=spring)
+    chi2 = float(residual @ np.linalg.solve(covariance, residual))
+    pull = (s - spring.value) / spring.u if spring.u > 0 else 0.0
+    dof = len(runs) - (2 if solved else 1)
+    if stated is not None:
+        chi2 += pull**2
+    tension = chi2 / chi2_quantile(probability, dof) if dof else 0.0
+    if stated is None:
+        # No spring weighs less than nothing; a heavy one is weighed by who hangs it.
+        heaviest = LARGEST_SPRING * float(loads.min())
+        away = max(-s, s - heaviest, 0.0) / max(u_spring, 1e-12 * heaviest)
+        tension = max(tension, away**2 / chi2_quantile(probability, 1))
+    of_residual = np.diag(covariance - design @ state @ design.T)
+    u_residual = np.sqrt(np.maximum(of_residual, 1e-24 * np.diag(covariance)))
+    # A stated spring gives each run the constant that its own analysis has, one that nothing brings together none.
+    shown = stated or (Estimate(s, u_spring, "kg") if tension <= 1.0 else Estimate(0.0, 0.0, "kg"))
+    each = squared * _oscillating(shown.value, loads)
+    whole = covariance + shown.u**2 * np.outer(slope, slope)
     deviations = [
-        abs(k[i] - k[j]) / math.sqrt(covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j])
+        abs(each[i] - each[j]) / math.sqrt(whole[i, i] + whole[j, j] - 2.0 * whole[i, j])
         for i, j in itertools.combinations(range(len(runs)), 2)
     ]
-    each = tuple(Estimate(float(x), math.sqrt(v), "N/m") for x, v in zip(k, np.diag(covariance), strict=True))
-    chi2 = float(residual @ inverse @ residual)
-    return Comparison(
-        tuple(run.name for run in runs),
-        Estimate(mean, weight**-0.5, "N/m"),
-        each,
+    return _Fit(
+        Estimate(float(x[0]), math.sqrt(state[0, 0]), "N/m"),
+        Estimate(s, u_spring, "kg"),
+        solved,
+        tuple(Estimate(float(value), math.sqrt(v), "N/m") for value, v in zip(each, np.diag(whole), strict=True)),
         tuple(map(float, own)),
         tuple(map(float, residual / u_residual)),
         chi2,
-        len(runs) - 1,
-        chi2 <= limit,
+        dof,
+        tension,
         float(max(deviations)),
     )
 
 
-def _message(found: Comparison, limit: float) -> str:
-    together = ", ".join(found.names)
-    if found.agree:
+def _oscillating(spring_kg: float, loads: F8) -> F8:
+    return np.array([oscillating_mass_kg(spring_kg, float(load)) for load in loads])
+
+
+def _covariance(
+    runs: Sequence[SpringRun], masses: Sequence[Estimate], each: F8, mass_correlation: float
+) -> tuple[F8, F8]:
+    """Of the runs' constants, (n, n), and what of it is each run's own, (n,), N/m."""
+    squared = np.array([run.angular_frequency.value**2 for run in runs])
+    of_omega = 2.0 * each * np.array([run.angular_frequency.u / run.angular_frequency.value for run in runs])
+    of_mass = squared * np.array([mass.u for mass in masses])
+    own = np.hypot(of_omega, of_mass * math.sqrt(1.0 - mass_correlation))
+    own = np.maximum(own, 1e-15 * each)
+    # Shared relative errors at the common value: taken at each value they would favour the smallest.
+    of_clock = 2.0 * float(np.mean(each)) * np.array([run.u_clock for run in runs])
+    one_clock = np.array([[a.clock == b.clock for b in runs] for a in runs])
+    common = np.where(one_clock, np.outer(of_clock, of_clock), 0.0) + mass_correlation * np.outer(of_mass, of_mass)
+    return np.diag(own**2) + common, own
+
+
+def _message(
+    runs: Sequence[SpringRun],
+    fit: _Fit,
+    stated: Estimate | None,
+    exchanged: tuple[str, ...],
+    best: _Fit,
+    reweighed: _Fit | None,
+) -> str:
+    together = ", ".join(run.name for run in runs)
+    difference = f"{fit.deviation:.1f} standard uncertainties"
+    if fit.agree and fit.solved:
+        text = f"One spring if it weighs {_grams(fit.spring)}: {together} agree on k = {fit.constant} then. "
+        if fit.dof:
+            return f"{text}The runs solve for its mass, which the scene does not state (chi-square {fit.chi2:.2g})."
         return (
-            f"One spring: {together} agree on k = {found.spring_constant} "
-            f"(largest difference {found.largest_deviation:.1f} standard uncertainties)."
+            f"{text}Two runs solve for its mass, which the scene does not state, and do not test it: weigh the spring, "
+            "or add a run with a third mass."
         )
-    text = f"Not one spring as recorded: {together} differ by {found.largest_deviation:.1f} standard uncertainties."
-    if found.exchanged_chi2 is not None:
+    if fit.agree:
+        text = f"One spring: {together} agree on k = {fit.constant} (largest difference {difference})."
+        if stated is None:
+            text += " The scene does not weigh it and the bobs are too alike to tell: the uncertainty holds its mass."
+        return text
+    text = f"Not one spring as recorded: {together} differ by {difference}."
+    if reweighed is not None:
+        text = (
+            f"They agree if the spring weighs {_grams(reweighed.spring)}, where the scene states {_grams(stated)}: "
+            f"weigh it again. {text}"
+        )
+    elif stated is None:
+        text += " No mass that springs have brings them together."
+    if exchanged:
         text += (
-            f" With the masses (or the periods) of {' and '.join(found.exchanged)} exchanged they "
-            f"{'agree' if found.exchanged_chi2 <= limit else 'come together'}: check which record belongs to which bob."
+            f" With the masses (or the periods) of {exchanged[0]} and {exchanged[1]} exchanged they "
+            f"{'agree' if best.agree else 'come together'}: check which record belongs to which bob."
         )
     return text
+
+
+def _grams(mass: Estimate | None) -> str:
+    return "nothing" if mass is None else str(Estimate(1e3 * mass.value, 1e3 * mass.u, "g"))

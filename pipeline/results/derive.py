@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.bench.added_mass import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
+from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
@@ -21,7 +22,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.ambient import Ambient
-from pipeline.results.budget import Budget, Inputs, estimate_of
+from pipeline.results.budget import Budget, Inputs, estimate_of, function_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality
@@ -80,18 +81,13 @@ class Derived:
 
     @cached_property
     def effective_mass_kg(self) -> Estimate | None:
-        """Mass that oscillates: bob, a third of the spring, air carried along, as far as the scene requires them."""
+        """Mass that oscillates: bob, air carried along, the spring's share, as far as the scene requires them."""
         return self._part("mass")
 
     @cached_property
     def own_mass_kg(self) -> Estimate | None:
         """What of the mass belongs to this run alone."""
         return self._part("own_mass")
-
-    @cached_property
-    def spring_share_kg(self) -> Estimate | None:
-        """The share of the spring in the mass, which other runs have too."""
-        return self._part("spring_share")
 
     @cached_property
     def half_stiffness(self) -> Estimate:
@@ -169,7 +165,8 @@ def derive(
     First-order propagation [1]_ through the ``uncertainties`` package, every input one variable wherever it enters:
     with the clock's rate r and the distances' scale s (both 1 but for their uncertainty)
     :math:`\\omega = r\\omega_0`, :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`,
-    :math:`k = (\\omega^2 + \\overline{\\lambda^2}) (m + m_s/3 + m_a)`, :math:`A_0 = s a_0`, :math:`\\beta = r b/s`,
+    :math:`k = (\\omega^2 + \\overline{\\lambda^2}) m_s/x^2` with :math:`x \\tan x = m_s/(m + m_a)`,
+    :math:`A_0 = s a_0`, :math:`\\beta = r b/s`,
     :math:`Q = \\omega/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start,
     :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta`,
     :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
@@ -211,7 +208,7 @@ def derive(
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
     parts = {"half_stiffness": (0.5 * (omega * scale) ** 2 * (1.0 if mass is None else mass), "N/m")}
-    for name, x in (("mass", mass), ("own_mass", own), ("spring_share", share)):
+    for name, x in (("mass", mass), ("own_mass", own)):
         if x is not None:
             parts[name] = x, "kg"
     if mass is not None:
@@ -299,7 +296,7 @@ def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[
 def _masses(
     scene: Scene, effects: tuple[Effect, ...], diameter: Any, ambient: Ambient, inputs: Inputs
 ) -> tuple[Any, Any]:
-    """Bob with the air it carries, and a third of the spring, as far as the effects table includes them."""
+    """Bob with the air it carries, and the spring's share, as far as the effects table includes them."""
     if scene.bob_mass_kg is None:
         return None, None
     own = inputs.add("bob_mass", scene.bob_mass_kg, "B")
@@ -307,7 +304,10 @@ def _masses(
     if "added_mass" in included and diameter is not None:
         own = own + ADDED_MASS_SHAPE / 8.0 * ambient.density * diameter**3
     if "spring_mass" in included and scene.spring_mass_kg is not None:
-        return own, inputs.add("spring_mass", scene.spring_mass_kg, "B") / 3.0
+        spring = inputs.add("spring_mass", scene.spring_mass_kg, "B")
+        return own, function_of(oscillating_mass_kg, spring, own) - own
+    if scene.spring_mass_kg is None:
+        return own, inputs.add("unstated_spring_mass", unstated_spring_kg(scene), "B") / 3.0
     return own, None
 
 

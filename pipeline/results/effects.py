@@ -14,6 +14,7 @@ from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_densit
 from pipeline.bench.air import air_viscosity, speed_of_sound
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
+from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.waveform import Rest
@@ -99,11 +100,11 @@ def _masses(scene: Scene, u_k: float) -> Iterator[Effect]:
         return
     mass = scene.bob_mass_kg.value
     if scene.spring_mass_kg is None:
-        why = "the scene gives no spring mass; a third of it would add to the bob"
+        why = f"the scene gives no spring mass: k counts none, and u(k) a spring of 0 to {HEAVIEST_SHARE:g} of the bob"
         yield Effect("spring_mass", None, None, "1", False, why)
     else:
-        share = scene.spring_mass_kg.value / 3.0 / mass
-        yield _mass_effect("spring_mass", share, u_k, "a third of the spring's mass swings along")
+        share = oscillating_mass_kg(scene.spring_mass_kg.value, mass) / mass - 1.0
+        yield _mass_effect("spring_mass", share, u_k, "of the spring's mass m_s/x^2 - m swings along, x tan x = m_s/m")
     if scene.disc_diameter_m is None:
         why = "the scene names no disc; the bob alone carries a negligible mass of air"
         yield Effect("added_mass", None, None, "1", False, why)
@@ -128,7 +129,8 @@ def _drags(scene: Scene, damping: Damping, omega: float) -> Iterator[Effect]:
     if scene.disc_diameter_m is not None and scene.bob_mass_kg is not None:
         radius, mass = 0.5 * scene.disc_diameter_m.value, scene.bob_mass_kg.value
         # Creeping flow past a disc broadside on: F = 16 eta a v.
-        predicted_gamma = 8.0 * air_viscosity(scene_air(scene)[0].value) * radius / mass
+        celsius, pascal, _ = scene_air(scene)
+        predicted_gamma = 8.0 * air_viscosity(celsius.value, pascal.value) * radius / mass
         b = 0.5 * STEADY_DISC_DRAG * scene_air_density(scene) * math.pi * radius**2
         predicted_beta = 4.0 * b * omega / (3.0 * math.pi * mass)
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
@@ -202,7 +204,9 @@ def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
         why += "; the distances were calibrated, so the calibration's uncertainty stands in its place"
         return Effect("speed_of_sound", None, None, "1", False, why)
     if scene.air_temperature_c is None:
-        why = f"the scene gives no air temperature, so its 0.18 %/K stand in no uncertainty: {why}"
+        bench = scene.tells_of_bench
+        counts = "a room's 20 +- 3 degC count, 0.5 % in the scale" if bench else "its 0.18 %/K stand in no uncertainty"
+        why = f"the scene gives no air temperature, so {counts}: {why}"
         return Effect("speed_of_sound", None, None, "1", False, why)
     actual = speed_of_sound(*(each.value for each in scene_air(scene)))
     whose = "of the record" if instrument.speed_of_sound_m_per_s else "that old recordings take for granted"

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.bench.scene import Scene
+from pipeline.bench.spring import HEAVIEST_SHARE
 from pipeline.damping.laws import LAWS
 from pipeline.damping.mixture import MixedDrag, find_mixed
 from pipeline.damping.select import Damping
@@ -104,8 +105,8 @@ def judge_scene(scene: Scene, effects: tuple[Effect, ...]) -> tuple[Finding, ...
     Examples
     --------
     >>> bare = Scene.from_mapping({"bob": {"mass_kg": 0.2}})
-    >>> judge_scene(bare, ())[0].code
-    'uncertainty_missing'
+    >>> [finding.code for finding in judge_scene(bare, ())]
+    ['spring_mass_missing', 'uncertainty_missing']
     """
     springs = any(effect.name == "spring_mass" and effect.included for effect in effects)
     used = {
@@ -114,13 +115,20 @@ def judge_scene(scene: Scene, effects: tuple[Effect, ...]) -> tuple[Finding, ...
         "[disc] diameter_m": scene.disc_diameter_m,
     }
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
-    if not exact:
-        return ()
-    message = (
-        f"the scene states {', '.join(exact)} without an uncertainty: taken as exact, so what is derived from "
-        f"{'it' if len(exact) == 1 else 'them'} is less certain than its u says; write {{ value = ..., u = ... }}"
-    )
-    return (Finding("uncertainty_missing", "warning", message),)
+    found = []
+    if scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
+        message = (
+            "the scene does not weigh the spring, a part of which swings along: the spring constant counts none of it, "
+            f"and its uncertainty a spring of 0 to {HEAVIEST_SHARE:g} of the bob's mass; write [spring] mass_kg"
+        )
+        found.append(Finding("spring_mass_missing", "warning", message))
+    if exact:
+        message = (
+            f"the scene states {', '.join(exact)} without an uncertainty: taken as exact, so what is derived from "
+            f"{'it' if len(exact) == 1 else 'them'} is less certain than its u says; write {{ value = ..., u = ... }}"
+        )
+        found.append(Finding("uncertainty_missing", "warning", message))
+    return tuple(found)
 
 
 def judge(

@@ -23,6 +23,7 @@ INPUTS = {
     "noise": "scatter of the samples",
     "bob_mass": "mass of the bob",
     "spring_mass": "mass of the spring",
+    "unstated_spring_mass": "mass of the spring, not stated",
     "disc_diameter": "diameter of the disc",
     "air_temperature": "air temperature",
     "air_pressure": "air pressure",

@@ -84,13 +84,12 @@ def compare_analysed(runs: Sequence[Analysed], *, mass_correlation: float = 0.0)
         If a run does not oscillate or has no bob mass.
     """
     motions = [(run.name, _moving(run)) for run in runs]
-    shares = [m.derived.spring_share_kg for _, m in motions if m.derived.spring_share_kg is not None]
     comparison = compare_springs(
         [
             SpringRun.of(name, motion.derived, clock=run.analysis.track.clock)
             for (name, motion), run in zip(motions, runs, strict=True)
         ],
-        shared_mass_kg=shares[0] if shares else None,
+        spring_mass_kg=runs[0].analysis.scene.spring_mass_kg,
         mass_correlation=mass_correlation,
     )
     joint = tuple(
@@ -118,6 +117,8 @@ def comparison_json(compared: Compared, runs: Sequence[Analysed], provenance: Ma
         "comparison": {
             "agree": found.agree,
             "spring_constant": found.spring_constant if found.agree else None,
+            "spring_mass": found.spring_mass if found.agree else None,
+            "spring_mass_stated": found.spring_mass_stated,
             **picked(found, numbers),
             "each": [
                 {

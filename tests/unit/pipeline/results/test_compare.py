@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.compare import SpringRun, compare_springs
+from pipeline.results.compare import Comparison, SpringRun, compare_springs
 
 BARE_OMEGA = Estimate(2 * math.pi * 7 / 5.27, 2 * math.pi * 7 / 5.27**2 * 0.01, "rad/s")
 DISC_OMEGA = Estimate(2 * math.pi * 7 / 5.08, 2 * math.pi * 7 / 5.08**2 * 0.01, "rad/s")
@@ -19,6 +21,20 @@ BARE_KG, DISC_KG = Estimate(0.2007, 0.00005, "kg"), Estimate(0.2176, 0.00005, "k
 # The report's own numbers: periods of 5.27 s and 5.08 s over seven, masses of 200.7 g and 217.6 g.
 REPORT = [SpringRun("undamped", BARE_OMEGA, BARE_KG), SpringRun("damped", DISC_OMEGA, DISC_KG)]
 SWAPPED = [SpringRun("undamped", DISC_OMEGA, BARE_KG), SpringRun("damped", BARE_OMEGA, DISC_KG)]
+
+
+def massless(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> Comparison:
+    """Compare runs of a spring without mass."""
+    return compare_springs(runs, spring_mass_kg=Estimate(0.0, 0.0, "kg"), mass_correlation=mass_correlation)
+
+
+def oscillating(spring_kg: float, load_kg: float) -> float:
+    """Return the mass that oscillates by x tan x = m_s/m, kg, found by bisection of its cotangent form."""
+    low, high = 0.0, math.pi / 2.0
+    for _ in range(60):
+        x = 0.5 * (low + high)
+        low, high = (x, high) if x * load_kg * math.sin(x) < spring_kg * math.cos(x) else (low, x)
+    return spring_kg / x**2
 
 
 def spring(name: str, k: float, mass_kg: float, relative: float = 1e-4) -> SpringRun:
@@ -29,7 +45,7 @@ def spring(name: str, k: float, mass_kg: float, relative: float = 1e-4) -> Sprin
 
 def test_the_reports_two_runs_disagree() -> None:
     """k = 13.979 and 16.311 N/m lie 28 standard uncertainties apart."""
-    result = compare_springs(REPORT)
+    result = massless(REPORT)
     assert [k.value for k in result.each] == [pytest.approx(13.979, abs=5e-4), pytest.approx(16.311, abs=1e-3)]
     assert [k.u for k in result.each] == [pytest.approx(0.053, abs=5e-4), pytest.approx(0.064, abs=5e-4)]
     assert not result.agree
@@ -40,13 +56,13 @@ def test_the_reports_two_runs_disagree() -> None:
 
 def test_the_reports_exchange_is_named() -> None:
     """With the masses exchanged the two come to 15.16 and 15.04 N/m, and the message names both runs."""
-    result = compare_springs(REPORT)
+    result = massless(REPORT)
     assert result.exchanged == ("undamped", "damped")
     assert "exchanged" in result.message
     assert "undamped" in result.message
     assert "damped" in result.message
     swapped = [SpringRun(run.name, run.angular_frequency, m) for run, m in zip(REPORT, (DISC_KG, BARE_KG), strict=True)]
-    assert [k.value for k in compare_springs(swapped).each] == [
+    assert [k.value for k in massless(swapped).each] == [
         pytest.approx(15.16, abs=0.01),
         pytest.approx(15.04, abs=0.01),
     ]
@@ -54,7 +70,7 @@ def test_the_reports_exchange_is_named() -> None:
 
 def test_the_right_way_round_they_agree() -> None:
     """Put right, the two runs agree on 15.1 N/m and nothing is exchanged."""
-    result = compare_springs(SWAPPED)
+    result = massless(SWAPPED)
     assert result.agree
     assert result.exchanged == ()
     assert result.largest_deviation < 1.5
@@ -65,7 +81,7 @@ def test_the_right_way_round_they_agree() -> None:
 def test_mean_is_weighted() -> None:
     """The mean and its uncertainty are those of inverse variances."""
     runs = [spring("a", 14.0, 0.2, 1e-4), spring("b", 14.001, 0.21, 3e-4), spring("c", 13.999, 0.22, 2e-4)]
-    result = compare_springs(runs)
+    result = massless(runs)
     weights = np.array([k.u**-2 for k in result.each])
     values = np.array([k.value for k in result.each])
     assert result.spring_constant.value == pytest.approx(float(weights @ values / weights.sum()), rel=1e-12)
@@ -77,27 +93,29 @@ def test_mean_is_weighted() -> None:
 def test_common_clock_widens_the_mean_and_not_the_test() -> None:
     """A clock that all runs share shifts all constants alike."""
     runs = [spring("a", 14.0, 0.2), spring("b", 14.005, 0.22)]
-    free, shared = compare_springs(runs), compare_springs([replace(run, u_clock=3e-5) for run in runs])
+    free, shared = massless(runs), massless([replace(run, u_clock=3e-5) for run in runs])
     assert shared.chi2 == pytest.approx(free.chi2, rel=1e-6)
     assert shared.largest_deviation == pytest.approx(free.largest_deviation, rel=1e-6)
     assert shared.spring_constant.u == pytest.approx(math.hypot(free.spring_constant.u, 6e-5 * 14.0), rel=1e-3)
 
 
 def test_mean_is_that_of_generalised_least_squares() -> None:
-    """With a spring's mass shared the mean and its uncertainty are those of the covariance written out."""
+    """Constant, its uncertainty and chi-square are those of scipy's fit of constant and spring, its mass an input."""
     runs = [spring("a", 14.0, 0.2, 1e-4), spring("b", 14.001, 0.21, 3e-4), spring("c", 13.999, 0.22, 2e-4)]
-    shared = Estimate(0.0033, 0.0002, "kg")
-    found = compare_springs(runs, shared_mass_kg=shared)
+    found = compare_springs(runs, spring_mass_kg=Estimate(0.0099, 0.0006, "kg"))
     squared = np.array([run.angular_frequency.value**2 for run in runs])
-    k = squared * np.array([run.mass_kg.value + 0.0033 for run in runs])
-    own = np.hypot(
-        k * 2 * np.array([run.angular_frequency.u / run.angular_frequency.value for run in runs]), squared * 2e-5
-    )
-    inverse = np.linalg.inv(np.diag(own**2) + 0.0002**2 * np.outer(squared, squared))
-    assert found.spring_constant.value == pytest.approx(float((inverse @ k).sum() / inverse.sum()), rel=1e-9)
-    assert found.spring_constant.u == pytest.approx(float(inverse.sum() ** -0.5), rel=1e-9)
-    residual = k - found.spring_constant.value
-    assert found.chi2 == pytest.approx(float(residual @ inverse @ residual), rel=1e-6)
+    k = squared * np.array([oscillating(0.0099, run.mass_kg.value) for run in runs])
+    relative = np.array([run.angular_frequency.u / run.angular_frequency.value for run in runs])
+    own = np.hypot(k * 2 * relative, squared * 2e-5)
+
+    def pulls(theta: np.ndarray) -> np.ndarray:
+        each = squared * np.array([oscillating(theta[1] / 100, run.mass_kg.value) for run in runs])
+        return np.append((each - theta[0]) / own, (theta[1] / 100 - 0.0099) / 0.0006)
+
+    fit = least_squares(pulls, [14.0, 0.99], method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    assert found.spring_constant.value == pytest.approx(fit.x[0], rel=1e-8)
+    assert found.spring_constant.u == pytest.approx(math.sqrt(np.linalg.inv(fit.jac.T @ fit.jac)[0, 0]), rel=1e-5)
+    assert found.chi2 == pytest.approx(2.0 * fit.cost, rel=1e-6)
     assert [e.value for e in found.each] == [pytest.approx(x) for x in k]
 
 
@@ -108,9 +126,9 @@ def test_shared_mass_is_no_disagreement() -> None:
         SpringRun(n, Estimate(math.sqrt(14.0 / (m + 0.0033)), 1e-4), Estimate(m, 2e-5))
         for n, m in zip("ab", masses, strict=True)
     ]
-    assert not compare_springs(runs).agree
-    assert compare_springs(runs, shared_mass_kg=Estimate(0.0033, 0.0002, "kg")).agree
-    assert compare_springs(runs, shared_mass_kg=Estimate(0.0030, 0.0003, "kg")).agree
+    assert not massless(runs).agree
+    assert compare_springs(runs, spring_mass_kg=Estimate(0.0099, 0.0006, "kg")).agree
+    assert compare_springs(runs, spring_mass_kg=Estimate(0.0090, 0.0009, "kg")).agree
 
 
 @pytest.mark.parametrize("pair", list(itertools.combinations(range(3), 2)))
@@ -122,14 +140,14 @@ def test_of_three_runs_the_two_exchanged_are_named(pair: tuple[int, int]) -> Non
     mixed = list(right)
     mixed[i] = SpringRun(right[i].name, right[j].angular_frequency, right[i].mass_kg)
     mixed[j] = SpringRun(right[j].name, right[i].angular_frequency, right[j].mass_kg)
-    result = compare_springs(mixed)
+    result = massless(mixed)
     assert not result.agree
     assert result.exchanged == (right[i].name, right[j].name)
 
 
 def test_three_runs_agree() -> None:
     """Three masses on one spring agree."""
-    result = compare_springs([spring("a", 14.0, 0.20), spring("b", 14.0, 0.22), spring("c", 14.0, 0.25)])
+    result = massless([spring("a", 14.0, 0.20), spring("b", 14.0, 0.22), spring("c", 14.0, 0.25)])
     assert result.agree
     assert result.exchanged == ()
     assert result.chi2 == pytest.approx(0.0, abs=1e-6)
@@ -137,7 +155,7 @@ def test_three_runs_agree() -> None:
 
 def test_another_spring_is_not_called_an_exchange() -> None:
     """A run with another spring disagrees, and exchanging masses does not excuse it."""
-    result = compare_springs([spring("a", 14.0, 0.20), spring("b", 14.0, 0.22), spring("other", 20.0, 0.21)])
+    result = massless([spring("a", 14.0, 0.20), spring("b", 14.0, 0.22), spring("other", 20.0, 0.21)])
     assert not result.agree
     assert result.exchanged == ()
     assert "exchanged" not in result.message
@@ -155,7 +173,7 @@ def test_agreement_is_as_frequent_as_stated() -> None:
                 rng.normal(true.angular_frequency.value, true.angular_frequency.u), true.angular_frequency.u
             )
             runs.append(SpringRun(name, omega, Estimate(rng.normal(mass, 2e-5), 2e-5)))
-        agreed += compare_springs(runs).agree
+        agreed += massless(runs).agree
     assert agreed >= 990
 
 
@@ -164,35 +182,35 @@ def test_clocks_of_two_sensors_do_not_cancel() -> None:
     runs = [spring("a", 14.0, 0.2, 1e-9), spring("b", 14.0, 0.2, 1e-9)]
     runs = [replace(run, u_clock=3e-5, mass_kg=Estimate(run.mass_kg.value, 0.0)) for run in runs]
     runs[1] = replace(runs[1], angular_frequency=Estimate(runs[1].angular_frequency.value * (1 + 3e-5), 1e-9))
-    apart = compare_springs([replace(runs[0], clock="device"), replace(runs[1], clock="nominal")])
+    apart = massless([replace(runs[0], clock="device"), replace(runs[1], clock="nominal")])
     assert apart.largest_deviation == pytest.approx(6e-5 / (6e-5 * math.sqrt(2)), rel=1e-3)
     assert apart.agree
-    assert not compare_springs(runs).agree
+    assert not massless(runs).agree
 
 
 def test_one_balance_moves_all_masses_alike() -> None:
     """With fully correlated masses their error cancels in the test, by as much as the masses are alike."""
     runs = [replace(spring(name, 14.0, 0.2, 1e-5), mass_kg=Estimate(0.2, 1e-4)) for name in "ab"]
-    free, tied = compare_springs(runs), compare_springs(runs, mass_correlation=1.0)
+    free, tied = massless(runs), massless(runs, mass_correlation=1.0)
     assert free.each == tied.each
     assert tied.own_u[0] == pytest.approx(14.0 * 2e-5, rel=1e-6)
     assert tied.spring_constant.u > 1.3 * free.spring_constant.u
     with pytest.raises(ValueError, match="must lie in 0 to 1"):
-        compare_springs(runs, mass_correlation=1.5)
+        massless(runs, mass_correlation=1.5)
 
 
 def test_pulls_are_differences_over_their_own_uncertainty() -> None:
     """For two runs each pull is the deviation between them, one up and one down."""
-    result = compare_springs([spring("a", 14.0, 0.2), spring("b", 14.02, 0.22)])
+    result = massless([spring("a", 14.0, 0.2), spring("b", 14.02, 0.22)])
     assert result.pulls == pytest.approx((-result.largest_deviation, result.largest_deviation))
 
 
 def test_the_nearest_exchange_is_named() -> None:
     """Where two exchanges help, the one that helps most is named, with its chi-square."""
-    result = compare_springs(REPORT)
+    result = massless(REPORT)
     assert result.exchanged_chi2 is not None
     assert result.exchanged_chi2 < 0.01 * result.chi2
-    assert compare_springs(SWAPPED).exchanged_chi2 is None
+    assert massless(SWAPPED).exchanged_chi2 is None
 
 
 @pytest.mark.parametrize(
@@ -208,13 +226,68 @@ def test_the_nearest_exchange_is_named() -> None:
 def test_impossible_inputs_are_refused(wrong: dict[str, Estimate], words: str) -> None:
     """A mass of zero, a negative or a missing uncertainty: one line with the run's name."""
     with pytest.raises(AnalysisError, match=f"damped: .*{words}"):
-        compare_springs([REPORT[0], replace(REPORT[1], **wrong)])
-    with pytest.raises(AnalysisError, match="the spring's share must not be negative"):
-        compare_springs(REPORT, shared_mass_kg=Estimate(0.003, -1e-4, "kg"))
+        massless([REPORT[0], replace(REPORT[1], **wrong)])
+    with pytest.raises(AnalysisError, match="the spring's mass must not be negative"):
+        compare_springs(REPORT, spring_mass_kg=Estimate(0.003, -1e-4, "kg"))
 
 
 @pytest.mark.parametrize("count", [0, 1])
 def test_one_run_cannot_be_compared(count: int) -> None:
     """Fewer than two runs are refused with their number."""
     with pytest.raises(ValueError, match=f"two runs at least, got {count}"):
-        compare_springs(REPORT[:count])
+        massless(REPORT[:count])
+
+
+def hung(name: str, k: float, spring_kg: float, load_kg: float) -> SpringRun:
+    """Return a run of a load on a spring with a mass."""
+    omega = math.sqrt(k / oscillating(spring_kg, load_kg))
+    return SpringRun(name, Estimate(omega, 2e-5 * omega), Estimate(load_kg, 2e-5))
+
+
+def test_two_runs_solve_for_a_spring_that_nobody_weighed() -> None:
+    """Two masses give constant and mass of the spring, and the message says that nothing tested them."""
+    result = compare_springs([hung("a", 15.0, 0.027, 0.2), hung("b", 15.0, 0.027, 0.3)])
+    assert result.agree
+    assert result.dof == 0
+    assert abs(result.spring_constant.value - 15.0) < 0.1 * result.spring_constant.u
+    assert abs(result.spring_mass.value - 0.027) < 0.1 * result.spring_mass.u < 1e-4
+    assert "if it weighs 27.0" in result.message
+    assert "do not test it" in result.message
+
+
+def test_three_runs_test_what_they_solve_for() -> None:
+    """A third mass leaves a degree of freedom, and a mistyped one is seen."""
+    masses = {"a": 0.1, "b": 0.2, "c": 0.35}
+    runs = [hung(name, 15.0, 0.05, m) for name, m in masses.items()]
+    result = compare_springs(runs)
+    assert (result.agree, result.dof, result.spring_mass_stated) == (True, 1, False)
+    wrong = replace(runs[1], mass_kg=Estimate(0.206, 2e-5))
+    result = compare_springs([runs[0], wrong, runs[2]])
+    assert not result.agree
+    assert "No mass that springs have" in result.message
+
+
+def test_alike_bobs_do_not_tell_the_springs_mass() -> None:
+    """Two runs of one bob agree, and the constant is as uncertain as an unweighed spring makes it."""
+    result = compare_springs([hung("a", 15.0, 0.02, 0.2), hung("b", 15.0, 0.02, 0.2)])
+    assert result.agree
+    assert result.dof == 1
+    assert result.spring_constant.u == pytest.approx(15.0 * 0.3 / 3**1.5, rel=0.05)
+    assert "too alike" in result.message
+
+
+def test_a_spring_weighed_wrong_is_named_before_the_disagreement() -> None:
+    """Where another mass of the spring brings the runs together, that mass comes first."""
+    runs = [hung(name, 15.0, 0.027, m) for name, m in {"a": 0.1, "b": 0.2, "c": 0.35}.items()]
+    result = compare_springs(runs, spring_mass_kg=Estimate(0.010, 0.0001, "kg"))
+    assert not result.agree
+    assert result.message.startswith("They agree if the spring weighs 26.999")
+    assert "Not one spring as recorded" in result.message
+
+
+def test_exchanged_runs_are_named_without_the_springs_mass() -> None:
+    """The report's two runs are named though a spring's mass is free to bring them together."""
+    result = compare_springs(REPORT)
+    assert not result.agree
+    assert result.exchanged == ("undamped", "damped")
+    assert compare_springs(SWAPPED).agree

@@ -1,0 +1,33 @@
+"""The part of a spring that oscillates with its load."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from pipeline.bench.scene import Scene
+from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
+from pipeline.numerics.estimate import Estimate
+
+
+@pytest.mark.parametrize("ratio", [1e-9, 1e-4, 1e-3, 0.1, 0.5, 1.0, 10.0, 1e6])
+def test_mass_fulfils_the_wave_equations_condition(ratio: float) -> None:
+    """x^2 = m_s/M of the mass M returned fulfils x tan x = m_s/m."""
+    x = math.sqrt(ratio / oscillating_mass_kg(ratio, 1.0))
+    assert math.atan2(ratio, x) == pytest.approx(x, rel=1e-12)
+
+
+def test_heavy_spring_alone_swings_as_a_quarter_wave() -> None:
+    """Without a load to speak of, M is 4/pi^2 of the spring."""
+    assert oscillating_mass_kg(1.0, 1e-12) == pytest.approx(4.0 / math.pi**2, rel=1e-9)
+
+
+def test_a_mass_below_nothing_continues_the_series() -> None:
+    """A fit may try negative masses: value and slope go on through zero."""
+    assert oscillating_mass_kg(-0.03, 0.3) == pytest.approx(0.29, rel=1e-3)
+
+
+def test_an_unweighed_spring_is_uncertain_by_a_share_of_the_bob() -> None:
+    """0 to 0.3 of the bob, uncorrected: its root mean square."""
+    assert unstated_spring_kg(Scene(bob_mass_kg=Estimate(0.2, 0.0, "kg"))).u == pytest.approx(0.06 / math.sqrt(3.0))
