@@ -63,7 +63,7 @@ def air_density(temperature_c: float, pressure_pa: float = 101325.0, relative_hu
     Examples
     --------
     >>> round(air_density(20.0), 4)
-    1.2045
+    1.2046
     """
     t, p = _within(temperature_c, 15.0, 27.0), _within(pressure_pa, 6e4, 1.1e5)
     fraction = _vapour_fraction(temperature_c, pressure_pa, relative_humidity)
@@ -101,7 +101,7 @@ def air_viscosity(temperature_c: float, pressure_pa: float = 101325.0) -> float:
     Examples
     --------
     >>> round(air_viscosity(20.0) * 1e6, 2)
-    18.2
+    18.21
     """
     kelvin = temperature_c + ZERO_CELSIUS_K
     log = math.log(kelvin / 103.3)

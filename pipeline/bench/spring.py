@@ -38,7 +38,7 @@ def oscillating_mass_kg(spring_kg: float, load_kg: float) -> float:
     Examples
     --------
     >>> round(oscillating_mass_kg(0.1, 1.0) / (1.0 + 0.1 / 3.0) - 1.0, 6)
-    0.000205
+    0.00021
     """
     ratio = spring_kg / load_kg
     if ratio < SERIES:
