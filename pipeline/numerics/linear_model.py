@@ -98,7 +98,8 @@ class LinearModel:
         """Return what columns (n, k) would add."""
         along, squares = self.basis.T @ columns, columns.T @ columns
         # A trace of ridge lets a column that the model holds already come out as nothing.
-        normal = squares - along.T @ along + np.diag(RIDGE * np.diagonal(squares) + 1e-300)
+        normal = squares - along.T @ along
+        normal.flat[:: normal.shape[0] + 1] += RIDGE * np.diagonal(squares) + 1e-300
         return Terms(columns, along, normal, columns.T @ self.left)
 
     def left_by(self, terms: Terms, values: F8) -> F8:
@@ -112,7 +113,13 @@ class LinearModel:
         more = self.basis.T @ beyond
         q, r = np.linalg.qr(beyond - self.basis @ more)
         share = q.T @ self.left
-        self._factor = np.block([[self._factor, terms.along + more], [np.zeros((r.shape[0], self._share.size)), r]])
+        before, factor = self._share.size, np.zeros((self._share.size + r.shape[0],) * 2)
+        factor[:before, :before], factor[:before, before:], factor[before:, before:] = (
+            self._factor,
+            terms.along + more,
+            r,
+        )
+        self._factor = factor
         self._share = np.concatenate([self._share, share])
         self.basis = np.concatenate([self.basis, q], axis=1)
         self.left = self.left - q @ share

@@ -7,6 +7,7 @@ every one of 200 records of noise with a correlation of 0.9 from block to block,
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics.linear_model import LinearModel
+from pipeline.numerics.robust import median
 from pipeline.track import F8
 
 __all__ = [
@@ -170,9 +172,9 @@ def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance
     inside = band.inside(frequency)
     if np.count_nonzero(inside) < 8:
         return False
-    usual = float(np.median(power[inside])) / math.log(2.0)
+    usual = median(power[inside]) / math.log(2.0)
     trials = _trials(inside, float(frequency[1]), blocks)
-    fixed = np.min(np.abs(frequency[:, None] - np.array(fixed_hz)), axis=1) <= 1.0 / blocks.seconds
+    fixed = np.min(np.abs(np.subtract.outer(fixed_hz, frequency)), axis=0) <= 1.0 / blocks.seconds
     # The taper costs a third of a line's power.
     least, least_fixed = (0.5 * evidence_for(chance, n) / 1.5 * usual for n in (trials, float(len(fixed_hz))))
     return bool(np.any(power[inside] > least) or np.any(power[fixed] > least_fixed))
@@ -226,7 +228,8 @@ def strongest(blocks: Blocks, model: LinearModel, band: Band) -> Peak | None:
     line = model.terms((rows / np.linalg.norm(rows, axis=1)[:, None]).T)
     if np.linalg.eigvalsh(line.normal[:2, :2])[0] < 0.04:  # the model holds it already
         return None
-    density = spectral_density(blocks, blocks.unweighted(model.left_by(line, line.fitted()[0])), f, band)
+    left = blocks.unweighted(model.left_by(line, line.fitted()[0]))
+    density = spectral_density(blocks, left, f, band, smooth_density(left, f * blocks.step))
     # Rows are weighted by samples, the density is one full block's.
     evidence = 0.5 * line.only(slice(2)).fitted()[2] / (density * blocks.samples)
     return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
@@ -264,7 +267,7 @@ def evidence_for(chance: float, trials: float) -> float:
     return float(FREEDOM * math.expm1(-math.log(single) / FREEDOM))
 
 
-def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band) -> float:
+def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band, smooth: float) -> float:
     """Variance of one block's noise at a frequency, m^2: an autoregression's or its neighbours', the larger.
 
     Parameters
@@ -275,8 +278,9 @@ def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band) -> 
     frequency_hz : float
     band : Band
         Neighbours outside it say nothing.
+    smooth : float, m^2
+        As :func:`smooth_density` has it there.
     """
-    smooth = smooth_density(y, frequency_hz * blocks.step)
     frequency, power = spectrum(blocks, y)
     reach = FAR / blocks.seconds
     around = slice(*np.searchsorted(frequency, [frequency_hz - reach, frequency_hz + reach]))
@@ -291,7 +295,8 @@ def smooth_density(y: F8, turns: float) -> float:
     Its mean over all frequencies is the variance, so that white noise has its variance everywhere.
     """
     coefficients, variance = _autoregression(y, AR_ORDER)
-    return float(_density(coefficients, variance, np.array([turns]))[0])
+    waves = (c * cmath.exp(-2j * math.pi * lag * turns) for lag, c in enumerate(coefficients, start=1))
+    return variance / abs(1.0 - sum(waves)) ** 2
 
 
 def _autoregression(y: F8, highest: int) -> tuple[list[float], float]:

@@ -160,8 +160,12 @@ class Mode:
         """Return E at times t (n,), m."""
         if not self.degree:
             return np.broadcast_to(self.coefficients, t.shape)
-        parts = np.polynomial.legendre.legval(self._x(t), self.coefficients.view(np.float64).reshape(-1, 2))
-        return np.asarray(parts[0] + 1j * parts[1])
+        x, powers = self._x(t), np.polynomial.legendre.leg2poly(self.coefficients)
+        envelope = np.full(t.shape, powers[-1])
+        for coefficient in powers[-2::-1]:
+            envelope *= x
+            envelope += coefficient
+        return envelope
 
     def whole(self, t: F8, wave: C16) -> C16:
         """Return the wave of which products are made: with the envelope, over the amplitude."""
@@ -169,8 +173,8 @@ class Mode:
 
     def columns(self, t: F8, wave: C16) -> F8:
         """Return (n, 2 (degree + 1)): what real and imaginary parts of the coefficients are multiplied by."""
-        powers = np.polynomial.legendre.legvander(self._x(t), self.degree).T
-        rows = np.empty((powers.shape[0], 2, t.size))
+        powers = np.polynomial.legendre.legvander(self._x(t), self.degree).T if self.degree else np.ones((1, 1))
+        rows = np.empty((self.degree + 1, 2, t.size))
         np.multiply(powers, wave.real, out=rows[:, 0])  # Re (x + iy) w = x Re w - y Im w
         np.multiply(powers, -wave.imag, out=rows[:, 1])
         return rows.reshape(-1, t.size).T

@@ -199,9 +199,10 @@ class _Search:
             values, cofactors, fall = together.fitted()
             left = self.blocks.unweighted(self.model.left_by(together, values))
             evidence, f = 0.5 * (fall - fallen) / self.blocks.samples, trial.frequency.value
-            if evidence <= least * smooth_density(left, f * self.blocks.step):
+            smooth = smooth_density(left, f * self.blocks.step)
+            if evidence <= least * smooth:
                 continue  # the density is no less than that
-            density = spectral_density(self.blocks, left, f, self.band)
+            density = spectral_density(self.blocks, left, f, self.band, smooth)
             if evidence > least * density:
                 unit, chance = density * self.blocks.samples, false_alarm(evidence / density, len(orders))
                 found = replace(trial, false_alarm=chance)

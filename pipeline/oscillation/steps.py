@@ -192,7 +192,10 @@ class _Windows:
 
     def staircase(self, params: Params) -> dict[int, float]:
         """First window after each step, and the probability that noise shows as much."""
-        trials = [self.grow(degree, params) for degree in DEGREES if degree <= self.t.size // 6]
+        powers = np.polynomial.legendre.legvander(
+            2.0 * (self.t - self.t[0]) / (self.t[-1] - self.t[0]) - 1.0, DEGREES[-1]
+        )
+        trials = [self.grow(powers[:, : degree + 1], params) for degree in DEGREES if degree <= self.t.size // 6]
         # One correlation length for all: that of the model that leaves least.
         length = correlation_length(min(trials, key=lambda trial: trial.chi2).left)
         price = math.log(self.t.size)
@@ -202,14 +205,14 @@ class _Windows:
         chances = [min(1.0, self.t.size * math.erfc(math.sqrt(0.5 * fall / length))) for fall in best.falls]
         return dict(sorted(zip(best.steps, chances, strict=True)))
 
-    def grow(self, degree: int, params: Params) -> _Staircase:
-        """Add steps to a polynomial as long as each counts.
+    def grow(self, powers: F8, params: Params) -> _Staircase:
+        """Add steps to a polynomial in ``powers`` (w, degree + 1) as long as each counts.
 
         Residuals of too few steps are correlated by those that are missing. So steps are added as if noise were white,
         and the first number of them is kept at which every one stands against the correlation of what is left.
         """
-        x = 2.0 * (self.t - self.t[0]) / (self.t[-1] - self.t[0]) - 1.0
-        model = LinearModel(self.deviations, np.polynomial.legendre.legvander(x, degree))
+        model = LinearModel(self.deviations, powers)
+        degree = powers.shape[1] - 1
         kept = now = _Staircase(degree, [], model.left, [])
         while len(now.steps) <= params.most:
             index, gain = _best_step(model.left, model.basis, params.apart, now.steps)

@@ -65,7 +65,7 @@ def test_density_of_white_noise_is_its_variance() -> None:
     of = blocks(np.random.default_rng(1).standard_normal(60_000))
     for f in (0.5, 2.0, 4.0):
         # The larger of two estimates, one of them from ten neighbours, so not below and up to twice.
-        assert 0.9 / 6.0 < spectral_density(of, of.y, f, BAND) < 2.0 / 6.0
+        assert 0.9 / 6.0 < spectral_density(of, of.y, f, BAND, smooth_density(of.y, f * of.step)) < 2.0 / 6.0
         assert smooth_density(of.y, f * of.step) == pytest.approx(1.0 / 6.0, rel=0.1)
 
 
