@@ -114,11 +114,8 @@ class LinearModel:
         q, r = np.linalg.qr(beyond - self.basis @ more)
         share = q.T @ self.left
         before, factor = self._share.size, np.zeros((self._share.size + r.shape[0],) * 2)
-        factor[:before, :before], factor[:before, before:], factor[before:, before:] = (
-            self._factor,
-            terms.along + more,
-            r,
-        )
+        factor[:before, :before], factor[before:, before:] = self._factor, r
+        factor[:before, before:] = terms.along + more
         self._factor = factor
         self._share = np.concatenate([self._share, share])
         self.basis = np.concatenate([self.basis, q], axis=1)

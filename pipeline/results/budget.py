@@ -154,11 +154,8 @@ class Inputs:
         from uncertainties import UFloat
 
         # Ordered by name: sums of floats depend on their order, and a mapping's order on addresses.
-        parts = (
-            sorted(x.error_components().items(), key=lambda part: (part[0].tag, part[1]))
-            if isinstance(x, UFloat)
-            else ()
-        )
+        components = x.error_components() if isinstance(x, UFloat) else {}
+        parts = sorted(components.items(), key=lambda part: (part[0].tag, part[1]))
         if not any(error for _, error in parts):
             return Budget(quantity, estimate_of(x, unit), ())
         variances: dict[str, float] = {}
