@@ -13,6 +13,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 
 __all__ = [
@@ -48,4 +49,5 @@ class ProgramError(Exception):
 
 def complain(message: object) -> None:
     """Write one line to stderr, also where a file's name or a library's message breaks over several."""
-    print("springmass:", " ".join(str(message).splitlines()), file=sys.stderr)
+    with contextlib.suppress(OSError, ValueError):  # nobody hears it; the exit code still says what it was
+        print("springmass:", " ".join(str(message).splitlines()), file=sys.stderr)

@@ -20,6 +20,7 @@ from typing import Any, Self
 from acquisition.clock import Clock
 from acquisition.readings import Read
 from storage.errors import WriteFailed, one_line
+from storage.log_place import LogPlace
 from storage.wire_log.appending import Item, LogFile, WireLogWriter, open_log_file
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, event_payload
 
@@ -46,6 +47,8 @@ class RecorderStatus:
     error : str
         Why the recording stopped, one line; empty while all is well.
     closed : bool
+    astray : str
+        What became of the log's name while it was recorded; empty while it leads to the log.
     """
 
     records: int
@@ -58,6 +61,7 @@ class RecorderStatus:
     dropped_bytes: int
     error: str
     closed: bool
+    astray: str = ""
 
 
 @dataclass(slots=True)
@@ -91,6 +95,11 @@ class Recorder:
     open_file : callable
         Makes the log's file: the seam for tests.
 
+    Attributes
+    ----------
+    path : Path
+        The log. Once it is closed, where it lies by then: somebody may have renamed its folder.
+
     Raises
     ------
     RunExists, WriteFailed
@@ -109,6 +118,7 @@ class Recorder:
     ) -> None:
         self._log = WireLogWriter(path, header, open_file=open_file)
         self.path = self._log.path
+        self._place = LogPlace(self.path)
         self._clock = clock
         self._sync_every_ns = int(sync_every_s * 1e9)
         self._limit = queue_bytes
@@ -142,7 +152,7 @@ class Recorder:
             written, synced = self._log.written, self._log.synced
             log = (written.records, written.bytes, synced.records, synced.bytes)
             queue = (len(self._queue), self._queued_bytes, self._dropped_records, self._dropped_bytes)
-            return RecorderStatus(*log, *queue, str(self._error or ""), self._closed)
+            return RecorderStatus(*log, *queue, str(self._error or ""), self._closed, self._place.astray)
 
     def reads(self, reads: Sequence[Read]) -> None:
         """Take what was read of ports; never waits for the disk, never raises for its sake."""
@@ -189,6 +199,7 @@ class Recorder:
             self._guarded(self._append_end)
         self._sync()
         self._guarded(self._log.close)
+        self._guarded(self._find_log)
         with self._lock:
             self._closed = True
         if self._error is not None:
@@ -266,8 +277,24 @@ class Recorder:
         # An event's wait and not the clock's: closing must not wait for the next sync.
         while not self._stop_sync.wait(max(0, due - self._clock.now_ns()) * 1e-9):
             due = max(due, self._clock.now_ns()) + self._sync_every_ns
+            self._look_for_log()
             if self._log.synced != self._log.written:
                 self._sync()
+
+    def _find_log(self) -> None:
+        """Have :attr:`path` say where the log lies, written anew where it was deleted."""
+        try:
+            self.path = self._place.found()
+        finally:
+            self._place.close()
+
+    def _look_for_log(self) -> None:
+        """Notice a log that was deleted, renamed or replaced, once; this thread alone may wait for the disk."""
+        before = self._place.astray
+        self._place.look()
+        if self._place.astray != before:
+            facts = {"what": self._place.astray or "the log is in its place again"}
+            self.event(0, self._clock.now_ns(), "astray", facts)
 
     def _sync(self) -> None:
         self._guarded(self._log.sync)

@@ -19,6 +19,7 @@ import numpy as np
 from acquisition.block import Block
 from acquisition.recordings.recording import Original, Trap
 from storage.errors import RunDamaged, RunExists
+from storage.losses import Event, LossCount, Losses, end_of
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
 from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry
@@ -42,6 +43,8 @@ class RecoveredRun:
         What the decoder counted.
     decoding : mapping
         What the chain reports besides: gaps, restarts, the clock's rate error.
+    losses : Losses
+        What the run lacks.
     """
 
     sensor: SensorEntry
@@ -49,6 +52,12 @@ class RecoveredRun:
     samples: int
     faults: Mapping[str, int]
     decoding: Mapping[str, Any]
+    losses: Losses
+
+    @property
+    def gone(self) -> bool:
+        """Whether the sensor was gone at the end."""
+        return self.losses.gone_s is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +93,8 @@ class RecoverReport:
                 longest = max(gap["length_s"] for gap in gaps)
                 lost = sum(gap["lost"] for gap in gaps)
                 yield f"{run.path}: {len(gaps)} gaps, {lost} readings lost in them, the longest {longest:.3g} s"
+            for trap in run.losses.traps():
+                yield f"{run.path}: {trap.code}: {trap.message}"
             clock = run.decoding.get("clock", {})
             if clock.get("kind") == "device" and clock.get("rate_error_ppm") is not None:
                 rate = f"{clock['rate_error_ppm']:+.1f} +- {clock['u_rate_error_ppm']:.1f} ppm"
@@ -155,7 +166,11 @@ def recover(
     # Events are known when the log was read; a calibration among them is rare, so only then it is read again.
     if (calibrated := _calibrated(log.header.sensors, _calibrations(log), other)) != sensors:
         decoded = decode_log(log.contents, calibrated)
-    runs = [_write(path, log, part, provenance or {}, overwrite) for path, part in zip(paths, decoded, strict=True)]
+    losses = _losses(log, decoded)
+    runs = [
+        _write(path, log, part, lost, provenance or {}, overwrite)
+        for path, part, lost in zip(paths, decoded, losses, strict=True)
+    ]
     removed = remove_log and _remove(log_path, len(log.original.data))
     marks, events = len(log.notes(Kind.MARK)), len(log.notes(Kind.EVENT))
     return RecoverReport(log_path, tuple(runs), log.contents.damage, marks, events, removed)
@@ -209,7 +224,24 @@ def _demand_free(paths: Sequence[Path]) -> None:
             raise RunExists(path, demand, "choose another name or allow overwriting")
 
 
-def _write(path: Path, log: _Log, decoded: Decoded, provenance: Mapping[str, Any], overwrite: bool) -> RecoveredRun:
+def _losses(log: _Log, decoded: Sequence[Decoded]) -> list[Losses]:
+    events: dict[int, list[Event]] = {part.sensor.channel: [] for part in decoded}
+    for event in log.notes(Kind.EVENT):
+        events.setdefault(event.channel, []).append((event.mono_ns, event.json()))
+    counts = [LossCount(part.chain.timebase.rate_hz) for part in decoded]
+    for count, part in zip(counts, decoded, strict=True):
+        count.push(part.samples)
+    start_ns = log.header.mono_ns
+    everything = [event for each in events.values() for event in each]
+    end_ns = end_of(everything, [count.last_ns for count in counts], start_ns)
+    return [
+        count.losses(events[part.sensor.channel], start_ns, end_ns) for count, part in zip(counts, decoded, strict=True)
+    ]
+
+
+def _write(
+    path: Path, log: _Log, decoded: Decoded, losses: Losses, provenance: Mapping[str, Any], overwrite: bool
+) -> RecoveredRun:
     samples, header = decoded.samples, log.header
     decoding = decoded.chain.report(samples.t, _host_ns(samples))
     faults = decoding["faults"]
@@ -220,17 +252,22 @@ def _write(path: Path, log: _Log, decoded: Decoded, provenance: Mapping[str, Any
         originals=[log.original],
         scene=header.scene,
         title=header.title,
-        traps=_traps(log.contents.damage),
+        traps=[*_traps(log.contents.damage), *losses.traps()],
         malformed_rows=sum(count for name, count in faults.items() if not name.endswith("bytes")),
         format="wire",
-        provenance={**_provenance(log, decoded), "decoding": decoding, **provenance},
+        provenance={
+            **_provenance(log, decoded),
+            "decoding": decoding,
+            "losses": dataclasses.asdict(losses),
+            **provenance,
+        },
         overwrite=overwrite,
     )
     with open_run(path) as run:
         run.verify()
         if run.originals() != (log.original,):
             raise RunDamaged(path, "the log inside is not the log that was read", "keep the log and recover it again")
-    return RecoveredRun(decoded.sensor, path, len(samples), faults, decoding)
+    return RecoveredRun(decoded.sensor, path, len(samples), faults, decoding, losses)
 
 
 def _host_ns(samples: Block) -> Any:

@@ -19,7 +19,7 @@ from acquisition.errors import PortError
 from acquisition.live.serial_port import READ_BYTES
 from acquisition.readings import Read
 
-__all__ = ["Line", "PortReader", "Sink", "Transport"]
+__all__ = ["Line", "PortReader", "Proof", "Sink", "Transport"]
 
 REOPEN_EVERY_NS = 500_000_000
 IDLE_WAIT_S = 0.5
@@ -78,6 +78,14 @@ class Transport(Protocol):
         ...
 
 
+class Proof(Protocol):
+    """Tells the sensor that was lost from another that came in its place."""
+
+    def feed(self, host_ns: int, data: bytes) -> bool | None:
+        """Take the bytes of one read; return whether it is the sensor, None while that is open."""
+        ...
+
+
 class Sink(Protocol):
     """Who keeps the bytes; called on the I/O thread, so it must not block."""
 
@@ -86,7 +94,7 @@ class Sink(Protocol):
         ...
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Take "lost", "reopened" (with gap_s) or "timeout"."""
+        """Take "lost", "reopened" (with gap_s), "refused" (another device came back) or "timeout"."""
         ...
 
 
@@ -103,13 +111,20 @@ class Line:
     decoder : callable or None
         Returns a polled sensor's decoder, where the sink feeds it within ``reads`` and flushes it at "timeout": then
         that says what to ask next, and a reply that came short counts as timed out before the next request.
+    proof : callable or None
+        Returns what a port that came back has to prove before its bytes are the sensor's again; None: nothing.
     """
 
     transport: Transport
     channel: int = 0
     poll: Poll | None = None
     decoder: Callable[[], Polled] | None = None
+    proof: Callable[[], Proof | None] | None = None
     _lost_ns: int | None = field(default=None, init=False)
+    """Since when its readings are missing."""
+    _closed: bool = field(default=False, init=False)
+    _proving: Proof | None = field(default=None, init=False)
+    _unproven: list[Read] = field(default_factory=list, init=False)
     _retry_ns: int = field(default=0, init=False)
     _ask_ns: int = field(default=0, init=False)
     _answer_by_ns: int | None = field(default=None, init=False)
@@ -152,7 +167,7 @@ class PortReader:
             thread.start()
 
     def stop(self) -> None:
-        """End reading and close the ports; raises what ended a thread, if anything did. Again does no harm."""
+        """End reading and close the ports; raises what a thread tripped over, if any did. Again does no harm."""
         if self._stop.is_set():
             return
         self._stop.set()
@@ -168,26 +183,32 @@ class PortReader:
 
     @property
     def failure(self) -> BaseException | None:
-        """What ended a reading thread, if anything did: a defect, or a sink that refused."""
+        """What a reading thread tripped over last, if over anything: a defect, or a sink that refused."""
         return self._failure
 
     def _guarded(self, loop: Any, lines: list[Line]) -> None:
-        try:
-            loop(lines)
-        except BaseException as error:  # handed to stop(), which raises it on the caller's thread
-            self._failure = error
+        while not self._stop.is_set():
+            try:
+                loop(lines)
+            except Exception as error:  # handed to stop(), which raises it on the caller's thread; the reading goes on
+                self._failure = error
+                for line in lines:
+                    if not line._closed and line.transport.fileno() < 0 and loop == self._select_loop:
+                        line._closed = True
+                self._stop.wait(IDLE_WAIT_S)
 
     def _select_loop(self, lines: list[Line]) -> None:
         with selectors.DefaultSelector() as selector:
             selector.register(self._wake_read, selectors.EVENT_READ)
             for line in lines:
-                selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
+                if not line._closed:
+                    selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
             while not self._stop.is_set():
                 ready = [key.data for key, _ in selector.select(self._wait_s(lines)) if key.data is not None]
                 for line in self._read(ready, self._clock.now_ns()):
                     _leave(selector, line)
                 for line in lines:
-                    if line._lost_ns is not None:
+                    if line._closed:
                         if self._tries_again(line):
                             selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
                     elif line.poll is not None and not self._ask(line, line.poll):
@@ -196,7 +217,7 @@ class PortReader:
     def _blocking_loop(self, lines: list[Line]) -> None:
         (line,) = lines
         while not self._stop.is_set():
-            if line._lost_ns is not None:
+            if line._closed:
                 if not self._tries_again(line):
                     self._stop.wait(IDLE_WAIT_S)
                 continue
@@ -213,7 +234,7 @@ class PortReader:
         now = self._clock.now_ns()
         wait = IDLE_WAIT_S
         for line in lines:
-            if line._lost_ns is not None:
+            if line._closed:
                 wait = min(wait, (line._retry_ns - now) * 1e-9)
             elif line.poll is not None:
                 wait = min(wait, (line._ask_ns - now) * 1e-9)
@@ -231,16 +252,35 @@ class PortReader:
             except OSError as error:
                 gone.append((line, str(error)))
                 continue
-            if data:
-                reads.append((line.channel, now_ns, data))
-            else:
+            if not data:
                 gone.append((line, "end of file"))
+            elif line._proving is None:
+                reads.append((line.channel, now_ns, data))
+            elif (proven := self._prove(line, line._proving, now_ns, data)) is None:
+                gone.append((line, ""))
+            else:
+                reads += proven
             line._answer_by_ns = None
         if reads:
             self._sink.reads(reads)
         for line, why in gone:
             self._gone(line, f"{line.transport.name}: the port has gone ({why})")
         return [line for line, _ in gone]
+
+    def _prove(self, line: Line, proof: Proof, now_ns: int, data: bytes) -> list[Read] | None:
+        """Return the reads of a port that came back, once it proved to be the sensor's; None where it is another's."""
+        verdict = proof.feed(now_ns, data)
+        line._unproven.append((line.channel, now_ns, data))
+        if verdict is None:
+            return []
+        if not verdict:
+            size = sum(len(unproven) for _, _, unproven in line._unproven)
+            facts = {"port": line.transport.name, "why": "what came back does not speak as the sensor", "bytes": size}
+            self._sink.event(line.channel, now_ns, "refused", facts)
+            return None
+        self._back(line, now_ns)
+        proven, line._unproven, line._proving = line._unproven, [], None
+        return proven
 
     def _wait_for(self, line: Line, wait_s: float) -> bool:
         """Hand on what comes within that time; False where the port is gone."""
@@ -251,7 +291,13 @@ class PortReader:
             return False
         if data:
             line._answer_by_ns = None
-            self._sink.reads([(line.channel, self._clock.now_ns(), data)])
+            now = self._clock.now_ns()
+            reads: list[Read] | None = [(line.channel, now, data)]
+            if line._proving is not None and (reads := self._prove(line, line._proving, now, data)) is None:
+                self._gone(line, "")
+                return False
+            if reads:
+                self._sink.reads(reads)
         return True
 
     def _ask(self, line: Line, poll: Poll) -> bool:
@@ -279,25 +325,34 @@ class PortReader:
         return True
 
     def _gone(self, line: Line, why: str) -> None:
-        line._lost_ns = self._clock.now_ns()
-        line._retry_ns = line._lost_ns + REOPEN_EVERY_NS
-        line._answer_by_ns = None
-        self._sink.event(line.channel, line._lost_ns, "lost", {"port": line.transport.name, "why": why})
+        now = self._clock.now_ns()
+        line._closed, line._retry_ns = True, now + REOPEN_EVERY_NS
+        line._answer_by_ns = line._proving = None
+        line._unproven = []
+        if line._lost_ns is None:  # one that came back and did not prove itself was never anything but lost
+            line._lost_ns = now
+            self._sink.event(line.channel, now, "lost", {"port": line.transport.name, "why": why})
 
     def _tries_again(self, line: Line) -> bool:
         now = self._clock.now_ns()
-        if line._lost_ns is None or now < line._retry_ns:
+        if now < line._retry_ns:
             return False
         try:
             line.transport.reopen()
         except PortError:
             line._retry_ns = now + REOPEN_EVERY_NS
             return False
-        gap_s = (now - line._lost_ns) * 1e-9
-        line._lost_ns = None
-        line._ask_ns = 0
-        self._sink.event(line.channel, now, "reopened", {"port": line.transport.name, "gap_s": gap_s})
+        line._closed, line._ask_ns = False, 0
+        line._proving = None if line.proof is None else line.proof()
+        if line._proving is None:
+            self._back(line, now)
         return True
+
+    def _back(self, line: Line, now_ns: int) -> None:
+        """Tell that the sensor is there again."""
+        gap_s = 0.0 if line._lost_ns is None else (now_ns - line._lost_ns) * 1e-9
+        line._lost_ns = None
+        self._sink.event(line.channel, now_ns, "reopened", {"port": line.transport.name, "gap_s": gap_s})
 
 
 def _may_block(line: Line) -> bool:

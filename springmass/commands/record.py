@@ -6,7 +6,7 @@ import argparse
 import contextlib
 import os
 import queue
-import signal
+import shlex
 import sys
 import threading
 from collections.abc import Iterator
@@ -26,18 +26,24 @@ from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from pipeline.streaming import LiveMotion
 from springmass import __version__
-from springmass.errors import OK, USAGE, ProgramError
+from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
 from springmass.runs.analysing import now_utc
 from springmass.runs.loading import read_scene
-from springmass.session.session import BYTES_PER_READ, Progress, Sensor, Session, Trigger, demand_new
+from springmass.session.console import Console
+from springmass.session.output import demand_new
+from springmass.session.session import BYTES_PER_READ, Ended, Progress, Sensor, Session, Trigger
+from springmass.session.stops import Stops
 from storage.disk import check_disk
-from storage.recover import recover
+from storage.errors import WriteFailed, one_line
+from storage.recover import RecoverReport, recover
 
 __all__ = ["run"]
 
 U_RULER_M = 0.5e-3
 # Off a terminal one line of so many is printed: working out the motion for each is a tenth of what recording costs.
 UNWATCHED_LINES = 30
+PATIENCE_S = 0.2  # a progress line that nobody reads is left out
+SILENT_S = 3.0  # of a sensor, said in the progress line
 UNLIMITED_S = 3600.0  # how long a run without --seconds is taken to be, for the look at the disk
 
 
@@ -48,35 +54,90 @@ def run(options: argparse.Namespace) -> int:
         raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5", USAGE)
     demand_new(out, len(options.port))
     _demand_sense(options)
+    _fill_standard_streams()
     scene_path = options.scene or options.simulate
     scene = None if scene_path is None else read_scene(scene_path)
-    with _sensors(options, scene) as (sensors, kind):
+    log = out.with_suffix(".wire")
+    with Stops() as stops, _sensors(options, scene) as (sensors, kind):
         rate = sum(sensor.rate_hz or sensor.family.rate_hz for sensor in sensors)
         check_disk(out, int(BYTES_PER_READ * rate * (options.seconds or UNLIMITED_S)) + 1_000_000)
+        clock = SystemClock()
         session = Session(
             sensors,
-            SystemClock(),
+            clock,
             kind=kind,
             scene=None if scene is None else scene.to_mapping(),
             title=options.title,
+            stops=stops,
         )
-        log = out.with_suffix(".wire")
+        console = Console(clock, lambda error: session.failures.note("stderr", error))
         try:
-            with _signals_as_ctrl_c():
-                stopped = _record(session, options, log)
+            ended = _record(session, options, log, console)
+            session.stop()
+            log = ended.log
+            return _built(ended, out, session, console)
+        except KeyboardInterrupt:
+            if not os.path.lexists(log):
+                raise
+            # The log is whole as far as the disk has taken it; nothing of it is removed.
+            console.line(f"springmass: ended at once, by {stops.by or 'Ctrl-C'}; {_what_to_do(log)}")
+            return INTERRUPTED
         finally:
             session.stop()
-    report = recover(
-        log,
-        out,
-        remove_log=True,
-        provenance={"software": "springmass", "version": __version__, "created_utc": now_utc()},
-    )
+
+
+def _built(ended: Ended, out: Path, session: Session, console: Console) -> int:
+    """Build the run file, say what became of the recording, and return the exit code."""
+    log, status = ended.log, ended.status
+    if status.astray:
+        console.line(f"springmass: {status.astray} during the recording; it is {log}")
+    if not out.parent.is_dir():
+        out = log.parent / out.name  # the folder was renamed
+    for line in session.failures.describe():
+        console.line(line)
+    if status.error:
+        console.line(f"springmass: {status.error}")
+    whole = not status.error and not status.dropped_records and log.name == out.with_suffix(".wire").name
+    try:
+        report = recover(
+            log,
+            out,
+            remove_log=whole,
+            provenance={"software": "springmass", "version": __version__, "created_utc": now_utc()},
+        )
+    except Exception as error:
+        console.line(f"springmass: the run file was not built ({one_line(error)}); {_what_to_do(log)}")
+        return SENSOR if status.error or isinstance(error, WriteFailed) else UNREADABLE
     for line in report.describe():
-        print(line, file=sys.stderr)
-    if stopped:
-        print("stopped before its end; the run is complete up to there", file=sys.stderr)
-    return 130 if stopped else OK
+        console.line(line)
+    if not report.log_removed:
+        console.line(f"{log}: the log stays")
+    return _exit_code(ended, report, console)
+
+
+def _exit_code(ended: Ended, report: RecoverReport, console: Console) -> int:
+    if ended.by == "the disk":
+        console.line("springmass: the disk took nothing more and ended the recording; the run holds what came before")
+        return SENSOR
+    if any(run.gone for run in report.runs):
+        return SENSOR
+    if ended.by == "seconds":
+        return OK
+    console.line(f"stopped by {ended.by}; the run is complete up to there")
+    return INTERRUPTED
+
+
+def _what_to_do(log: Path) -> str:
+    return f"the log stays: {log}; `springmass recover {shlex.quote(str(log))}` makes the run file"
+
+
+def _fill_standard_streams() -> None:
+    """Put nothing in place of standard streams that are closed, so that no log gets their number."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
 
 
 def _demand_sense(options: argparse.Namespace) -> None:
@@ -86,33 +147,14 @@ def _demand_sense(options: argparse.Namespace) -> None:
             raise ProgramError(f"--{name} does nothing without --{needed}; name both or neither", USAGE)
 
 
-@contextlib.contextmanager
-def _signals_as_ctrl_c() -> Iterator[None]:
-    """Take the end of a terminal or a service (SIGTERM, SIGHUP) for Ctrl-C, so that it closes the run as cleanly.
-
-    What was ignored before stays ignored: under ``nohup`` a recording outlives its terminal.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield  # signals are the main thread's
-        return
-    signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    heard = [number for number in signals if signal.getsignal(number) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, signal.default_int_handler) for number in heard}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _record(session: Session, options: argparse.Namespace, log: Path) -> bool:
-    """Run the session; True where Ctrl-C ended it."""
+def _record(session: Session, options: argparse.Namespace, log: Path, console: Console) -> Ended:
+    """Run the session."""
     session.listen()
-    rest = None if options.still is None else _rest(session, options.still, options.ruler)
+    rest = None if options.still is None else _rest(session, options.still, options.ruler, console)
     trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
-    show = _ProgressLine()
+    show = _ProgressLine(console)
     try:
-        session.record(
+        return session.record(
             log,
             seconds=options.seconds,
             trigger=trigger,
@@ -120,43 +162,38 @@ def _record(session: Session, options: argparse.Namespace, log: Path) -> bool:
             progress=show,
             marks=_typed_marks(),
         )
-    except KeyboardInterrupt:
-        if not log.exists():
-            raise
-        return True
     finally:
         show.end()
-    return False
 
 
-def _rest(session: Session, seconds: float, ruler: list[float]) -> StillPoint:
+def _rest(session: Session, seconds: float, ruler: list[float], console: Console) -> StillPoint:
     """Measure the rest position, at the distances by the ruler first, which set offset and scale."""
     if not ruler:
-        return _still(session, seconds, "let the bob hang still")
+        return _still(session, seconds, "let the bob hang still", console)
     if len(ruler) == 1:
-        return session.calibrate([_still(session, seconds, "let the bob hang still")], ruler, U_RULER_M)
+        return session.calibrate([_still(session, seconds, "let the bob hang still", console)], ruler, U_RULER_M)
     points = []
     for known in ruler:
-        _ask(f"bring the target to {known:g} m by the ruler, then press Enter")
-        points.append(_still(session, seconds, "keep it still"))
+        _ask(f"bring the target to {known:g} m by the ruler, then press Enter", console)
+        points.append(_still(session, seconds, "keep it still", console))
     session.calibrate(points, ruler, U_RULER_M)
     found = session.sensors[0].calibration
     scale = format_value(found.scale, found.u_scale)
-    print(f"scale {scale}, offset {format_value(found.offset_m, found.u_offset_m, 'm')}", file=sys.stderr)
-    _ask("hang the bob over the sensor, then press Enter")
-    return _still(session, seconds, "let it hang still")
+    console.line(f"scale {scale}, offset {format_value(found.offset_m, found.u_offset_m, 'm')}")
+    _ask("hang the bob over the sensor, then press Enter", console)
+    return _still(session, seconds, "let it hang still", console)
 
 
-def _still(session: Session, seconds: float, demand: str) -> StillPoint:
-    print(f"{demand} for {seconds:g} s ...", file=sys.stderr)
+def _still(session: Session, seconds: float, demand: str, console: Console) -> StillPoint:
+    console.line(f"{demand} for {seconds:g} s ...")
     rest = session.still(seconds)
-    print(f"rest {rest.rest_m * 1e3:.2f} mm, noise {rest.noise_m * 1e3:.3f} mm", file=sys.stderr)
+    console.line(f"rest {rest.rest_m * 1e3:.2f} mm, noise {rest.noise_m * 1e3:.3f} mm")
     return rest
 
 
-def _ask(demand: str) -> None:
+def _ask(demand: str, console: Console) -> None:
     """Wait for Enter."""
-    print(demand, file=sys.stderr, flush=True)
+    console.line(demand)
     if sys.stdin is None or not sys.stdin.readline():
         raise ProgramError(
             "several --ruler distances are measured one after the other, each begun with Enter, and the standard input "
@@ -168,21 +205,22 @@ def _ask(demand: str) -> None:
 class _ProgressLine:
     """The progress line on stderr: rewritten in place on a terminal; elsewhere after 1, 10, 40, 70 s and so on."""
 
-    def __init__(self) -> None:
-        self._terminal = sys.stderr.isatty()
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._terminal = console.terminal
         self._shown = 0
 
     def __call__(self, progress: Progress) -> None:
         self._shown += 1
         if self._terminal:
-            print(f"\r\x1b[K{line_of(progress)}", end="", file=sys.stderr, flush=True)
+            self._console.write(f"\r\x1b[K{line_of(progress)}", PATIENCE_S)
         elif self._shown == 1 or self._shown % UNWATCHED_LINES == 10:
-            print(line_of(progress), file=sys.stderr, flush=True)
+            self._console.write(f"{line_of(progress)}\n", PATIENCE_S)
 
     def end(self) -> None:
         """Leave the line standing."""
         if self._terminal and self._shown:
-            print(file=sys.stderr)
+            self._console.write("\n", PATIENCE_S)
 
 
 def line_of(progress: Progress) -> str:
@@ -191,14 +229,16 @@ def line_of(progress: Progress) -> str:
     found = progress.motion()
     motion = f"T {found.period}, A {found.amplitude}" if isinstance(found, LiveMotion) else found.why
     parts = [state, motion, f"{progress.rate_hz:.0f} Hz", f"{progress.missing} missing, {progress.gaps} gaps"]
+    parts += progress.gone
+    if not progress.gone and progress.silent_s > SILENT_S:
+        parts.append(f"no reading for {progress.silent_s:.0f} s")
     if progress.unshown:
         parts.append(f"{progress.unshown} samples recorded and not shown")
     if progress.status is not None:
         parts.append(f"{progress.status.synced_bytes / 1e3:.0f} kB safe")
         if progress.disk_free_bytes is not None:
             parts.append(f"{progress.disk_free_bytes / 1e9:.1f} GB left")
-        if progress.status.error:
-            parts.append(progress.status.error)
+        parts += [told for told in (progress.status.astray, progress.status.error) if told]
     return " | ".join(parts)
 
 
@@ -209,8 +249,9 @@ def _typed_marks() -> queue.SimpleQueue[str] | None:
     marks: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def read() -> None:
-        for text in sys.stdin:
-            marks.put(text.strip() or "mark")
+        with contextlib.suppress(OSError, ValueError):  # a terminal that was closed: no more marks come
+            for text in sys.stdin:
+                marks.put(text.strip() or "mark")
 
     threading.Thread(target=read, name="springmass-marks", daemon=True).start()
     return marks

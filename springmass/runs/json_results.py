@@ -34,6 +34,9 @@ _SEVERITY = {
     "stale_header": "warning",
     "lost_target": "warning",
     "quantised": "warning",
+    "sensor_lost": "warning",
+    "readings_dropped": "warning",
+    "other_device": "warning",
 }
 
 

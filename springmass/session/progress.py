@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +42,10 @@ class Progress:
         Whether the trigger has not come yet.
     unshown : int
         Samples that came faster than they were shown; the run file holds them.
+    gone : sequence of str
+        Why ports are lost that have not come back.
+    silent_s : float
+        How long no reading of the first sensor came, s.
     """
 
     seconds: float
@@ -54,6 +58,8 @@ class Progress:
     disk_free_bytes: int | None
     waiting: bool
     unshown: int = 0
+    gone: Sequence[str] = ()
+    silent_s: float = 0.0
 
 
 class Shown:
@@ -72,12 +78,7 @@ class Shown:
         self._found: LiveMotion | NotYet = NotYet("no samples so far")
         self._found_ns = 0
         self._stamps: deque[I8] = deque()
-
-    def clear(self) -> None:
-        """Count from here."""
-        self.samples = self.missing = 0
-        self._motion.clear()
-        self._found = NotYet("no samples so far")
+        self._last_ns: int | None = None
 
     def push(self, blocks: Iterable[tuple[int, Block]]) -> None:
         """Take blocks of samples by channel."""
@@ -86,14 +87,19 @@ class Shown:
             self.missing += int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
             if channel == 0:
                 self._motion.push(block.t, block.distance, block.flags)
-                if block.host_ns is not None:
+                if block.host_ns is not None and len(block):
                     self._stamps.append(block.host_ns)
+                    self._last_ns = int(block.host_ns[-1])
 
     def motion(self, now_ns: int) -> LiveMotion | NotYet:
         """Return the first sensor's motion, found anew where the last is old enough."""
         if isinstance(self._found, NotYet) or now_ns - self._found_ns >= MOTION_EVERY_NS:
             self._found, self._found_ns = self._motion.value(), now_ns
         return self._found
+
+    def silent_s(self, now_ns: int) -> float:
+        """Return how long ago the first sensor's last reading came; 0 before there was one."""
+        return 0.0 if self._last_ns is None else (now_ns - self._last_ns) * 1e-9
 
     def rate_hz(self, now_ns: int) -> int:
         """Return how many samples of the first sensor came within the last second."""

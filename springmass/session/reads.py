@@ -1,7 +1,8 @@
 """Reads on their way from the port: to the recorder as they are, then through the decoders.
 
-Both happen on the reading thread, and in this order: a defect of a decoder must not cost the bytes. A second thread for
-the decoding would be woken by each read, which costs more than the decoding of a reading does.
+Both happen on the reading thread, and in this order: a defect of a decoder must not cost the bytes. What a decoder
+raises is counted and goes no further. A second thread for the decoding would be woken by each read, which costs more
+than the decoding of a reading does.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from acquisition.decoders.family import Polled
 from acquisition.live.decoding import SensorChain
 from acquisition.live.reader import Line
 from acquisition.readings import Read
+from springmass.session.failures import Failures
 from springmass.session.sensors import Sensor
 from storage.recorder import Recorder
 
@@ -35,28 +37,34 @@ class Tee:
     ----------
     chains : sequence of SensorChain
         By channel.
+    failures : Failures, optional
+        Takes what decoders raise.
 
     Attributes
     ----------
     gone : dict of int to str
-        By channel, why a port that was lost went away.
+        By channel, why a port is lost; a port that came back is not among them.
+    readings : list of int
+        By channel, how many came.
     unshown : int
         Samples that nobody asked for in time: recorded, and the run file holds them, but not shown.
     """
 
-    def __init__(self, chains: Sequence[SensorChain]) -> None:
+    def __init__(self, chains: Sequence[SensorChain], failures: Failures | None = None) -> None:
         self._chains = chains
+        self._failures = failures or Failures()
         self._lock = threading.Lock()
         self._recorder: Recorder | None = None
         self._kept: deque[Read] | None = None
         self._heard = [bytearray() for _ in chains]
         self.gone: dict[int, str] = {}
+        self.readings = [0 for _ in chains]
         self.unshown = 0
 
     def line(self, channel: int, sensor: Sensor) -> Line:
         """Return how the reader speaks to a sensor; a polled one is asked as its chain's decoder says."""
         decoder = None if sensor.family.poll is None else partial(self._polled, channel)
-        return Line(sensor.transport, channel, sensor.family.poll, decoder)
+        return Line(sensor.transport, channel, sensor.family.poll, decoder, sensor.proof)
 
     def _polled(self, channel: int) -> Polled:
         return cast(Polled, self._chains[channel].decoder)
@@ -71,19 +79,31 @@ class Tee:
             for channel, host_ns, data in reads:
                 if len(heard := self._heard[channel]) < HEARD_BYTES:
                     heard += data[: HEARD_BYTES - len(heard)]
-                chain = self._chains[channel]
-                chain.take(host_ns, data)
-                if len(chain) > HELD_SAMPLES:
-                    self.unshown += len(chain.block())
+                self._decode(channel, host_ns, data)
+
+    def _decode(self, channel: int, host_ns: int, data: bytes) -> None:
+        chain = self._chains[channel]
+        try:
+            chain.take(host_ns, data)
+            self.readings[channel] += len(chain.last)
+            if len(chain) > HELD_SAMPLES:
+                self.unshown += len(chain.block())
+        except Exception as error:  # the bytes are recorded; what is shown of them is not worth a run
+            self._failures.note("decoder", error)
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Take an event; called on the reading thread."""
         with self._lock:
             if self._recorder is not None:
                 self._recorder.event(channel, host_ns, kind, facts)
-            self._chains[channel].lost()
+            try:
+                self._chains[channel].lost()
+            except Exception as error:
+                self._failures.note("decoder", error)
             if kind == "lost":
                 self.gone[channel] = str(facts.get("why", ""))
+            elif kind == "reopened":
+                self.gone.pop(channel, None)
 
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples that came since the last call, by channel, of the sensors that have any."""
@@ -117,7 +137,7 @@ class Tee:
             self._recorder, self._chains = recorder, chains
             recorder.reads(kept)
             for channel, host_ns, data in kept:
-                chains[channel].take(host_ns, data)
+                self._decode(channel, host_ns, data)
 
     def stop(self) -> None:
         """Record no more."""

@@ -6,14 +6,49 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Decoder, Family
 from acquisition.decoders.registry import describe_bytes
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from acquisition.live.reader import Transport
 from storage.wire_log.records import SensorEntry
 
-__all__ = ["Sensor"]
+__all__ = ["Proof", "Sensor"]
+
+PROOF_READINGS = 3
+PROOF_BYTES = 4096
+"""So many bytes without proof are another device's."""
+
+
+class Proof:
+    """Whether what speaks on a port that came back has the wire form of the sensor that was lost.
+
+    Parameters
+    ----------
+    decoder : Decoder
+        A fresh one.
+    readings : int
+        So many readings prove it, where they are at least half of the bytes since the first of them.
+    """
+
+    def __init__(self, decoder: Decoder, readings: int) -> None:
+        self._decoder = decoder
+        self._wanted = readings
+        self._readings = self._bytes = self._since_first = self._garbage_before = 0
+
+    def feed(self, host_ns: int, data: bytes) -> bool | None:
+        """Take the bytes of one read; return whether it is the sensor, None while that is open."""
+        before = self._decoder.faults.get("garbage_bytes", 0)
+        came = len(self._decoder.feed(host_ns, data))
+        if not self._readings:
+            self._garbage_before = before
+        self._readings += came
+        self._bytes += len(data)
+        self._since_first += len(data) if self._readings else 0
+        garbage = self._decoder.faults.get("garbage_bytes", 0) - self._garbage_before
+        if self._readings >= self._wanted and 2 * garbage <= self._since_first:
+            return True
+        return False if self._bytes >= PROOF_BYTES else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +78,13 @@ class Sensor:
     def chain(self) -> SensorChain:
         """Return a fresh chain."""
         return SensorChain(self.family, options=self.options, rate_hz=self.rate_hz, calibration=self.calibration)
+
+    def proof(self) -> Proof | None:
+        """Return what tells this sensor from another on a port that came back; None where bytes cannot tell."""
+        if not self.family.self_framing:
+            return None
+        # One that is asked is asked once: its decoder sees the reply only afterwards, and says then what to ask next.
+        return Proof(self.family.decoder(**self.options), PROOF_READINGS if self.family.poll is None else 1)
 
     def entry(self, channel: int) -> SensorEntry:
         """Return what the log's header says of it."""

@@ -1,16 +1,19 @@
-"""A recording session: ports opened, sensors heard, bytes kept, and the run file built at the end.
+"""A recording session: ports opened, sensors heard, and bytes kept until somebody ends it.
 
 The reading thread brings bytes; they go to the recorder as they are, and then through the decoders. The session's own
-thread looks for marks five times a second, where they can be typed, and at the samples once.
+thread waits for the end and puts marks into the run. What is shown is worked out on a thread of its own, which takes
+samples once a second (``display``): nothing that it does or raises delays or ends the other two.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import queue
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -22,21 +25,44 @@ from acquisition.block import Block
 from acquisition.clock import Clock
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortReader
+from pipeline.streaming import LiveMotion, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, USAGE, ProgramError
+from springmass.session.display import Display, Samples
+from springmass.session.failures import Failures
 from springmass.session.progress import SECOND_NS, Progress, Shown
 from springmass.session.reads import Tee
 from springmass.session.sensors import Sensor
+from springmass.session.stops import Stops
 from springmass.session.trigger import Trigger, Watch
+from storage.errors import WriteFailed
 from storage.recorder import Recorder, RecorderStatus
-from storage.recover import run_paths
 from storage.wire_log.records import LogHeader
 
-__all__ = ["Progress", "Sensor", "Session", "Trigger"]
+__all__ = ["Ended", "Progress", "Sensor", "Session", "Trigger"]
 
 HEAR_S = 3.0  # silence longer than this before a run is no sensor
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
+HELD_BLOCKS = 1000  # of samples that nobody looked at before the run began
 BYTES_PER_READ = 64  # log bytes a reading takes, for the look at the disk
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a recording ended.
+
+    Parameters
+    ----------
+    by : str
+        "seconds", "Ctrl-C", "SIGTERM", "a closed terminal" or "the disk".
+    status : RecorderStatus
+    log : Path
+        Where the log is now; elsewhere than it was begun where somebody renamed a folder meanwhile.
+    """
+
+    by: str
+    status: RecorderStatus
+    log: Path
 
 
 class Session:
@@ -51,6 +77,13 @@ class Session:
     scene : mapping, optional
         Tables, stored with the run.
     title : str
+    stops : Stops, optional
+        The user's word that the recording shall end.
+
+    Attributes
+    ----------
+    failures : Failures
+        What failed beside the recording.
     """
 
     def __init__(
@@ -61,16 +94,19 @@ class Session:
         kind: str = "live",
         scene: Mapping[str, Any] | None = None,
         title: str = "",
+        stops: Stops | None = None,
     ) -> None:
+        self.failures = Failures()
         self.sensors = list(sensors)
         self._clock = clock
         self._kind = kind
         self._scene = scene
         self._title = title
         self._chains = [sensor.chain() for sensor in self.sensors]
-        self._tee = Tee(self._chains)
+        self._tee = Tee(self._chains, self.failures)
         self._reader: PortReader | None = None
-        self._shown = Shown(self._chains[0].timebase.rate_hz)
+        self._reader_failure: BaseException | None = None
+        self._stops = stops or Stops()
 
     def listen(self) -> None:
         """Start reading, and return when every sensor has been heard.
@@ -83,17 +119,15 @@ class Session:
         lines = [self._tee.line(channel, sensor) for channel, sensor in enumerate(self.sensors)]
         self._reader = PortReader(lines, self._tee, self._clock)
         self._reader.start()
-        heard = [0] * len(self.sensors)
         # A slow sensor takes several of its own periods to be distinguished from silence.
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
-        while not all(count >= 3 for count in heard):
+        while min(self._tee.readings) < 3:
             if self._clock.now_ns() > deadline:
-                mute = next(i for i, count in enumerate(heard) if count < 3)
+                mute = next(i for i, count in enumerate(self._tee.readings) if count < 3)
                 self.stop()
                 raise ProgramError(self._not_heard(mute), SENSOR)
-            for channel, block in self.poll(0.05):
-                heard[channel] += len(block)
+            self._wait_until(self._clock.now_ns() + 50_000_000)
 
     def still(self, seconds: float = 3.0) -> StillPoint:
         """Return rest position and noise of the first sensor's next seconds, the bob hanging still."""
@@ -125,28 +159,30 @@ class Session:
         rest: StillPoint | None = None,
         progress: Callable[[Progress], None] = lambda _: None,
         marks: queue.SimpleQueue[str] | None = None,
-    ) -> RecorderStatus:
-        """Record until the seconds are over or Ctrl-C; the log is closed cleanly either way.
+    ) -> Ended:
+        """Record until the seconds are over, the user ends it or the disk takes nothing more.
 
         Parameters
         ----------
         log : Path
             The wire log to make.
         seconds : float or None
-            How long; None: until Ctrl-C.
+            How long; None: until the user ends it.
         trigger : Trigger, optional
             Left out, it starts at once.
         rest : StillPoint, optional
             What the trigger measures from; left out, the distance when it began to wait.
         progress : callable
-            Called about once a second.
+            Called about once a second, on a thread of its own.
         marks : queue of str, optional
             Marks to put into the run.
 
         Raises
         ------
         storage.errors.WriteFailed
-            If the disk refused; the log holds what came before.
+            If the log cannot be begun.
+        KeyboardInterrupt
+            If the user would not wait for the disk to take what is queued; the log stays, without its end.
         """
         if trigger is not None and any(sensor.options.get("temperature_every") for sensor in self.sensors):
             raise ProgramError(
@@ -157,111 +193,138 @@ class Session:
         since_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, progress)
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
         self._chains = [sensor.chain() for sensor in self.sensors]
-        self._shown.clear()
         recorder = Recorder(log, self._header(), self._clock)
-        start_ns = self._clock.now_ns()
-        try:
-            self._tee.start(recorder, self._chains, since_ns)
-            if rest is not None:
-                recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
-            if trigger is not None:
-                recorder.event(0, start_ns, "trigger", {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s})
-            self._loop(recorder, start_ns, seconds, progress, marks)
-        finally:
-            self._tee.stop()
+        with self._stops.counted():
+            display = self._display(progress)
+            start_ns = self._clock.now_ns()
+            self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
+            try:
+                self._tee.start(recorder, self._chains, since_ns)
+                if rest is not None:
+                    recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
+                if trigger is not None:
+                    facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
+                    recorder.event(0, start_ns, "trigger", facts)
+                by = self._loop(recorder, display, start_ns, seconds, marks)
+            finally:
+                self._tee.stop()
+                self.failures.tell = None
+            counts = self.failures.counts
+            recorder.event(0, self._clock.now_ns(), "ended", {"by": by, **({"failures": counts} if counts else {})})
+        # From here on the user may end the wait for the disk.
+        display.close()
+        with contextlib.suppress(WriteFailed):  # it stands in the status
             recorder.close()
-        return recorder.status
+        status = recorder.status
+        return Ended("the disk" if status.error else by, status, recorder.path)
 
     def poll(self, wait_s: float) -> list[tuple[int, Block]]:
         """Wait so long, then return the blocks that came since the last call."""
         self._wait_until(self._clock.now_ns() + int(wait_s * 1e9))
-        return self._look()
-
-    def _look(self) -> list[tuple[int, Block]]:
-        blocks = self._tee.blocks()
-        self._shown.push(blocks)
-        return blocks
+        return self._tee.blocks()
 
     def stop(self) -> None:
         """Stop reading and close the ports."""
         if self._reader is not None:
             reader, self._reader = self._reader, None
-            reader.stop()
+            try:
+                reader.stop()
+            except Exception as error:
+                if error is not self._reader_failure:
+                    self.failures.note("reader", error)
 
     def _loop(
         self,
         recorder: Recorder,
+        display: Display,
         start_ns: int,
         seconds: float | None,
-        progress: Callable[[Progress], None],
         marks: queue.SimpleQueue[str] | None,
-    ) -> None:
+    ) -> str:
+        """Wait for the end; return what ended the recording."""
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
         # Without marks a turn a second will do: the samples are shown once a second, and an error of the disk stands.
-        turn_s = 1.0 if marks is None else LOOK_FOR_MARKS_S
-        for _ in self._turns(turn_s, progress, recorder, start_ns, end_ns):
+        wait_ns, tick_ns = int((1.0 if marks is None else LOOK_FOR_MARKS_S) * 1e9), start_ns + SECOND_NS
+        while end_ns is None or self._clock.now_ns() < end_ns:
+            turn_ns = min(self._clock.now_ns() + wait_ns, tick_ns, tick_ns if end_ns is None else end_ns)
+            try:
+                self._wait_until(turn_ns)
+            except KeyboardInterrupt:
+                return self._stops.by or "Ctrl-C"
             if recorder.status.error:
-                return  # close() raises it; what was recorded stands
+                return "the disk"
             while marks is not None and not marks.empty():
                 recorder.mark(marks.get())
+            if turn_ns == end_ns:
+                break
+            if turn_ns == tick_ns:
+                self._ring(display, self._tee.blocks, start_ns, recorder)
+                tick_ns += SECOND_NS
+        self._tee.stop()  # what comes while the last line is shown is no part of the run
+        self._ring(display, self._tee.blocks, start_ns, recorder)
+        return "seconds"
 
     def _wait_for(self, trigger: Trigger, rest: StillPoint | None, progress: Callable[[Progress], None]) -> int:
         """Wait until the bob moves; return the host's time from which on reads belong to the run."""
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
-        keep_ns = int(trigger.keep_s * 1e9)
+        keep_ns, start_ns = int(trigger.keep_s * 1e9), self._clock.now_ns()
         self._tee.keep()
-        turns = self._turns(LOOK_FOR_TRIGGER_S, progress, None, self._clock.now_ns(), None)
-        while True:
-            for channel, block in next(turns):
-                moment_ns = watch.moment_ns(block) if channel == 0 else None
-                if moment_ns is not None:
-                    return moment_ns - keep_ns
-            # A second more than asked for: samples may lie a moment before they are looked at.
-            self._tee.forget(self._clock.now_ns() - keep_ns - SECOND_NS)
+        display, tick_ns = self._display(progress), start_ns + SECOND_NS
+        seen: deque[tuple[int, Block]] = deque(maxlen=HELD_BLOCKS)
+        try:
+            while True:
+                for channel, block in self.poll(LOOK_FOR_TRIGGER_S):
+                    seen.append((channel, block))
+                    moment_ns = watch.moment_ns(block) if channel == 0 else None
+                    if moment_ns is not None:
+                        return moment_ns - keep_ns
+                # A second more than asked for: samples may lie a moment before they are looked at.
+                self._tee.forget(self._clock.now_ns() - keep_ns - SECOND_NS)
+                if self._clock.now_ns() >= tick_ns:
+                    self._ring(display, lambda: [seen.popleft() for _ in range(len(seen))], start_ns, None)
+                    tick_ns += SECOND_NS
+        finally:
+            display.close()
 
     def _wait_until(self, deadline_ns: int) -> None:
-        """Wait; raise what ended the reading, if anything did."""
-        self._clock.sleep_until_ns(deadline_ns)
-        if self._reader is not None and self._reader.failure is not None:
-            raise self._reader.failure
+        """Wait, or let the user end it; note what the reading tripped over, if over anything."""
+        with self._stops.raised():
+            self._clock.sleep_until_ns(deadline_ns)
+        failure = None if self._reader is None else self._reader.failure
+        if failure is not None and failure is not self._reader_failure:
+            self._reader_failure = failure
+            self.failures.note("reader", failure)
 
-    def _turns(
-        self,
-        wait_s: float,
-        progress: Callable[[Progress], None],
-        recorder: Recorder | None,
-        start_ns: int,
-        end_ns: int | None,
-    ) -> Iterator[list[tuple[int, Block]]]:
-        """Wait in turns until the end, if there is one, and show the progress once a second.
+    def _display(self, progress: Callable[[Progress], None]) -> Display:
+        return Display(Shown(self._chains[0].timebase.rate_hz), progress, self.failures)
 
-        Gives the samples of each turn; while recording those of each second, for nobody needs them before.
-        """
-        wait_ns, tick_ns = int(wait_s * 1e9), start_ns + SECOND_NS
-        while end_ns is None or self._clock.now_ns() < end_ns:
-            turn_ns = min(self._clock.now_ns() + wait_ns, tick_ns, tick_ns if end_ns is None else end_ns)
-            self._wait_until(turn_ns)
-            if turn_ns == end_ns:
-                self._tee.stop()  # what comes while the last line is worked out is no part of the run
-            yield self._look() if recorder is None or turn_ns == tick_ns else []
-            if turn_ns == tick_ns:
-                progress(self._progress((self._clock.now_ns() - start_ns) * 1e-9, recorder))
-                tick_ns += SECOND_NS
+    def _ring(self, display: Display, take: Callable[[], Samples], start_ns: int, recorder: Recorder | None) -> None:
+        now_ns = self._clock.now_ns()
+        display.ring(take, lambda shown: self._progress(shown, now_ns, (now_ns - start_ns) * 1e-9, recorder))
 
-    def _progress(self, seconds: float, recorder: Recorder | None) -> Progress:
-        shown = self._shown
+    def _progress(self, shown: Shown, now_ns: int, seconds: float, recorder: Recorder | None) -> Progress:
         return Progress(
             seconds,
             shown.samples,
             shown.missing,
             sum(len(chain.timebase.gaps) for chain in self._chains),
-            shown.rate_hz(self._clock.now_ns()),
-            partial(shown.motion, self._clock.now_ns()),
+            shown.rate_hz(now_ns),
+            partial(self._motion, shown, now_ns),
             None if recorder is None else recorder.status,
-            None if recorder is None else shutil.disk_usage(recorder.path.parent).free,
+            None if recorder is None else _free_bytes(recorder.path.parent),
             recorder is None,
             self._tee.unshown,
+            tuple(self._tee.gone.values()),
+            shown.silent_s(now_ns),
         )
+
+    def _motion(self, shown: Shown, now_ns: int) -> LiveMotion | NotYet:
+        """Return the motion; where working it out fails, why there is none, for the rest of the line stands."""
+        try:
+            return shown.motion(now_ns)
+        except Exception as error:
+            self.failures.note("analysis", error)
+            return NotYet(f"no motion shown ({type(error).__name__})")
 
     def _header(self) -> LogHeader:
         return LogHeader(
@@ -280,16 +343,8 @@ class Session:
         return self.sensors[channel].not_heard(self._tee.heard(channel))
 
 
-def demand_new(path: Path, sensors: int) -> None:
-    """Refuse to record over anything: the log, and the run file or those of several sensors.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if the run file or its log exists.
-    """
-    for there in dict.fromkeys((path, path.with_suffix(".wire"), *run_paths(path, range(sensors)))):
-        if there.exists():
-            raise ProgramError(
-                f"{there}: exists already, and a recording never replaces one; choose another name", USAGE
-            )
+def _free_bytes(folder: Path) -> int | None:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:  # a folder that was renamed; that is said elsewhere
+        return None

@@ -18,6 +18,7 @@ from acquisition.live.decoding import SensorChain
 from acquisition.live.reader import Transport
 from acquisition.readings import Read, Readings
 from springmass.session import reads
+from springmass.session.failures import Failures
 from springmass.session.reads import Tee
 from springmass.session.sensors import Sensor
 from storage.recorder import Recorder
@@ -117,18 +118,23 @@ def test_samples_that_nobody_asks_for_do_not_fill_the_memory(monkeypatch: pytest
     np.testing.assert_allclose(block.t, np.arange(183, 200) * 0.01, atol=1e-12)
 
 
-def test_a_defect_of_a_decoder_costs_no_byte(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was read is recorded before it is decoded."""
-    tee, each = Tee([chain()]), chain()
+def test_a_defect_of_a_decoder_costs_no_byte_and_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was read is recorded before it is decoded; what the decoder raises is counted, and told once."""
+    failures = Failures()
+    tee, each = Tee([chain()], failures), chain()
     log = started(tee, [each], 0)
+    told: list[str] = []
+    failures.tell = lambda kind, facts: told.append(f"{kind} {facts['error']} {facts['why']}")
 
     def break_down(host_ns: int, data: bytes) -> Readings:
-        raise RuntimeError(host_ns)
+        raise RuntimeError("no such form")
 
     monkeypatch.setattr(each, "decoder", SimpleNamespace(feed=break_down))
-    with pytest.raises(RuntimeError):
-        tee.reads([(0, 7, b"x")])
-    assert log.taken == [(0, 7, b"x")]
+    for i in range(5):
+        tee.reads([(0, i, b"x")])
+    assert log.taken == [(0, i, b"x") for i in range(5)]
+    assert told == ["decoder_failed RuntimeError no such form"]
+    assert list(failures.counts.values()) == [5]
 
 
 def test_a_polled_sensor_is_asked_by_the_decoder_that_hears_its_replies() -> None:

@@ -1,0 +1,69 @@
+"""The user's word that a recording shall end: Ctrl-C, SIGTERM, a closed terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Iterator
+
+__all__ = ["Stops"]
+
+NAMES = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "a closed terminal"}
+
+
+class Stops:
+    """Takes the signals that end a recording; used in a ``with``.
+
+    Before and after the recording a signal raises KeyboardInterrupt wherever the program is. While it records, within
+    :meth:`counted`, it only does so in a wait, within :meth:`raised`: no step is left half done.
+
+    What was ignored before stays ignored: under ``nohup`` a recording outlives its terminal.
+
+    Attributes
+    ----------
+    by : str
+        What asked for the end, for people; empty where nothing did.
+    """
+
+    def __init__(self) -> None:
+        self.by = ""
+        self._raises = True
+        self._before: dict[signal.Signals, object] = {}
+
+    def __enter__(self) -> Stops:
+        if threading.current_thread() is threading.main_thread():  # signals are the main thread's
+            for number in (getattr(signal, name) for name in NAMES if hasattr(signal, name)):
+                if signal.getsignal(number) is not signal.SIG_IGN:
+                    self._before[number] = signal.signal(number, self._heard)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)  # type: ignore[arg-type]
+        self._before.clear()
+
+    @contextlib.contextmanager
+    def counted(self) -> Iterator[None]:
+        """Hold signals back for the waits within."""
+        self._raises = False
+        try:
+            yield
+        finally:
+            self._raises = True
+
+    @contextlib.contextmanager
+    def raised(self) -> Iterator[None]:
+        """Raise KeyboardInterrupt for a signal that came or comes."""
+        before, self._raises = self._raises, True
+        try:
+            if self.by and not before:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self._raises = before
+
+    def _heard(self, number: int, *_: object) -> None:
+        self.by = self.by or NAMES[signal.Signals(number).name]
+        if self._raises:
+            raise KeyboardInterrupt

@@ -1,0 +1,183 @@
+"""What a recording did not get: a sensor that went, a target that was lost, readings that no queue took.
+
+Found from the samples and the events of the log, so that the end of a recording, ``recover`` and an analysis say the
+same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from acquisition.block import Block, Flag
+from acquisition.recordings.recording import Trap
+
+__all__ = ["LossCount", "Losses", "end_of"]
+
+SILENCE_S, SILENT_PERIODS = 1.5, 5.0
+"""A sensor from which no reading comes for so long, or for so many of its periods, up to the end, is gone."""
+NO_TARGET_S = 1.0
+"""A target that is lost for less, now and then, is what missing samples tell anyway."""
+
+Event = tuple[int, Mapping[str, Any]]
+"""Host's monotonic clock, ns, and ``{"kind", "facts"}`` as the log notes it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """What one sensor's run lacks.
+
+    Parameters
+    ----------
+    seconds : float
+        How long was recorded, s.
+    gone_s : float or None
+        How long before the end the sensor's last reading came, s; None where it was there to the end.
+    why : str
+        Why the port was lost; empty where it was there and silent.
+    away : tuple of float
+        How long the port was lost each time it came back, s.
+    refused : int
+        How often another device came in its place and was not recorded.
+    no_target_s, longest_no_target_s : float
+        How long the sensor answered without a distance, s: in all, and at a stretch.
+    dropped_reads, dropped_bytes : int
+        What came while the recorder's queue was full.
+    """
+
+    seconds: float
+    gone_s: float | None = None
+    why: str = ""
+    away: tuple[float, ...] = ()
+    refused: int = 0
+    no_target_s: float = 0.0
+    longest_no_target_s: float = 0.0
+    dropped_reads: int = 0
+    dropped_bytes: int = 0
+
+    def traps(self) -> Iterator[Trap]:
+        """Yield what an analysis has to say of it."""
+        if self.gone_s is not None:
+            why = f" ({self.why})" if self.why else ", though its port was there"
+            yield Trap(
+                "sensor_lost",
+                f"The sensor was gone at the end: no reading came in the last {self.gone_s:.3g} s of the "
+                f"{self.seconds:.4g} s recorded{why}.",
+            )
+        if self.away:
+            often = "once" if len(self.away) == 1 else f"{len(self.away)} times"
+            yield Trap(
+                "sensor_away",
+                f"The sensor's port was lost {often} and came back, after {max(self.away):.3g} s at the most; "
+                f"{sum(self.away):.3g} s in all were not recorded.",
+                len(self.away),
+            )
+        if self.refused:
+            yield Trap(
+                "other_device",
+                "In place of the sensor that was lost another device came, which did not speak as the sensor does; "
+                "it was not recorded.",
+                self.refused,
+            )
+        if self.longest_no_target_s >= NO_TARGET_S:
+            yield Trap(
+                "no_target",
+                f"The sensor heard no target for {self.no_target_s:.3g} s in all, at a stretch for up to "
+                f"{self.longest_no_target_s:.3g} s.",
+            )
+        if self.dropped_reads:
+            yield Trap(
+                "readings_dropped",
+                f"{self.dropped_reads} reads of the port ({self.dropped_bytes} bytes) came while the recorder's queue "
+                "was full, because the disk did not take them; they are gaps in the record.",
+                self.dropped_reads,
+            )
+
+
+class LossCount:
+    """Counts what is missing in one sensor's samples, as they are decoded.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Nominal.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._last_ns: int | None = None
+        self._known_t: float | None = None
+        self._last_t = 0.0
+        self._missing_since = False
+        self._total = self._longest = 0.0
+
+    @property
+    def last_ns(self) -> int | None:
+        """Host's clock at the last reading."""
+        return self._last_ns
+
+    def push(self, samples: Block) -> None:
+        """Take the next samples."""
+        if not len(samples):
+            return
+        if samples.host_ns is not None:
+            self._last_ns = int(samples.host_ns[-1])
+        missing = (samples.flags & np.uint8(Flag.MISSING)) != 0
+        known = np.flatnonzero(~missing)
+        start = float(samples.t[0]) if self._known_t is None else self._known_t
+        self._last_t = float(samples.t[-1])
+        if known.size:
+            # From one distance to the next, where readings without one lie between.
+            t = np.concatenate(([start], samples.t[known]))
+            between = np.diff(known, prepend=-1) > 1
+            between[0] |= self._missing_since
+            self._add(np.diff(t)[between] - 1.0 / self._rate_hz)
+            self._known_t = float(t[-1])
+            self._missing_since = bool(missing[-1])
+        else:
+            self._known_t, self._missing_since = start, True
+
+    def losses(self, events: Iterable[Event], start_ns: int, end_ns: int) -> Losses:
+        """Return what is missing between two moments of the host's clock, by the samples and by the events."""
+        if self._missing_since and self._known_t is not None:
+            self._add(np.array([self._last_t - self._known_t]))
+            self._missing_since = False
+        told = [(content.get("kind"), content.get("facts", {})) for _, content in events]
+        gone_s = (end_ns - (start_ns if self._last_ns is None else self._last_ns)) * 1e-9
+        ports = [(kind, facts) for kind, facts in told if kind in ("lost", "reopened")]
+        lost = bool(ports) and ports[-1][0] == "lost"
+        silent = gone_s > max(SILENCE_S, SILENT_PERIODS / self._rate_hz)
+        overflows = [facts for kind, facts in told if kind == "overflow"]
+        return Losses(
+            (end_ns - start_ns) * 1e-9,
+            max(gone_s, 0.0) if lost or silent else None,
+            str(ports[-1][1].get("why", "")) if lost else "",
+            tuple(_number(facts, "gap_s") for kind, facts in ports if kind == "reopened"),
+            sum(kind == "refused" for kind, _ in told),
+            self._total,
+            self._longest,
+            sum(int(_number(facts, "records")) for facts in overflows),
+            sum(int(_number(facts, "bytes")) for facts in overflows),
+        )
+
+    def _add(self, stretches: np.ndarray[Any, Any]) -> None:
+        if stretches.size:
+            self._total += float(stretches.clip(0.0).sum())
+            self._longest = max(self._longest, float(stretches.max()))
+
+
+def _number(facts: Mapping[str, Any], name: str) -> float:
+    """A number of an event; one that a damaged or foreign log does not hold as such is none."""
+    value = facts.get(name)
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
+def end_of(events: Sequence[Event], last_ns: Iterable[int | None], start_ns: int) -> int:
+    """Return the host's clock at the end of a recording: as the log notes it, else of the last that came."""
+    for mono_ns, content in events:
+        if content.get("kind") == "ended":
+            return mono_ns
+    return max([start_ns, *(mono_ns for mono_ns, _ in events), *(ns for ns in last_ns if ns is not None)])
