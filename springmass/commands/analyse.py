@@ -13,7 +13,7 @@ from pipeline.errors import PipelineError
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder
-from springmass.runs.json_results import picked
+from springmass.runs.json_results import REJECTED_WARNINGS, picked
 from springmass.runs.loading import load, read_scene
 from storage.errors import StorageError
 
@@ -73,7 +73,8 @@ def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | No
     if not isinstance(analysed.analysis.motion, (Oscillation, Overdamped)):
         complain(f"{path}: no oscillation: {analysed.analysis.motion.why}")
         return UNREADABLE
-    wrong = [f["code"] for f in analysed.result["findings"] if f["severity"] == "error"]
+    findings = analysed.result["findings"]
+    wrong = [f["code"] for f in findings if f["severity"] == "error" or f["code"] in REJECTED_WARNINGS]
     if options.strict and wrong:
         complain(f"{path}: rejected under --strict: {', '.join(wrong)}")
         return REJECTED

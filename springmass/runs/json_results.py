@@ -17,7 +17,16 @@ from pipeline.results.findings import Finding, by_severity
 from springmass import __version__
 from springmass.runs.loading import Loaded
 
-__all__ = ["SCHEMA", "all_findings", "input_of", "picked", "plain", "provenance_of", "result_of"]
+__all__ = [
+    "REJECTED_WARNINGS",
+    "SCHEMA",
+    "all_findings",
+    "input_of",
+    "picked",
+    "plain",
+    "provenance_of",
+    "result_of",
+]
 
 SCHEMA = 1
 # How grave it is that a reader saw this; what is not named here is for information.
@@ -38,6 +47,9 @@ _SEVERITY = {
     "readings_dropped": "warning",
     "other_device": "warning",
 }
+
+REJECTED_WARNINGS = frozenset({"sensor_lost"})
+"""Warnings that ``--strict`` rejects as it does errors: the run is not the one that was to be recorded."""
 
 
 def result_of(

@@ -51,9 +51,11 @@ class Display:
             self._rings.put((take, look))
 
     def close(self) -> None:
-        """Ask for no more turns; return when the last has ended, or hangs."""
+        """Ask for no more turns; return when the last has ended, or hangs, which is a failure too."""
         self._rings.put(None)
         self._thread.join(LAST_S)
+        if self._thread.is_alive():
+            self._failures.note("display", TimeoutError(f"the last turn has not ended after {LAST_S:g} s"))
 
     def _turns(self) -> None:
         while (ring := self._rings.get()) is not None:
@@ -61,5 +63,5 @@ class Display:
             try:
                 self._shown.push(take())
                 self._show(look(self._shown))
-            except Exception as error:  # whatever it is, it is no reason to lose a reading
+            except BaseException as error:  # whatever it is, it is no reason to lose a reading
                 self._failures.note("display", error)

@@ -208,11 +208,12 @@ class Session:
                 by = self._loop(recorder, display, start_ns, seconds, marks)
             finally:
                 self._tee.stop()
+                end_ns = self._clock.now_ns()
+                display.close()
                 self.failures.tell = None
             counts = self.failures.counts
-            recorder.event(0, self._clock.now_ns(), "ended", {"by": by, **({"failures": counts} if counts else {})})
+            recorder.event(0, end_ns, "ended", {"by": by, **({"failures": counts} if counts else {})})
         # From here on the user may end the wait for the disk.
-        display.close()
         with contextlib.suppress(WriteFailed):  # it stands in the status
             recorder.close()
         status = recorder.status
@@ -322,7 +323,7 @@ class Session:
         """Return the motion; where working it out fails, why there is none, for the rest of the line stands."""
         try:
             return shown.motion(now_ns)
-        except Exception as error:
+        except BaseException as error:
             self.failures.note("analysis", error)
             return NotYet(f"no motion shown ({type(error).__name__})")
 

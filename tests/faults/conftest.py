@@ -1,0 +1,191 @@
+"""A sensor that shares no code with the decoders, and a recording of it as a process of its own."""
+
+from __future__ import annotations
+
+import binascii
+import contextlib
+import os
+import pty
+import subprocess
+import sys
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from storage.run_file.reading import open_run
+
+STEP_S = 0.01
+FIRST_US, STEP_US = 1000.0, 0.25
+SPEED_M_PER_S = 344.0
+LIMIT_S = 60.0
+
+
+def line_of(number: int, *, heard: bool = True) -> bytes:
+    """Return a reading whose echo time tells its number, as docs/reference/line-protocol.md has it."""
+    echo = f"{FIRST_US + STEP_US * number:.2f}" if heard else ""
+    body = f"R1,{number},{number * 10_000},{echo},2000,{'E' if heard else 'N'}".encode("ascii")
+    return b"$%s*%04X\n" % (body, binascii.crc_hqx(body, 0xFFFF))
+
+
+class Feeder:
+    """Sends a hundred readings a second into a pseudo-terminal until it is stopped or unplugged.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the port's name stands.
+    heard : callable
+        Tells of a reading's number whether the sensor heard its echo.
+    """
+
+    def __init__(self, folder: Path, heard: Callable[[int], bool] = lambda _: True) -> None:
+        self.port = folder / "port"
+        self._heard = heard
+        self._stop = threading.Event()
+        self._mute = threading.Event()
+        self._unplug = threading.Event()
+        self.sent = 0
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port.symlink_to(os.ttyname(self._slave))
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def __enter__(self) -> Feeder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+        self._pull()
+
+    def mute(self) -> None:
+        """Send nothing more, the cable still in."""
+        self._mute.set()
+
+    def unplug(self) -> None:
+        """Take the port away."""
+        self._unplug.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        start = time.monotonic()
+        while not self._stop.wait(max(0.0, start + self.sent * STEP_S - time.monotonic())):
+            if self._unplug.is_set():
+                self._pull()
+                return
+            if self._mute.is_set():
+                self._stop.wait(STEP_S)
+                continue
+            with contextlib.suppress(BlockingIOError):  # nobody reads: a sensor's bytes are lost then
+                os.write(self._master, line_of(self.sent, heard=self._heard(self.sent)))
+            self.sent += 1
+
+    def _pull(self) -> None:
+        self.port.unlink(missing_ok=True)
+        for descriptor in (self._slave, self._master):
+            if descriptor >= 0:
+                os.close(descriptor)
+        self._slave = self._master = -1
+
+
+@dataclass
+class Recording:
+    """A recording process: its end is awaited, never slept for."""
+
+    process: subprocess.Popen[bytes]
+    out: Path
+
+    @property
+    def log(self) -> Path:
+        """The wire log."""
+        return self.out.with_suffix(".wire")
+
+    def until_bytes(self, size: int) -> None:
+        """Return once the log holds so much."""
+        end = time.monotonic() + LIMIT_S
+        while not (self.log.exists() and self.log.stat().st_size >= size):
+            assert self.process.poll() is None, f"ended with {self.process.returncode}"
+            assert time.monotonic() < end, "nothing is recorded"
+            threading.Event().wait(0.02)
+
+    def ended(self, limit_s: float = LIMIT_S) -> int:
+        """Wait for the end; return the exit code."""
+        return self.process.wait(limit_s)
+
+
+def start_recording(
+    port: object,
+    out: Path,
+    *arguments: str,
+    before: str = "",
+    stderr: Any = subprocess.DEVNULL,
+    prepare: Callable[[], None] | None = None,
+) -> Recording:
+    """Start ``springmass record`` as a process; ``before`` is Python that it runs first."""
+    code = f"{before}\nimport sys\nfrom springmass.cli import main\nsys.exit(main(sys.argv[1:]))"
+    command = ["record", "--port", str(port), "--sensor", "line-protocol", "-o", str(out), *arguments]
+    process = subprocess.Popen(
+        [sys.executable, "-B", "-c", code, *command],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=stderr,
+        preexec_fn=prepare,
+    )
+    return Recording(process, out)
+
+
+def numbers_of(run_file: Path) -> list[int]:
+    """Return the numbers of the readings that a run file holds, and fail where a value is none that was sent."""
+    with open_run(run_file) as run:
+        run.verify()
+        distance = run.samples().distance
+    steps = (2e6 * distance[np.isfinite(distance)] / SPEED_M_PER_S - FIRST_US) / STEP_US
+    whole = np.rint(steps)
+    assert np.abs(steps - whole).max(initial=0.0) < 1e-6, "a value that nobody sent"
+    return [int(number) for number in whole]
+
+
+def demand_whole(numbers: Sequence[int]) -> None:
+    """Fail where a reading between the first and the last is missing, wrong or out of order."""
+    assert list(numbers) == list(range(numbers[0], numbers[0] + len(numbers))), "readings are missing"
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What a test of this folder needs."""
+
+    feeder: Callable[..., Feeder]
+    record: Callable[..., Recording]
+    numbers: Callable[[Path], list[int]]
+    demand_whole: Callable[[Sequence[int]], None]
+    line: Callable[..., bytes]
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    """Give a feeder and recordings; no process outlives the test."""
+    started: list[Recording] = []
+
+    def record(*arguments: Any, **options: Any) -> Recording:
+        started.append(start_recording(*arguments, **options))
+        return started[-1]
+
+    def feeder(*arguments: Any, **options: Any) -> Feeder:
+        return Feeder(tmp_path, *arguments, **options)
+
+    yield Bench(feeder, record, numbers_of, demand_whole, line_of)
+    for recording in started:
+        if recording.process.poll() is None:
+            recording.process.kill()
+            recording.process.wait()
+        if recording.process.stderr is not None:
+            recording.process.stderr.close()

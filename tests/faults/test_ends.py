@@ -1,0 +1,313 @@
+"""Every end of a recording, as docs/reference/ends-of-a-recording.md has them, while every display fails.
+
+``SPRINGMASS_ENDS`` sets the number of trials that pair ends and failures by a seeded chance.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import pty
+import resource
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springmass.cli import main
+from storage.run_file.reading import open_run
+
+ENDS = int(os.environ.get("SPRINGMASS_ENDS", "8"))
+ANSWER_S = 30.0
+"""A process that only builds its run file is done long before; the limit is for a machine that does other things."""
+SECONDS = 20_000
+"""Bytes of log that two and a half seconds fill, about."""
+
+PATCHES = {
+    "analysis raises": "raise IndexError('list index out of range')",
+    "analysis has no memory": "raise MemoryError",
+    "analysis hangs": "threading.Event().wait()",
+    "analysis ends its thread": "raise SystemExit(7)",
+}
+
+
+def patch(body: str) -> str:
+    """Return Python that has the live analysis do something else."""
+    return (
+        "import threading\nfrom pipeline.streaming import MotionAccumulator\n"
+        f"def value(self):\n    {body}\nMotionAccumulator.value = value"
+    )
+
+
+@contextlib.contextmanager
+def failing(display: str) -> Iterator[dict[str, Any]]:
+    """Give how a recording is started whose display fails in a certain way."""
+    with contextlib.ExitStack() as stack:
+        if display in PATCHES:
+            yield {"before": patch(PATCHES[display])}
+        elif display == "reader of stderr gone":
+            read, write = os.pipe()
+            os.close(read)
+            stack.callback(os.close, write)
+            yield {"stderr": write}
+        elif display == "nobody reads stderr":
+            read, write = os.pipe()
+            stack.callback(os.close, read)
+            stack.callback(os.close, write)
+            size = fcntl.fcntl(write, fcntl.F_SETPIPE_SZ, 4096)
+            os.write(write, b"x" * size)
+            yield {"stderr": write}
+        elif display == "stderr on a full disk":
+            yield {"stderr": stack.enter_context(open("/dev/full", "wb"))}
+        elif display == "stderr closed":
+            yield {"prepare": lambda: os.close(2)}
+        elif display == "terminal closed":
+            master, slave = pty.openpty()
+            os.close(master)
+            stack.callback(os.close, slave)
+            yield {"stderr": slave}
+        else:
+            assert display == "none"
+            yield {}
+
+
+DISPLAYS = [
+    *PATCHES,
+    "reader of stderr gone",
+    "nobody reads stderr",
+    "stderr on a full disk",
+    "stderr closed",
+    "terminal closed",
+]
+
+
+def end_by_signal(number: signal.Signals) -> Callable[[Any], None]:
+    """Return how a recording is ended by a signal."""
+
+    def end(recording: Any) -> None:
+        recording.until_bytes(SECONDS)
+        recording.process.send_signal(number)
+
+    return end
+
+
+def wait(recording: Any) -> None:
+    """Have the seconds end it."""
+
+
+ENDINGS: dict[str, tuple[tuple[str, ...], Callable[[Any], None], int]] = {
+    "seconds": (("--seconds", "2.5"), wait, 0),
+    "Ctrl-C": ((), end_by_signal(signal.SIGINT), 130),
+    "kill": ((), end_by_signal(signal.SIGTERM), 130),
+    "a closed terminal": ((), end_by_signal(signal.SIGHUP), 130),
+}
+
+
+def usual_signals() -> None:
+    """Undo what whoever started the tests may ignore, for children inherit that."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def play(bench: Any, folder: Path, display: str, end: str) -> None:
+    """Play one end while a display fails, and hold what is left against what was sent."""
+    arguments, bring, code = ENDINGS[end]
+    out = folder / "run.h5"
+    with bench.feeder() as feeder, failing(display) as started:
+        extra = started.pop("prepare", lambda: None)
+
+        def prepare() -> None:
+            usual_signals()
+            extra()
+
+        recording = bench.record(feeder.port, out, *arguments, prepare=prepare, **started)
+        bring(recording)
+        assert recording.ended(ANSWER_S) == code
+    numbers = bench.numbers(out)
+    bench.demand_whole(numbers)
+    assert len(numbers) > 200
+    assert not recording.log.exists()
+    with open_run(out) as run:
+        (ended,) = [event["facts"] for event in run.provenance["events"] if event["kind"] == "ended"]
+        failed = [event["kind"] for event in run.provenance["events"] if event["kind"].endswith("_failed")]
+    assert ended["by"] in (end, "SIGTERM")
+    if display != "none":
+        assert failed, "what failed is not in the run"
+        assert sum(ended["failures"].values()) >= 1
+
+
+@pytest.mark.parametrize("display", DISPLAYS)
+def test_no_display_ends_a_recording(bench: Any, tmp_path: Path, display: str) -> None:
+    """Whatever becomes of stderr or of the live analysis, the seconds end the run, with all its readings."""
+    play(bench, tmp_path, display, "seconds")
+
+
+@pytest.mark.parametrize("end", ["Ctrl-C", "kill", "a closed terminal"])
+def test_the_user_ends_a_recording(bench: Any, tmp_path: Path, end: str) -> None:
+    """Ctrl-C, kill and a closed terminal leave the run file, complete up to there, and no log."""
+    play(bench, tmp_path, "none", end)
+
+
+HUNG_DISK = """
+import os, time
+from storage.recorder import Recorder
+
+made = Recorder.__init__.__kwdefaults__["open_file"]
+
+class Disk:
+    def __init__(self, path):
+        self.file = made(path)
+        self.hung = path.with_suffix(".hung")
+    def write(self, data):
+        while self.hung.exists():
+            time.sleep(0.01)
+        return self.file.write(data)
+    def sync(self):
+        self.file.sync()
+    def close(self):
+        self.file.close()
+
+Recorder.__init__.__kwdefaults__["open_file"] = Disk
+"""
+
+
+def told(recording: Any) -> str:
+    """Return what is said until the process ends."""
+    assert recording.process.stderr is not None
+    said = recording.process.stderr.read().decode()
+    assert "Traceback" not in said
+    return str(said)
+
+
+def test_a_second_ctrl_c_while_the_disk_hangs_leaves_the_log_and_says_where(bench: Any, tmp_path: Path) -> None:
+    """The first waits for the disk; the second ends at once, removes nothing, and names the log and what to do."""
+    out = tmp_path / "run.h5"
+    with bench.feeder() as feeder:
+        recording = bench.record(feeder.port, out, before=HUNG_DISK, stderr=subprocess.PIPE, prepare=usual_signals)
+        recording.until_bytes(SECONDS)
+        (tmp_path / "run.hung").touch()
+        sent = feeder.sent
+        while feeder.sent < sent + 100:
+            pass
+        recording.process.send_signal(signal.SIGINT)
+        with pytest.raises(subprocess.TimeoutExpired):
+            recording.ended(2.0)
+        recording.process.send_signal(signal.SIGINT)
+        assert recording.ended(ANSWER_S) == 130
+        said = told(recording)
+    assert f"the log stays: {recording.log}" in said
+    assert "springmass recover" in said
+    assert not out.exists()
+    assert main(["recover", str(recording.log)]) == 0
+    numbers = bench.numbers(out)
+    bench.demand_whole(numbers)
+    assert len(numbers) > 200
+
+
+def test_a_disk_that_takes_nothing_more_ends_the_recording_with_what_it_has(bench: Any, tmp_path: Path) -> None:
+    """At a file-size limit: exit code 4, one line that says why, the run file of what came before, and the log."""
+    out = tmp_path / "run.h5"
+
+    def limited() -> None:
+        usual_signals()
+        resource.setrlimit(resource.RLIMIT_FSIZE, (SECONDS, resource.RLIM_INFINITY))
+
+    with bench.feeder() as feeder:
+        recording = bench.record(feeder.port, out, stderr=subprocess.PIPE, prepare=limited)
+        assert recording.ended(ANSWER_S) == 4
+        said = told(recording)
+    assert "could not be written further (File too large)" in said
+    assert recording.log.exists()
+    assert "springmass recover" in said  # the run file holds the log, so the limit is too low for it as well
+    assert not out.exists()
+    assert main(["recover", str(recording.log)]) == 0
+    numbers = bench.numbers(out)
+    bench.demand_whole(numbers)
+    assert len(numbers) > 200
+
+
+def test_a_folder_that_is_renamed_takes_its_recording_along(bench: Any, tmp_path: Path) -> None:
+    """The run goes on, and its run file lies beside the log, in the folder by its new name."""
+    before, after = tmp_path / "before", tmp_path / "after"
+    before.mkdir()
+    with bench.feeder() as feeder:
+        recording = bench.record(
+            feeder.port, before / "run.h5", "--seconds", "4", stderr=subprocess.PIPE, prepare=usual_signals
+        )
+        recording.until_bytes(SECONDS // 2)
+        before.rename(after)
+        assert recording.ended(ANSWER_S) == 0
+        said = told(recording)
+    assert "renamed" in said
+    numbers = bench.numbers(after / "run.h5")
+    bench.demand_whole(numbers)
+    assert len(numbers) > 350
+    assert [path.name for path in after.iterdir()] == ["run.h5"]
+
+
+@pytest.mark.parametrize("by", ["nothing", "another file"])
+def test_a_log_that_is_taken_away_is_noticed_and_saved(bench: Any, tmp_path: Path, by: str) -> None:
+    """Deleted or replaced while it is recorded: said in the run and at its end, and no reading is missing."""
+    out = tmp_path / "run.h5"
+    with bench.feeder() as feeder:
+        recording = bench.record(feeder.port, out, "--seconds", "4", stderr=subprocess.PIPE, prepare=usual_signals)
+        recording.until_bytes(SECONDS // 2)
+        recording.log.unlink()
+        if by == "another file":
+            recording.log.write_bytes(b"mine")
+        assert recording.ended(ANSWER_S) == 0
+        said = told(recording)
+    assert ("deleted" if by == "nothing" else "another file has taken") in said
+    numbers = bench.numbers(out)
+    bench.demand_whole(numbers)
+    assert len(numbers) > 350
+    with open_run(out) as run:
+        assert [event["kind"] for event in run.provenance["events"]].count("astray") == 1
+    if by == "another file":
+        assert recording.log.read_bytes() == b"mine"
+
+
+def test_a_killed_recording_leaves_its_log(bench: Any, tmp_path: Path) -> None:
+    """After kill -9 the log holds every reading but the one in flight."""
+    out = tmp_path / "run.h5"
+    with bench.feeder() as feeder:
+        recording = bench.record(feeder.port, out)
+        recording.until_bytes(SECONDS)
+        recording.process.kill()
+        recording.ended()
+    assert not out.exists()
+    assert main(["recover", str(recording.log)]) == 0
+    numbers = bench.numbers(out)
+    bench.demand_whole(numbers)
+    assert len(numbers) > 200
+
+
+def test_a_sensor_that_hears_one_ping_of_five_is_recorded(bench: Any, tmp_path: Path) -> None:
+    """Pings without an echo are missing samples, the rest is recorded, and an analysis says what it can."""
+    out = tmp_path / "run.h5"
+    with bench.feeder(lambda number: number % 5 == 0) as feeder:
+        recording = bench.record(feeder.port, out, "--seconds", "4", stderr=subprocess.PIPE, prepare=usual_signals)
+        assert recording.ended(ANSWER_S) == 0
+        told(recording)
+    numbers = bench.numbers(out)
+    assert np.all(np.diff(numbers) == 5)
+    assert len(numbers) > 70
+    assert main(["analyse", str(out), "--json"]) in (0, 3)
+
+
+@pytest.mark.trials
+def test_ends_while_displays_fail(bench: Any, tmp_path: Path) -> None:
+    """Any end with any failing display: all readings, no wrong value, an answer in time."""
+    rng = np.random.default_rng(ENDS)
+    for number in range(ENDS):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        display, end = str(rng.choice(DISPLAYS)), str(rng.choice(list(ENDINGS)))
+        play(bench, folder, display, end)
+        (tmp_path / "port").unlink(missing_ok=True)
+    print(f"{ENDS} ends while a display fails: every reading kept, none wrong")
