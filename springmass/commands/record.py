@@ -25,9 +25,8 @@ from pipeline.bench.air import speed_of_sound
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from pipeline.streaming import LiveMotion
-from springmass import __version__
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
-from springmass.runs.analysing import now_utc
+from springmass.runs.analysing import made_now
 from springmass.runs.loading import read_scene
 from springmass.session.console import Console
 from springmass.session.output import demand_new
@@ -103,7 +102,7 @@ def _built(ended: Ended, out: Path, session: Session, console: Console) -> int:
             log,
             out,
             remove_log=whole,
-            provenance={"software": "springmass", "version": __version__, "created_utc": now_utc()},
+            provenance=made_now(),
         )
     except Exception as error:
         console.line(f"springmass: the run file was not built ({one_line(error)}); {_what_to_do(log)}")

@@ -119,6 +119,25 @@ def test_nothing_is_ever_recorded_over(cli: Callable, tmp_path: Path, scene: Pat
     assert (tmp_path / name).read_bytes() == b"precious"
 
 
+def test_a_link_to_nothing_is_refused_before_the_recording(cli: Callable, tmp_path: Path, scene: Path) -> None:
+    """OUTPUT is a dangling link: one line, exit code 2, nothing recorded."""
+    (tmp_path / "run.h5").symlink_to(tmp_path / "nowhere" / "run.h5")
+    done = cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / "run.h5")
+    assert done.code == 2
+    assert "a link to nothing" in done.complaint
+    assert not (tmp_path / "run.wire").exists()
+
+
+def test_a_name_too_long_for_the_log_is_refused_before_the_recording(
+    cli: Callable, tmp_path: Path, scene: Path
+) -> None:
+    """A name of 255 bytes leaves no room for the log's longer suffix: one line, exit code 2, nothing there."""
+    done = cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / ("x" * 252 + ".h5"))
+    assert done.code == 2
+    assert "at most 255 bytes was demanded, got 257" in done.complaint
+    assert not list(tmp_path.glob("x*"))
+
+
 def test_an_absent_port_is_named_with_those_that_are_there(cli: Callable, tmp_path: Path) -> None:
     """A port that does not exist: one line, exit code 4, no file."""
     done = cli("record", "--port", "/dev/ttyNONE7", "--sensor", "line-protocol", "-o", tmp_path / "run.h5")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import errno
+import fcntl
 import grp
 import math
 import os
 import socket
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -425,18 +427,27 @@ def test_a_port_that_another_program_holds_is_busy() -> None:
 
 @pytest.mark.parametrize("code", [errno.EACCES, errno.EPERM])
 def test_without_permission_the_group_is_named(code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The message says which group owns the port and how to join it."""
+    """The message says which group owns the port and how to join it; it never says to join root."""
 
     def refuse(address: str, **_: Any) -> None:
         raise serial.SerialException(code, f"could not open port {address}: {os.strerror(code)}")
 
     place = tmp_path / "ttyUSB0"
-    place.touch()
+    place.touch(0o660)
+    place.chmod(0o660)
     monkeypatch.setattr(serial, "serial_for_url", refuse)
+    if os.geteuid() == 0:
+        with pytest.raises(PortError, match="it is root's alone") as error:
+            SerialPort(str(place), 9600)
+        assert "usermod" not in str(error.value)
+        os.chown(place, -1, grp.getgrnam("tty").gr_gid)
     group = grp.getgrgid(place.stat().st_gid).gr_name
     with pytest.raises(PortError, match="no permission to open the port") as error:
         SerialPort(str(place), 9600)
     assert f"it belongs to the group {group}; join it with `sudo usermod -aG {group} $USER`" in str(error.value)
+    place.chmod(0o600)
+    with pytest.raises(PortError, match=f"it is {group}'s alone"):
+        SerialPort(str(place), 9600)
     assert "\n" not in str(error.value)
 
 
@@ -533,6 +544,23 @@ def test_an_address_without_a_descriptor_is_read_on_a_thread_of_its_own() -> Non
     keeper.until_samples(20)
     reader.stop()
     np.testing.assert_allclose(keeper.samples.distance, 1.953)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells whether a terminal is exclusive")
+def test_an_open_port_is_closed_to_other_programs() -> None:
+    """The device itself refuses to be opened again, lock or no lock, until the port is closed."""
+    exclusive = 0x80045440  # TIOCGEXCL
+
+    def state(slave: int) -> int:
+        return int.from_bytes(fcntl.ioctl(slave, exclusive, bytes(4)), sys.byteorder)
+
+    with VirtualPort(get_family("ffhls"), Rangefinder(10.0, swing), CLOCK, seconds=0.0) as port:
+        slave = os.open(port.path, os.O_RDWR | os.O_NOCTTY)
+        held = SerialPort(port.path, 9600)
+        assert state(slave) == 1
+        held.close()
+        assert state(slave) == 0
+        os.close(slave)
 
 
 def test_stopping_closes_the_ports_and_may_be_done_twice() -> None:
