@@ -124,7 +124,7 @@ def record(hours: float, points: int) -> tuple[list[tuple[float, float]], int, i
         log = Path(folder) / "day.wire"
         session.listen()
         try:
-            status = session.record(log, seconds=seconds, progress=note)
+            status = session.record(log, seconds=seconds, progress=note).status
         finally:
             session.stop()
         readings = sum(record.payload.count(b"\n") for record in read_log(log))

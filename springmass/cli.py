@@ -26,8 +26,8 @@ def build_parser() -> argparse.ArgumentParser:
         prog="springmass",
         description="From a rangefinder's samples to period, spring constant and damping law, "
         "with uncertainties that hold.",
-        epilog="exit codes: 0 done, 1 some inputs failed, 2 usage, 3 unreadable input, 4 sensor or port, "
-        "5 rejected under --strict, 130 Ctrl-C",
+        epilog="exit codes: 0 done, 1 some inputs failed, 2 usage, 3 unreadable input, 4 sensor, port or recording "
+        "disk, 5 rejected under --strict, 130 Ctrl-C",
         formatter_class=_formatter,
     )
     parser.add_argument("--version", action="version", version=f"springmass {__version__}")

@@ -1,14 +1,14 @@
 """Exit codes of the program, and which error leads to which.
 
-====  =====================================================
+====  ================================================================
 0     everything done
 1     some inputs failed, others were done
 2     usage: an option or a scene that cannot be
 3     an input that cannot be read or holds nothing to analyse
-4     sensor or port
+4     sensor or port, or a disk that takes nothing more of a recording
 5     rejected under ``--strict``
 130   Ctrl-C, with the file closed cleanly
-====  =====================================================
+====  ================================================================
 """
 
 from __future__ import annotations
