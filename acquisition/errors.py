@@ -16,6 +16,8 @@ Every message is one line: what was demanded, what was got, where, and what to d
 
 from __future__ import annotations
 
+import unicodedata
+
 __all__ = [
     "AcquisitionError",
     "CalibrationError",
@@ -25,7 +27,27 @@ __all__ = [
     "SensorError",
     "SourceError",
     "UnknownFormat",
+    "visible",
 ]
+
+
+def visible(text: str) -> str:
+    """Return a text on one line with nothing hidden in it: what would steer a terminal or a page stands as an escape.
+
+    Titles, names and units come out of files. An escape sequence among them could clear the screen or print a line of
+    its own, and a mark of direction turn a name around.
+
+    Examples
+    --------
+    >>> visible("Bob\\x1b[2J 3\\n")
+    'Bob\\\\x1b[2J 3\\\\n'
+    """
+    return text if text.isprintable() else "".join(c if c.isprintable() else _escaped(c) for c in text)
+
+
+def _escaped(character: str) -> str:
+    # Blanks that are not the plain one hide nothing, and hold a number and its unit together.
+    return character if unicodedata.category(character) == "Zs" else character.encode("unicode_escape").decode()
 
 
 class AcquisitionError(Exception):
@@ -52,8 +74,7 @@ class FormatError(AcquisitionError):
         where = path if line is None else f"{path}, line {line}"
         said = f"{demand}; {remedy}"
         # Names and units come out of the file, line ends and all. The path is the user's own and stays as it is.
-        said = said if said.isprintable() else "".join(c if c.isprintable() else "\ufffd" for c in said)
-        super().__init__(f"{where}: {said}")
+        super().__init__(f"{where}: {visible(said)}")
 
 
 class UnknownFormat(FormatError):

@@ -81,8 +81,11 @@ class Replay:
             raise ValueError(f"speed must be positive, or None to never wait, got {speed!r}")
         self.info = info if info.kind == "simulated" else replace(info, kind="replay")
         self._run = concatenate(blocks)
-        # Times that run back are due at once: nothing waits for the past.
-        self._due = np.maximum.accumulate(self._run.t) if len(self._run) else self._run.t
+        # Times that run back are due at once, and so are unknown ones: nothing waits for the past.
+        known = self._run.t[np.isfinite(self._run.t)]
+        self._due = np.fmax.accumulate(np.concatenate([known[:1], self._run.t]))[known[:1].size :]
+        if not known.size:
+            self._due = np.zeros(len(self._run))
         self._clock = clock
         self._speed = math.inf if speed is None else float(speed)
         self._block_samples = block_samples

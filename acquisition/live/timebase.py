@@ -194,6 +194,8 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     delay = (host_ns - host_ns[0]) * NANO - (t - t[0])
     candidates = [_through_minima(x, delay), _through_all(x, delay)]
     slope, u_slope = min(candidates, key=lambda line: line[1])
+    if not slope > -1.0:  # the host's clock stood still or ran back
+        return ClockFit(math.nan, math.inf, math.nan, n)
     return ClockFit(
         # Exactly, and not -slope: at 50 ppm the square is many times a long run's uncertainty.
         -slope / (1.0 + slope) * 1e6,

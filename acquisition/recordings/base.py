@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import mmap
 import os
-import stat
-from typing import BinaryIO, Protocol, runtime_checkable
+from io import FileIO
+from typing import Protocol, runtime_checkable
 
 from acquisition.errors import FormatError
 from acquisition.recordings.inspection import Survey
 from acquisition.recordings.recording import Recording
 from acquisition.recordings.tables.text import is_text
+from acquisition.regular import open_regular
 
 __all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "read_bytes", "read_head"]
 
@@ -121,12 +122,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
 def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
     name = os.fspath(path)
     try:
-        mode = os.stat(name).st_mode
-        if stat.S_ISDIR(mode):
-            raise FormatError(name, "expected a file, got a directory", "name a recording inside it")
-        if not stat.S_ISREG(mode):
-            raise FormatError(name, "expected a regular file, got a device or pipe", "save it to a file first")
-        with open(name, "rb", buffering=0) as file:  # what is read at once needs no copy
+        with open_regular(name) as file:
             head = file.read(HEAD_BYTES)
             if not head:
                 raise FormatError(name, "expected a recording, got an empty file", "check that the export ended")
@@ -145,7 +141,7 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
         raise FormatError(repr(name), f"is no file name ({error})", "check its name") from error
 
 
-def _demand_lines(name: str, file: BinaryIO) -> None:
+def _demand_lines(name: str, file: FileIO) -> None:
     """Give up at the first MiB that holds no line end, before a file of any size is read into memory."""
     with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
         for start in range(0, len(text) - _LONGEST_LINE + 1, _LONGEST_LINE):

@@ -28,6 +28,7 @@ def lazy_dataset(contents: Contents) -> xr.Dataset:
 
     for name in contents.header.columns:
         contents.column(name)  # type and length, which a lazy reading would take as it finds them
+    contents.demand_own_signal()
     with reading(contents.path, layout.SIGNAL):
         # Through the run's own handle: the path may by now name another file.
         file = h5netcdf.File(contents.file(), "r")

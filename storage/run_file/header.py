@@ -10,8 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from acquisition.block import UNITS
 from acquisition.recordings.recording import Trap
 from acquisition.source import SourceInfo
+from storage.checked import ValueRefused, demand, parsed
+from storage.run_file.rules import HEADER_RULE
 
 __all__ = ["SCHEMA", "FileEntry", "Header", "json_text"]
 
@@ -75,10 +78,13 @@ class Header:
         Raises
         ------
         TypeError, ValueError
-            If the scene or the provenance holds what JSON cannot: an object, NaN, an infinity.
+            If the scene or the provenance holds what JSON cannot: an object, NaN, an infinity; or a value is one that
+            :meth:`decode` would refuse.
         """
         content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return json_text({"schema": SCHEMA, **content}).encode("ascii")
+        text = json_text({"schema": SCHEMA, **content}).encode("ascii")
+        self.decode(text)
+        return text
 
     @classmethod
     def decode(cls, text: bytes) -> Header:
@@ -86,16 +92,23 @@ class Header:
 
         Raises
         ------
-        TypeError, ValueError, KeyError
+        ValueRefused
+            If a value is not what :data:`storage.run_file.rules.HEADER_RULE` allows.
+        ValueError
             If the text is of another schema.
         """
-        content = json.loads(text)
-        if (schema := content.pop("schema")) != SCHEMA:
-            raise ValueError(f"schema {SCHEMA} demanded, got {schema!r}")
+        content = parsed(text, "header")
+        schema = content.pop("schema", None) if isinstance(content, dict) else None
+        if schema != SCHEMA:
+            raise ValueError(f"schema {SCHEMA} demanded, got {ascii(schema)[:60]}")
+        demand(HEADER_RULE, content, "header")
+        quantity, unit = content.get("quantity", ""), content.get("unit", "")
+        if unit != UNITS.get(quantity, ""):
+            raise ValueRefused("header.unit", f"{UNITS.get(quantity, 'empty')} of the quantity {quantity!r}", unit)
         content.pop("implied", None)  # formulas of columns, which some files hold besides the columns
         content["info"] = SourceInfo(**content["info"])
-        content["originals"] = tuple(FileEntry(**entry) for entry in content["originals"])
-        content["traps"] = tuple(Trap(**trap) for trap in content["traps"])
+        content["originals"] = tuple(FileEntry(**entry) for entry in content.get("originals", ()))
+        content["traps"] = tuple(Trap(**trap) for trap in content.get("traps", ()))
         return cls(**content)
 
 

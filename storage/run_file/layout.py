@@ -37,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import Block, Flag
+from storage.checked import ValueRefused
 from storage.run_file.header import Header, json_text
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     "column_attributes",
     "fields",
     "filters",
+    "records",
     "signal_attributes",
 ]
 
@@ -97,12 +99,32 @@ class Column:
         Units and description. What depends on the run is added by :func:`attributes`.
     fill : float or int
         Value of samples from before an optional column's first value.
+    least, greatest : float or int
+        Its range, both ends allowed; NaN is, too. The ends lie far beyond any bench: squares and sums of what lies
+        between are finite.
     """
 
     path: str
     dtype: str
     attributes: Mapping[str, Any]
     fill: float | int = 0
+    least: float | int = -1e12
+    greatest: float | int = 1e12
+
+    def demand_within(self, values: NDArray[Any], start: int) -> None:
+        """Hold values of samples from ``start`` on against the range.
+
+        Raises
+        ------
+        ValueRefused
+            Naming the first that lies outside.
+        """
+        # Of all-NaN the extremes are NaN, which is inside; a warning is given for none of it.
+        low, high = np.fmin.reduce(values, initial=self.greatest), np.fmax.reduce(values, initial=self.least)
+        if low < self.least or high > self.greatest:
+            at = int(np.flatnonzero((values < self.least) | (values > self.greatest))[0])
+            allowed = f"a number from {self.least:g} to {self.greatest:g}"
+            raise ValueRefused(f"{self.name} of sample {start + at}", allowed, values[at].item())
 
     @property
     def name(self) -> str:
@@ -131,20 +153,24 @@ COLUMNS: tuple[Column, ...] = (
             "long_name": "standard deviation of a distance, as the source knows it",
             "_FillValue": np.float32("nan"),
         },
+        least=0.0,
+        greatest=1e30,
     ),
-    Column(f"{SIGNAL}/quality", "|u1", _quality()),
+    Column(f"{SIGNAL}/quality", "|u1", _quality(), least=0, greatest=255),  # also bits of later versions
     Column(
         f"{SIGNAL}/velocity",
         "<f8",
         {"units": "m/s", "long_name": "velocity as the recording states it", **_NAN},
         float("nan"),
     ),
-    Column("/raw/sequence", "<u4", {"long_name": "index of the sample within the run"}),
+    Column("/raw/sequence", "<u4", {"long_name": "index of the sample within the run"}, least=0, greatest=2**32 - 1),
     Column(
         "/raw/host_mono_ns",
         "<i8",
         {"units": "ns", "long_name": "host's monotonic clock at arrival; -1 where no host was there"},
         NO_HOST_NS,
+        least=NO_HOST_NS,
+        greatest=2**62,
     ),
 )
 
@@ -180,6 +206,15 @@ def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None
         "velocity": block.velocity,
         "sequence": np.arange(block.first, block.first + len(block), dtype=np.int64).astype("<u4"),
         "host_mono_ns": block.host_ns,
+    }
+
+
+def records(sizes: NDArray[np.uint64]) -> dict[str, NDArray[Any]]:
+    """Return what stands beside the bytes of original files of these sizes, by name: one record a file."""
+    return {
+        "record_offset": np.cumsum(sizes, dtype="<u8") - sizes,
+        "record_len": sizes,
+        "record_mono_ns": np.full(len(sizes), NO_HOST_NS, "<i8"),
     }
 
 

@@ -28,8 +28,9 @@ from numpy.typing import NDArray
 
 from acquisition.block import Block
 from acquisition.recordings.recording import Original, Trap
+from acquisition.regular import open_regular
 from acquisition.source import SourceInfo
-from storage.errors import NotARun, damaged, reading
+from storage.errors import NotARun, RunDamaged, reading
 from storage.run_file import layout
 from storage.run_file import verification as verify
 from storage.run_file.dataset import checked_dataset, lazy_dataset
@@ -40,7 +41,7 @@ from storage.run_file.layout import CHUNK
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["Run", "is_run", "open_run"]
+__all__ = ["CHECKED", "Run", "is_run", "open_run"]
 
 
 def is_run(head: bytes) -> bool:
@@ -51,8 +52,14 @@ def is_run(head: bytes) -> bool:
     return head.startswith(layout.MAGIC)
 
 
-def open_run(path: str | os.PathLike[str]) -> Run:
+def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
     """Open a run file for reading.
+
+    Parameters
+    ----------
+    path : str or PathLike
+    unverified : bool
+        Whether to give what does not fit its digest, to look at it; what differs, :meth:`Run.differences` says.
 
     Returns
     -------
@@ -64,18 +71,18 @@ def open_run(path: str | os.PathLike[str]) -> Run:
     NotARun
         If nothing is there, or something else.
     RunDamaged
-        If the file cannot be read, or its header is not what was written.
+        If the file cannot be read, its header is not what was written, or holds what no header may.
     """
     path = Path(path)
     remedy = "name a run file; springmass formats FILE says what a file is"
     try:
-        with path.open("rb") as stream:
+        with open_regular(path) as stream:
             head = stream.read(len(layout.MAGIC))
     except OSError as error:
-        raise NotARun(path, f"a run file was demanded, got none ({error.strerror})", remedy) from error
+        raise NotARun(path, f"a run file was demanded, got none ({error.strerror or error})", remedy) from error
     if not is_run(head):
         raise NotARun(path, f"a run file (HDF5) was demanded, got a file that begins with {head!r}", remedy)
-    return Run(path, *open_header(path))
+    return Run(path, *open_header(path, unverified=unverified), unverified)
 
 
 class Run(Contents):
@@ -186,6 +193,7 @@ class Run(Contents):
             column = self.column(name)
             with reading(self.path, f"the column {name!r} from sample 0"):
                 values[name] = column[:]
+            self.demand_within(name, values[name], 0)
             self.check(name, hashlib.sha256(values[name].data).hexdigest())
         return _block(header, header.first, values)
 
@@ -238,33 +246,36 @@ class Run(Contents):
         RunDamaged
             If one is not what was written.
         """
-        found = []
-        start = 0
-        for entry in self.header.originals:
-            what = f"the original file {entry.name!r}"
-            with reading(self.path, what):
-                data = self.file()[f"{layout.WIRE}/bytes"][start : start + entry.size].tobytes()
-            original = Original(entry.name, data)
-            if original.sha256 != entry.sha256:
-                raise damaged(self.path, what, "its SHA-256 differs")
-            found.append(original)
-            start += entry.size
-        return tuple(found)
+        return tuple(
+            Original(entry.name, b"".join(verify.original_pieces(self, entry, start)))
+            for entry, start in verify.entries(self)
+        )
 
-    def verify(self) -> None:
+    def differences(self) -> tuple[RunDamaged, ...]:
+        """Read everything again and return an error for each thing that is not what was written.
+
+        Returns
+        -------
+        tuple of RunDamaged
+            Naming the array, original file, field or attribute; empty for a file that verifies.
+        """
+        return tuple(verify.differences(self))
+
+    def verify(self, *, but: Iterable[str] = ()) -> None:
         """Read everything again and hold it against what was written.
+
+        Parameters
+        ----------
+        but : iterable of str
+            Columns to leave out, such as :data:`CHECKED`, which :meth:`samples` has held against their digests.
 
         Raises
         ------
         RunDamaged
             Naming the first array, original file, field or attribute that differs.
         """
-        for _ in self.blocks(CHUNK):
-            pass
-        verify.columns(self, verify.BESIDE_BLOCKS)
-        self.originals()
-        verify.fields(self)
-        verify.attributes(self)
+        for error in verify.differences(self, but=but):
+            raise error
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,6 +297,7 @@ class _Blocks:
                 with reading(run.path, f"the column {name!r} from sample {start}"):
                     run.file()
                     values[name] = columns[name][start : start + step]
+                run.demand_within(name, values[name], start)
                 digests[name].update(values[name].tobytes())
             if start + step >= samples:
                 for name, digest in digests.items():
@@ -302,6 +314,8 @@ _BLOCK_COLUMNS = {
     "host_mono_ns": "host_ns",
     "velocity": "velocity",
 }
+CHECKED = tuple(_BLOCK_COLUMNS)
+"""The columns that make blocks: whoever reads these to their end has them checked."""
 
 
 def _block(header: Header, first: int, values: Mapping[str, NDArray[Any]]) -> Block:

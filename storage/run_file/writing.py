@@ -183,6 +183,7 @@ class _Columns:
                 if array is None:
                     array = np.full(len(block), column.fill)
                 exact = np.ascontiguousarray(array).astype(column.dtype, casting="safe", copy=False)
+                column.demand_within(exact, self._written)
                 self._write_column(column, exact, growing)
         self._written += len(block)
 
@@ -220,11 +221,7 @@ def _write_originals(file: Any, originals: Sequence[Original]) -> None:
         if original.data:
             data[start : start + len(original.data)] = np.frombuffer(original.data, np.uint8)
         start += len(original.data)
-    records = {
-        "record_offset": np.cumsum(sizes, dtype="<u8") - sizes,
-        "record_len": sizes,
-        "record_mono_ns": np.full(len(sizes), layout.NO_HOST_NS, "<i8"),
-    }
+    records = layout.records(sizes)
     wire = file[layout.WIRE]
     for name, values in records.items():
         _create(file, f"{layout.WIRE}/{name}", values.dtype.str, len(values))[:] = values

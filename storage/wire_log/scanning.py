@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from acquisition.regular import open_regular
 from storage.errors import StorageError, one_line
 from storage.wire_log.records import HEAD_BYTES, MAGIC, Kind, LogHeader, Parts, Record, unframe
 
@@ -150,7 +151,8 @@ def read_log(path: str | os.PathLike[str]) -> LogContents:
     """
     path = Path(path)
     try:
-        return LogContents(path, path.read_bytes())
+        with open_regular(path) as file:
+            return LogContents(path, file.read())
     except OSError as error:
         demand = f"a wire log was demanded, got no file that can be read ({error.strerror or one_line(error)})"
         raise NotALog(path, demand, "name a file that springmass record left behind") from error

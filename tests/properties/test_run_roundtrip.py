@@ -19,7 +19,8 @@ from storage.errors import NotARun, RunDamaged
 from storage.run_file.reading import Run, open_run
 from storage.run_file.writing import write_run
 
-# Any bit pattern is a float64: NaN payloads, negative zero and subnormal numbers among them.
+# Any bit pattern is a float64: NaN payloads, negative zero and subnormal numbers among them. Those beyond the range
+# that a run file holds become small by their highest bits.
 patterns = st.integers(0, 2**64 - 1)
 texts = st.text(max_size=20) | st.sampled_from(["\0", "a\0", "\ud800", "🜁 Träger", "a\nb"])
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -32,8 +33,11 @@ mappings = st.dictionaries(texts, json_values, max_size=4)
 
 
 def floats(draw: Any, n: int) -> Any:
-    """Draw n float64 of any bit pattern."""
-    return draw(hnp.arrays(np.uint64, n, elements=patterns)).view(np.float64)
+    """Draw n float64 of any bit pattern that a run file may hold."""
+    drawn = draw(hnp.arrays(np.uint64, n, elements=patterns))
+    with np.errstate(invalid="ignore"):  # signalling NaN
+        beyond = np.abs(drawn.view(np.float64)) > 1e12
+    return np.where(beyond, drawn & np.uint64(0xBFFFFFFFFFFFFFFF), drawn).view(np.float64)
 
 
 @st.composite
@@ -43,7 +47,7 @@ def runs(draw: Any) -> list[Block]:
     blocks = []
     for n in draw(st.lists(st.integers(0, 12), max_size=4)):
         flags = draw(hnp.arrays(np.uint8, n))
-        host = draw(st.none() | hnp.arrays(np.int64, n))
+        host = draw(st.none() | hnp.arrays(np.int64, n, elements=st.integers(-1, 2**62)))
         velocity = floats(draw, n) if draw(st.booleans()) else None
         blocks.append(Block(first, floats(draw, n), floats(draw, n), flags, host, velocity))
         first += n

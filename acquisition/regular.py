@@ -1,0 +1,55 @@
+"""Files opened for reading: regular ones alone, at once or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from io import FileIO
+
+__all__ = ["open_regular"]
+
+_OTHERS = (
+    (stat.S_ISDIR, "directory"),
+    (stat.S_ISFIFO, "pipe"),
+    (stat.S_ISSOCK, "socket"),
+    (stat.S_ISCHR, "device"),
+    (stat.S_ISBLK, "device"),
+)
+
+
+def open_regular(path: str | os.PathLike[str]) -> FileIO:
+    """Open a regular file for reading, unbuffered.
+
+    Opening a pipe that nobody writes to waits for ever, and reading a terminal or a device waits or never ends. So what
+    it is is asked first, and again of what was opened, which does not wait either.
+
+    Raises
+    ------
+    OSError
+        If it is no regular file or cannot be opened; ``strerror`` says why in a few words.
+
+    Examples
+    --------
+    >>> open_regular("/dev/null")
+    Traceback (most recent call last):
+    OSError: [Errno 22] a regular file was demanded, got a device: '/dev/null'
+    """
+    _demand_regular(path, os.stat(path).st_mode)
+    return open(path, "rb", buffering=0, opener=_open)
+
+
+def _open(path: str, flags: int) -> int:
+    descriptor = os.open(path, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
+    try:
+        _demand_regular(path, os.fstat(descriptor).st_mode)
+    except OSError:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def _demand_regular(path: str | os.PathLike[str], mode: int) -> None:
+    if not stat.S_ISREG(mode):
+        got = next((word for holds, word in _OTHERS if holds(mode)), "something else")
+        raise OSError(errno.EINVAL, f"a regular file was demanded, got a {got}", os.fspath(path))
