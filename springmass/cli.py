@@ -107,6 +107,13 @@ def _add_completions(parser: argparse.ArgumentParser) -> None:
         "--rate-hz", type=_positive, metavar="R", help="samples per second, where the file does not say"
     )
     parser.add_argument("--unit", metavar="U", help="unit of the distance where the file does not say: m, cm, mm or um")
+    _add_unverified(parser)
+
+
+def _add_unverified(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--unverified", action="store_true", help="read a run file that is not what was written; what is made says so"
+    )
 
 
 def _add_analyse(parser: argparse.ArgumentParser) -> None:
@@ -185,6 +192,7 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--force", action="store_true", help="run a step that is unstable")
     parser.add_argument("--against", metavar="RUN", help="measured run to lay the prediction over")
+    _add_unverified(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for NAME.simulated (default: here; with --json: none)")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
 

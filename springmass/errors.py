@@ -26,6 +26,7 @@ __all__ = [
     "USAGE",
     "ProgramError",
     "complain",
+    "tell",
 ]
 
 OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERRUPTED = 0, 1, 2, 3, 4, 5, 130
@@ -49,5 +50,12 @@ class ProgramError(Exception):
 
 def complain(message: object) -> None:
     """Write one line to stderr, also where a file's name or a library's message breaks over several."""
+    tell(f"springmass: {' '.join(str(message).splitlines())}")
+
+
+def tell(message: str) -> None:
+    """Write one line to stderr, control characters in it made visible."""
+    from acquisition.errors import visible  # not at the top: `--help` has nothing to tell
+
     with contextlib.suppress(OSError, ValueError):  # nobody hears it; the exit code still says what it was
-        print("springmass:", " ".join(str(message).splitlines()), file=sys.stderr)
+        print(visible(message), file=sys.stderr)

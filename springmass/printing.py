@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
@@ -26,7 +27,7 @@ def findings_text(findings: Sequence[Mapping[str, Any]]) -> str:
     """
     if not findings:
         return "No findings."
-    told = (f"{_MARKS[f['severity']]} {f['code']}: {f['message']}" for f in findings)
+    told = (visible(f"{_MARKS[f['severity']]} {f['code']}: {f['message']}") for f in findings)
     return "\n".join(wrapped(one, " " * 8) for one in told)
 
 
@@ -50,7 +51,7 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str
     for name, analysis, k, pull in zip(comparison.names, analyses, comparison.each, comparison.pulls, strict=True):
         mass = analysis.motion.derived.effective_mass_kg if isinstance(analysis.motion, Oscillation) else None
         period = str(analysis.estimates["period"])
-        rows.append((name.encode("ascii", "replace").decode(), period, str(mass), str(k), f"{pull:+.1f}"))
+        rows.append((visible(name).encode("ascii", "replace").decode(), period, str(mass), str(k), f"{pull:+.1f}"))
     # Of constants that disagree there is no mean to give.
     mean = str(comparison.spring_constant) if comparison.agree else "none"
     rows.append(("together", "", "", mean, f"chi2 {comparison.chi2:.3g} / {comparison.dof}"))

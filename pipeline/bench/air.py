@@ -84,6 +84,8 @@ def _vapour_fraction(temperature_c: float, pressure_pa: float, relative_humidity
     t, kelvin = temperature_c, temperature_c + ZERO_CELSIUS_K
     saturated = math.exp(1.2378847e-5 * kelvin**2 - 1.9121316e-2 * kelvin + 33.93711047 - 6.3431645e3 / kelvin)
     enhancement = 1.00062 + 3.14e-8 * pressure_pa + 5.6e-7 * t**2
+    if pressure_pa <= 0.0:  # an uncertain pressure may reach down to none
+        return 1.0
     return min(relative_humidity * enhancement * saturated / pressure_pa, 1.0)
 
 

@@ -46,11 +46,11 @@ _QUANTITIES: dict[tuple[str, str], _Quantity] = {
     ("air", "pressure_pa"): _Quantity("air_pressure_pa", "Pa", 1e-3, 1e7),
     ("air", "relative_humidity"): _Quantity("air_relative_humidity", "", 0.0, 1.0),
     ("sensor", "sigma_m"): _Quantity("sensor_sigma_m", "m", 1e-12, 1e3),
-    ("start", "displacement_m"): _Quantity("start_displacement_m", "m", -1e6, 1e6),
+    ("start", "displacement_m"): _Quantity("start_displacement_m", "m", -1e3, 1e3),
     ("start", "velocity_m_per_s"): _Quantity("start_velocity_m_per_s", "m/s", -1e6, 1e6),
-    ("damping", "gamma_per_s"): _Quantity("gamma_per_s", "1/s", 0.0, 1e12),
-    ("damping", "beta_per_m_s"): _Quantity("beta_per_m_s", "1/(m s)", 0.0, 1e12),
-    ("damping", "mu_m_per_s"): _Quantity("mu_m_per_s", "m/s", 0.0, 1e12),
+    ("damping", "gamma_per_s"): _Quantity("gamma_per_s", "1/s", 0.0, 1e6),
+    ("damping", "beta_per_m_s"): _Quantity("beta_per_m_s", "1/(m s)", 0.0, 1e6),
+    ("damping", "mu_m_per_s"): _Quantity("mu_m_per_s", "m/s", 0.0, 1e6),
 }
 
 
@@ -207,4 +207,6 @@ def _short(value: object) -> str:
         words = repr(value)
     except ValueError:
         return "an integer of thousands of digits"  # Python refuses to print it
+    except RecursionError:
+        return "tables nested by the hundred"
     return words if len(words) <= 60 else f"{words[:57]}..."

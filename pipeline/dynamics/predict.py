@@ -95,12 +95,13 @@ def predicted_by_pilot(
         return math.inf  # far too stiff for a method with a limit
     if fine * omega < FINE / STIFF and pilot < seconds / MOST_STIFF_STEPS:
         pilot, order = seconds / MOST_STIFF_STEPS, min(order, 1)
-    # With friction no step of the truth is longer than a radian until the bob is held.
+    # With friction no step of the truth is longer than a radian until the bob is held, and to find where it turns costs
+    # as much as a dozen steps, twice a cycle.
     held = stopping_time(start, *problem.equation.laws())
     radians = omega * min(seconds, held) if problem.equation.friction_m_per_s2 else 0.0
     while True:
         parts = min(math.ceil(pilot / fine * (1.0 - 1e-12)), MOST_PARTS)
-        if max(seconds / pilot * parts, 2.0 * radians) > MOST_STEPS:
+        if max(seconds / pilot * parts, 8.0 * radians) > MOST_STEPS:
             return math.inf  # so coarse, or so long, that to see its error takes seconds
         shares = PLAIN_SHARES[:pilots] if plain and kinked and pilot > step_s else (1.0,)
         errors = [_largest_error(integrator, solver, problem, each * pilot, parts, seconds) / start for each in shares]

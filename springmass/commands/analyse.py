@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 from acquisition.errors import AcquisitionError
 from pipeline.analyse import Oscillation, Overdamped
 from pipeline.errors import PipelineError
 from springmass.commands import completions
-from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain
+from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder
 from springmass.runs.json_results import REJECTED_WARNINGS, picked
 from springmass.runs.loading import load, read_scene
@@ -98,4 +97,4 @@ def _print_text(analysed: Analysed) -> None:
 def _write(analysed: Analysed, results: Path) -> None:
     from springmass.report.write import write_report
 
-    print(f"report: {write_report(results, [analysed])}", file=sys.stderr)
+    tell(f"report: {write_report(results, [analysed])}")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 
+from acquisition.errors import visible
 from pipeline.bench.scene import Scene
 from springmass.commands import completions
-from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain
+from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
 from springmass.runs.json_results import picked, provenance_of
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     if out is not None:
         from springmass.report.write import write_report
 
-        print(f"report: {write_report(out, runs, compared=compared, summary=result)}", file=sys.stderr)
+        tell(f"report: {write_report(out, runs, compared=compared, summary=result)}")
     findings = [*result["findings"], *(f for run in runs for f in run.result["findings"])]
     wrong = [f["code"] for f in findings if f["severity"] == "error"]
     if options.strict and wrong:
@@ -79,5 +79,5 @@ def _print_text(compared: Compared, runs: list[Analysed]) -> None:
     for run in runs:
         grave = [f for f in run.result["findings"] if f["severity"] != "info"]
         if grave:
-            print(f"\n{run.name}:")
+            print(f"\n{visible(run.name)}:")
             print(findings_text(grave))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path, PurePath
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
 from springmass.commands import completions
-from springmass.errors import OK, UNREADABLE, USAGE, ProgramError
+from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, tell
 from springmass.runs.analysing import made_now
 from springmass.runs.loading import Loaded, load, read_scene
 from storage.atomic import write_whole
@@ -29,12 +28,12 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.output)
     if out.suffix.lower() in RUN_SUFFIXES:
         written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=scene, overwrite=options.overwrite)
-        print(f"{written}: {len(loaded.samples)} samples from {loaded.path}", file=sys.stderr)
+        tell(f"{written}: {len(loaded.samples)} samples from {loaded.path}")
         return OK
     if not _holds(loaded, out):
         return _write_form(loaded, out, overwrite=options.overwrite)
     for path in _give_back(loaded, out, options.overwrite):
-        print(f"{path}: the original inside {loaded.path}, bit for bit", file=sys.stderr)
+        tell(f"{path}: the original inside {loaded.path}, bit for bit")
     return OK
 
 
@@ -67,9 +66,9 @@ def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
     _demand_free(targets, overwrite)
     for target, (_, data) in zip(targets, written.files, strict=True):
         write_whole(target, data, overwrite=overwrite)
-        print(f"{target}: {len(loaded.samples)} samples from {loaded.path}", file=sys.stderr)
+        tell(f"{target}: {len(loaded.samples)} samples from {loaded.path}")
     for sentence in written.lost:
-        print(f"{out}: {sentence}", file=sys.stderr)
+        tell(f"{out}: {sentence}")
     return OK
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.errors import NeedsAnswer
+from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.identify import formats, inspect
 from acquisition.recordings.inspection import Inspection, Survey
 from springmass.commands import completions
@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(facts, allow_nan=False))
         return OK
     for line in _lines(facts):
-        print(line)
+        print(visible(line))
     return OK
 
 

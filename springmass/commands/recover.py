@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
-from springmass.errors import OK
+from springmass.errors import OK, tell
 from springmass.runs.analysing import made_now
 from storage.recover import recover
 
@@ -23,5 +22,5 @@ def run(options: argparse.Namespace) -> int:
         provenance=made_now(),
     )
     for line in report.describe():
-        print(line, file=sys.stderr)
+        tell(line)
     return OK

@@ -14,7 +14,7 @@ from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.replay import Replay
 from springmass.commands import completions
 from springmass.commands.convert import write_loaded
-from springmass.errors import OK, USAGE, ProgramError
+from springmass.errors import OK, USAGE, ProgramError, tell
 from springmass.runs.loading import load
 
 __all__ = ["run"]
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
             path = write_loaded(
                 Path(options.output), replace(loaded, info=source.info), source, overwrite=options.overwrite
             )
-            print(f"{path}: replayed from {loaded.path}", file=sys.stderr)
+            tell(f"{path}: replayed from {loaded.path}")
             return OK
         samples = loaded.samples
         print("time_s", "distance_m" if samples.quantity == "length" else samples.quantity, "flags", sep="\t")

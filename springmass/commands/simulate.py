@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import Block
+from acquisition.errors import visible
 from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem, effective_mass_kg
@@ -21,7 +22,8 @@ from pipeline.dynamics.choose import Choice
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Joint
 from pipeline.track import F8
-from springmass.errors import OK, USAGE, ProgramError
+from springmass.commands import completions
+from springmass.errors import OK, USAGE, ProgramError, tell
 from springmass.runs.analysing import made_now, make_folder
 from springmass.runs.loading import load, read_scene
 from springmass.runs.simulation import (
@@ -50,10 +52,10 @@ def run(options: argparse.Namespace) -> int:
         from pipeline.analyse import analyse
         from springmass.runs.against import completed, duration_s, lay_over
 
-        analysis = analyse(load(options.against).track, scene)
+        analysis = analyse(load(options.against, **completions(options)).track, scene)
         scene, measured = completed(scene, analysis)
         seconds = max(seconds, duration_s(analysis))
-        print(f"from {options.against}: {', '.join(measured.names)}", file=sys.stderr)
+        tell(f"from {options.against}: {', '.join(measured.names)}")
     problem = Problem.from_scene(scene, where=options.scene)
     try:
         choice = plan(problem, options.method, options.dt, count, options.tolerance)
@@ -75,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.out is not None or not options.json:
         folder = _write(simulation, against, band, scene, options)
-        print(f"written          {folder}", file=say)
+        print(f"written          {visible(str(folder))}", file=say)
     if options.json:
         print(json.dumps(summary(simulation, against, band)))
     return OK

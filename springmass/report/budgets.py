@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.budget import Budget, Contribution
-from springmass.report.tables import QUANTITIES
+from springmass.report.tables import QUANTITIES, cell
 
 __all__ = ["INPUTS", "BudgetRow", "budget_csv", "budget_text", "budgets_of"]
 
@@ -123,5 +123,5 @@ def budget_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
             for c in budget.contributions:
                 given = ["", "", ""] if c.input is None else [repr(c.input.value), repr(c.input.u), c.input.unit]
                 slope = "" if c.sensitivity is None else repr(c.sensitivity)
-                writer.writerow([run, quantity, c.name, c.kind, *given, slope, repr(c.u), repr(c.share)])
+                writer.writerow([cell(run), quantity, c.name, c.kind, *given, slope, repr(c.u), repr(c.share)])
     return out.getvalue()

@@ -8,6 +8,7 @@ from dataclasses import replace
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.joint import JointDamping
 from pipeline.damping.select import Damping
@@ -74,7 +75,9 @@ def render_html(
     """
     from jinja2 import Environment, StrictUndefined
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_shown
+    )
     environment.filters |= {"pretty": pretty, "number": pretty_number, "symbol": _symbol, "input": INPUTS.__getitem__}
     source = files("springmass.report").joinpath("templates/report.html.j2").read_text(encoding="utf-8")
     parts = [_part(i, run, drawn) for i, (run, drawn) in enumerate(zip(runs, pictures, strict=True))]
@@ -85,6 +88,11 @@ def render_html(
         compared=None if compared is None else _compared(compared, overview),
         provenance=list(_flattened(provenance)),
     )
+
+
+def _shown(value: object) -> object:
+    """Make control characters visible in whatever text the template puts in, its own markup aside."""
+    return visible(value) if type(value) is str else value
 
 
 def _part(index: int, run: Analysed, pictures: Mapping[str, bytes]) -> dict[str, Any]:

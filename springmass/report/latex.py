@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from acquisition.errors import visible
 from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate, format_value
 from springmass.report.budgets import INPUTS, budgets_of
@@ -128,5 +129,4 @@ def _tex_quantity(estimate: Estimate | None) -> str:
 
 
 def _tex_text(text: str) -> str:
-    printable = "".join(character if character.isprintable() else " " for character in text)
-    return "".join(_TEX_SPECIAL.get(character, character) for character in printable)
+    return "".join(_TEX_SPECIAL.get(character, character) for character in visible(text))

@@ -138,8 +138,8 @@ def _periods(simulation: Simulation) -> float:
 
 
 def _shown(simulation: Simulation, run: Trajectory, periods: int) -> slice:
-    """Return the rows of the first periods."""
-    return slice(0, min(len(run.y), int(periods * _periods(simulation) / run.spacing_s) + 1))
+    """Return the rows of the first periods, two at least."""
+    return slice(0, min(len(run.y), max(2, int(periods * _periods(simulation) / run.spacing_s) + 1)))
 
 
 def _stacked(height: float, *rows: tuple[float, float]) -> tuple[Figure, list[Axes]]:
@@ -197,7 +197,7 @@ def _energies(of: Trajectory, run: Trajectory, mass_kg: float | None) -> tuple[F
     """Times and energies, mJ, as far as a run went and before it grew beyond what can be drawn."""
     relative = of.relative_energy()[: len(run.y)]
     limit = np.flatnonzero(run.relative_energy() > GROWN**2)
-    end = int(limit[0]) if limit.size else len(run.y)
+    end = max(2, int(limit[0])) if limit.size else len(run.y)
     rows = np.unique(np.linspace(0, end - 1, min(end, POINTS)).astype(np.intp))
     start = run.problem.amplitude_m() * run.problem.equation.angular_frequency_per_s
     return of.t[rows], 0.5e3 * (1.0 if mass_kg is None else mass_kg) * start * start * relative[rows]

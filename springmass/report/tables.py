@@ -7,6 +7,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate, format_value
@@ -14,6 +15,7 @@ from pipeline.numerics.estimate import Estimate, format_value
 __all__ = [
     "QUANTITIES",
     "TableRow",
+    "cell",
     "law_status",
     "page_unit",
     "pretty",
@@ -154,8 +156,30 @@ def results_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
             for law, fit in analysis.motion.damping.fits.items():
                 everything |= {f"{law}.{name}": x for name, x in fit.joint.estimates().items()}
         for name, x in everything.items():
-            writer.writerow([run, name, repr(float(x.value)), repr(float(x.u)), x.unit])
+            writer.writerow([cell(run), name, repr(float(x.value)), repr(float(x.u)), x.unit])
     return out.getvalue()
+
+
+def cell(text: str) -> str:
+    """Return a text from outside for a cell of a CSV file.
+
+    A spreadsheet takes what begins with ``=``, ``+``, ``-`` or ``@`` for a formula and runs it; an apostrophe in front
+    makes it text. Numbers stay numbers.
+
+    Examples
+    --------
+    >>> cell("=1+1"), cell("-3.5")
+    ("'=1+1", '-3.5')
+    """
+    shown = visible(text)
+    try:
+        float(shown)
+    except ValueError:
+        return f"'{shown}" if shown.strip()[:1] in _FORMULA else shown
+    return shown
+
+
+_FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
 
 
 def pretty(estimate: Estimate | None) -> str:
@@ -221,8 +245,7 @@ def _shortened(name: str, width: int) -> str:
 
 
 def _ascii(text: str) -> str:
-    printable = "".join(character if character.isprintable() else " " for character in text)
-    return printable.encode("ascii", "replace").decode()
+    return visible(text).encode("ascii", "replace").decode()
 
 
 def _typeset(number: str) -> str:

@@ -31,6 +31,7 @@ __all__ = [
 SCHEMA = 1
 # How grave it is that a reader saw this; what is not named here is for information.
 _SEVERITY = {
+    "unverified": "error",
     "malformed_rows": "warning",
     "offset_unknown_after_gap": "warning",
     "pair_mismatch": "warning",

@@ -6,7 +6,7 @@ import hashlib
 import os
 import tempfile
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,18 +19,23 @@ from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.live.timebase import fit_clock
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.recording import Original, Recording, Trap
+from acquisition.regular import open_regular
 from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from pipeline.track import Track
-from springmass.errors import UNREADABLE, USAGE, ProgramError
+from springmass.errors import UNREADABLE, USAGE, ProgramError, complain
+from storage.errors import RunDamaged
 from storage.recover import recover
 from storage.run_file.layout import MAGIC
-from storage.run_file.reading import open_run
+from storage.run_file.reading import CHECKED, open_run
 from storage.wire_log.records import MAGIC as WIRE_MAGIC
 
 __all__ = ["Loaded", "kind_of", "load", "read_scene", "sample_data", "to_track"]
 
+UNVERIFIED = "unverified"
+NAMED = 5  # differences that a message names
+LONGEST_SCENE = 1 << 14  # bytes; of longer ones some take seconds to parse
 MOTION_SENSOR = "motion-sensor"  # fixes the speed of sound
 LINE_PROTOCOL = "line-protocol"  # sends echo times
 
@@ -119,8 +124,11 @@ def load(
     run: str | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
+    unverified: bool = False,
 ) -> Loaded:
     """Read a recording, a run file or a wire log.
+
+    A run file is held against its digests, all of it, before anybody sees a sample.
 
     Parameters
     ----------
@@ -132,6 +140,9 @@ def load(
         or its port.
     from_s, to_s : float, optional
         Use samples of these seconds only; the rest stays in the file.
+    unverified : bool
+        Whether a run file that is not what was written is read all the same. What differs is said on stderr, and in a
+        trap of the code "unverified" that goes into whatever is made of it.
 
     Raises
     ------
@@ -145,13 +156,16 @@ def load(
     answers = {"velocity": velocity, "rate-hz": rate_hz, "unit": unit, "run": run}
     if kind == "run":
         _refuse(where, "a run file", {**answers, "channel": channel})
-        loaded = _load_run(where)
+        loaded = _load_run(where, unverified=unverified)
     elif kind == "wire":
         _refuse(where, "a wire log", answers)
         loaded = _load_wire(where, channel)
     else:
         recording = open_recording(where, channel=channel, rate_hz=rate_hz, unit=unit, run=run, velocity_path=velocity)
         loaded = _from_recording(where, recording)
+    for trap in loaded.traps:
+        if trap.code == UNVERIFIED:
+            complain(f"{where}: {trap.message}")
     if from_s is None and to_s is None:
         return loaded
     return replace(loaded, track=_between(loaded, from_s, to_s))
@@ -226,13 +240,24 @@ def read_scene(path: str | Path) -> Scene:
         With exit code 2 if it is absent, no TOML, or says something impossible; the line names file, key and value.
     """
     try:
-        with Path(path).open("rb") as file:
-            tables = tomllib.load(file)
-        return Scene.from_mapping(tables, where=str(path))
+        with open_regular(path) as file:
+            content = file.read(LONGEST_SCENE + 1) or b""
+        if len(content) > LONGEST_SCENE:
+            raise ProgramError(
+                f"{path}: a scene file of at most {LONGEST_SCENE} bytes was demanded, got a longer one; "
+                "name the scene, not the recording",
+                USAGE,
+            )
+        return Scene.from_mapping(tomllib.loads(content.decode()), where=str(path))
     except OSError as error:
-        raise ProgramError(f"{path}: a scene file was demanded, {error.strerror}; check the name", USAGE) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ProgramError(f"{path}: not a TOML file ({error}); see the scene file in the reference", USAGE) from error
+        raise ProgramError(
+            f"{path}: a scene file was demanded, got none ({error.strerror}); check the name", USAGE
+        ) from error
+    # A number of thousands of digits is a plain ValueError, brackets nested by the thousand end Python's own reader.
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        demand = f"not a TOML file ({reason}); see the scene file in the reference"
+        raise ProgramError(f"{path}: {demand}", USAGE) from error
     except SceneError as error:
         raise ProgramError(str(error), USAGE) from error
 
@@ -249,7 +274,7 @@ def sample_data() -> Path:
 def kind_of(path: Path) -> Literal["run", "wire", "recording"]:
     """Tell run files and wire logs from recordings, by their first bytes."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             head = file.read(len(MAGIC))
     except (OSError, ValueError):
         return "recording"  # the format registry says what is wrong with it
@@ -292,10 +317,20 @@ def _origin(recording: Recording) -> dict[str, Any]:
     return {name: value for name, value in told.items() if value}
 
 
-def _load_run(path: Path) -> Loaded:
+def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
     stamp = _stamp(path)
-    with open_run(path) as run:
-        samples = run.samples()
+    with open_run(path, unverified=unverified) as run:
+        try:
+            samples, traps = run.samples(), run.traps
+            if unverified:
+                traps += _unverified(path, run.differences())
+            else:
+                run.verify(but=CHECKED)
+        except RunDamaged as error:
+            if unverified:
+                raise
+            remedy = f"{error.remedy}, or look at it as it is with --unverified"
+            raise RunDamaged(path, error.demand, remedy) from error
         return Loaded(
             path,
             "run",
@@ -304,14 +339,24 @@ def _load_run(path: Path) -> Loaded:
             run.title,
             samples,
             to_track(samples, run.info, recorded_format=run.format, sensor=run.provenance.get("sensor")),
-            run.traps,
+            traps,
             run.malformed_rows,
-            lambda: _originals_of(path, stamp),
+            lambda: _originals_of(path, stamp, unverified),
             lambda: _sha256_of(path, stamp),
             run.scene,
             run.provenance,
             run.format,
         )
+
+
+def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[Trap, ...]:
+    """Say what of a run file is not what was written."""
+    if not differing:
+        return ()
+    named = "; ".join(error.demand for error in differing[:NAMED])
+    more = f"; and {len(differing) - NAMED} more" if len(differing) > NAMED else ""
+    message = f"{path.name} did not verify and was read all the same: {named}{more}."
+    return (Trap(UNVERIFIED, message, len(differing)),)
 
 
 def _stamp(path: Path) -> tuple[int, int, int] | None:
@@ -328,17 +373,17 @@ def _demand_same(path: Path, stamp: tuple[int, int, int] | None) -> None:
         raise ProgramError(f"{path}: the file that was loaded was demanded, got another; load it again", UNREADABLE)
 
 
-def _originals_of(path: Path, stamp: tuple[int, int, int] | None) -> tuple[Original, ...]:
+def _originals_of(path: Path, stamp: tuple[int, int, int] | None, unverified: bool) -> tuple[Original, ...]:
     """Read the original files inside a run file that was loaded."""
     _demand_same(path, stamp)
-    with open_run(path) as run:
+    with open_run(path, unverified=unverified) as run:
         return run.originals()
 
 
 def _sha256_of(path: Path, stamp: tuple[int, int, int] | None) -> str:
     """Digest a run file that was loaded."""
     _demand_same(path, stamp)
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from springmass.runs.json_results import picked, plain
 from springmass.trade.measure import Trade
@@ -123,7 +124,11 @@ def own_text(path: str, results: Own) -> str:
         period, amplitude, rate = _period(found), found.get("amplitude"), found.get("damping_rate")
         scaled = None if amplitude is None else Estimate(amplitude.value * 1e3, amplitude.u * 1e3)
         body.append([method.label, f"{seconds * 1e3:.3g}", _plain(period), _plain(scaled), _plain(rate)])
-    lines = [f"{path}, by every method (the references assume an exponential and no false echo):", "", *_aligned(body)]
+    lines = [
+        f"{visible(path)}, by every method (the references assume an exponential and no false echo):",
+        "",
+        *_aligned(body),
+    ]
     return "\n".join([*lines, *notes])
 
 

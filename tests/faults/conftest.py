@@ -1,4 +1,4 @@
-"""A sensor that shares no code with the decoders, and a recording of it as a process of its own."""
+"""A sensor that shares no code with the decoders, a recording of it as a process of its own, and a limit of time."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ import binascii
 import contextlib
 import os
 import pty
+import signal
 import subprocess
 import sys
 import threading
 import time
 import tty
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -189,3 +192,29 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
             recording.process.wait()
         if recording.process.stderr is not None:
             recording.process.stderr.close()
+
+
+@pytest.fixture
+def answer_within() -> Callable[[int], AbstractContextManager[None]]:
+    """Return a context that raises TimeoutError where its body works longer than so many seconds, or waits six times.
+
+    Processor time tells work from a machine that is busy; what waits for ever uses none.
+    """
+
+    @contextmanager
+    def within(seconds: int) -> Iterator[None]:
+        def late(_: int, __: FrameType | None) -> None:
+            raise TimeoutError(f"no answer within {seconds} s")
+
+        before = [signal.signal(each, late) for each in (signal.SIGALRM, signal.SIGPROF)]
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+        signal.alarm(6 * seconds)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            signal.alarm(0)
+            for each, handler in zip((signal.SIGALRM, signal.SIGPROF), before, strict=True):
+                signal.signal(each, handler)
+
+    return within

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from acquisition.errors import visible
 from pipeline.results.compare import Comparison
 from springmass.report.figures.canvas import BLUE, BOTTOM, RIGHT, SKY, VERMILLION, WIDTH, blank, legend_row, style
 
@@ -71,6 +72,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
 
 def _short(name: str, most: int) -> str:
+    name = visible(name)
     # Names of one experiment differ at their ends as often as at their beginnings: keep both.
     half = most // 2
-    return name if len(name) <= most else f"{name[: half - 1]}…{name[-half:]}"
+    shown = name if len(name) <= most else f"{name[: half - 1]}…{name[-half:]}"
+    return shown.replace("$", r"\$")  # else matplotlib sets what stands between two as mathematics

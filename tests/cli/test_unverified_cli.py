@@ -1,0 +1,103 @@
+"""Run files that are not what was written: refused by name, looked at only when asked, never blessed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+
+Cli = Callable[..., Any]
+
+COMMANDS = ("analyse", "convert", "replay", "trade", "simulate", "compare", "formats")
+
+
+@pytest.fixture
+def edited(cli: Cli, recording: Path, tmp_path: Path) -> Path:
+    """Return a run file with one distance rewritten, its chunk's checksum right."""
+    path = tmp_path / "edited.h5"
+    assert cli("convert", recording, path).code == 0
+    with h5py.File(path, "r+") as file:
+        file["entry/signal/distance"][7] += 0.001
+    return path
+
+
+def arguments(command: str, path: Path, out: Path, data: Path) -> list[Any]:
+    """Return a command line that reads the run."""
+    scene = data / "undamped.scene.toml"
+    return {
+        "analyse": ["analyse", "--json", path],
+        "convert": ["convert", path, out],
+        "replay": ["replay", path, "--speed", "max", "-o", out],
+        "trade": ["trade", path],
+        "simulate": ["simulate", "--scene", scene, "--json", "--against", path],
+        "compare": ["compare", path, path, "--scene", scene, "--json"],
+        "formats": ["formats", path],
+    }[command]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_rewritten_array_is_refused_by_name(cli: Cli, edited: Path, tmp_path: Path, data: Path, command: str) -> None:
+    """Exit code 3, nothing made, and a line that names the column and the way to look at it."""
+    out = tmp_path / "out.h5"
+    done = cli(*arguments(command, edited, out, data))
+    assert (done.code, done.out) == (3, "")
+    assert done.complaint.startswith(f"springmass: {edited}: the column 'distance' is not what was written")
+    assert "--unverified" in done.complaint
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("command", ["analyse", "convert", "replay", "trade", "simulate", "compare", "formats"])
+def test_unverified_looks_at_it_and_says_so(cli: Cli, edited: Path, tmp_path: Path, data: Path, command: str) -> None:
+    """The answer comes, and with it the line that it is of a file that is not what was written."""
+    done = cli(*arguments(command, edited, tmp_path / "out.h5", data), "--unverified")
+    assert done.code == 0
+    assert f"{edited}: edited.h5 did not verify and was read all the same: the column 'distance'" in done.err
+
+
+def test_what_is_made_of_it_is_never_blessed(cli: Cli, edited: Path, tmp_path: Path) -> None:
+    """A run file made of it has valid digests and says that it comes from one without, down the generations."""
+    first, second = tmp_path / "first.h5", tmp_path / "second.h5"
+    assert cli("convert", edited, first, "--unverified").code == 0
+    assert cli("replay", first, "--speed", "max", "-o", second).code == 0
+    for path in (first, second):
+        done = cli("analyse", "--json", "--strict", path)
+        assert done.code == 5
+        (finding,) = (f for f in done.results[0]["findings"] if f["code"] == "unverified")
+        assert finding["severity"] == "error"
+        assert "edited.h5 did not verify" in finding["message"]
+
+
+def test_unverified_says_nothing_of_a_sound_file(cli: Cli, recording: Path, tmp_path: Path) -> None:
+    """A file that verifies gets no mark for having been asked about."""
+    path = tmp_path / "run.h5"
+    assert cli("convert", recording, path).code == 0
+    done = cli("analyse", "--json", "--unverified", path)
+    assert (done.code, done.err) == (0, "")
+    assert "unverified" not in {f["code"] for f in done.results[0]["findings"]}
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda f: f["raw/sequence"].__setitem__(3, 9), "the column 'sequence'"),
+        (lambda f: f["wire/bytes"].__setitem__(3, 9), "the original file 'run.txt'"),
+        (lambda f: f["wire/record_len"].__setitem__(0, 9), "the array /wire/record_len"),
+        (lambda f: f["entry/instrument/rate_hz"].__setitem__((), 50.0), "the field /entry/instrument/rate_hz"),
+        (lambda f: f["entry/signal/time"].attrs.__setitem__("units", "ms"), "the attribute /entry/signal/time@units"),
+        (lambda f: f["entry/signal"].create_dataset("more", data=[1.0]), "/entry/signal/more"),
+    ],
+)
+def test_whatever_was_changed_is_named(
+    cli: Cli, recording: Path, tmp_path: Path, change: Callable[[Any], None], named: str
+) -> None:
+    """Columns that no analysis uses, originals, fields, attributes and what was added count as the samples do."""
+    path = tmp_path / "run.h5"
+    assert cli("convert", recording, path).code == 0
+    with h5py.File(path, "r+") as file:
+        change(file)
+    done = cli("analyse", "--json", path)
+    assert done.code == 3
+    assert f"{path}: {named} is not what was written" in done.complaint
