@@ -1,28 +1,36 @@
-"""Memory over a simulated day at 100 Hz: `python benchmarks/day.py`.
+"""A simulated day at 100 Hz: memory while it is recorded, memory and time of its recovery: `python benchmarks/day.py`.
 
 A session records through its own threads, log and live analysis; only the clock and the port are simulated. The port
 advances the clock by a tenth of a second whenever the session has nothing more to do, and sends what a sensor would
-have sent by then, so that a day takes minutes.
+have sent by then, so that a day takes minutes. The log is then recovered by a process of its own, which says what it
+took: time by the clock and by the processor, and the peak of its memory (VmHWM).
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import json
 import math
 import os
+import subprocess
 import sys
 import tempfile
 import threading
+import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from springmass.session.session import Progress, Sensor, Session
+from storage.recover import recover
 from storage.wire_log.scanning import read_log
 
 RATE_HZ = 100
 STEP_NS = 100_000_000
 SPEED_M_PER_S = 344.0
+PEAK_MB = 200.0
 
 
 class LockstepClock:
@@ -107,8 +115,39 @@ def resident_mb() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def record(hours: float, points: int) -> tuple[list[tuple[float, float]], int, int]:
-    """Record; return (hours, MB) at that many equal steps, readings in the log, and records dropped."""
+def peak_mb() -> float:
+    """Greatest memory that this process has had in use, MB."""
+    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) * 1024 / 1e6
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a recovery took."""
+
+    samples: int
+    seconds: float
+    processor_s: float
+    peak_mb: float
+
+
+def recovered(log: Path) -> Cost:
+    """Recover a log in a process of its own, and remove it as a recording's end does."""
+    command = [sys.executable, __file__, "--recover", str(log)]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return Cost(**json.loads(said))
+
+
+def recover_here(log: Path) -> Cost:
+    """Recover a log in this process."""
+    start_s, start_processor_s = time.perf_counter(), time.process_time()
+    (run,) = recover(log, log.with_suffix(".h5"), overwrite=True, remove_log=True).runs
+    seconds, processor_s = time.perf_counter() - start_s, time.process_time() - start_processor_s
+    return Cost(run.samples, seconds, processor_s, peak_mb())
+
+
+def record(hours: float, points: int) -> tuple[list[tuple[float, float]], int, int, Cost]:
+    """Record; return (hours, MB) at that many equal steps, readings in the log, records dropped, and its recovery."""
     clock = LockstepClock()
     session = Session([Sensor(get_family("line-protocol"), SimulatedPort(clock))], clock, kind="simulated")
     seconds = hours * 3600.0
@@ -128,7 +167,8 @@ def record(hours: float, points: int) -> tuple[list[tuple[float, float]], int, i
         finally:
             session.stop()
         readings = sum(record.payload.count(b"\n") for record in read_log(log))
-    return seen, readings, status.dropped_records
+        cost = recovered(log)
+    return seen, readings, status.dropped_records, cost
 
 
 def main() -> int:
@@ -136,15 +176,24 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=24.0, metavar="H", help="length of the run (%(default)s)")
     parser.add_argument("--limit-mb", type=float, default=8.0, metavar="MB", help="growth that is flat (%(default)s)")
+    parser.add_argument("--recover", type=Path, metavar="LOG", help="only recover this log, which is removed")
     options = parser.parse_args()
-    seen, readings, dropped = record(options.hours, 12)
+    if options.recover is not None:
+        print(json.dumps(dataclasses.asdict(recover_here(options.recover))))
+        return 0
+    seen, readings, dropped, cost = record(options.hours, 12)
     for hours, mb in seen:
         print(f"{hours:6.2f} h  {mb:7.1f} MB")
     expected = round(options.hours * 3600 * RATE_HZ)
     growth = seen[-1][1] - seen[0][1]
     print(f"{readings} readings in the log of {expected}, {dropped} records dropped")
     print(f"growth from the first to the last: {growth:+.1f} MB (flat: below {options.limit_mb:g})")
-    return int(growth > options.limit_mb or dropped > 0 or readings < expected)
+    print(
+        f"recovered: {cost.samples} samples in {cost.seconds:.1f} s ({cost.processor_s:.1f} s of the processor, "
+        f"{cost.samples / cost.processor_s:.0f} samples/s), peak of memory {cost.peak_mb:.0f} MB (limit {PEAK_MB:g})"
+    )
+    whole = readings >= expected and cost.samples >= expected
+    return int(growth > options.limit_mb or dropped > 0 or not whole or cost.peak_mb > PEAK_MB)
 
 
 if __name__ == "__main__":

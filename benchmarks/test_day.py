@@ -1,4 +1,4 @@
-"""The day benchmark as a test: a quarter of an hour, whose memory is flat and whose log is whole."""
+"""The day benchmark as a test: a quarter of an hour, whose memory is flat and whose log and run file are whole."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ SCRIPT = Path(__file__).with_name("day.py")
 
 
 def test_memory_is_flat_and_every_reading_is_kept() -> None:
-    """After the first minutes memory grows by less than 4 MB, and the log holds 90,000 readings."""
+    """After the first minutes memory grows by less than 4 MB; log and run file hold 90,000 readings, within 200 MB."""
     spec = importlib.util.spec_from_file_location("springmass_benchmark_day", SCRIPT)
     assert spec is not None
     assert spec.loader is not None
     day = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = day
     spec.loader.exec_module(day)
-    seen, readings, dropped = day.record(0.25, 3)
+    seen, readings, dropped, cost = day.record(0.25, 3)
     assert seen[-1][1] - seen[0][1] < 4.0
     assert (readings, dropped) == (90_000, 0)
+    assert cost.samples == 90_000
+    assert cost.peak_mb < day.PEAK_MB

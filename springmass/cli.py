@@ -65,6 +65,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ImportError as error:
         complain(f"{error}; this installation is not whole, springmass doctor says what is wrong with it")
         return SOME_FAILED
+    except MemoryError:
+        complain("more memory was demanded than there is; end other programs, or raise the limit")
+        return UNREADABLE
     except BrokenPipeError:
         # The reader of our output went away (`| head`): nothing is left to say, not even at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -256,6 +259,8 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="applied to echo times, m/s")
     parser.add_argument("--trigger", type=_positive, metavar="M", help="start when the bob leaves its rest by this, m")
     parser.add_argument("--pre", type=_positive, metavar="S", help="seconds to keep from before (default 2)")
+    parser.add_argument("--roll-mb", type=_positive, metavar="MB", help="begin another log after this (default 1000)")
+    parser.add_argument("--roll-hours", type=_positive, metavar="H", help="begin another log after this, too")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated bench's noise (default 0)")
     parser.add_argument(
         "--crystal-ppm", type=_finite, default=0.0, metavar="PPM", help="of the simulated sensor's clock"

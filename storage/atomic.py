@@ -9,17 +9,22 @@ import contextlib
 import errno
 import io
 import os
+import re
 import secrets
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from storage.errors import HDF5_ERRORS, RunExists, WriteFailed, one_line
+from storage.errors import HDF5_ERRORS, RunExists, WriteFailed, demand_memory, one_line
+
+if sys.platform != "win32":
+    import fcntl
 
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["sync_folder", "whole_file", "whole_h5", "write_whole", "writing_h5"]
+__all__ = ["remove_leftovers", "sync_folder", "whole_file", "whole_h5", "write_whole", "writing_h5"]
 
 # Some network and FUSE file systems cannot sync a folder, and Windows cannot even open one.
 _FOLDER_CANNOT_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EBADF}
@@ -93,7 +98,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
     target = Path(path)
     if not overwrite and os.path.lexists(target):
         raise _exists(target)
-    temporary = _reserve(target)
+    temporary, lock = _reserve(target)
     try:
         yield temporary
         try:
@@ -106,6 +111,8 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
         # After a rename nothing is left to remove.
         with contextlib.suppress(OSError):
             temporary.unlink()
+        if lock is not None:
+            os.close(lock)
 
 
 @contextlib.contextmanager
@@ -161,6 +168,7 @@ def writing_h5(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except HDF5_ERRORS as error:
+        demand_memory(path, error)
         remedy = "check the disk's space and what was handed over"
         raise WriteFailed(path, f"could not be written ({one_line(error)})", remedy) from error
 
@@ -215,15 +223,52 @@ class _Sink:
             self.error = self.error or error
 
 
-def _reserve(target: Path) -> Path:
-    """Make an empty hidden file beside the target, with the permissions that any new file would get."""
-    # The name is cut, so that a target of the longest allowed name still gets a temporary one.
-    temporary = target.with_name(f".{target.name[:32]}.{secrets.token_hex(4)}.part")
-    try:
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-    except OSError as error:
-        raise _failed(target, error) from error
-    return temporary
+_LEFTOVER = re.compile(r"\..{1,32}\.[0-9a-f]{8}\.part", re.DOTALL)
+
+
+def remove_leftovers(folder: Path) -> tuple[Path, ...]:
+    """Remove what writers left that were killed, and return it; what a living one is at work on stays.
+
+    A writer holds a lock on its temporary file, which ends with it, however it ends. Where a system or a file system
+    has no locks, nothing is removed.
+    """
+    if sys.platform == "win32":
+        return ()
+    removed = []
+    with contextlib.suppress(OSError):
+        for name in sorted(os.listdir(folder)):
+            if _LEFTOVER.fullmatch(name) and _abandoned(folder / name):
+                removed.append(folder / name)
+    return tuple(removed)
+
+
+def _abandoned(leftover: Path) -> bool:
+    """Remove a temporary file that nobody holds; return whether it is gone."""
+    with contextlib.suppress(OSError), leftover.open("r+b") as file:
+        assert sys.platform != "win32"
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        leftover.unlink()
+        return True
+    return False
+
+
+def _reserve(target: Path) -> tuple[Path, int | None]:
+    """Make an empty hidden file beside the target, with the permissions that any new file would get, and lock it."""
+    while True:
+        # The name is cut, so that a target of the longest allowed name still gets a temporary one.
+        temporary = target.with_name(f".{target.name[:32]}.{secrets.token_hex(4)}.part")
+        try:
+            descriptor = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
+        except OSError as error:
+            raise _failed(target, error) from error
+        if sys.platform == "win32":
+            os.close(descriptor)
+            return temporary, None
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        if os.fstat(descriptor).st_nlink:
+            return temporary, descriptor
+        os.close(descriptor)  # taken for a leftover before it was locked
 
 
 def _sync(file: Path) -> None:

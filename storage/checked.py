@@ -8,8 +8,8 @@ through both. Whatever it lets pass has the types, ranges, sizes and depth that 
 from __future__ import annotations
 
 import json
-import math
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +17,7 @@ from typing import Any
 __all__ = ["Choice", "Json", "Number", "Optional", "Rows", "Rule", "Table", "Text", "ValueRefused", "demand", "parsed"]
 
 _SHOWN = 60
+_GREATEST = sys.float_info.max  # an integer beyond it is no float's equal, and NaN compares as false
 
 
 class ValueRefused(ValueError):
@@ -153,7 +154,7 @@ class Json:
                     inner += each.values()
                 elif isinstance(each, list | tuple):
                     inner += each
-                elif isinstance(each, float) and not math.isfinite(each):
+                elif isinstance(each, int | float) and not -_GREATEST <= each <= _GREATEST:
                     raise ValueRefused(key, "finite where it holds numbers", each)
             level = inner
             if not level:

@@ -7,6 +7,7 @@
     |-- RunDamaged     a run file whose content is not what was written       springmass exits with 3
     |-- RunClosed      a run used outside its ``with``
     |-- NotALog        nothing there, or no wire log                          springmass exits with 3
+    |-- OutOfMemory    the machine has too little memory; no word against the file   springmass exits with 3
     `-- WriteFailed    a file could not be written; what stood there before stands
         |-- RunExists  a file of that name stands already and may not be replaced
         `-- DiskNearlyFull   too little room for the run, known before it starts
@@ -18,23 +19,28 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections.abc import Iterator
 
 __all__ = [
     "HDF5_ERRORS",
     "NotARun",
+    "OutOfMemory",
     "RunClosed",
     "RunDamaged",
     "RunExists",
     "StorageError",
     "WriteFailed",
     "damaged",
+    "demand_memory",
     "one_line",
     "reading",
 ]
 
 HDF5_ERRORS = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
 """What h5py raises on a wrong checksum, a missing object, a full disk or a value that HDF5 cannot hold."""
+
+_NO_MEMORY = re.compile("memory alloc|alloc[a-z]* memory|out of memory|cannot allocate", re.IGNORECASE)
 
 
 def one_line(error: BaseException) -> str:
@@ -82,6 +88,10 @@ class RunClosed(StorageError):
     """A run read after its ``with`` ended."""
 
 
+class OutOfMemory(StorageError):
+    """A file that this machine has too little memory for; it may be sound."""
+
+
 class WriteFailed(StorageError):
     """A file that could not be written: a full disk, a missing folder, blocks with a gap between them."""
 
@@ -104,4 +114,19 @@ def reading(path: str | os.PathLike[str], what: str) -> Iterator[None]:
     except StorageError:
         raise
     except HDF5_ERRORS as error:
+        demand_memory(path, error)
         raise damaged(path, what, one_line(error)) from error
+
+
+def demand_memory(path: str | os.PathLike[str], error: BaseException) -> None:
+    """Raise :class:`OutOfMemory` where an error is a lack of memory, which says nothing of the file.
+
+    Examples
+    --------
+    >>> demand_memory("run.h5", OSError("Can't read data (memory allocation failed for chunk)"))
+    Traceback (most recent call last):
+    storage.errors.OutOfMemory: run.h5: more memory was demanded than there is; end other programs, or raise the limit
+    """
+    if isinstance(error, MemoryError) or _NO_MEMORY.search(str(error)):
+        demand = "more memory was demanded than there is"
+        raise OutOfMemory(path, demand, "end other programs, or raise the limit") from error

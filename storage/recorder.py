@@ -21,7 +21,7 @@ from acquisition.clock import Clock
 from acquisition.readings import Read
 from storage.errors import WriteFailed, one_line
 from storage.log_place import LogPlace
-from storage.wire_log.appending import Item, LogFile, WireLogWriter, open_log_file
+from storage.wire_log.appending import Item, LogFile, Roll, WireLogWriter, open_log_file
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, event_payload
 
 __all__ = ["Recorder", "RecorderStatus"]
@@ -92,6 +92,8 @@ class Recorder:
         Between syncs, s.
     queue_bytes : int
         Bound of the queue. What comes while it is full is counted, and an event in the log says so.
+    roll : Roll
+        When a long log goes on in another file.
     open_file : callable
         Makes the log's file: the seam for tests.
 
@@ -114,9 +116,10 @@ class Recorder:
         *,
         sync_every_s: float = 1.0,
         queue_bytes: int = QUEUE_BYTES,
+        roll: Roll = Roll(),  # noqa: B008, it is frozen
         open_file: Callable[[Path], LogFile] = open_log_file,
     ) -> None:
-        self._log = WireLogWriter(path, header, open_file=open_file)
+        self._log = WireLogWriter(path, header, open_file=open_file, roll=roll)
         self.path = self._log.path
         self._place = LogPlace(self.path)
         self._clock = clock

@@ -1,7 +1,8 @@
 """From a wire log, however torn, to a run file: at the end of every recording, and after a crash.
 
 The bytes go through the very chain that showed them live, so both give the same samples. The log itself travels
-inside the run file, bit for bit: nothing that decoding leaves out is lost.
+inside the run file, bit for bit: nothing that decoding leaves out is lost. Log and samples pass through memory a
+stretch at a time, so that a run may be of any length.
 """
 
 from __future__ import annotations
@@ -9,111 +10,28 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from acquisition.block import Block
-from acquisition.recordings.recording import Original, Trap
-from storage.errors import RunDamaged, RunExists
-from storage.losses import Event, LossCount, Losses, end_of
+from acquisition.errors import AcquisitionError
+from storage.atomic import remove_leftovers
+from storage.building import SensorRun
+from storage.checked import ValueRefused
+from storage.errors import RunDamaged, RunExists, StorageError
+from storage.losses import Losses
+from storage.recovered import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
-from storage.run_file.writing import write_run
-from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry
-from storage.wire_log.scanning import Damage, LogContents, NotALog, read_log
-from storage.wire_log.wire_samples import Decoded, decode_log
+from storage.run_file.writing import RunWriter, run_writer
+from storage.wire_log.notes import Notes
+from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.scanning import LogContents, NotALog, read_log
+from storage.wire_log.wire_samples import LogDecoder, chains_of
 
-__all__ = ["RecoverReport", "RecoveredRun", "recover", "run_paths"]
+__all__ = ["RecoverReport", "RecoveredRun", "recover", "run_paths", "verify_against_log"]
 
-
-@dataclass(frozen=True, slots=True)
-class RecoveredRun:
-    """One sensor's run file.
-
-    Parameters
-    ----------
-    sensor : SensorEntry
-    path : Path
-        The file, verified.
-    samples : int
-    faults : mapping of str to int
-        What the decoder counted.
-    decoding : mapping
-        What the chain reports besides: gaps, restarts, the clock's rate error.
-    losses : Losses
-        What the run lacks.
-    """
-
-    sensor: SensorEntry
-    path: Path
-    samples: int
-    faults: Mapping[str, int]
-    decoding: Mapping[str, Any]
-    losses: Losses
-
-    @property
-    def gone(self) -> bool:
-        """Whether the sensor was gone at the end."""
-        return self.losses.gone_s is not None
-
-
-@dataclass(frozen=True, slots=True)
-class RecoverReport:
-    """What became of a log.
-
-    Parameters
-    ----------
-    log : Path
-    runs : tuple of RecoveredRun
-        One for each sensor.
-    damage : Damage
-        Of the log.
-    marks, events : int
-        Kept in the provenance of every run file.
-    log_removed : bool
-    """
-
-    log: Path
-    runs: tuple[RecoveredRun, ...]
-    damage: Damage
-    marks: int
-    events: int
-    log_removed: bool
-
-    def describe(self) -> Iterator[str]:
-        """Yield lines for people: one a run file, and one about the log."""
-        for run in self.runs:
-            faults = "".join(f", {count} {name.replace('_', ' ')}" for name, count in run.faults.items() if count)
-            yield f"{run.path}: {run.samples} samples from {self.log}{faults}"
-            gaps = run.decoding.get("gaps", [])
-            if gaps:
-                longest = max(gap["length_s"] for gap in gaps)
-                lost = sum(gap["lost"] for gap in gaps)
-                yield f"{run.path}: {len(gaps)} gaps, {lost} readings lost in them, the longest {longest:.3g} s"
-            for trap in run.losses.traps():
-                yield f"{run.path}: {trap.code}: {trap.message}"
-            clock = run.decoding.get("clock", {})
-            if clock.get("kind") == "device" and clock.get("rate_error_ppm") is not None:
-                rate = f"{clock['rate_error_ppm']:+.1f} +- {clock['u_rate_error_ppm']:.1f} ppm"
-                jitter = f"{clock['host_jitter_s'] * 1e3:.2g} ms"
-                yield f"{run.path}: sensor clock {rate} against this host's, jitter {jitter}"
-        yield f"{self.log}: {self.damage.describe()}"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Log:
-    """A log as it was read, once, so that what is decoded and what is kept are the same bytes."""
-
-    original: Original
-    contents: LogContents
-    header: LogHeader
-
-    def notes(self, kind: Kind) -> list[Record]:
-        """Return marks or events."""
-        return [record for record in self.contents.notes if record.kind is kind]
+AT_ONCE = 4
+"""So many sensors' run files are written in one pass over the log: each holds some megabytes of samples back."""
 
 
 def recover(
@@ -155,47 +73,105 @@ def recover(
     RunDamaged
         If a run file just written does not read back as it should. The log stands.
     """
-    log_path = Path(log_path)
-    log = _read(log_path, header)
+    contents = read_log(log_path)
+    log = _Log(contents, _header(contents, header), provenance or {})
+    leftovers = remove_leftovers(contents.path.absolute().parent)
     other = {} if speed_of_sound_m_per_s is None else {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
-    sensors = _calibrated(log.header.sensors, {}, other)
-    paths = run_paths(log_path if out_path is None else Path(out_path), [sensor.channel for sensor in sensors])
-    if not overwrite:
-        _demand_free(paths)
-    decoded = decode_log(log.contents, sensors)
-    # Events are known when the log was read; a calibration among them is rare, so only then it is read again.
-    if (calibrated := _calibrated(log.header.sensors, _calibrations(log), other)) != sensors:
-        decoded = decode_log(log.contents, calibrated)
-    losses = _losses(log, decoded)
-    runs = [
-        _write(path, log, part, lost, provenance or {}, overwrite)
-        for path, part, lost in zip(paths, decoded, losses, strict=True)
-    ]
-    removed = remove_log and _remove(log_path, len(log.original.data))
-    marks, events = len(log.notes(Kind.MARK)), len(log.notes(Kind.EVENT))
-    return RecoverReport(log_path, tuple(runs), log.contents.damage, marks, events, removed)
+    sensors = log.header.sensors
+    paths = run_paths(contents.path if out_path is None else Path(out_path), [each.channel for each in sensors])
+    runs = {} if overwrite else _standing(paths, sensors, contents, other)
+    missing = [number for number in range(len(sensors)) if number not in runs]
+    for start in range(0, len(missing), AT_ONCE):
+        numbers = missing[start : start + AT_ONCE]
+        built = _build(log, [sensors[n] for n in numbers], [paths[n] for n in numbers], other, overwrite)
+        for number, run in zip(numbers, built, strict=True):
+            _demand_held(run.path, contents)
+            runs[number] = run
+    if not missing:
+        for record in contents:
+            if record.kind is not Kind.DATA:
+                log.notes.take(record)
+    damage = contents.damage
+    removed = remove_log and _remove(contents)
+    return RecoverReport(
+        contents.path,
+        tuple(runs[number] for number in range(len(sensors))),
+        damage,
+        log.notes.counts[Kind.MARK],
+        log.notes.counts[Kind.EVENT],
+        removed,
+        len(contents.parts),
+        leftovers,
+    )
 
 
-def _read(path: Path, stand_in: LogHeader | None) -> _Log:
-    contents = read_log(path)
-    data = contents.data
+def verify_against_log(path: str | os.PathLike[str], log_path: str | os.PathLike[str]) -> None:
+    """Read a run file back, all of it, and hold it against the log that it was made from.
+
+    After this, and not before, the log may be deleted.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        The run file.
+    log_path : str or PathLike
+        The log, with all the files that it lies in.
+
+    Raises
+    ------
+    NotALog
+        If the log cannot be read.
+    NotARun, RunDamaged
+        If the run file does not verify, or the log inside is not, bit for bit, the one on the disk.
+    """
+    _demand_held(Path(path), read_log(log_path))
+
+
+def _demand_held(path: Path, contents: LogContents) -> None:
+    with open_run(path) as run:
+        run.verify()
+        held = [(entry.name, entry.size, entry.sha256) for entry in run.header.originals]
+    if held != [(part.path.name, part.size, part.sha256()) for part in contents.parts]:
+        raise RunDamaged(path, f"the log inside is not {contents.path}", "keep the log and recover it again")
+
+
+def _standing(
+    paths: Sequence[Path], sensors: Sequence[SensorEntry], contents: LogContents, other: Mapping[str, Any]
+) -> dict[int, RecoveredRun]:
+    """Return the run files, by number, that stand there and hold all of this log: a build that was killed made them.
+
+    Raises
+    ------
+    RunExists
+        If something else stands there. What comes meanwhile is refused by the writing itself.
+    """
+    found = {}
+    for number, (path, sensor) in enumerate(zip(paths, sensors, strict=True)):
+        if not os.path.lexists(path):
+            continue
+        try:
+            if other:
+                raise RunExists(path, "", "")
+            _demand_held(path, contents)
+            with open_run(path) as run:
+                decoding, lost = run.provenance["decoding"], run.provenance["losses"]
+                losses = Losses(**{**lost, "away": tuple(lost["away"])})
+                found[number] = RecoveredRun(sensor, path, len(run), decoding["faults"], decoding, losses, stood=True)
+        except (StorageError, KeyError, TypeError) as error:
+            demand = "a new run file was to be written, but a file stands there"
+            raise RunExists(path, demand, "choose another name or allow overwriting") from error
+    return found
+
+
+def _header(contents: LogContents, stand_in: LogHeader | None) -> LogHeader:
     header = contents.header or stand_in
-    if header is None:
-        if not contents.damage.records:
-            raise NotALog(path, f"a wire log was demanded, got {len(data)} bytes without one record", "name another")
-        demand = f"the log's header is lost in all its copies ({contents.damage.describe()})"
-        raise NotALog(path, demand, "say which sensors were recorded")
-    return _Log(Original(path.name, data), contents, header)
-
-
-def _calibrations(log: _Log) -> dict[int, Mapping[str, Any]]:
-    """Return the last calibration that the log notes, by channel."""
-    noted = {}
-    for event in log.notes(Kind.EVENT):
-        content = event.json()
-        if content.get("kind") == "calibration":
-            noted[event.channel] = content.get("facts", {})
-    return noted
+    if header is not None:
+        return header
+    path = contents.path
+    if not contents.damage.records:
+        raise NotALog(path, f"a wire log was demanded, got {contents.size} bytes without one record", "name another")
+    demand = f"the log's header is lost in all its copies ({contents.damage.describe()})"
+    raise NotALog(path, demand, "say which sensors were recorded")
 
 
 def _calibrated(
@@ -216,108 +192,66 @@ def run_paths(path: Path, channels: Sequence[int]) -> list[Path]:
     return [path.with_name(f"{path.stem}.{channel}{path.suffix}") for channel in channels]
 
 
-def _demand_free(paths: Sequence[Path]) -> None:
-    """Look before the work; the writing itself refuses what comes meanwhile."""
-    for path in paths:
-        if os.path.lexists(path):
-            demand = "a new run file was to be written, but a file stands there"
-            raise RunExists(path, demand, "choose another name or allow overwriting")
+@dataclasses.dataclass(slots=True, eq=False)
+class _Log:
+    """A log on its way into run files."""
+
+    contents: LogContents
+    header: LogHeader
+    provenance: Mapping[str, Any]
+    notes: Notes = dataclasses.field(default_factory=Notes)
 
 
-def _losses(log: _Log, decoded: Sequence[Decoded]) -> list[Losses]:
-    events: dict[int, list[Event]] = {part.sensor.channel: [] for part in decoded}
-    for event in log.notes(Kind.EVENT):
-        events.setdefault(event.channel, []).append((event.mono_ns, event.json()))
-    counts = [LossCount(part.chain.timebase.rate_hz) for part in decoded]
-    for count, part in zip(counts, decoded, strict=True):
-        count.push(part.samples)
-    start_ns = log.header.mono_ns
-    everything = [event for each in events.values() for event in each]
-    end_ns = end_of(everything, [count.last_ns for count in counts], start_ns)
-    return [
-        count.losses(events[part.sensor.channel], start_ns, end_ns) for count, part in zip(counts, decoded, strict=True)
-    ]
+class _Again(Exception):
+    """What was written was worked out with a calibration that did not last."""
 
 
-def _write(
-    path: Path, log: _Log, decoded: Decoded, losses: Losses, provenance: Mapping[str, Any], overwrite: bool
-) -> RecoveredRun:
-    samples, header = decoded.samples, log.header
-    decoding = decoded.chain.report(samples.t, _host_ns(samples))
-    faults = decoding["faults"]
-    write_run(
-        path,
-        [samples],
-        decoded.chain.info(decoded.sensor.port, header.kind),
-        originals=[log.original],
-        scene=header.scene,
-        title=header.title,
-        traps=[*_traps(log.contents.damage), *losses.traps()],
-        malformed_rows=sum(count for name, count in faults.items() if not name.endswith("bytes")),
-        format="wire",
-        provenance={
-            **_provenance(log, decoded),
-            "decoding": decoding,
-            "losses": dataclasses.asdict(losses),
-            **provenance,
-        },
-        overwrite=overwrite,
-    )
-    with open_run(path) as run:
-        run.verify()
-        if run.originals() != (log.original,):
-            raise RunDamaged(path, "the log inside is not the log that was read", "keep the log and recover it again")
-    return RecoveredRun(decoded.sensor, path, len(samples), faults, decoding, losses)
+def _build(
+    log: _Log, sensors: Sequence[SensorEntry], paths: Sequence[Path], other: Mapping[str, Any], overwrite: bool
+) -> list[RecoveredRun]:
+    """Write the run files of some sensors in one pass over the log."""
+    while True:
+        calibrated = _calibrated(sensors, log.notes.calibrations, other)
+        with contextlib.suppress(_Again), contextlib.ExitStack() as stack:
+            writers = [stack.enter_context(run_writer(path, overwrite=overwrite)) for path in paths]
+            runs, decoder = _poured(log, calibrated, writers)
+            # Events are known when the log was read; a calibration among them is rare, so only then it is read again.
+            if _calibrated(sensors, log.notes.calibrations, other) != calibrated:
+                raise _Again
+            told = zip(runs, decoder.reads, strict=True)
+            return [run.finish(log.header, log.notes, reads, decoder.last_ns, log.provenance) for run, reads in told]
 
 
-def _host_ns(samples: Block) -> Any:
-    return np.empty(0, np.int64) if samples.host_ns is None else samples.host_ns
+def _poured(
+    log: _Log, sensors: Sequence[SensorEntry], writers: Sequence[RunWriter]
+) -> tuple[list[SensorRun], LogDecoder]:
+    """Read the log once, into all the run files."""
+    contents, log.notes = log.contents, Notes()
+    remedy = "springmass writes no such log; ask where it comes from"
+    try:
+        chains = chains_of(sensors)
+    except AcquisitionError as error:
+        raise NotALog(contents.path, f"header.sensors: {error}", remedy) from error
+    runs = [SensorRun(*each) for each in zip(writers, [contents] * len(writers), sensors, chains, strict=True)]
+
+    def taken(part: int, data: bytes) -> None:
+        for run in runs:
+            run.take(part, data)
+
+    decoder = LogDecoder(sensors, chains, log.notes.take)
+    try:
+        for number, block in decoder.blocks(contents.records(taken)):
+            runs[number].append(block)
+    except ValueRefused as error:
+        raise NotALog(contents.path, str(error), remedy) from error
+    return runs, decoder
 
 
-def _provenance(log: _Log, decoded: Decoded) -> dict[str, Any]:
-    header, damage = log.header, log.contents.damage
-    origin = _origin_ns(decoded.samples, header)
-
-    def at(record: Record) -> dict[str, Any]:
-        return {"mono_ns": record.mono_ns, "t_s": (record.mono_ns - origin) * 1e-9, "channel": record.channel}
-
-    return {
-        "start_time": header.utc(origin),
-        "clock_map": {"mono_ns": header.mono_ns, "unix_ns": header.unix_ns, "t0_mono_ns": origin},
-        "recorded_with": header.version,
-        "sensor": dataclasses.asdict(decoded.sensor),
-        "reads": decoded.reads,
-        "log": {"name": log.original.name, "sha256": log.original.sha256, **dataclasses.asdict(damage)},
-        "marks": [{**at(mark), "text": mark.text()} for mark in log.notes(Kind.MARK)],
-        "events": [{**at(event), **event.json()} for event in log.notes(Kind.EVENT)],
-    }
-
-
-def _origin_ns(samples: Block, header: LogHeader) -> int:
-    """Return the host's clock at t = 0: a stamp may come late, never early, so of the first ones the earliest.
-
-    Those after the first thousand would bring in the difference of the two clocks' rates.
-    """
-    if samples.host_ns is None or not len(samples):
-        return header.mono_ns
-    first = slice(0, 1000)
-    late_ns = samples.host_ns[first] - np.rint(samples.t[first] * 1e9).astype(np.int64)
-    return int(late_ns.min())
-
-
-def _traps(damage: Damage) -> list[Trap]:
-    found = []
-    if not damage.intact:
-        found.append(Trap("damaged_log", f"The wire log is damaged: {damage.describe()}.", max(1, damage.lost)))
-    if not damage.ended:
-        found.append(Trap("cut_short", "The recording did not end by itself; what the log holds is here."))
-    return found
-
-
-def _remove(path: Path, size: int) -> bool:
-    """Remove a log whose every byte is in a run file that verifies; one that grew meanwhile stays."""
+def _remove(contents: LogContents) -> bool:
+    """Remove a log whose every byte is in run files that verify; one that grew meanwhile stays."""
     with contextlib.suppress(OSError):
-        if path.stat().st_size == size:
-            path.unlink()
+        if all(part.path.stat().st_size == part.size for part in contents.parts):
+            for part in contents.parts:  # the first file first: without it, the others are not taken for all of a run
+                part.path.unlink()
             return True
     return False

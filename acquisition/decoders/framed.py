@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from acquisition.decoders.lines import LineSplitter
 from acquisition.decoders.sum_frames import SumFrames
-from acquisition.readings import Reading, Readings
+from acquisition.readings import NO_READINGS, Reading, Readings
 
 __all__ = ["FramedDecoder"]
 
@@ -37,8 +37,17 @@ class FramedDecoder(ABC):
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
         """Return the readings whose frames these bytes complete, all stamped with the read that completed them."""
-        frames = self._frames.split(data)
-        return Readings([found for frame in frames if (found := self.reading(host_ns, frame)) is not None])
+        found: list[Reading] = []
+        self.extend(found, ((host_ns, data),))
+        return Readings(found) if found else NO_READINGS
+
+    def extend(self, found: list[Reading], reads: Iterable[tuple[int, bytes]]) -> None:
+        """Append the readings of many reads, each of which has its own stamp."""
+        split, reading = self._frames.split, self.reading
+        for host_ns, data in reads:
+            for frame in split(data):
+                if (row := reading(host_ns, frame)) is not None:
+                    found.append(row)
 
     def flush(self) -> None:
         """Forget a half-received frame."""

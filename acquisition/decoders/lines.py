@@ -37,9 +37,12 @@ class LineSplitter:
 
     def split(self, data: bytes) -> list[bytes]:
         """Return the lines that these bytes end, without their ends."""
-        data = self._held + data
+        if self._held:
+            data = self._held + data
         lines = data.split(self._end)
         self._held = lines.pop()
+        if len(data) <= self._limit and not (self._skip or self._overlong):
+            return lines  # none of them can be too long
         if lines and (self._skip or self._overlong):
             self._drop(lines.pop(0), "partial_line" if self._skip else "bad_frame")
             self._skip = self._overlong = False

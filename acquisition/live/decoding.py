@@ -5,13 +5,14 @@ Live view, recording, recovery and replay from wire bytes all use this one chain
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from acquisition.block import F8, I8, Block, Flag
 from acquisition.decoders.family import Family
+from acquisition.decoders.framed import FramedDecoder
 from acquisition.live.calibration import Calibration
 from acquisition.live.timebase import Timebase, fit_clock
 from acquisition.readings import NO_READINGS, Reading, Readings
@@ -19,6 +20,7 @@ from acquisition.source import SourceInfo
 
 __all__ = ["SensorChain"]
 
+_NONE: tuple[tuple[float, ...], ...] = ((),) * len(Reading._fields)
 MISSING, GAP_BEFORE = np.uint8(Flag.MISSING), np.uint8(Flag.GAP_BEFORE)
 
 
@@ -72,19 +74,28 @@ class SensorChain:
         self.last = readings = self.decoder.feed(host_ns, data)
         self._held += readings
 
+    def take_all(self, reads: Iterable[tuple[int, bytes]]) -> None:
+        """Take the bytes of many reads, each with its stamp, as :meth:`take` does those of one."""
+        if isinstance(self.decoder, FramedDecoder):
+            self.decoder.extend(self._held, reads)
+            return
+        for host_ns, data in reads:
+            self._held += self.decoder.feed(host_ns, data)
+
     def block(self) -> Block:
         """Return the samples of the readings held, with the next indices of the run, and hold none."""
-        held, self._held = Readings(self._held), []
-        timed = np.array([self.timebase.push(reading) for reading in held], np.float64).reshape(-1, 2)
-        distance = self.calibration.distance(held.echo_us, held.distance_m)
-        flags = timed[:, 1].astype(np.uint8)
+        held, self._held = self._held, []
+        host_ns, _, _, echo_us, distance_m, _ = zip(*held, strict=True) if held else _NONE
+        t, flagged = zip(*map(self.timebase.push, held), strict=True) if held else _NONE[:2]
+        distance = self.calibration.distance(np.array(echo_us, np.float64), np.array(distance_m, np.float64))
+        flags = np.array(flagged, np.uint8)
         flags[np.isnan(distance)] |= MISSING
         if self._breaks:
             flags[[at for at in self._breaks if at < len(held)]] |= GAP_BEFORE
             self._breaks = [0] if self._breaks[-1] == len(held) else []
         first = self._next
         self._next += len(held)
-        return Block(first, np.ascontiguousarray(timed[:, 0]), distance, flags, held.host_ns)
+        return Block(first, np.array(t, np.float64), distance, flags, np.array(host_ns, np.int64))
 
     def lost(self) -> None:
         """The port went away: a frame cut in half by that is no frame, and the next sample is flagged."""

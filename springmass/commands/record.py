@@ -35,6 +35,7 @@ from springmass.session.stops import Stops
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
 from storage.recover import RecoverReport, recover
+from storage.wire_log.appending import Roll
 
 __all__ = ["run"]
 
@@ -144,6 +145,10 @@ def _demand_sense(options: argparse.Namespace) -> None:
     for name, needed in (("ruler", "still"), ("pre", "trigger")):
         if getattr(options, name) not in (None, []) and getattr(options, needed) is None:
             raise ProgramError(f"--{name} does nothing without --{needed}; name both or neither", USAGE)
+    for name, least, greatest, unit in (("roll_mb", 1.0, 1e9, "MB"), ("roll_hours", 1e-4, 1e5, "h")):
+        value, option = getattr(options, name), name.replace("_", "-")
+        if value is not None and not least <= value <= greatest:
+            raise ProgramError(f"--{option} must be {least:g} to {greatest:g} {unit}, got {value:g}", USAGE)
 
 
 def _record(session: Session, options: argparse.Namespace, log: Path, console: Console) -> Ended:
@@ -160,9 +165,18 @@ def _record(session: Session, options: argparse.Namespace, log: Path, console: C
             rest=rest,
             progress=show,
             marks=_typed_marks(),
+            roll=_roll(options),
         )
     finally:
         show.end()
+
+
+def _roll(options: argparse.Namespace) -> Roll:
+    """Return when the log goes on in another file."""
+    hours, megabytes = options.roll_hours, options.roll_mb
+    return Roll(
+        Roll().bytes if megabytes is None else int(megabytes * 1e6), None if hours is None else int(hours * 3600e9)
+    )
 
 
 def _rest(session: Session, seconds: float, ruler: list[float], console: Console) -> StillPoint:

@@ -37,6 +37,7 @@ from springmass.session.stops import Stops
 from springmass.session.trigger import Trigger, Watch
 from storage.errors import WriteFailed
 from storage.recorder import Recorder, RecorderStatus
+from storage.wire_log.appending import Roll
 from storage.wire_log.records import LogHeader
 
 __all__ = ["Ended", "Progress", "Sensor", "Session", "Trigger"]
@@ -159,6 +160,7 @@ class Session:
         rest: StillPoint | None = None,
         progress: Callable[[Progress], None] = lambda _: None,
         marks: queue.SimpleQueue[str] | None = None,
+        roll: Roll = Roll(),  # noqa: B008, it is frozen
     ) -> Ended:
         """Record until the seconds are over, the user ends it or the disk takes nothing more.
 
@@ -176,6 +178,8 @@ class Session:
             Called about once a second, on a thread of its own.
         marks : queue of str, optional
             Marks to put into the run.
+        roll : Roll
+            When a long log goes on in another file.
 
         Raises
         ------
@@ -193,7 +197,7 @@ class Session:
         since_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, progress)
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
         self._chains = [sensor.chain() for sensor in self.sensors]
-        recorder = Recorder(log, self._header(), self._clock)
+        recorder = Recorder(log, self._header(), self._clock, roll=roll)
         with self._stops.counted():
             display = self._display(progress)
             start_ns = self._clock.now_ns()

@@ -14,26 +14,25 @@ Examples
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.block import UNITS, Block, concatenate
+from acquisition.block import UNITS, Block
 from acquisition.recordings.recording import Original, Trap
 from acquisition.source import SourceInfo
 from storage.atomic import whole_h5, writing_h5
-from storage.errors import WriteFailed
 from storage.run_file import layout
-from storage.run_file.header import FileEntry, Header
-from storage.run_file.layout import CHUNK
+from storage.run_file.arrays import Columns, Originals
+from storage.run_file.header import Header
 from storage.run_file.values import stored
 
-__all__ = ["write_run"]
+__all__ = ["RunWriter", "run_writer", "write_run"]
 
 
 def write_run(
@@ -94,18 +93,14 @@ def write_run(
         provenance holds what JSON cannot. What the iterable of blocks raises passes through. What stood there before
         stands.
     """
-    path = Path(path)
-    with whole_h5(path, overwrite=overwrite, libver=layout.LIBVER) as file:
-        columns = _Columns(path, file, info)
+    with run_writer(path, sigma_m=info.sigma_m, overwrite=overwrite) as run:
         for block in blocks:
-            columns.append(block)
-        columns.finish()
-        header = Header(
-            info=info,
-            first=columns.first or 0,
-            samples=columns.rows,
-            columns={name: digest.hexdigest() for name, digest in columns.digests.items()},
-            originals=tuple(FileEntry(o.name, len(o.data), o.sha256) for o in originals),
+            run.append(block)
+        run.keep([(original.name, len(original.data)) for original in originals])
+        for number, original in enumerate(originals):
+            run.take(number, original.data)
+        run.finish(
+            info,
             title=title,
             channel=channel,
             format=format,
@@ -113,130 +108,95 @@ def write_run(
             traps=tuple(traps),
             malformed_rows=malformed_rows,
             provenance=provenance or {},
-            quantity=columns.quantity,
-            unit=UNITS[columns.quantity],
         )
-        with writing_h5(path):
-            _write_originals(file, originals)
-            _write_header(file, header)
-    return path
+    return Path(path)
 
 
-class _Columns:
-    """The growing arrays of a run file, written a whole chunk at a time."""
+@contextlib.contextmanager
+def run_writer(
+    path: str | os.PathLike[str], *, sigma_m: float | None = None, overwrite: bool = False
+) -> Iterator[RunWriter]:
+    """Give a writer of a run file, which is put in place when the ``with`` ends well.
 
-    def __init__(self, path: Path, file: Any, info: SourceInfo) -> None:
-        self.path, self.file, self.sigma_m = path, file, info.sigma_m
-        self.first: int | None = None
-        self.quantity = "length"
-        self.rows = 0
-        self.digests: dict[str, Any] = {}
-        self._pending: list[Block] = []
-        self._written = 0
+    Parameters
+    ----------
+    path, overwrite
+        As in :func:`write_run`.
+    sigma_m : float, optional
+        Standard deviation of a distance, m, as the source knows it.
+
+    Raises
+    ------
+    RunExists, WriteFailed
+        As in :func:`write_run`.
+    """
+    path = Path(path)
+    with whole_h5(path, overwrite=overwrite, libver=layout.LIBVER) as file:
+        run = RunWriter(path, file, sigma_m)
+        yield run
+        if not run.finished:
+            raise ValueError(f"{path}: a run file was begun and not finished")
+
+
+class RunWriter:
+    """Writes a run file piece by piece; :func:`run_writer` gives one. Memory holds a chunk of samples."""
+
+    def __init__(self, path: Path, file: Any, sigma_m: float | None) -> None:
+        self.path, self.finished = path, False
+        self._file = file
+        self._columns = Columns(path, file, sigma_m)
+        self._originals: Originals | None = None
 
     def append(self, block: Block) -> None:
-        """Take a block; write what fills whole chunks."""
-        if self.first is None:
-            self.first, self.quantity = block.first, block.quantity
-        self._demand_fit(block)
-        self._pending.append(block)
-        self.rows += len(block)
-        if self.rows - self._written >= CHUNK:
-            whole = concatenate(self._pending)
-            full = len(whole) // CHUNK * CHUNK
-            self._write(whole[:full], growing=True)
-            self._pending = [whole[full:]]
+        """Take the next samples.
 
-    def finish(self) -> None:
-        """Write the rest and tie every array to its dimension."""
-        rest = concatenate(self._pending)
-        if not self._written or len(rest):
-            self._write(rest, growing=bool(self._written))
+        Raises
+        ------
+        WriteFailed
+            If they do not follow those before, are of another quantity, or cannot be written.
+        """
+        self._columns.append(block)
+
+    def keep(self, files: Sequence[tuple[str, int]]) -> None:
+        """Make room for original files of these names and sizes, whose bytes :meth:`take` brings."""
         with writing_h5(self.path):
-            for group, scale in ((layout.SIGNAL, "time"), ("/raw", "sequence")):
-                arrays = self.file[group]
-                arrays[scale].make_scale(scale)
-                for name in arrays:
-                    if name != scale:
-                        arrays[name].dims[0].attach_scale(arrays[scale])
+            self._originals = Originals(self._file, files) if files else None
 
-    def _demand_fit(self, block: Block) -> None:
-        expected = (self.first or 0) + self.rows
-        if block.first != expected or block.first < 0 or expected + len(block) > 2**32:
-            demand = f"a block that begins with sample {expected} was demanded, got first = {block.first}"
-            raise WriteFailed(self.path, demand, "number blocks without gaps, and flag what is missing")
-        if block.quantity != self.quantity:
-            demand = f"samples of {self.quantity} were demanded, got {block.quantity} from sample {block.first} on"
-            raise WriteFailed(self.path, demand, "write a run file for each quantity")
-        for name, values in layout.arrays(block, None).items():
-            if values is not None and values.shape != block.t.shape:
-                demand = f"{len(block)} values of {name} from sample {block.first} were demanded"
-                raise WriteFailed(self.path, f"{demand}, got shape {values.shape}", "make them equally long")
-
-    def _write(self, block: Block, *, growing: bool) -> None:
+    def take(self, number: int, data: bytes) -> None:
+        """Take the next bytes of an original file, in the order in which :meth:`keep` named them."""
+        assert self._originals is not None
         with writing_h5(self.path):
-            values = layout.arrays(block, self.sigma_m)
-            for column in layout.COLUMNS:
-                array = values[column.name]
-                if array is None and column.name not in self.digests:
-                    continue
-                if array is None:
-                    array = np.full(len(block), column.fill)
-                exact = np.ascontiguousarray(array).astype(column.dtype, casting="safe", copy=False)
-                column.demand_within(exact, self._written)
-                self._write_column(column, exact, growing)
-        self._written += len(block)
+            self._originals.take(number, data)
 
-    def _write_column(self, column: layout.Column, values: NDArray[Any], growing: bool) -> None:
-        if column.name not in self.digests:
-            self.digests[column.name] = hashlib.sha256()
-            _create(self.file, column.path, column.dtype, None if growing else len(values))
-            for start in range(0, self._written, CHUNK):  # a column that comes late
-                self._extend(column, start, np.full(CHUNK, column.fill, column.dtype))
-        self._extend(column, self._written, values)
+    def finish(self, info: SourceInfo, **header: Any) -> None:
+        """Write the rest and the header.
 
-    def _extend(self, column: layout.Column, start: int, values: NDArray[Any]) -> None:
-        array = self.file[column.path]
-        if array.shape[0] < start + len(values):
-            array.resize((start + len(values),))
-        array[start : start + len(values)] = values
-        self.digests[column.name].update(values.tobytes())
+        Parameters
+        ----------
+        info : SourceInfo
+        **header
+            Of :class:`storage.run_file.header.Header`, what is not known from the samples and the originals.
 
-
-def _create(file: Any, path: str, dtype: str, length: int | None) -> Any:
-    """Make an array of a known length, or a growing one; zero length only a growing one can have."""
-    if length:
-        return file.create_dataset(path, (length,), dtype, chunks=(min(length, CHUNK),), **layout.filters(path))
-    chunk = CHUNK if length is None else 1
-    return file.create_dataset(path, (0,), dtype, maxshape=(None,), chunks=(chunk,), **layout.filters(path))
-
-
-def _write_originals(file: Any, originals: Sequence[Original]) -> None:
-    if not originals:
-        return
-    sizes = np.array([len(original.data) for original in originals], "<u8")
-    data = _create(file, f"{layout.WIRE}/bytes", "|u1", int(sizes.sum()))
-    start = 0
-    for original in originals:
-        if original.data:
-            data[start : start + len(original.data)] = np.frombuffer(original.data, np.uint8)
-        start += len(original.data)
-    records = layout.records(sizes)
-    wire = file[layout.WIRE]
-    for name, values in records.items():
-        _create(file, f"{layout.WIRE}/{name}", values.dtype.str, len(values))[:] = values
-    _dimension(wire, "byte", [data])
-    _dimension(wire, "record", [wire[name] for name in records])
-
-
-def _dimension(group: Any, name: str, arrays: Sequence[Any]) -> None:
-    """Tie arrays to a dimension without coordinates, in netCDF's own way: a scale of this very title."""
-    length = arrays[0].shape[0]
-    growing: dict[str, Any] = {} if length else {"maxshape": (None,), "chunks": (1,)}
-    scale = group.create_dataset(name, (length,), ">f4", **growing)
-    scale.make_scale(f"This is a netCDF dimension but not a netCDF variable.{length:10d}")
-    for array in arrays:
-        array.dims[0].attach_scale(scale)
+        Raises
+        ------
+        WriteFailed
+            If an original is not whole, or the header holds what none may.
+        """
+        columns = self._columns
+        columns.finish()
+        with writing_h5(self.path):
+            text = Header(
+                info=info,
+                first=columns.first or 0,
+                samples=columns.rows,
+                columns={name: digest.hexdigest() for name, digest in columns.digests.items()},
+                originals=() if self._originals is None else self._originals.entries(),
+                quantity=columns.quantity,
+                unit=UNITS[columns.quantity],
+                **header,
+            )
+            _write_header(self._file, text)
+        self.finished = True
 
 
 def _write_header(file: Any, header: Header) -> None:

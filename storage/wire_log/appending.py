@@ -24,65 +24,30 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import io
+import math
 import os
 import secrets
 import threading
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
-from storage.atomic import sync_folder
 from storage.errors import RunExists, WriteFailed, one_line
-from storage.wire_log.records import Kind, LogHeader, ends_item, frames
+from storage.wire_log.log_file import LogFile, open_log_file
+from storage.wire_log.records import Kind, LogHeader, ends_item, event_payload, frames, part_path
 
-__all__ = ["Item", "LogFile", "WireLogWriter", "Written", "open_log_file"]
+__all__ = ["Item", "LogFile", "Roll", "WireLogWriter", "Written", "open_log_file"]
 
 FIRST_COPY = 8192
 """Byte of the log past which the header is first repeated."""
 WRITE_BYTES = 1 << 18
 """So much is written at a time where many records wait."""
+TAKEN_NAMES = 100
 
 Item = tuple[Kind, int, int, bytes]
 """What a record is made of: kind, channel, host's monotonic clock in ns, payload."""
-
-
-class LogFile(Protocol):
-    """The seam between the writer and the disk; tests put a failing one in its place."""
-
-    def write(self, data: bytes | memoryview) -> int:
-        """Append; return how many bytes were taken, as ``os.write`` does. Raises OSError."""
-        ...
-
-    def sync(self) -> None:
-        """Return when what was written is on the disk. Raises OSError."""
-        ...
-
-    def close(self) -> None:
-        """Close."""
-        ...
-
-
-class _NewFile(io.FileIO):
-    """A file that was not there yet; nothing is buffered on this side of the kernel."""
-
-    # macOS and Windows have no fdatasync; fsync does more than it.
-    _sync: Callable[[int], None] = staticmethod(getattr(os, "fdatasync", os.fsync))
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path, "x", opener=lambda name, flags: os.open(name, flags | os.O_APPEND, 0o666))
-
-    def sync(self) -> None:
-        self._sync(self.fileno())
-
-
-def open_log_file(path: Path) -> LogFile:
-    """Make a file that is not there yet, for appending, its name safe on the disk. Raises OSError."""
-    file = _NewFile(path)
-    with contextlib.suppress(OSError):  # then the name is as safe as it gets
-        sync_folder(path.parent)
-    return file
 
 
 class Written(NamedTuple):
@@ -92,8 +57,28 @@ class Written(NamedTuple):
     bytes: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class Roll:
+    """When a log goes on in another file.
+
+    Parameters
+    ----------
+    bytes : int
+        A file that is this long is the last one's, and the next record begins another.
+    ns : int or None
+        So much time by the records' stamps after a file's first record, too.
+    """
+
+    bytes: int = 1_000_000_000
+    ns: int | None = None
+
+
 class WireLogWriter:
     """Appends records to a new log.
+
+    A long log lies in several files, ``run.wire``, ``run.001.wire``, ``run.002.wire`` and so on: one log that is cut
+    between two records, each file beginning with a copy of the header. The old file is on the disk before anything is
+    written to the next. Where the next cannot be made, the old one goes on, and an event says so.
 
     One thread appends; others may call :meth:`sync` at the same time. :attr:`written` and ``synced`` say how far the
     log has come, in the kernel's hands and on the disk; ``extended`` how many items of the last call are whole in the
@@ -106,9 +91,11 @@ class WireLogWriter:
     header : LogHeader
         Written and synced before the constructor returns.
     open_file : callable
-        Makes the file: the seam for tests.
+        Makes a file: the seam for tests.
     log : int, optional
         The number that all records carry; left out, a random one.
+    roll : Roll
+        When the log goes on in another file.
 
     Raises
     ------
@@ -125,8 +112,13 @@ class WireLogWriter:
         *,
         open_file: Callable[[Path], LogFile] = open_log_file,
         log: int | None = None,
+        roll: Roll = Roll(),
     ) -> None:
         self.path = Path(path)
+        self._roll = roll
+        self._open_file = open_file
+        self._files = 1
+        self._roll_at_bytes, self._roll_at_ns = self._next_roll(0, header.mono_ns)
         self.written = self.synced = Written()
         self.extended = 0
         self._log = secrets.randbits(32) if log is None else log
@@ -139,7 +131,7 @@ class WireLogWriter:
         except (TypeError, ValueError) as error:
             remedy = "give the scene and options as plain texts and numbers"
             raise WriteFailed(self.path, f"the header cannot be written ({one_line(error)})", remedy) from error
-        self._file = self._made(open_file)
+        self._file = self._made(self.path)
         try:
             self.append(Kind.HEADER, self._header, mono_ns=header.mono_ns)
             self.sync()
@@ -149,9 +141,9 @@ class WireLogWriter:
                 self.path.unlink()
             raise
 
-    def _made(self, open_file: Callable[[Path], LogFile]) -> LogFile:
+    def _made(self, path: Path) -> LogFile:
         try:
-            return open_file(self.path)
+            return self._open_file(path)
         except FileExistsError as error:
             demand = "a new wire log was to be begun, but a file stands there"
             raise RunExists(self.path, demand, "choose another name; a recording is never written over") from error
@@ -203,6 +195,11 @@ class WireLogWriter:
         laid, end = 0, self.written.bytes
         try:
             for kind, channel, mono_ns, payload in items:
+                if end >= self._roll_at_bytes or mono_ns >= self._roll_at_ns:
+                    whole, batch = batch, []
+                    self._write(whole, laid)
+                    laid = 0
+                    end = self._go_on(mono_ns)
                 if end >= self._next_copy:
                     # Doubling distances: about twenty copies in a day's log, and no zeroed page takes all of them.
                     # Before the record and not after it, so that an error always means that the record itself is not
@@ -226,8 +223,48 @@ class WireLogWriter:
         batch += frames(kind, payload, sequence=sequence, mono_ns=mono_ns, log=self._log, channel=channel)
         return sum(map(len, batch[before:]))
 
+    def _next_roll(self, start: int, start_ns: int) -> tuple[int, float]:
+        return start + self._roll.bytes, math.inf if self._roll.ns is None else start_ns + self._roll.ns
+
+    def _go_on(self, mono_ns: int) -> int:
+        """Go on in the next file; return how many bytes the log has by then.
+
+        Raises
+        ------
+        WriteFailed
+            If the disk refuses the sync of the old file or the header's copy.
+        """
+        batch: list[bytes] = []
+        self._roll_at_bytes, self._roll_at_ns = self._next_roll(self.written.bytes, mono_ns)
+        self.sync()
+        try:
+            file = self._next_file()
+        except (OSError, RunExists) as error:
+            facts = {"why": one_line(error), "files": self._files}
+            self._lay(batch, Kind.EVENT, 0, mono_ns, event_payload("roll_failed", facts))
+        else:
+            with self._syncing:
+                before, self._file = self._file, file
+            with contextlib.suppress(OSError):  # it is on the disk, whatever closing says
+                before.close()
+            self._lay(batch, Kind.HEADER, 0, mono_ns, self._header)
+        self._write(batch, 0)
+        return self.written.bytes
+
+    def _next_file(self) -> LogFile:
+        """Make the log's next file; a name that is taken, by another recording or whoever, is passed over."""
+        for number in range(self._files, self._files + TAKEN_NAMES):
+            with contextlib.suppress(FileExistsError):
+                file = self._open_file(part_path(self.path, number))
+                self._files = number + 1
+                return file
+        demand = f"{part_path(self.path, self._files).name} and the {TAKEN_NAMES - 1} after it are taken"
+        raise RunExists(self.path, demand, "move them away")
+
     def _write(self, batch: list[bytes], items: int) -> None:
         """Write the records of so many items, and count those that are whole in the log."""
+        if not batch:
+            return
         data = b"".join(batch)
         taken = 0
         try:

@@ -28,18 +28,17 @@ end      JSON, counts; its absence means that the recording was cut short
 
 from __future__ import annotations
 
-import dataclasses
 import enum
-import json
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from acquisition.source import Kind as SourceKind
+from storage.checked import ValueRefused, parsed
 from storage.run_file.header import json_text
+from storage.wire_log.allowed import LATEST_NS, LONGEST_TEXT
+from storage.wire_log.log_header import LogHeader, SensorEntry
 
 __all__ = [
     "HEAD_BYTES",
@@ -54,16 +53,19 @@ __all__ = [
     "event_payload",
     "frame",
     "frames",
+    "part_path",
     "unframe",
 ]
 
 MAGIC = b"\xf5\xa9"
 MAX_PAYLOAD = 65535
-LOG_VERSION = 1
+MOST_PARTS = LONGEST_TEXT // MAX_PAYLOAD
+"""Records of the longest mark, event or header: longer ones are not put together again."""
 _HEAD = struct.Struct("<2sHIqIBBH")
 _CRC = struct.Struct("<I")
 _HEAD_AND_CRC = struct.Struct(_HEAD.format + "I")
 HEAD_BYTES = _HEAD_AND_CRC.size
+CRC_AT = _HEAD.size
 _WRAP = 1 << 32
 
 
@@ -86,107 +88,6 @@ class Parts(enum.IntFlag):
 
 _KINDS = {kind.value: kind for kind in Kind}
 _ALL_PARTS = int(Parts.GOES_ON | Parts.GOES_ON_FROM)
-
-
-@dataclass(frozen=True, slots=True)
-class SensorEntry:
-    """One sensor of a run.
-
-    Parameters
-    ----------
-    channel : int
-        0 to 255, its number within the run.
-    family : str
-        As ``--sensor`` took it.
-    port : str
-        Address of the port.
-    baud : int
-    rate_hz : float or None
-        Readings per second that it is set to, Hz; None for the family's.
-    options : mapping
-        Of the family's decoder; JSON-able.
-    calibration : mapping
-        Numbers of :class:`acquisition.live.calibration.Calibration` by name; empty for the default.
-    """
-
-    channel: int
-    family: str
-    port: str = ""
-    baud: int = 0
-    rate_hz: float | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
-    calibration: Mapping[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.channel <= 255:
-            raise ValueError(f"a channel must lie in 0 to 255, got {self.channel}")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LogHeader:
-    """What a log says of its run before the first byte came.
-
-    Parameters
-    ----------
-    sensors : tuple of SensorEntry
-        Each with a channel of its own.
-    mono_ns, unix_ns : int
-        The host's monotonic clock and UTC since 1970 at one and the same moment, ns: the map between the two.
-    kind : {"live", "simulated", "replay"}
-        Travels with the data: simulated data cannot pass for measured.
-    scene : mapping or None
-        The scene's tables; JSON-able.
-    title, version : str
-        The run's title; the version of springmass that records it.
-    """
-
-    sensors: tuple[SensorEntry, ...]
-    mono_ns: int
-    unix_ns: int
-    kind: SourceKind = "live"
-    scene: Mapping[str, Any] | None = None
-    title: str = ""
-    version: str = ""
-
-    def __post_init__(self) -> None:
-        channels = [sensor.channel for sensor in self.sensors]
-        if len(set(channels)) != len(channels):
-            raise ValueError(f"each sensor must have a channel of its own, got {channels}")
-        if self.kind not in ("live", "simulated", "replay"):
-            raise ValueError(f"kind must be live, simulated or replay, got {self.kind!r}")
-
-    def utc(self, mono_ns: int) -> str:
-        """Return the wall clock (ISO 8601, UTC) at a moment of the monotonic clock in ns."""
-        micros = (self.unix_ns + mono_ns - self.mono_ns) // 1000
-        moment = datetime.fromtimestamp(micros // 10**6, UTC).replace(microsecond=micros % 10**6)
-        return moment.isoformat(timespec="microseconds")
-
-    def encode(self) -> bytes:
-        """Return the payload of a header record.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If the scene or an option holds what JSON cannot.
-        """
-        content = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
-        return json_text({"log": LOG_VERSION, "start_utc": self.utc(self.mono_ns), **content}).encode("ascii")
-
-    @classmethod
-    def decode(cls, payload: bytes) -> LogHeader:
-        """Read what :meth:`encode` wrote.
-
-        Raises
-        ------
-        TypeError, ValueError, KeyError, AttributeError
-            If the payload is of another version.
-        """
-        content = json.loads(payload)
-        if (version := content.pop("log")) != LOG_VERSION:
-            raise ValueError(f"a log of version {LOG_VERSION} was demanded, got {version!r}")
-        del content["start_utc"]  # for people; the clock map says the same
-        content["sensors"] = tuple(SensorEntry(**sensor) for sensor in content["sensors"])
-        return cls(**content)
 
 
 class Record(NamedTuple):
@@ -223,10 +124,21 @@ class Record(NamedTuple):
     def json(self) -> Mapping[str, Any]:
         """Return the payload as a JSON object; empty where it is none."""
         try:
-            content = json.loads(self.payload)
-        except ValueError:
+            content = parsed(self.payload, "record")
+        except ValueRefused:
             return {}
         return content if isinstance(content, dict) else {}
+
+
+def part_path(path: Path, number: int) -> Path:
+    """Return the name of a log's file, numbered from 0.
+
+    Examples
+    --------
+    >>> [part_path(Path("run.wire"), number).name for number in (0, 1, 12)]
+    ['run.wire', 'run.001.wire', 'run.012.wire']
+    """
+    return path.with_name(f"{path.stem}.{number:03d}{path.suffix}") if number else path
 
 
 def event_payload(kind: str, facts: Mapping[str, Any]) -> bytes:
@@ -273,7 +185,11 @@ def ends_item(record: bytes) -> bool:
     return kind != Kind.HEADER and not parts & Parts.GOES_ON
 
 
-def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, Kind, int, int, bytes] | None:
+unpack_head = _HEAD_AND_CRC.unpack_from
+Unframed = tuple[int, int, int, Kind, int, int, bytes]
+
+
+def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
     """Return the record that begins at a byte, None where no whole and sound one does.
 
     Parameters
@@ -292,12 +208,12 @@ def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, Kind,
     start = at + HEAD_BYTES
     if start > len(data):
         return None
-    magic, length, sequence, mono_ns, found, code, channel, parts, crc = _HEAD_AND_CRC.unpack_from(data, at)
+    magic, length, sequence, mono_ns, found, code, channel, parts, crc = unpack_head(data, at)
     # The cheap checks first: a search through damage comes here for every magic that chance has put there.
     kind = _KINDS.get(code)
     if magic != MAGIC or kind is None or parts > _ALL_PARTS or start + length > len(data):
         return None
-    if log is not None and found != log:
+    if (log is not None and found != log) or not 0 <= mono_ns <= LATEST_NS:
         return None
     payload = data[start : start + length]
     if crc != zlib.crc32(payload, zlib.crc32(data[at : at + _HEAD.size])):

@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from acquisition.block import Block, concatenate
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
+from storage.wire_log.allowed import event_content
 from storage.wire_log.records import Kind, Record, SensorEntry
 
-__all__ = ["BREAKS", "Decoded", "chains_of", "decode_log"]
+__all__ = ["BREAKS", "Decoded", "LogDecoder", "chains_of", "decode_log"]
 
-_DATA = Kind.DATA  # looked up once, and not for each record
+_DATA, _EVENT = Kind.DATA, Kind.EVENT  # looked up once, and not for each record
 
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
 """Events after which the bytes of a channel do not continue those before."""
 HELD_READS = 4096
 """Of so many reads samples are made at a time: a long run would be a heap of small arrays, or of readings."""
+HELD_BYTES = 1 << 18
+"""Or of so many bytes, where a read holds many readings."""
 
 
 def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
-    """Return the chains that the sensors' families name, with the calibrations noted in the log."""
+    """Return the chains that the sensors' families name, with the calibrations noted in the log.
+
+    Raises
+    ------
+    acquisition.errors.AcquisitionError
+        If there is no such family, or it takes no such options.
+    """
     return [
         SensorChain(
             get_family(sensor.family),
@@ -32,6 +41,82 @@ def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
         )
         for sensor in sensors
     ]
+
+
+class LogDecoder:
+    """Makes samples of a log's records, a few at a time.
+
+    Where records are missing, or a port went away, no frame is put together across the gap, and the first sample
+    after it is flagged. Channels that are not asked for are passed over.
+
+    Parameters
+    ----------
+    sensors : sequence of SensorEntry
+    chains : sequence of SensorChain
+        One for each of them; they stand after the last byte when all samples were taken.
+    noted : callable
+        Is given every record that holds no data.
+
+    Attributes
+    ----------
+    reads : list of int
+        Reads of each sensor's port so far.
+    last_ns : int
+        Host's stamp of the log's last record, whatever its channel; known at the end.
+    """
+
+    def __init__(
+        self,
+        sensors: Sequence[SensorEntry],
+        chains: Sequence[SensorChain],
+        noted: Callable[[Record], object] = lambda _: None,
+    ) -> None:
+        self.sensors, self.chains, self._noted = tuple(sensors), tuple(chains), noted
+        self.reads = [0] * len(self.sensors)
+        self.last_ns = 0
+        self._held: list[list[tuple[int, bytes]]] = [[] for _ in self.sensors]
+
+    def blocks(self, log: Iterable[Record]) -> Iterator[tuple[int, Block]]:
+        """Yield samples as they come, with the number of the sensor among those asked for."""
+        places = {sensor.channel: (number, held) for number, (sensor, held) in enumerate(self._places())}
+        size = mono_ns = 0
+        for record in log:
+            _, _, mono_ns, kind, channel, payload, lost_before = record
+            if lost_before:
+                for number in range(len(self.chains)):
+                    self._break(number)
+            place = places.get(channel)
+            if kind is not _DATA:
+                self._noted(record)
+                if place is not None and kind is _EVENT and event_content(payload)["kind"] in BREAKS:
+                    self._break(place[0])
+            elif place is not None:
+                place[1].append((mono_ns, payload))
+                size += len(payload)
+                if len(place[1]) >= HELD_READS or size >= HELD_BYTES:
+                    size = 0
+                    yield from self._samples()
+        self.last_ns = mono_ns
+        yield from self._samples()
+
+    def _places(self) -> Iterator[tuple[SensorEntry, list[tuple[int, bytes]]]]:
+        return zip(self.sensors, self._held, strict=True)
+
+    def _break(self, number: int) -> None:
+        self._hand_over(number)
+        self.chains[number].lost()
+
+    def _hand_over(self, number: int) -> None:
+        held = self._held[number]
+        self.chains[number].take_all(held)
+        self.reads[number] += len(held)
+        held.clear()
+
+    def _samples(self) -> Iterator[tuple[int, Block]]:
+        for number, chain in enumerate(self.chains):
+            self._hand_over(number)
+            if len(chain):
+                yield number, chain.block()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,29 +145,12 @@ def decode_log(
     sensors: Sequence[SensorEntry],
     chains_for: Callable[[Sequence[SensorEntry]], Sequence[SensorChain]] = chains_of,
 ) -> tuple[Decoded, ...]:
-    """Return every sensor's samples, in the order of ``sensors``; other channels are passed over.
-
-    Where records are missing, or a port went away, no frame is put together across the gap, and the first sample
-    after it is flagged.
-    """
-    chains = {sensor.channel: chain for sensor, chain in zip(sensors, chains_for(sensors), strict=True)}
-    blocks: dict[int, list[Block]] = {channel: [] for channel in chains}
-    reads = dict.fromkeys(chains, 0)
-    for record in log:
-        if record.lost_before:
-            for each in chains.values():
-                each.lost()
-        channel = record.channel
-        if (chain := chains.get(channel)) is None:
-            continue
-        if record.kind is _DATA:
-            chain.take(record.mono_ns, record.payload)
-            reads[channel] += 1
-            if reads[channel] % HELD_READS == 0:
-                blocks[channel].append(chain.block())
-        elif record.kind is Kind.EVENT and record.json().get("kind") in BREAKS:
-            chain.lost()
+    """Return every sensor's samples at once, in the order of ``sensors``, as :class:`LogDecoder` finds them."""
+    decoder = LogDecoder(sensors, chains_for(sensors))
+    blocks: list[list[Block]] = [[] for _ in sensors]
+    for number, block in decoder.blocks(log):
+        blocks[number].append(block)
     return tuple(
-        Decoded(sensor, chain, concatenate([*blocks[sensor.channel], chain.block()]), reads[sensor.channel])
-        for sensor, chain in zip(sensors, chains.values(), strict=True)
+        Decoded(sensor, chain, concatenate([*found, chain.block()]), reads)
+        for sensor, chain, found, reads in zip(sensors, decoder.chains, blocks, decoder.reads, strict=True)
     )

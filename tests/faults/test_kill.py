@@ -23,6 +23,7 @@ from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
 from springmass.session.reads import Tee
 from storage.recorder import Recorder
+from storage.wire_log.appending import Roll
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
 
@@ -34,14 +35,15 @@ HEADER = LogHeader(sensors=(SensorEntry(0, "line"),), mono_ns=0, unix_ns=0)
 def record(port: int, log: str, mode: str) -> None:
     """Record a port until the process is killed; say after each read how far the log has come."""
     clock = SystemClock()
-    recorder = Recorder(log, HEADER, clock, sync_every_s=0.003)
+    # Rolling, each file of the log takes the header and some twenty reads.
+    recorder = Recorder(log, HEADER, clock, sync_every_s=0.003, roll=Roll(2000) if mode == "rolling" else Roll())
     chains = [SensorChain(get_family("line-protocol"))]
     tee = Tee(chains)
     tee.start(recorder, chains, 0)
     os.write(1, struct.pack("<II", 0, 0))
     while data := os.read(port, PACKET):
         tee.reads([(0, clock.now_ns(), data)])  # as the reading thread does: put away, then decoded
-        status = recorder.drain() if mode == "paced" else recorder.status
+        status = recorder.drain() if mode != "flood" else recorder.status
         os.write(1, struct.pack("<II", status.records, status.synced_records))
 
 
@@ -71,7 +73,7 @@ def trial(log: Path, mode: str, rng: np.random.Generator) -> Outcome:
         for sent in range(1, last + 1):
             os.write(feed, packet(sent - 1))
             # Only at the pace of a bench is a read over before the next one comes.
-            if mode == "paced" and sent < last:
+            if mode != "flood" and sent < last:
                 said = child.stdout.read(8)
         if mode == "flood":
             said = child.stdout.read(8 * int(rng.integers(1, last + 1)))
@@ -88,12 +90,12 @@ def trial(log: Path, mode: str, rng: np.random.Generator) -> Outcome:
 
 
 @pytest.mark.trials
-@pytest.mark.parametrize(("mode", "kills"), [("paced", KILLS), ("flood", -(-KILLS // 3))])
+@pytest.mark.parametrize(("mode", "kills"), [("paced", KILLS), ("flood", -(-KILLS // 3)), ("rolling", -(-KILLS // 3))])
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no kill -9")
 def test_a_killed_recording_keeps_every_committed_record(mode: str, kills: int, tmp_path: Path) -> None:
     """Every log opens with the reads from the first on, at the bench's pace all but the one in flight."""
     rng = np.random.default_rng(kills)
-    lost = []
+    lost, files = [], 0
     for number in range(kills):
         log = tmp_path / f"{number}.wire"
         outcome = trial(log, mode, rng)
@@ -104,8 +106,10 @@ def test_a_killed_recording_keeps_every_committed_record(mode: str, kills: int, 
         assert contents.damage.lost == contents.damage.skipped_bytes == 0
         assert contents.damage.records >= outcome.written >= outcome.synced, outcome
         lost.append(outcome.taken - len(reads))
+        files = max(files, len(contents.parts))
     assert mode == "flood" or max(lost) <= 1, lost
     assert min(lost) >= 0
+    assert files > 2 if mode == "rolling" else files == 1
     print(f"kill -9, {mode}: {kills} trials, reads lost in flight: {sum(lost)}, at most {max(lost)}")
 
 

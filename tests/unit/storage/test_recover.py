@@ -15,10 +15,13 @@ from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from storage import recover as module
-from storage.errors import RunDamaged, RunExists
+from storage.atomic import whole_file
+from storage.errors import OutOfMemory, RunDamaged, RunExists
 from storage.recorder import Recorder
-from storage.recover import recover
+from storage.recover import recover, verify_against_log
+from storage.run_file.arrays import Columns, Originals
 from storage.run_file.reading import Run, open_run
+from storage.wire_log import notes
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import NotALog, read_log
@@ -212,17 +215,92 @@ def test_the_log_goes_only_when_the_run_file_verifies(tmp_path: Path, monkeypatc
     assert not log.exists()
 
 
+def test_a_log_is_what_a_run_file_is_held_against(tmp_path: Path) -> None:
+    """A run file of this log passes; one of another log, or of this one before it went on, is refused by name."""
+    log, other = write(tmp_path / "run.wire", count=10), write(tmp_path / "other.wire", count=20)
+    recover(log)
+    recover(other)
+    verify_against_log(tmp_path / "run.h5", log)
+    with pytest.raises(RunDamaged, match=r"run\.h5: the log inside is not .*other\.wire; keep the log"):
+        verify_against_log(tmp_path / "run.h5", other)
+    with log.open("ab") as file:
+        file.write(b"more")
+    with pytest.raises(RunDamaged, match=r"the log inside is not .*run\.wire"):
+        verify_against_log(tmp_path / "run.h5", log)
+
+
+def test_a_recovery_that_was_killed_is_called_again(tmp_path: Path) -> None:
+    """Run files that stand there and hold all of the log are taken as they are, and the others are made."""
+    sensors = tuple(SensorEntry(channel, FAMILY) for channel in range(6))
+    log = write(tmp_path / "run.wire", LogHeader(sensors=sensors, mono_ns=0, unix_ns=0), count=40)
+    whole = recover(log)
+    bytes_of = {run.path: run.path.read_bytes() for run in whole.runs}
+    for channel in (1, 4):
+        (tmp_path / f"run.{channel}.h5").unlink()
+    again = recover(log)
+    assert [run.stood for run in again.runs] == [True, False, True, True, False, True]
+    assert [(run.path, run.samples) for run in again.runs] == [(run.path, 40) for run in whole.runs]
+    assert {run.path: run.path.read_bytes() for run in again.runs} == bytes_of
+    assert (again.marks, again.damage) == (whole.marks, whole.damage) == (1, whole.damage)
+    assert recover(log).describe().__next__().endswith("; it stood there already and holds all of the log")
+    with pytest.raises(RunExists):
+        recover(log, speed_of_sound_m_per_s=340.0)
+
+
+def test_what_a_killed_build_left_is_removed_and_named(tmp_path: Path) -> None:
+    """A temporary file that nobody holds goes; one that a living writer is at work on stays."""
+    log = write(tmp_path / "run.wire", count=10)
+    left = tmp_path / ".run.h5.0123abcd.part"
+    left.write_bytes(b"half")
+    with whole_file(tmp_path / "other.h5") as living:
+        lines = list(recover(log).describe())
+        assert living.exists()
+    assert not left.exists()
+    assert lines[0] == f"{left}: left by a build that was killed, removed"
+
+
+def test_notes_beyond_the_bound_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A flood of events fills no memory: the first are shown, the rest are counted, the last calibration counts."""
+    monkeypatch.setattr(notes, "KEPT", 5)
+    with Recorder(tmp_path / "run.wire", HEADER, VirtualClock()) as recorder:
+        for host_ns, data in wire(20):
+            recorder.put(0, host_ns, data)
+            recorder.event(0, host_ns, "timeout", {"after_s": 1.0})
+        recorder.event(0, 1, "calibration", Calibration(offset_m=2.0).to_mapping())
+    report = recover(tmp_path / "run.wire")
+    assert report.events == 22
+    with open_run(report.runs[0].path) as run:
+        assert (len(run.provenance["events"]), run.provenance["notes_left_out"]) == (5, 17)
+        assert run.samples().distance.min() > 2.2
+
+
+def test_too_little_memory_is_no_damaged_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What HDF5 or numpy say of memory is said of the machine and not of the file; no run file is left."""
+    log = write(tmp_path / "run.wire", count=10)
+
+    def starved(*_: Any) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(Columns, "finish", starved)
+    with pytest.raises(MemoryError):
+        recover(log)
+    monkeypatch.setattr(Originals, "take", starved)
+    with pytest.raises(OutOfMemory, match=r"run\.h5: more memory was demanded than there is; end other programs"):
+        recover(log)
+    assert [path.name for path in tmp_path.iterdir()] == ["run.wire"]
+
+
 def test_a_log_that_grew_meanwhile_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bytes that came after the reading are in no run file yet."""
     log = write(tmp_path / "run.wire", count=10)
-    real = module.decode_log
+    real = module.chains_of
 
     def slow(*arguments: Any) -> Any:
         with log.open("ab") as file:
             file.write(b"more")
         return real(*arguments)
 
-    monkeypatch.setattr(module, "decode_log", slow)
+    monkeypatch.setattr(module, "chains_of", slow)
     assert not recover(log, remove_log=True).log_removed
     assert log.read_bytes().endswith(b"more")
 

@@ -1,0 +1,151 @@
+"""One sensor's run file on its way: samples and the log go in as they come, what is said of them at the end."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from acquisition.block import F8, I8, Block
+from acquisition.live.decoding import SensorChain
+from acquisition.recordings.recording import Trap
+from storage.losses import LossCount, end_of
+from storage.recovered import RecoveredRun
+from storage.run_file.writing import RunWriter
+from storage.wire_log.notes import Notes
+from storage.wire_log.records import LogHeader, SensorEntry
+from storage.wire_log.scanning import Damage, LogContents
+
+__all__ = ["SensorRun"]
+
+FIRST_SAMPLES = 1000
+"""Of so many the earliest stamp says when t = 0 was; later ones would bring in the difference of the clocks' rates."""
+CLOCK_SAMPLES = 1 << 19
+"""At most so many, at least half as many, evenly spread over the run, tell how the clocks run against each other."""
+
+
+class SensorRun:
+    """Puts one sensor's run file together.
+
+    Parameters
+    ----------
+    writer : RunWriter
+    contents : LogContents
+        The log.
+    sensor : SensorEntry
+    chain : SensorChain
+        Makes the samples.
+    """
+
+    def __init__(self, writer: RunWriter, contents: LogContents, sensor: SensorEntry, chain: SensorChain) -> None:
+        self._writer, self._contents, self._sensor, self._chain = writer, contents, sensor, chain
+        self._clock = _ClockSamples()
+        self._digest = hashlib.sha256()
+        self._first_ns: list[int] = []
+        self._samples = 0
+        self._losses = LossCount(chain.timebase.rate_hz)
+        writer.keep([(part.path.name, part.size) for part in contents.parts])
+
+    def take(self, part: int, data: bytes) -> None:
+        """Take the log's next bytes."""
+        self._digest.update(data)
+        self._writer.take(part, data)
+
+    def append(self, block: Block) -> None:
+        """Take the next samples."""
+        assert block.host_ns is not None
+        if (left := FIRST_SAMPLES - self._samples) > 0:
+            pairs = zip(block.t[:left].tolist(), block.host_ns[:left].tolist(), strict=True)
+            self._first_ns += [host_ns - round(t * 1e9) for t, host_ns in pairs]
+        self._samples += len(block)
+        self._losses.push(block)
+        self._clock.take(block.first, block.t, block.host_ns)
+        self._writer.append(block)
+
+    def finish(
+        self, header: LogHeader, notes: Notes, reads: int, last_ns: int, extra: Mapping[str, Any]
+    ) -> RecoveredRun:
+        """Write what is known at the end.
+
+        Parameters
+        ----------
+        header : LogHeader
+        notes : Notes
+            Marks and events of the log.
+        reads : int
+            Of the sensor's port.
+        last_ns : int
+            Host's stamp of the log's last record.
+        extra : mapping
+            Goes into the provenance besides.
+        """
+        decoding = self._chain.report(*self._clock.columns())
+        faults, damage = decoding["faults"], self._contents.damage
+        end_ns = end_of(notes.events(), [last_ns], header.mono_ns)
+        losses = self._losses.losses(notes.events(self._sensor.channel), header.mono_ns, end_ns)
+        # A stamp may come late, never early.
+        origin = min(self._first_ns, default=header.mono_ns)
+        self._writer.finish(
+            self._chain.info(self._sensor.port, header.kind),
+            scene=header.scene,
+            title=header.title,
+            traps=(*_traps(damage), *losses.traps()),
+            malformed_rows=sum(count for name, count in faults.items() if not name.endswith("bytes")),
+            format="wire",
+            provenance={
+                "start_time": header.utc(origin),
+                "clock_map": {"mono_ns": header.mono_ns, "unix_ns": header.unix_ns, "t0_mono_ns": origin},
+                "recorded_with": header.version,
+                "sensor": dataclasses.asdict(self._sensor),
+                "reads": reads,
+                "log": {
+                    "name": self._contents.path.name,
+                    "sha256": self._digest.hexdigest(),
+                    **dataclasses.asdict(damage),
+                },
+                **notes.provenance(origin),
+                "decoding": decoding,
+                "losses": dataclasses.asdict(losses),
+                **extra,
+            },
+        )
+        return RecoveredRun(self._sensor, self._writer.path, self._samples, faults, decoding, losses)
+
+
+class _ClockSamples:
+    """Times by both clocks of samples spread evenly over a run of any length."""
+
+    def __init__(self) -> None:
+        self._step = 1
+        self._kept: list[tuple[F8, I8]] = []
+        self._count = 0
+
+    def take(self, first: int, t: F8, host_ns: I8) -> None:
+        start = -first % self._step
+        self._kept.append((t[start :: self._step].copy(), host_ns[start :: self._step].copy()))
+        self._count += self._kept[-1][0].size
+        if self._count > CLOCK_SAMPLES:
+            t, host_ns = self.columns()
+            self._step *= 2
+            self._kept = [(t[::2].copy(), host_ns[::2].copy())]
+            self._count = self._kept[0][0].size
+
+    def columns(self) -> tuple[F8, I8]:
+        """Return sensor times in s and host stamps in ns."""
+        if not self._kept:
+            return np.empty(0), np.empty(0, np.int64)
+        t, host_ns = zip(*self._kept, strict=True)
+        self._kept = [(np.concatenate(t), np.concatenate(host_ns))]
+        return self._kept[0]
+
+
+def _traps(damage: Damage) -> tuple[Trap, ...]:
+    found = []
+    if not damage.intact:
+        found.append(Trap("damaged_log", f"The wire log is damaged: {damage.describe()}.", max(1, damage.lost)))
+    if not damage.ended:
+        found.append(Trap("cut_short", "The recording did not end by itself; what the log holds is here."))
+    return tuple(found)

@@ -1,0 +1,159 @@
+"""The arrays of a run file while it is written: samples a chunk at a time, original files as their bytes come."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.block import Block, concatenate
+from storage.atomic import writing_h5
+from storage.errors import WriteFailed
+from storage.run_file import layout
+from storage.run_file.header import FileEntry
+from storage.run_file.layout import CHUNK
+
+__all__ = ["Columns", "Originals"]
+
+
+class Columns:
+    """The growing arrays of a run file, written a whole chunk at a time."""
+
+    def __init__(self, path: Path, file: Any, sigma_m: float | None) -> None:
+        self.path, self.file, self.sigma_m = path, file, sigma_m
+        self.first: int | None = None
+        self.quantity = "length"
+        self.rows = 0
+        self.digests: dict[str, Any] = {}
+        self._pending: list[Block] = []
+        self._written = 0
+
+    def append(self, block: Block) -> None:
+        """Take a block; write what fills whole chunks."""
+        if self.first is None:
+            self.first, self.quantity = block.first, block.quantity
+        self._demand_fit(block)
+        self._pending.append(block)
+        self.rows += len(block)
+        if self.rows - self._written >= CHUNK:
+            whole = concatenate(self._pending)
+            full = len(whole) // CHUNK * CHUNK
+            self._write(whole[:full], growing=True)
+            self._pending = [whole[full:]]
+
+    def finish(self) -> None:
+        """Write the rest and tie every array to its dimension."""
+        rest = concatenate(self._pending)
+        if not self._written or len(rest):
+            self._write(rest, growing=bool(self._written))
+        with writing_h5(self.path):
+            for group, scale in ((layout.SIGNAL, "time"), ("/raw", "sequence")):
+                arrays = self.file[group]
+                arrays[scale].make_scale(scale)
+                for name in arrays:
+                    if name != scale:
+                        arrays[name].dims[0].attach_scale(arrays[scale])
+
+    def _demand_fit(self, block: Block) -> None:
+        expected = (self.first or 0) + self.rows
+        if block.first != expected or block.first < 0 or expected + len(block) > 2**32:
+            demand = f"a block that begins with sample {expected} was demanded, got first = {block.first}"
+            raise WriteFailed(self.path, demand, "number blocks without gaps, and flag what is missing")
+        if block.quantity != self.quantity:
+            demand = f"samples of {self.quantity} were demanded, got {block.quantity} from sample {block.first} on"
+            raise WriteFailed(self.path, demand, "write a run file for each quantity")
+        for name, values in layout.arrays(block, None).items():
+            if values is not None and values.shape != block.t.shape:
+                demand = f"{len(block)} values of {name} from sample {block.first} were demanded"
+                raise WriteFailed(self.path, f"{demand}, got shape {values.shape}", "make them equally long")
+
+    def _write(self, block: Block, *, growing: bool) -> None:
+        with writing_h5(self.path):
+            values = layout.arrays(block, self.sigma_m)
+            for column in layout.COLUMNS:
+                array = values[column.name]
+                if array is None and column.name not in self.digests:
+                    continue
+                if array is None:
+                    array = np.full(len(block), column.fill)
+                exact = np.ascontiguousarray(array).astype(column.dtype, casting="safe", copy=False)
+                column.demand_within(exact, self._written)
+                self._write_column(column, exact, growing)
+        self._written += len(block)
+
+    def _write_column(self, column: layout.Column, values: NDArray[Any], growing: bool) -> None:
+        if column.name not in self.digests:
+            self.digests[column.name] = hashlib.sha256()
+            _create(self.file, column.path, column.dtype, None if growing else len(values))
+            for start in range(0, self._written, CHUNK):  # a column that comes late
+                self._extend(column, start, np.full(CHUNK, column.fill, column.dtype))
+        self._extend(column, self._written, values)
+
+    def _extend(self, column: layout.Column, start: int, values: NDArray[Any]) -> None:
+        array = self.file[column.path]
+        if array.shape[0] < start + len(values):
+            array.resize((start + len(values),))
+        array[start : start + len(values)] = values
+        self.digests[column.name].update(values.tobytes())
+
+
+def _create(file: Any, path: str, dtype: str, length: int | None) -> Any:
+    """Make an array of a known length, or a growing one; zero length only a growing one can have."""
+    if length:
+        return file.create_dataset(path, (length,), dtype, chunks=(min(length, CHUNK),), **layout.filters(path))
+    chunk = CHUNK if length is None else 1
+    return file.create_dataset(path, (0,), dtype, maxshape=(None,), chunks=(chunk,), **layout.filters(path))
+
+
+class Originals:
+    """The original files of a run, written as their bytes come."""
+
+    def __init__(self, file: Any, files: Sequence[tuple[str, int]]) -> None:
+        self._names = [name for name, _ in files]
+        self._digests = [hashlib.sha256() for _ in files]
+        self._taken = [0] * len(files)
+        sizes = np.array([size for _, size in files], "<u8")
+        self._sizes, self._starts = sizes.tolist(), (np.cumsum(sizes, dtype="<u8") - sizes).tolist()
+        self._bytes = _create(file, f"{layout.WIRE}/bytes", "|u1", int(sizes.sum()))
+        records = layout.records(sizes)
+        wire = file[layout.WIRE]
+        for name, values in records.items():
+            _create(file, f"{layout.WIRE}/{name}", values.dtype.str, len(values))[:] = values
+        _dimension(wire, "byte", [self._bytes])
+        _dimension(wire, "record", [wire[name] for name in records])
+
+    def take(self, number: int, data: bytes) -> None:
+        """Take the next bytes of a file."""
+        start = self._starts[number] + self._taken[number]
+        self._taken[number] += len(data)
+        self._digests[number].update(data)
+        if data and self._taken[number] <= self._sizes[number]:
+            self._bytes[start : start + len(data)] = np.frombuffer(data, np.uint8)
+
+    def entries(self) -> tuple[FileEntry, ...]:
+        """Return what the header says of them.
+
+        Raises
+        ------
+        ValueError
+            If one is not whole.
+        """
+        for name, size, taken in zip(self._names, self._sizes, self._taken, strict=True):
+            if taken != size:
+                raise ValueError(f"{size} bytes of {name} were to be kept, got {taken}: it changed meanwhile")
+        digests = (digest.hexdigest() for digest in self._digests)
+        return tuple(FileEntry(*entry) for entry in zip(self._names, self._sizes, digests, strict=True))
+
+
+def _dimension(group: Any, name: str, arrays: Sequence[Any]) -> None:
+    """Tie arrays to a dimension without coordinates, in netCDF's own way: a scale of this very title."""
+    length = arrays[0].shape[0]
+    growing: dict[str, Any] = {} if length else {"maxshape": (None,), "chunks": (1,)}
+    scale = group.create_dataset(name, (length,), ">f4", **growing)
+    scale.make_scale(f"This is a netCDF dimension but not a netCDF variable.{length:10d}")
+    for array in arrays:
+        array.dims[0].attach_scale(scale)
