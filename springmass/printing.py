@@ -15,6 +15,9 @@ from pipeline.results.compare import Comparison
 __all__ = ["classic_text", "comparison_text", "findings_text", "wrapped"]
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
+STANDING = ("nominal_clock", "stated_error_is_not_noise", "jittered_time", "offset_unknown", "velocity_missing")
+"""Notes that a format makes on every file of its own: they drown what this record says."""
+FIRST = 3  # that change a number stand by themselves
 
 
 def findings_text(findings: Sequence[Mapping[str, Any]]) -> str:
@@ -27,8 +30,17 @@ def findings_text(findings: Sequence[Mapping[str, Any]]) -> str:
     """
     if not findings:
         return "No findings."
-    told = (visible(f"{_MARKS[f['severity']]} {f['code']}: {f['message']}") for f in findings)
-    return "\n".join(wrapped(one, " " * 8) for one in told)
+    standing = [f["code"] for f in findings if f["code"] in STANDING and f["severity"] == "info"]
+    own = [f for f in findings if f["code"] not in standing]
+    told = [visible(f"{_MARKS[f['severity']]} {f['code']}: {f['message']}") for f in own]
+    grave = sum(f["severity"] != "info" for f in own)
+    lines = [wrapped(one, " " * 8) for one in told]
+    if grave > FIRST:
+        lines.insert(FIRST, f"and {grave - FIRST} more that may change a number:")
+    if standing:
+        words = f"{_MARKS['info']} of the format, as of every file of its kind: {', '.join(standing)} (findings.md)"
+        lines.append(wrapped(words, " " * 8))
+    return "\n".join(lines)
 
 
 def classic_text(classic: Classic) -> str:

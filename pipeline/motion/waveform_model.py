@@ -13,7 +13,7 @@ from pipeline.motion.waveform import Rest
 from pipeline.numerics import least_squares
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.condition import Conditioned
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.track import F8, UNUSABLE, Quality
 
 __all__ = ["Chooser", "Record", "Rows", "State", "WaveformModel"]
@@ -262,6 +262,8 @@ class Chooser:
     def __init__(self, conditioned: Conditioned, demodulated: Demodulated, record: Record, clip_sigmas: float) -> None:
         self._conditioned, self._record = conditioned, record
         self._noise_m, self._clip_sigmas = demodulated.noise_m, clip_sigmas
+        errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
+        self._least_m = float(np.median(errors))
         usable = (conditioned.flags & UNUSABLE) == 0
         self.by_windows: Rows = usable & ((demodulated.flags & UNUSABLE) == 0)
         echo = (demodulated.flags & np.uint8(Quality.FALSE_ECHO)) != 0
@@ -307,7 +309,7 @@ class Chooser:
         if spread > 1.5 * self._noise_m:
             # What the model leaves is not noise alone: the verdict so far on each sample stands.
             return np.asarray(near & rows)
-        return np.asarray(near & (np.abs(left) <= self._clip_sigmas * spread))
+        return np.asarray(near & (np.abs(left) <= self._clip_sigmas * max(spread, self._least_m)))
 
     def on_plateau(self, position: F8) -> Rows:
         """Return where a model (n,), m less the record's level, is too near a level at which distances are cut."""

@@ -22,9 +22,10 @@ from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.windows import Solution, Tuning, Windows, quantile, retune, solve, unwrap
 from pipeline.track import F8, U8, Quality
 
-__all__ = ["Demodulated", "Params", "demodulate", "polar"]
+__all__ = ["Demodulated", "Params", "demodulate", "model_error", "polar"]
 
 WEAK = 7.0  # standard uncertainties of an amplitude under which its phase is known to 0.14 rad and less well
+FINEST = 1e-4  # of the amplitude: scatter below it is a computed record's
 HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, and their quantiles of a normal |x|
 
 
@@ -131,7 +132,7 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     basis = windows.decaying(basis, rough.decay)
     solution = _let_go(windows, basis, conditioned.noise_m, params)
     _rescue(windows, basis, solution, tuning, params)
-    solution, weights = _clip(windows, basis, solution, params)
+    solution, weights = _clip(windows, basis, solution, rough, params)
     if conditioned.clipped_from_m:
         level = _typical(_spread(windows, solution), windows, solution)
         crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
@@ -140,7 +141,7 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     # Once more in a basis that turns and decays in each window as the record does there.
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
-    solution, weights = _clip(windows, basis, solve(basis, weights), params)
+    solution, weights = _clip(windows, basis, solve(basis, weights), tuning, params)
     return _finish(conditioned, windows, solution, weights, tuning)
 
 
@@ -221,14 +222,24 @@ def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
     return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
 
 
-def _clip(windows: Windows, basis: F8, solution: Solution, params: Params) -> tuple[Solution, F8]:
+def _clip(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, params: Params) -> tuple[Solution, F8]:
     """Take residuals beyond the clip out and fit again."""
     spread = _spread(windows, solution)
     level = _typical(spread, windows, solution)
     # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
-    bound = params.clip_sigmas * np.clip(spread, 0.75 * level, 2.0 * level)
+    size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
+    least = model_error(size, tuning.decay, tuning.angular_frequency)
+    bound = params.clip_sigmas * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
     weights = np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0)
     return solve(basis, weights), weights
+
+
+def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:
+    """What a sinusoid may leave of a motion without noise, m: no echo, however little noise there is.
+
+    A ten-thousandth of the amplitude, and twice the third harmonic :math:`A g/20\\omega` of quadratic drag.
+    """
+    return (FINEST + np.abs(decay) / (10.0 * angular_frequency)) * np.abs(amplitude)
 
 
 def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, weights: F8, tuning: Tuning) -> Demodulated:

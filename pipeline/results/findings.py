@@ -20,7 +20,7 @@ from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_fit import FullFit
 from pipeline.oscillation.cycles import Cycles
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
 from pipeline.results.effects import Effect
 
@@ -165,7 +165,11 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
     rejected = [name for name, fit in damping.fits.items() if fit.rejected]
     if damping.fits and len(rejected) == len(damping.fits):
         yield Finding(
-            "law_rejected", "error", "every damping law tried is rejected: none describes the amplitude's fall"
+            "no_law_fits",
+            "warning",
+            f"no damping law describes the amplitude's fall to within its scatter; {LAWS[damping.selected].words} "
+            f"comes nearest (reduced chi-square {_number(damping.best.reduced_chi2)}): period and amplitudes hold, "
+            "quote the amplitude against time rather than the law's coefficients",
         )
     yield from _rejections(damping)
     if (mixed := find_mixed(damping)) is not None:
@@ -220,6 +224,8 @@ def _rejections(damping: Damping) -> Iterator[Finding]:
 
 def _number(value: float) -> str:
     """Three digits, in full."""
+    if value > 1e6:
+        return "over a million"
     return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
 
 
@@ -249,7 +255,9 @@ def _motion_findings(
             f"{start * 1e3:.0f} mm than at rest and shifts with {words_on_exponent(phase.exponent)}; "
             "the period given is the record's mean, its uncertainty covers the bend",
         )
-    if rest.moves:
+    # What a computed record's rest position does within its digits disturbs no number.
+    errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
+    if rest.moves and rest.range_m > float(np.max(errors)):
         yield Finding("rest_drift", "warning", _words_on_rest(rest))
     ratio = waveform.rms_m / demodulated.noise_m if demodulated.noise_m > 0 else 1.0
     excess = phase.damping.scatter.excess
