@@ -36,6 +36,8 @@ class SensorEntry:
         Of the family's decoder; JSON-able.
     calibration : mapping
         Numbers of :class:`acquisition.live.calibration.Calibration` by name; empty for the default.
+    clock_ppm : float or None
+        What its clock may be off at most, ppm; None for the family's.
     """
 
     channel: int
@@ -45,6 +47,7 @@ class SensorEntry:
     rate_hz: float | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)
+    clock_ppm: float | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.channel <= 255:

@@ -14,6 +14,7 @@ from acquisition.clock import VirtualClock
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
+from storage import building
 from storage import recover as module
 from storage.atomic import whole_file
 from storage.errors import OutOfMemory, RunDamaged, RunExists
@@ -272,6 +273,18 @@ def test_notes_beyond_the_bound_are_counted(tmp_path: Path, monkeypatch: pytest.
     with open_run(report.runs[0].path) as run:
         assert (len(run.provenance["events"]), run.provenance["notes_left_out"]) == (5, 17)
         assert run.samples().distance.min() > 2.2
+
+
+def test_gaps_beyond_the_bound_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sensor half as fast as its rate says has a gap at each reading: the first are shown, the rest are counted."""
+    monkeypatch.setattr(building, "KEPT_GAPS", 5)
+    sensor = SensorEntry(0, FAMILY, rate_hz=200.0)
+    log = write(tmp_path / "run.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0), count=40)
+    report = recover(log)
+    decoding = report.runs[0].decoding
+    assert len(decoding["gaps"]) == 5
+    assert decoding["gaps_left_out"] == {"count": 34, "lost": 34, "longest_s": pytest.approx(0.01)}
+    assert f"{tmp_path / 'run.h5'}: 39 gaps, 39 readings lost in them, the longest 0.01 s" in report.describe()
 
 
 def test_too_little_memory_is_no_damaged_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
