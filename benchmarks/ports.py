@@ -30,7 +30,8 @@ from acquisition.clock import SystemClock
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
-from acquisition.live.reader import Line, PortReader
+from acquisition.live.line import Line
+from acquisition.live.reader import PortReader
 from acquisition.live.serial_port import SerialPort
 from acquisition.readings import Read
 from springmass.session.reads import Tee

@@ -79,7 +79,7 @@ class _Overflow:
 
 
 class Recorder:
-    """Records to a new wire log. It is a :class:`acquisition.live.reader.Sink`.
+    """Records to a new wire log. It is a :class:`acquisition.live.line.Sink`.
 
     Parameters
     ----------

@@ -24,13 +24,13 @@ from pipeline.bench.added_mass import scene_air
 from pipeline.bench.air import speed_of_sound
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
-from pipeline.streaming import LiveMotion
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
 from springmass.runs.analysing import made_now
 from springmass.runs.loading import read_scene
 from springmass.session.console import Console
 from springmass.session.output import demand_new
-from springmass.session.session import BYTES_PER_READ, Ended, Progress, Sensor, Session, Trigger
+from springmass.session.progress_line import ProgressLine
+from springmass.session.session import BYTES_PER_READ, Ended, Sensor, Session, Trigger
 from springmass.session.stops import Stops
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
@@ -40,10 +40,6 @@ from storage.wire_log.appending import Roll
 __all__ = ["run"]
 
 U_RULER_M = 0.5e-3
-# Off a terminal one line of so many is printed: working out the motion for each is a tenth of what recording costs.
-UNWATCHED_LINES = 30
-PATIENCE_S = 0.2  # a progress line that nobody reads is left out
-SILENT_S = 3.0  # of a sensor, said in the progress line
 UNLIMITED_S = 3600.0  # how long a run without --seconds is taken to be, for the look at the disk
 
 
@@ -156,7 +152,7 @@ def _record(session: Session, options: argparse.Namespace, log: Path, console: C
     session.listen()
     rest = None if options.still is None else _rest(session, options.still, options.ruler, console)
     trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
-    show = _ProgressLine(console)
+    show = ProgressLine(console)
     try:
         return session.record(
             log,
@@ -213,46 +209,6 @@ def _ask(demand: str, console: Console) -> None:
             "is closed; name one --ruler, or run this at a terminal",
             USAGE,
         )
-
-
-class _ProgressLine:
-    """The progress line on stderr: rewritten in place on a terminal; elsewhere after 1, 10, 40, 70 s and so on."""
-
-    def __init__(self, console: Console) -> None:
-        self._console = console
-        self._terminal = console.terminal
-        self._shown = 0
-
-    def __call__(self, progress: Progress) -> None:
-        self._shown += 1
-        if self._terminal:
-            self._console.write(f"\r\x1b[K{line_of(progress)}", PATIENCE_S)
-        elif self._shown == 1 or self._shown % UNWATCHED_LINES == 10:
-            self._console.write(f"{line_of(progress)}\n", PATIENCE_S)
-
-    def end(self) -> None:
-        """Leave the line standing."""
-        if self._terminal and self._shown:
-            self._console.write("\n", PATIENCE_S)
-
-
-def line_of(progress: Progress) -> str:
-    """Return a progress line: time, period, amplitude, rate, drop-outs, what is safe on the disk."""
-    state = "waiting for the bob" if progress.waiting else f"{progress.seconds:6.0f} s"
-    found = progress.motion()
-    motion = f"T {found.period}, A {found.amplitude}" if isinstance(found, LiveMotion) else found.why
-    parts = [state, motion, f"{progress.rate_hz:.0f} Hz", f"{progress.missing} missing, {progress.gaps} gaps"]
-    parts += progress.gone
-    if not progress.gone and progress.silent_s > SILENT_S:
-        parts.append(f"no reading for {progress.silent_s:.0f} s")
-    if progress.unshown:
-        parts.append(f"{progress.unshown} samples recorded and not shown")
-    if progress.status is not None:
-        parts.append(f"{progress.status.synced_bytes / 1e3:.0f} kB safe")
-        if progress.disk_free_bytes is not None:
-            parts.append(f"{progress.disk_free_bytes / 1e9:.1f} GB left")
-        parts += [told for told in (progress.status.astray, progress.status.error) if told]
-    return " | ".join(parts)
 
 
 def _typed_marks() -> queue.SimpleQueue[str] | None:

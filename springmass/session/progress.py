@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import shutil
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from acquisition.block import I8, Block, Flag
+from acquisition.live.decoding import SensorChain
 from pipeline.accuracy import params_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
-from storage.recorder import RecorderStatus
+from springmass.session.failures import Failures
+from springmass.session.reads import Tee
+from storage.recorder import Recorder, RecorderStatus
 
-__all__ = ["Progress", "Shown"]
+__all__ = ["Progress", "Shown", "progress_of"]
 
 SECOND_NS = 1_000_000_000
 MOTION_EVERY_NS = 1_900_000_000
@@ -107,3 +112,45 @@ class Shown:
         while self._stamps and self._stamps[0][-1] < since:
             self._stamps.popleft()
         return sum(int(np.count_nonzero(stamps >= since)) for stamps in self._stamps)
+
+
+def progress_of(
+    shown: Shown,
+    failures: Failures,
+    chains: Sequence[SensorChain],
+    tee: Tee,
+    recorder: Recorder | None,
+    start_ns: int,
+    now_ns: int,
+) -> Progress:
+    """Return where a recording stands, that began at a moment; without a recorder, one that waits for its trigger."""
+
+    def motion() -> LiveMotion | NotYet:
+        """Where working it out fails, say why there is none: the rest of the line stands."""
+        try:
+            return shown.motion(now_ns)
+        except BaseException as error:
+            failures.note("analysis", error)
+            return NotYet(f"no motion shown ({type(error).__name__})")
+
+    return Progress(
+        (now_ns - start_ns) * 1e-9,
+        shown.samples,
+        shown.missing,
+        sum(len(chain.timebase.gaps) for chain in chains),
+        shown.rate_hz(now_ns),
+        motion,
+        None if recorder is None else recorder.status,
+        None if recorder is None else _free_bytes(recorder.path.parent),
+        recorder is None,
+        tee.unshown,
+        tuple(tee.gone.values()),
+        shown.silent_s(now_ns),
+    )
+
+
+def _free_bytes(folder: Path) -> int | None:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:  # a folder that was renamed; that is said elsewhere
+        return None

@@ -16,7 +16,7 @@ from typing import Any, cast
 from acquisition.block import Block
 from acquisition.decoders.family import Polled
 from acquisition.live.decoding import SensorChain
-from acquisition.live.reader import Line
+from acquisition.live.line import Line
 from acquisition.readings import Read
 from springmass.session.failures import Failures
 from springmass.session.sensors import Sensor

@@ -10,7 +10,7 @@ from acquisition.decoders.family import Decoder, Family
 from acquisition.decoders.registry import describe_bytes
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from acquisition.live.reader import Transport
+from acquisition.live.line import Transport
 from storage.wire_log.records import SensorEntry
 
 __all__ = ["Proof", "Sensor"]

@@ -10,12 +10,10 @@ from __future__ import annotations
 import contextlib
 import math
 import queue
-import shutil
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +23,11 @@ from acquisition.block import Block
 from acquisition.clock import Clock
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortReader
-from pipeline.streaming import LiveMotion, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, USAGE, ProgramError
 from springmass.session.display import Display, Samples
 from springmass.session.failures import Failures
-from springmass.session.progress import SECOND_NS, Progress, Shown
+from springmass.session.progress import SECOND_NS, Progress, Shown, progress_of
 from springmass.session.reads import Tee
 from springmass.session.sensors import Sensor
 from springmass.session.stops import Stops
@@ -305,31 +302,8 @@ class Session:
 
     def _ring(self, display: Display, take: Callable[[], Samples], start_ns: int, recorder: Recorder | None) -> None:
         now_ns = self._clock.now_ns()
-        display.ring(take, lambda shown: self._progress(shown, now_ns, (now_ns - start_ns) * 1e-9, recorder))
-
-    def _progress(self, shown: Shown, now_ns: int, seconds: float, recorder: Recorder | None) -> Progress:
-        return Progress(
-            seconds,
-            shown.samples,
-            shown.missing,
-            sum(len(chain.timebase.gaps) for chain in self._chains),
-            shown.rate_hz(now_ns),
-            partial(self._motion, shown, now_ns),
-            None if recorder is None else recorder.status,
-            None if recorder is None else _free_bytes(recorder.path.parent),
-            recorder is None,
-            self._tee.unshown,
-            tuple(self._tee.gone.values()),
-            shown.silent_s(now_ns),
-        )
-
-    def _motion(self, shown: Shown, now_ns: int) -> LiveMotion | NotYet:
-        """Return the motion; where working it out fails, why there is none, for the rest of the line stands."""
-        try:
-            return shown.motion(now_ns)
-        except BaseException as error:
-            self.failures.note("analysis", error)
-            return NotYet(f"no motion shown ({type(error).__name__})")
+        state = (self.failures, self._chains, self._tee, recorder, start_ns, now_ns)
+        display.ring(take, lambda shown: progress_of(shown, *state))
 
     def _header(self) -> LogHeader:
         return LogHeader(
@@ -346,10 +320,3 @@ class Session:
         if channel in self._tee.gone:
             return f"{self._tee.gone[channel]}; is a sensor connected, and is this its port?"
         return self.sensors[channel].not_heard(self._tee.heard(channel))
-
-
-def _free_bytes(folder: Path) -> int | None:
-    try:
-        return shutil.disk_usage(folder).free
-    except OSError:  # a folder that was renamed; that is said elsewhere
-        return None

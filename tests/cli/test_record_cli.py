@@ -25,9 +25,9 @@ from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from pipeline.analyse import Oscillation, analyse
 from pipeline.streaming import NotYet
 from springmass import load
-from springmass.commands.record import _ProgressLine, line_of
 from springmass.session.console import Console
 from springmass.session.progress import Progress
+from springmass.session.progress_line import ProgressLine, line_of
 from storage.run_file.reading import open_run
 
 SCENE = """
@@ -477,7 +477,7 @@ def test_off_a_terminal_the_progress_line_comes_now_and_then(capsys: pytest.Capt
 
         return Progress(seconds, 0, 0, 0, 0.0, motion, None, None, waiting=False)
 
-    line = _ProgressLine(Console(SystemClock(), pytest.fail))
+    line = ProgressLine(Console(SystemClock(), pytest.fail))
     for second in range(1, 81):
         line(progress(float(second)))
     assert asked == [1.0, 10.0, 40.0, 70.0]

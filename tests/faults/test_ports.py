@@ -29,7 +29,8 @@ from acquisition.errors import PortError
 from acquisition.live import reader as wired
 from acquisition.live import serial_port
 from acquisition.live.decoding import SensorChain
-from acquisition.live.reader import Line, PortReader
+from acquisition.live.line import Line
+from acquisition.live.reader import PortReader
 from acquisition.live.serial_port import PortFacts, SerialPort, list_ports
 from acquisition.readings import Read, Readings
 from acquisition.simulated.pseudo_terminal import Faults, VirtualPort

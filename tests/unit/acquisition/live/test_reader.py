@@ -7,9 +7,12 @@ import threading
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import pytest
+
 from acquisition.clock import VirtualClock
 from acquisition.errors import PortError
-from acquisition.live.reader import Line, PortReader
+from acquisition.live.line import Line
+from acquisition.live.reader import PortReader
 from acquisition.readings import Read
 
 WAIT_S = 10.0
@@ -118,3 +121,39 @@ def test_a_network_port_that_is_slow_to_open_holds_up_no_other() -> None:
     remote.answer.set()
     reader.stop()
     os.close(remote.fileno())
+
+
+class Odd(Pipe):
+    """A transport that trips over a defect of its own when it is opened again, and then opens."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tries = 0
+
+    def reopen(self) -> None:
+        """Trip once."""
+        self.tries += 1
+        if self.tries == 1:
+            raise RuntimeError("a defect")
+        self._read, self.end = os.pipe()
+
+
+def test_a_defect_on_the_reading_thread_is_heard_of_and_the_reading_goes_on() -> None:
+    """The port that tripped is tried again, another is read meanwhile, and stop raises what it was."""
+    other, odd, sink, clock = Pipe(), Odd(), Heard(), VirtualClock()
+    reader = PortReader([Line(other, 0), Line(odd, 1)], sink, clock)
+    reader.start()
+    os.close(odd.end)
+    odd.end = os.open(os.devnull, os.O_WRONLY)  # for the transport to close
+    while odd.tries < 2:
+        clock.sleep_until_ns(clock.now_ns() + 500_000_000)
+        threading.Event().wait(0.01)
+    os.write(odd.end, b"x")
+    os.write(other.end, b"x")
+    heard: set[int] = set()
+    while heard < {0, 1}:
+        assert sink.came.wait(WAIT_S)
+        heard = {channel for channels in sink.reads_of for channel in channels}
+    assert sink.events == ["lost 1", "reopened 1"]
+    with pytest.raises(RuntimeError, match="a defect"):
+        reader.stop()

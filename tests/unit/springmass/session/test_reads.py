@@ -15,7 +15,7 @@ import pytest
 from acquisition.block import Block, concatenate
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
-from acquisition.live.reader import Transport
+from acquisition.live.line import Transport
 from acquisition.readings import Read, Readings
 from springmass.session import reads
 from springmass.session.failures import Failures
