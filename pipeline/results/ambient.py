@@ -62,12 +62,12 @@ class Ambient:
         A calibrated scale has the calibration's uncertainty and no other. Else the speed of sound is uncertain with
         temperature, pressure, humidity and its formula; and where the record was made with another speed than the
         scene's air has, the difference, which is not corrected, is the half-width of a rectangle. A bench whose air
-        has no stated temperature has a room's, 20 +- 3 degC. Where no bench is told of, nothing says that the distances
-        are an echo's: their scale is taken as it stands.
+        has no stated temperature has a room's, 20 +- 3 degC. Where neither a bench is told of nor a speed of sound of
+        the record, nothing says that the distances are an echo's: their scale is taken as it stands.
         """
         if instrument.u_scale > 0:
             return self._inputs.add("calibrated_scale", Estimate(1.0, instrument.u_scale), "B")
-        if not self._sonic:
+        if not self._sonic and instrument.speed_of_sound_m_per_s is None:
             return 1.0
         sound = function_of(speed_of_sound, self._temperature, self._pressure, self._humidity)
         actual = estimate_of(sound, "m/s").value

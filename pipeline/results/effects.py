@@ -204,7 +204,7 @@ def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
         why += "; the distances were calibrated, so the calibration's uncertainty stands in its place"
         return Effect("speed_of_sound", None, None, "1", False, why)
     if scene.air_temperature_c is None:
-        bench = scene.tells_of_bench
+        bench = scene.tells_of_bench or instrument.speed_of_sound_m_per_s is not None
         counts = "a room's 20 +- 3 degC count, 0.5 % in the scale" if bench else "its 0.18 %/K stand in no uncertainty"
         why = f"the scene gives no air temperature, so {counts}: {why}"
         return Effect("speed_of_sound", None, None, "1", False, why)
