@@ -11,7 +11,7 @@ from pipeline.analyse import Oscillation, Overdamped
 from pipeline.errors import PipelineError
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, tell
-from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder
+from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder
 from springmass.runs.json_results import REJECTED_WARNINGS, picked
 from springmass.runs.loading import load, read_scene
 from storage.errors import StorageError
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
             complain(f"{path}: {error}")
             codes.append(UNREADABLE)
         else:
-            codes.append(_deliver(analysed, options, None if out is None else out / f"{name}.results"))
+            codes.append(_deliver(analysed, options, None if out is None else out / in_a_name(name, ".results")))
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(codes)

@@ -24,7 +24,7 @@ from pipeline.numerics.estimate import Joint
 from pipeline.track import F8
 from springmass.commands import completions
 from springmass.errors import OK, USAGE, ProgramError, tell
-from springmass.runs.analysing import made_now, make_folder
+from springmass.runs.analysing import in_a_name, made_now, make_folder
 from springmass.runs.loading import load, read_scene
 from springmass.runs.simulation import (
     Against,
@@ -123,12 +123,11 @@ def _write(
     from springmass.report.figures import save
     from springmass.report.simulation_figures import against_figure, band_figure, draw_simulation
     from storage.atomic import write_whole
+    from storage.folder import whole_folder
 
     name = Path(options.scene).name.removesuffix(".toml").removesuffix(".scene")
-    folder = make_folder(make_folder(options.out or ".") / f"{name}.simulated")
-    pictures = make_folder(folder / "figures")
+    target = make_folder(options.out or ".") / in_a_name(name, ".simulated")
     told = summary(simulation, against, band)
-    _write_run(folder / "run.h5", simulation, scene, options, told)
     figures, tables = draw_simulation(simulation, effective_mass_kg(scene)), {}
     if band is not None:
         t, y = simulation.trajectory.t, simulation.trajectory.y
@@ -140,16 +139,22 @@ def _write(
         if against.band is not None:
             around = against.predicted + against.band
             tables["against"] |= {f"predicted_{level}_m": each for level, each in zip(LEVELS, around, strict=True)}
-    for title in ("against", "band"):
-        if title not in figures:  # of an earlier simulation, it would pass for one of this
-            for old in (pictures / f"{title}.svg", pictures / f"{title}.pdf", folder / f"{title}.csv"):
-                old.unlink(missing_ok=True)
-    for title, figure in figures.items():
-        save(figure, pictures, title)
-    for title, columns in tables.items():
-        write_whole(folder / f"{title}.csv", _table(columns))
-    write_whole(folder / "simulation.json", json.dumps(told, indent=2) + "\n")
-    return folder
+    with whole_folder(target, FILES, "simulation.json") as folder:
+        _write_run(folder / "run.h5", simulation, scene, options, told)
+        pictures = make_folder(folder / "figures")
+        for title, figure in figures.items():
+            save(figure, pictures, title)
+        for title, columns in tables.items():
+            write_whole(folder / f"{title}.csv", _table(columns))
+        write_whole(folder / "simulation.json", json.dumps(told, indent=2) + "\n")
+    return target
+
+
+FIGURES = ("position", "velocity", "energy", "phase", "error", "band", "against")
+FILES = frozenset(
+    {"run.h5", "simulation.json", "band.csv", "against.csv"}
+    | {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf")}
+)
 
 
 def _table(columns: dict[str, F8]) -> str:

@@ -1,4 +1,4 @@
-"""Write a report: the page, its figures and its tables, each file whole or not at all."""
+"""Write a report: the page, its figures and its tables, a folder that changes as a whole."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from springmass.report.budgets import budget_csv
 from springmass.report.figures import KINDS, MAKERS, comparison_figure, draw, render
@@ -18,6 +18,7 @@ from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
 from springmass.runs.json_results import plain
 from storage.atomic import write_whole
+from storage.folder import whole_folder
 
 __all__ = ["write_report"]
 
@@ -34,7 +35,7 @@ def write_report(
     Parameters
     ----------
     directory : Path
-        Usually ``NAME.results``; made if it is not there, files of an earlier report are replaced.
+        Usually ``NAME.results``; replaced as a whole where it holds an earlier report and nothing else.
     runs : sequence of Analysed
         One at least.
     compared : Compared, optional
@@ -46,14 +47,14 @@ def write_report(
     Returns
     -------
     Path
-        The page, ``report.html``, written last: where it stands, the rest stands.
+        The page, ``report.html``: where it stands, the rest stands.
 
     Raises
     ------
     ValueError
         If there is no run.
     storage.errors.WriteFailed
-        If a file cannot be written.
+        If a file or the folder cannot be written; the earlier report stands then.
 
     Notes
     -----
@@ -65,47 +66,65 @@ def write_report(
     """
     if not runs:
         raise ValueError("a report needs one run at least, got none")
-    directory = Path(directory)
-    (directory / "figures").mkdir(parents=True, exist_ok=True)
+    directory, names = Path(directory), [run.name for run in runs]
+    stems = _stems(names)
+    with whole_folder(directory, _names(stems), PAGE) as folder:
+        _write(folder, runs, stems, compared, summary)
+    return directory / PAGE
+
+
+PAGE = "report.html"
+_TABLES = ("results.json", "results.csv", "table.tex", "budget.csv", "budget.tex")
+
+
+def _names(stems: Sequence[str]) -> set[str]:
+    """Return the name of every file that a report of these runs may hold."""
+    pictures = [f"{stem}{name}" for stem in stems for name in MAKERS]
+    figures = {f"figures/{name}.{kind}" for name in (*pictures, "comparison") for kind in KINDS}
+    return {PAGE, *_TABLES, *figures, *(f"{stem}motion.csv" for stem in stems)}
+
+
+def _write(
+    folder: Path,
+    runs: Sequence[Analysed],
+    stems: Sequence[str],
+    compared: Compared | None,
+    summary: Mapping[str, Any] | None,
+) -> None:
+    (folder / "figures").mkdir()
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
     pictures = []
-    for stem, run in zip(_stems(names), runs, strict=True):
+    for stem, run in zip(stems, runs, strict=True):
         smoothed = smoothed_or_why(run.analysis)
         figures = draw(run.analysis, smoothed)
         drawn = {name: {kind: render(figure, kind) for kind in KINDS} for name, figure in figures.items()}
-        _write_figures(directory / "figures", stem, drawn)
-        motion = directory / f"{stem}motion.csv"
-        _put(motion, None if isinstance(smoothed, str) else motion_csv(run.analysis, smoothed))
+        for name, files in drawn.items():
+            for kind, data in files.items():
+                write_whole(folder / "figures" / f"{stem}{name}.{kind}", data)
+        if not isinstance(smoothed, str):
+            write_whole(folder / f"{stem}motion.csv", motion_csv(run.analysis, smoothed))
         pictures.append({name: files["svg"] for name, files in drawn.items()})
     results = [run.result for run in runs]
     content = plain(summary if summary is not None else results[0] if len(results) == 1 else results)
-    write_whole(directory / "results.json", json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
-    write_whole(directory / "results.csv", results_csv(names, analyses))
-    write_whole(directory / "table.tex", table_tex(names, analyses))
-    write_whole(directory / "budget.csv", budget_csv(names, analyses))
-    write_whole(directory / "budget.tex", budget_tex(names, analyses))
+    text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    # Half a character, which a file's name may hold, is written as JSON's own escape of it.
+    tables: tuple[bytes | str, ...] = (
+        text.encode("utf-8", "backslashreplace"),
+        results_csv(names, analyses),
+        table_tex(names, analyses),
+        budget_csv(names, analyses),
+        budget_tex(names, analyses),
+    )
+    for name, table in zip(_TABLES, tables, strict=True):
+        write_whole(folder / name, table)
     overview = {}
     if compared is not None:
         overview = {kind: render(comparison_figure(compared.comparison), kind) for kind in KINDS}
         for kind, data in overview.items():
-            write_whole(directory / "figures" / f"comparison.{kind}", data)
+            write_whole(folder / "figures" / f"comparison.{kind}", data)
     provenance = (summary or results[0])["provenance"]
     page = render_html(runs, pictures, compared=compared, overview=overview.get("svg", b""), provenance=provenance)
-    return write_whole(directory / "report.html", page)
-
-
-def _write_figures(folder: Path, stem: str, drawn: Mapping[str, Mapping[Literal["svg", "pdf"], bytes]]) -> None:
-    for name in MAKERS:
-        for kind in KINDS:
-            _put(folder / f"{stem}{name}.{kind}", drawn[name][kind] if name in drawn else None)
-
-
-def _put(target: Path, content: bytes | str | None) -> None:
-    """Write a file, or take away one that an earlier report left: it would pass for one of this."""
-    if content is None:
-        target.unlink(missing_ok=True)
-    else:
-        write_whole(target, content)
+    write_whole(folder / PAGE, page)
 
 
 def _stems(names: Sequence[str]) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -17,7 +19,16 @@ from springmass.errors import USAGE, ProgramError
 from springmass.runs.json_results import result_of
 from springmass.runs.loading import Loaded
 
-__all__ = ["Analysed", "analyse_loaded", "distinct_names", "made_now", "make_folder", "now_utc", "scene_of"]
+__all__ = [
+    "Analysed",
+    "analyse_loaded",
+    "distinct_names",
+    "in_a_name",
+    "made_now",
+    "make_folder",
+    "now_utc",
+    "scene_of",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,6 +118,26 @@ def distinct_names(paths: Sequence[str]) -> list[str]:
             count += 1
         names.append(name)
     return names
+
+
+def in_a_name(name: str, suffix: str) -> str:
+    """Return a name with a suffix added, cut where both together are longer than the 255 bytes that a name may have.
+
+    Examples
+    --------
+    >>> in_a_name("bob", ".results")
+    'bob.results'
+    >>> len(in_a_name("b" * 255, ".results"))
+    255
+    """
+    whole = os.fsencode(name)
+    if len(whole) + len(suffix) <= LONGEST_NAME:
+        return name + suffix
+    digest = hashlib.sha256(whole).hexdigest()[:8]  # names that are alike up to there stay apart
+    return f"{whole[: LONGEST_NAME - len(suffix) - 9].decode(errors='ignore')}-{digest}{suffix}"
+
+
+LONGEST_NAME = 255
 
 
 def make_folder(path: str | Path) -> Path:

@@ -22,7 +22,8 @@ import pytest
 
 from springmass.cli import main
 
-FILES = 1000 if os.environ.get("SPRINGMASS_TRIALS") else 120
+FEW, MANY = 120, 1000 if os.environ.get("SPRINGMASS_TRIALS") else 240
+FILES = [range(FEW), pytest.param(range(FEW, MANY), marks=pytest.mark.trials)]
 SECONDS = 10
 ANSWERS = {0, 2, 3}  # done, refused as a scene, refused as an input
 PERIOD_S = 0.75
@@ -506,13 +507,14 @@ def command(rng: np.random.Generator, path: Path) -> list[str]:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+@pytest.mark.parametrize("files", FILES, ids=["few", "many"])
 def test_any_run_file_gets_an_answer(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], answer_within: Callable[[int], Any]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], answer_within: Callable[[int], Any], files: range
 ) -> None:
     """Every command answers a hostile file within ten seconds: refused in one line, or with the numbers it holds."""
     path = tmp_path / "run.h5"
     answered = 0
-    for number in range(FILES):
+    for number in files:
         rng = np.random.default_rng([14, number])
         make = KINDS[number % len(KINDS)]
         left = make(path, rng)

@@ -13,7 +13,8 @@ import pytest
 from springmass import sample_data
 from springmass.cli import main
 
-FILES = 500 if os.environ.get("SPRINGMASS_TRIALS") else 40
+FEW, MANY = 40, 500 if os.environ.get("SPRINGMASS_TRIALS") else 80
+FILES = [range(FEW), pytest.param(range(FEW, MANY), marks=pytest.mark.trials)]
 SECONDS = 10
 POSITION = "undamped_simulated_position.txt"
 ANSWERS = {0, 2, 3}  # done, refused as a scene, nothing to analyse
@@ -161,15 +162,16 @@ def command(rng: np.random.Generator, scene: Path) -> list[str]:
     return [*choices[rng.integers(len(choices))], "--scene", str(scene)]
 
 
+@pytest.mark.parametrize("files", FILES, ids=["few", "many"])
 def test_any_scene_gets_an_answer(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], answer_within: Callable[[int], Any]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], answer_within: Callable[[int], Any], files: range
 ) -> None:
     """Whatever a scene says, over the whole of the documented ranges and beyond, a command ends within ten seconds.
 
     It answers or refuses in words; what is refused is one line without control characters.
     """
     path = tmp_path / "scene.toml"
-    for number in range(FILES):
+    for number in files:
         rng = np.random.default_rng([14, number])
         text = scene_text(rng).encode() if number % 2 else hostile_scene(rng, number // 2)
         path.write_bytes(text)
