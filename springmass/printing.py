@@ -32,7 +32,7 @@ def findings_text(findings: Sequence[Mapping[str, Any]]) -> str:
         return "No findings."
     standing = [f["code"] for f in findings if f["code"] in STANDING and f["severity"] == "info"]
     own = [f for f in findings if f["code"] not in standing]
-    told = [visible(f"{_MARKS[f['severity']]} {f['code']}: {f['message']}") for f in own]
+    told = [f"{_MARKS[f['severity']]} {f['code']}: {f['message']}" for f in own]
     grave = sum(f["severity"] != "info" for f in own)
     lines = [wrapped(one, " " * 8) for one in told]
     if grave > FIRST:
@@ -76,4 +76,5 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str
 def wrapped(text: str, indent: str = "") -> str:
     """Return text wrapped to the terminal, at most a hundred columns, lines after the first indented."""
     width = min(shutil.get_terminal_size((100, 24)).columns, 100)
-    return textwrap.fill(text, width, subsequent_indent=indent, break_on_hyphens=False)
+    shown = visible(" ".join(text.splitlines()))
+    return textwrap.fill(shown, width, subsequent_indent=indent, break_on_hyphens=False)

@@ -86,6 +86,7 @@ def test_a_report_of_any_name_is_a_report(cli: Cli, data: Path, tmp_path: Path, 
     scenes = [option for of in ("undamped", "damped") for option in ("--scene", data / f"{of}.scene.toml")]
     done = cli("compare", *paths, *scenes, "--out", tmp_path / "together")
     assert done.code == 0, done.err
+    assert (done.out + done.err).replace("\n", "").isprintable()
     found = texts_of(tmp_path / "together")
     for file, text in found.items():
         hidden = [c for c in text if not c.isprintable() and c not in "\n\r\u00a0\u202f\u2009"]
