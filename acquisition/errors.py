@@ -72,7 +72,7 @@ class FormatError(AcquisitionError):
     def __init__(self, path: str, demand: str, remedy: str, *, line: int | None = None) -> None:
         self.path, self.demand, self.remedy, self.line = path, demand, remedy, line
         where = path if line is None else f"{path}, line {line}"
-        said = f"{demand}; {remedy}"
+        said = f"{demand} {remedy}" if demand.endswith("?") else f"{demand}; {remedy}"
         # Names and units come out of the file, line ends and all. The path is the user's own and stays as it is.
         super().__init__(f"{where}: {visible(said)}")
 

@@ -104,12 +104,18 @@ def _add_input_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_completions(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--channel", metavar="NAME", help="which channel of the file to take as distance")
+    parser.add_argument("--channel", metavar="NAME", help="which channel of the file to take")
     parser.add_argument("--run", metavar="NAME", help="which run of the file to take, where it holds several")
     parser.add_argument(
         "--rate-hz", type=_positive, metavar="R", help="samples per second, where the file does not say"
     )
-    parser.add_argument("--unit", metavar="U", help="unit of the distance where the file does not say: m, cm, mm or um")
+    parser.add_argument(
+        "--unit", metavar="U", help="unit of the channel where the file does not say: m, cm, mm, rad, V, m/s2, N ..."
+    )
+    parser.add_argument("--time", metavar="NAME", help="which column is the time, where the file does not say")
+    parser.add_argument(
+        "--time-unit", metavar="U", help="unit of the times where the file does not say: s, ms, us, ns or min"
+    )
     _add_unverified(parser)
 
 

@@ -48,6 +48,8 @@ class Format(Protocol):
         rate_hz: float | None = None,
         unit: str | None = None,
         run: str | None = None,
+        time: str | None = None,
+        time_unit: str | None = None,
     ) -> Recording:
         """Read one channel of one run of a file.
 
@@ -58,13 +60,15 @@ class Format(Protocol):
         data : bytes
             The file's content.
         channel : str, optional
-            Which quantity or column to take as distance.
+            Which quantity or column to take.
         rate_hz : float, optional
             The rate where the file does not say it, Hz. It is an error where the file contradicts it.
         unit : str, optional
-            The unit of distance where the file does not say it.
+            The channel's unit where the file does not say it.
         run : str, optional
-            Which run, where the file holds several. It is passed only where it was asked for.
+            Which run, where the file holds several. This and the next two are passed only where they were given.
+        time, time_unit : str, optional
+            Which column is the time, and in which unit, where the file does not say it.
 
         Raises
         ------

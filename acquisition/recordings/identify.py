@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
@@ -37,8 +38,10 @@ _TABLE = {
     "tracker": "tracker",
     "csv": "csv_units",
     "bare": "bare",
+    "table": "any_table",
 }
 """The module in ``families`` of each name."""
+_LAST = "table"  # takes any rows of numbers, so that everybody else is asked before
 
 
 def formats() -> tuple[Format, ...]:
@@ -88,6 +91,8 @@ def open_recording(
     rate_hz: float | None = None,
     unit: str | None = None,
     run: str | None = None,
+    time: str | None = None,
+    time_unit: str | None = None,
     velocity_path: str | os.PathLike[str] | None = None,
 ) -> Recording:
     """Read an old recording.
@@ -97,7 +102,7 @@ def open_recording(
     path : path
     format : str, optional
         Name of the format; told by content if left out.
-    channel, rate_hz, unit, run : optional
+    channel, rate_hz, unit, run, time, time_unit : optional
         What the file leaves out or leaves open; see :meth:`acquisition.recordings.base.Format.read`.
     velocity_path : path, optional
         The velocity file that belongs to a position file, joined to it by time.
@@ -114,9 +119,10 @@ def open_recording(
     name = os.fspath(path)
     reader = get_format(format) if format else _recognise(name, read_head(path))
     data = read_bytes(path)
-    of_run = {} if run is None else {"run": run}
+    rare = {"run": run, "time": time, "time_unit": time_unit}
+    said = {name: value for name, value in rare.items() if value is not None}
     if velocity_path is None:
-        return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **of_run)
+        return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **said)
     if not hasattr(reader, "read_pair"):
         demand = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
         raise UnknownFormat(name, demand, "leave the velocity file out")
@@ -152,16 +158,19 @@ def _recognise(path: str, head: bytes) -> Format:
 def _every() -> Iterator[Format]:
     """Yield one format after the other; entry points are looked for only if the table is used up."""
     for name in _TABLE:
-        yield _built_in(name)
+        if name != _LAST:
+            yield _built_in(name)
     for name, entry in _entry_points().items():
         if name not in _TABLE:
             yield _load(entry)
+    yield _built_in(_LAST)
 
 
 def _built_in(name: str) -> Format:
     return cast(Format, import_module(f"acquisition.recordings.families.{_TABLE[name]}").FORMAT)
 
 
+@cache
 def _entry_points() -> dict[str, EntryPoint]:
     from importlib.metadata import entry_points  # costs more than all the rest of this module
 

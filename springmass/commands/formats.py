@@ -95,6 +95,7 @@ def _facts(loaded: Loaded) -> dict[str, Any]:
         "start_time": loaded.provenance.get("start_time"),
         "kind": loaded.info.kind,
         "channel": loaded.channel,
+        "quantity": f"{loaded.samples.quantity} in {loaded.samples.unit}",
         "samples": len(loaded.samples),
         "missing": int(np.count_nonzero(~np.isfinite(loaded.samples.distance))),
         "malformed_rows": loaded.malformed_rows,

@@ -42,6 +42,7 @@ _SEVERITY = {
     "rate_assumed": "warning",
     "unit_assumed": "warning",
     "stale_header": "warning",
+    "time_assumed": "warning",
     "lost_target": "warning",
     "quantised": "warning",
     "sensor_lost": "warning",

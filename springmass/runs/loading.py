@@ -122,6 +122,8 @@ def load(
     rate_hz: float | None = None,
     unit: str | None = None,
     run: str | None = None,
+    time: str | None = None,
+    time_unit: str | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
     unverified: bool = False,
@@ -135,7 +137,7 @@ def load(
     path : path
     velocity : path, optional
         The velocity file that belongs to a position file; joined by time.
-    channel, rate_hz, unit, run : optional
+    channel, rate_hz, unit, run, time, time_unit : optional
         What the file leaves out or leaves open. Of a wire log of several sensors ``channel`` names one, by its number
         or its port.
     from_s, to_s : float, optional
@@ -153,7 +155,7 @@ def load(
     """
     where = Path(path)
     kind = kind_of(where)
-    answers = {"velocity": velocity, "rate-hz": rate_hz, "unit": unit, "run": run}
+    answers = {"velocity": velocity, "rate-hz": rate_hz, "unit": unit, "run": run, "time": time, "time-unit": time_unit}
     if kind == "run":
         _refuse(where, "a run file", {**answers, "channel": channel})
         loaded = _load_run(where, unverified=unverified)
@@ -161,7 +163,16 @@ def load(
         _refuse(where, "a wire log", answers)
         loaded = _load_wire(where, channel)
     else:
-        recording = open_recording(where, channel=channel, rate_hz=rate_hz, unit=unit, run=run, velocity_path=velocity)
+        recording = open_recording(
+            where,
+            channel=channel,
+            rate_hz=rate_hz,
+            unit=unit,
+            run=run,
+            time=time,
+            time_unit=time_unit,
+            velocity_path=velocity,
+        )
         loaded = _from_recording(where, recording)
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:

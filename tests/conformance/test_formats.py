@@ -181,6 +181,32 @@ def bare(t: Any, x: Any, mark: str = " ") -> bytes:
     return "\n".join([*rows(t, x * 100, f"{{t:.3f}}{mark}{{x:.3f}}"), ""]).encode()
 
 
+def names_alone(t: Any, x: Any, head: str = "# t theta_x", form: str = "{t:.3f} {x:.5f}") -> bytes:
+    """Write rows below names behind a comment mark."""
+    return "\n".join([head, *rows(t, x, form), ""]).encode()
+
+
+def oscilloscope(t: Any, x: Any) -> bytes:
+    """Write names, units below them, a blank line, decimal commas; times in milliseconds."""
+    body = [row.replace(".", ",") for row in rows(t * 1e3, x * 1e3, "{t:.1f}\t0.5\t{x:.2f}")]
+    return "\r\n".join(["Zeitachse\tKanal A\tKanal B", "(ms)\t(V)\t(mm)", "", *body]).encode()
+
+
+def preamble(t: Any, x: Any) -> bytes:
+    """Write a logger's preamble, a column of row numbers, and one of words."""
+    head = ["%Logger 3", "%Sample rate: 100 Hz", "%Created: Tue, 12 Mar, 2024", "n, state, elapsed [s], position [mm]"]
+    body = (f"{i}, ok, {row}" for i, row in enumerate(rows(t, x * 1e3, "{t:.3f}, {x:.2f}")))
+    return "\n".join([*head, *body]).encode()
+
+
+def clock(t: Any, x: Any) -> bytes:
+    """Write clock times that pass midnight."""
+    total = [86399.5 + float(each) for each in t]
+    told = [f"{int(s // 3600) % 24:02d}:{int(s // 60) % 60:02d}:{s % 60:06.3f}" for s in total]
+    body = (f"{a};{row}" for a, row in zip(told, rows(t, x, "{x:.5f}"), strict=True))
+    return "\n".join(["Chart recorder", "Time;Position (m)", *body]).encode()
+
+
 def height_log(t: Any, x: Any) -> bytes:
     """Write the invented log of the template."""
     body = (f"{i};{row}" for i, row in enumerate(rows(t, x * 1000, "{x:.2f}")))
@@ -210,6 +236,10 @@ CASES = [
     Case("tracker", "masa", tracker, options={"channel": "y", "unit": "m"}),
     Case("csv", "semicolon-comma", columns_with_units),
     Case("example", "template", height_log, times=False),
+    Case("table", "names-alone", names_alone, options={"unit": "m"}),
+    Case("table", "oscilloscope", oscilloscope),
+    Case("table", "preamble", preamble),
+    Case("table", "clock", clock),
     Case("bare", "blanks", bare, options={"unit": "cm"}),
     Case("bare", "tabs", lambda t, x: bare(t, x, "\t"), options={"unit": "cm"}),
 ]
@@ -253,9 +283,11 @@ def test_every_format_of_the_registry_has_a_case() -> None:
 
 @every_case
 def test_it_is_recognised_by_its_own_format_alone(case: Case) -> None:
-    """From the head of the file, whatever its name."""
+    """From the head of the file, whatever its name; but for the family that takes any table and is asked last."""
     head = whole(case)[:HEAD_BYTES]
-    assert [each.name for each in FAMILIES if each.recognises(head)] == [case.format]
+    claims = [each.name for each in FAMILIES if each.recognises(head)]
+    assert claims in ([case.format], [case.format, "table"], ["table", case.format])
+    assert case.format != "table" or claims == ["table"]
 
 
 @pytest.mark.parametrize("each", FAMILIES, ids=lambda each: each.name)
@@ -461,7 +493,17 @@ def test_positions_rounded_to_a_centimetre_are_known_as_such(case: Case) -> None
 @with_times
 def test_measured_times_stand_and_are_told_from_nominal_ones(case: Case) -> None:
     """Times that jitter by a few microseconds are kept as they are, and the clock is the device's."""
-    if case.format in ("motion-sensor", "vernier", "logger-pro", "tracker", "csv", "bare", "capstone", "datastudio"):
+    if case.format in (
+        "motion-sensor",
+        "vernier",
+        "logger-pro",
+        "tracker",
+        "csv",
+        "bare",
+        "table",
+        "capstone",
+        "datastudio",
+    ):
         t = np.round(np.cumsum(0.050 + 0.004 * np.random.default_rng(5).random(300)), 3)
         t = np.round(t, 2) if case.format in ("vernier", "logger-pro") else t
         t += np.arange(300) * (0.02 if case.format in ("vernier", "logger-pro") else 0.0)
@@ -471,5 +513,6 @@ def test_measured_times_stand_and_are_told_from_nominal_ones(case: Case) -> None
     if case.label == "velocity":
         assert recording.info.clock in ("device", "nominal")
         return
+    t = t - t[0] if case.label == "clock" else t  # which counts from its first
     np.testing.assert_allclose(recording.samples.t, t, atol=6e-3 if case.format in ("vernier", "logger-pro") else 6e-7)
     assert recording.info.rate_hz == pytest.approx(299 / (t[-1] - t[0]), rel=2e-3)

@@ -284,34 +284,48 @@ def test_a_dialect_met_in_public_opens_or_is_refused_in_one_line(recordings: Pat
 
 @pytest.mark.parametrize("path", sorted({row.path for row in TABLE}))
 def test_a_real_file_is_of_one_family_alone(recordings: Path, path: str) -> None:
-    """No second format lays claim to it."""
+    """No second format lays claim to it, but for the one that takes any table and is asked last."""
     head = (recordings / path).read_bytes()[:8192]
-    assert [each.name for each in formats() if each.recognises(head)] == [sniff(recordings / path)]
+    claims = [each.name for each in formats() if each.recognises(head) and each.name != "table"]
+    assert claims == [sniff(recordings / path)]
 
 
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        (MATTIA, 'the file holds 2 runs: "Run #1", "Run #2"; name the one to take with --run'),
-        (FILO, '"position", "velocity", "acceleration"; name the one to take with --channel'),
+        (
+            MATTIA,
+            'column "Position (mm)": which of the 2 runs "Run #1", "Run #2", and what is the rate? springmass analyse',
+        ),
+        (
+            FILO,
+            'which channel of "position", "velocity", "acceleration", and what is position\'s unit? springmass analyse',
+        ),
         (SHM, '"Acceleration_0 (m/s^2)", "Acceleration_1 (m/s^2)", "Untitled"'),
-        (TDMS, '"Amplitude sweep", "Phase sweep"; name the one to take with --channel'),
+        (TDMS, 'which channel of "Amplitude sweep", "Phase sweep", and what is Amplitude sweep\'s unit?'),
         (PHYPHOX, '"Gyroscope x (rad/s)", "Gyroscope y (rad/s)"'),
-        (TRACKER, '"x", "y", "rad"; name the one to take with --channel'),
-        ("caspar__PhysicsLab/Q1.txt", 'channel "Voltage": its unit is "V", no length; say with --unit'),
+        (TRACKER, 'which channel of "x", "y", "rad", and what is x\'s unit?'),
     ],
 )
 def test_what_a_real_file_leaves_open_is_asked_for(recordings: Path, path: str, words: str) -> None:
-    """Several runs or channels, or a unit that is no length: one line that lists them."""
+    """Several runs or channels, or no unit: one line that lists them and ends in what to type."""
     with pytest.raises(NeedsAnswer) as caught:
         open_recording(recordings / path)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
+def test_a_channel_of_volts_is_a_voltage_unless_it_is_counted_as_a_length(recordings: Path) -> None:
+    """The file's own unit says what a channel is of; one volt counts as a metre only where the user asks for it."""
+    path = recordings / "caspar__PhysicsLab/Q1.txt"
+    volts, metres = open_recording(path).samples, open_recording(path, unit="m").samples
+    assert (volts.quantity, volts.unit, metres.quantity, metres.unit) == ("voltage", "V", "length", "m")
+    assert volts.distance.tobytes() == metres.distance.tobytes()
+
+
 def test_a_missing_rate_is_asked_for(recordings: Path) -> None:
     """A Capstone export without times needs --rate-hz."""
-    with pytest.raises(NeedsAnswer, match=r"give the rate with --rate-hz"):
+    with pytest.raises(NeedsAnswer, match=r"what is the rate\? springmass analyse .* --run 1 --rate-hz R"):
         open_recording(recordings / MATTIA, run="1")
 
 

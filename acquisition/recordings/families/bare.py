@@ -1,8 +1,8 @@
 """Bare numbers: rows without a word on what they are.
 
-Delimiter and decimal mark are told from the rows. A first column that runs forward in even steps is taken for times in
-seconds, which is said; row numbers (steps of 1) are no times. The unit of distance must be given, with several columns
-the channel, without times the rate: none of them is guessed.
+Delimiter and decimal mark are told from the rows. A first column that runs forward in even steps, or the one column
+that runs forward, is taken for times, which is said; row numbers (steps of 1) are no times. The unit must be given,
+with several columns the channel, without times the rate: none of them is guessed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ import numpy as np
 
 from acquisition.errors import FormatError
 from acquisition.recordings.families import motion_sensor
-from acquisition.recordings.tables.contents import Channel, Contents, Sheet
+from acquisition.recordings.recording import Trap
+from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet
+from acquisition.recordings.tables.roles import are_row_numbers, times_by_steps
 from acquisition.recordings.tables.sheet import ColumnFormat
 from acquisition.recordings.tables.text import guess_delimiter, head_lines, parse_number, split_cells, text_of
 
@@ -58,24 +60,19 @@ def _contents(path: str, data: bytes) -> Contents:
     if not rows:
         raise FormatError(path, "expected rows of numbers", "check the file", line=1)
     sheet = Sheet(text, text.start, text.stop, 1, mark)
-    width = len(rows[0])
-    time = 0 if width > 1 and _are_times(np.array([row[0] for row in rows])) else None
-    first = 1 if width > 1 and (time == 0 or _are_row_numbers(np.array([row[0] for row in rows]))) else 0
-    channels = (Channel(f"column {column + 1}", "", sheet, "", column, time) for column in range(first, width))
-    return Contents(tuple(channels), zeros=text.zeros)
-
-
-def _are_row_numbers(first: np.ndarray) -> bool:
-    return bool(first.size > 1 and first[0] in (0.0, 1.0) and (np.diff(first) == 1.0).all())
-
-
-def _are_times(first: np.ndarray) -> bool:
-    """Tell a column that runs forward, mostly in steps alike; whole numbers one by one are row numbers."""
-    if first.size < 3 or not np.isfinite(first).all() or _are_row_numbers(first):
-        return False
-    steps = np.diff(first)
-    usual = float(np.median(steps))
-    return bool(usual > 0 and np.mean(np.abs(steps - usual) <= 0.5 * usual) >= 0.8)
+    numbers = [np.array(column) for column in zip(*rows, strict=True)]
+    names = tuple(f"column {column + 1}" for column in range(len(numbers)))
+    time = times_by_steps([Heading("", "")] * len(names), numbers) if len(names) > 1 else None
+    counts = len(names) > 1 and are_row_numbers(numbers[0])
+    channels = (
+        Channel(name, "", sheet, "", column, time)
+        for column, name in enumerate(names)
+        if column != time and not (column == 0 and counts)
+    )
+    traps = (
+        [] if not time else [Trap("time_assumed", f'"{names[time]}" was taken for the times: it alone runs forward')]
+    )
+    return Contents(tuple(channels), traps=tuple(traps), zeros=text.zeros, names=names)
 
 
 FORMAT = ColumnFormat("bare", "bare numbers: nothing but rows; units are asked for", _evidence, _contents)

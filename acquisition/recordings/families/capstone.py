@@ -5,6 +5,7 @@ What no careful reader may take at face value:
 - Runs stand side by side and end at different rows; derived columns (velocity, acceleration) are empty at the edges.
 - The decimal mark is told cell by cell: ``-8,90E-4`` stands beside ``0.12``, and a small number has an exponent.
 - The column of times may be missing: then the rate must be given.
+- SPARKvue writes ``Time (s) Run 5``, with dates as text beside.
 - Localised exports have words of their own for time and run, or headings without any unit
   (``time;position;velocity;acceleration``).
 """
@@ -18,7 +19,7 @@ from acquisition.recordings.tables.sheet import headed_format
 
 __all__ = ["FORMAT"]
 
-_OF_RUN = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+)")
+_OF_RUN = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+|Run \d+)")
 _QUANTITIES = frozenset(
     (
         *("position", "velocity", "acceleration"),

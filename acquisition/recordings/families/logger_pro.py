@@ -1,4 +1,4 @@
-"""Logger Pro CSV: headings like ``Latest: Position (m)`` or ``Run 1: Position (m)``, runs side by side."""
+"""Logger Pro and Graphical Analysis CSV: runs side by side under ``Latest: Position (m)`` or ``Data Set 1:Time(s)``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from acquisition.recordings.tables.sheet import headed_format
 
 __all__ = ["FORMAT"]
 
-_OF_RUN = re.compile(r"(?P<run>[^:]+): (?P<quantity>.+)")
+_OF_RUN = re.compile(r"(?P<run>[^:]+):\s*(?P<quantity>.+)")
 
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:

@@ -168,6 +168,7 @@ def _channels(text: Text, top: _Header, segment: _Header, stop: int, mark: str, 
             formula=_formula(segment, column) if dimension == "Time" else None,
             start_time=_start_time(segment, column),
             ragged=True,
+            aside=segment.of_column("Samples", column) == "0",
         )
 
 

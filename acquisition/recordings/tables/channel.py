@@ -23,7 +23,7 @@ from acquisition.recordings.sampling.timing import (
 )
 from acquisition.recordings.tables.contents import Arrays, Channel, Sheet
 from acquisition.recordings.tables.table import EMPTY, EXPONENT, UNREAD, Table, read_table
-from acquisition.recordings.units import time_power
+from acquisition.recordings.units import TIMES, time_power, unit_words
 
 __all__ = ["Sampled", "pull", "sample"]
 
@@ -129,7 +129,10 @@ def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Rows:
         raise _no_rows(path, channel, sheet, 0, sheet.first_line)
     kept = None if keep.all() else np.flatnonzero(keep)
     remark = _kept(remark, kept)
-    bad = _kept(table.bad if sheet.width else table.form[own] == UNREAD, kept) | remark
+    unread = table.bad if sheet.width else table.form[own] == UNREAD
+    if at is not None and table.cut and table.form[at][-1] == UNREAD:
+        unread[-1] = True  # its time stopped midway
+    bad = _kept(unread, kept) | remark
     printed = tolerance = None
     time_resolution = 0.0
     if at is not None:
@@ -137,6 +140,8 @@ def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Rows:
         time_resolution = _resolution(printed, table.decimals[at], table.exponents[at], shift)
         if channel.formula is not None:
             tolerance = tolerance_of(printed, _kept(table.form[at], kept), shift, EXPONENT)
+        if unit_words(channel.time_unit) == "min":
+            printed, time_resolution = printed * 60.0, time_resolution * 60.0
         if not within(printed, _LONGEST_S):
             none = ~(np.abs(printed) < _LONGEST_S)
             printed, bad = np.where(none, np.nan, printed), bad | none
@@ -180,7 +185,7 @@ def _time_power(path: str, channel: Channel) -> int:
         return 0
     power = time_power(channel.time_unit)
     if power is None:
-        demand = f'expected times in s, ms or us, got "{channel.time_unit}"'
+        demand = f'expected times in one of {", ".join(TIMES)}, got "{channel.time_unit}"'
         raise FormatError(path, demand, "export the times in seconds")
     return power
 

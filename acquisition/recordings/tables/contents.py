@@ -20,20 +20,45 @@ __all__ = [
     "Formula",
     "Heading",
     "Sheet",
+    "candidates",
     "channels_of",
-    "choose",
     "is_time",
     "name_and_unit",
+    "named",
     "numbered_apart",
+    "of_run",
     "split_heading",
 ]
 
 _TIME_WORDS = frozenset(
     (
-        *("time", "t", "elapsed", "zeit", "tempo", "temps", "tiempo", "tijd", "tid", "czas", "čas", "aika", "idő"),
+        *("time", "times", "t", "elapsed", "timestamp", "seconds", "secs", "millis", "milliseconds"),
+        *("zeit", "tempo", "tempi", "temps", "tiempo", "tiempos", "tijd", "tid", "czas", "čas", "aika", "idő"),
         *("zaman", "время", "时间", "時間", "시간"),
     )
 )
+_BESIDE_TIME = frozenset(
+    (
+        *(
+            "axis",
+            "value",
+            "stamp",
+            "data",
+            "set",
+            "run",
+            "latest",
+            "elapsed",
+            "relative",
+            "absolute",
+            "since",
+            "start",
+        ),
+        *("velocity", "acceleration", "raw", "sensor", "gps", "system", "rel", "abs"),
+    )
+)
+"""Words that a time may have beside its own: what else stands there makes it a time of something, a period say."""
+_WORDS = re.compile(r"[^\W\d_]+\d*|\d+")
+_CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _HEADING = re.compile(r"(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*")
 
 
@@ -106,6 +131,8 @@ class Channel:
         Whether it may end before its times do, which then belong to others.
     difference : bool
         Whether its values differ from the row before: the first has nothing to differ from, and NaN is right there.
+    aside : bool
+        Whether it is there beside others (a row number, an uncertainty) and is taken only where it is named.
     """
 
     name: str
@@ -120,6 +147,7 @@ class Channel:
     start_time: str = ""
     ragged: bool = False
     difference: bool = False
+    aside: bool = False
 
     @property
     def label(self) -> str:
@@ -145,12 +173,15 @@ class Contents:
         What was seen in the file as a whole.
     zeros : int
         Zero bytes at the end, left out.
+    names : tuple of str
+        What each column is called, times among them, where the family tells; so that ``--time`` may name one.
     """
 
     channels: tuple[Channel, ...]
     title: str = ""
     traps: tuple[Trap, ...] = ()
     zeros: int = field(default=0)
+    names: tuple[str, ...] = ()
 
     @property
     def runs(self) -> tuple[str, ...]:
@@ -176,57 +207,63 @@ def is_time(name: str) -> bool:
 
     Examples
     --------
-    >>> is_time("Zeit"), is_time("Position"), is_time("X_Value")
-    (True, False, False)
+    >>> is_time("Zeit"), is_time("Position"), is_time("t_{1}"), is_time("time for 10 swings")
+    (True, False, True, False)
     """
-    return name.strip().lower() in _TIME_WORDS
+    words = _WORDS.findall(_CAMEL.sub(" ", name).lower())
+    told = [word for word in words if word in _TIME_WORDS]
+    beside = [word for word in words if word not in told]
+    if not told or (len(words[0]) == 1 and words[0] not in _TIME_WORDS):
+        return False
+    return all(len(word) == 1 or word.isdecimal() or word in _BESIDE_TIME for word in beside)
 
 
-def choose(path: str, contents: Contents, channel: str | None, run: str | None) -> Channel:
-    """Return the channel to take as distance.
+def candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
+    """Return the channels that may be meant where none is named: the lengths, or else all that do not stand aside."""
+    fit = [each for each in channels if not each.aside] or channels
+    return [each for each in fit if each.is_length] or fit
+
+
+def named(path: str, channels: Sequence[Channel], name: str, what: str = "channel") -> Channel:
+    """Return the channel of a name, with or without its unit.
 
     Raises
     ------
     NeedsAnswer
-        If there are several and none, or none of that name, was asked for; the line lists them.
+        If none, or more than one, is called so; the line lists them.
     """
-    of_run = _run(path, contents, run)
-    if channel is not None:
-        wanted = _plain(channel)
-        exact = [each for each in of_run if wanted in (_plain(each.label), _plain(each.name))]
-        if len(exact) == 1:
-            return exact[0]
-        names = _names(of_run)
-        if exact:
-            raise NeedsAnswer(path, f'channel "{channel}" is the name of {len(exact)} channels of {names}', _CHANNEL)
-        demand = f'channel "{channel}" was asked for, the file holds {names}'
-        raise NeedsAnswer(path, demand, "name one of these with --channel, or leave it out")
-    lengths = [each for each in of_run if each.is_length]
-    if len(lengths) == 1:
-        return lengths[0]
-    if len(of_run) == 1:
-        return of_run[0]
-    raise NeedsAnswer(path, f"more than one channel may be the distance: {_names(lengths or of_run)}", _CHANNEL)
+    wanted = _plain(name)
+    exact = [each for each in channels if wanted in (_plain(each.label), _plain(each.name))]
+    if len(exact) == 1:
+        return exact[0]
+    names = _names(channels)
+    if exact:
+        demand = f'{what} "{name}" is the name of {len(exact)} channels of {names}'
+        raise NeedsAnswer(path, demand, f"name the one to take with --{what}")
+    demand = f'{what} "{name}" was asked for, the file holds {names}'
+    raise NeedsAnswer(path, demand, f"name one of these with --{what}, or leave it out")
 
 
-_CHANNEL = "name the one to take with --channel"
+def of_run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
+    """Return the channels of the run asked for.
 
-
-def _run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
+    Raises
+    ------
+    NeedsAnswer
+        If none, or more than one, is called so; the line lists them.
+    """
     runs = contents.runs
     listed = ", ".join(f'"{name}"' for name in runs)
-    if run is None:
-        if len(runs) > 1:
-            raise NeedsAnswer(path, f"the file holds {len(runs)} runs: {listed}", "name the one to take with --run")
-        return contents.channels
+    if run is None or run == runs[0]:
+        return [each for each in contents.channels if each.run == runs[0]]
     if runs == ("",):
         raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds one run without a name', "leave --run out")
-    named = [name for name in runs if _plain(name) == _plain(run)]
+    called = [name for name in runs if _plain(name) == _plain(run)]
     # "2" is enough for "Run #2".
-    named = named or [name for name in runs if re.fullmatch(rf"\D*#?\s*0*{re.escape(run.strip())}", name)]
-    if len(named) != 1:
+    called = called or [name for name in runs if re.fullmatch(rf"\D*#?\s*0*{re.escape(run.strip())}", name)]
+    if len(called) != 1:
         raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds {listed}', "name one of these with --run")
-    return [each for each in contents.channels if each.run == named[0]]
+    return [each for each in contents.channels if each.run == called[0]]
 
 
 def _names(channels: Sequence[Channel]) -> str:
@@ -306,5 +343,6 @@ def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind =
         for column, name in zip(own, names, strict=True):
             time = max((each for each in of_run if each < column), default=of_run[0] if of_run else None)
             time_unit = "" if time is None else headings[time].unit
-            found.append(Channel(name, headings[column].unit, sheet, run, column, time, time_unit, clock=clock))
+            unit, aside = headings[column].unit, name.lower().startswith("date")
+            found.append(Channel(name, unit, sheet, run, column, time, time_unit, clock=clock, aside=aside))
     return tuple(found)

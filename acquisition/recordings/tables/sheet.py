@@ -12,10 +12,11 @@ from acquisition.recordings.inspection import Survey
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.samples import value_traps
 from acquisition.recordings.sampling.timing import check_rate
+from acquisition.recordings.tables.answers import Answers, measure, settle
 from acquisition.recordings.tables.channel import pull, sample
-from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet, channels_of, choose
+from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet, channels_of
 from acquisition.recordings.tables.text import head_lines, says_simulated, text_of
-from acquisition.recordings.units import LENGTHS, length_power, unit_words
+from acquisition.recordings.units import length_power
 from acquisition.source import Kind, SourceInfo
 
 __all__ = ["ColumnFormat", "headed_format"]
@@ -53,15 +54,20 @@ class ColumnFormat:
         rate_hz: float | None = None,
         unit: str | None = None,
         run: str | None = None,
+        time: str | None = None,
+        time_unit: str | None = None,
     ) -> Recording:
         """Read one channel of one run; see :class:`acquisition.recordings.base.Format`."""
         check_rate(path, rate_hz)
         contents = self.contents(path, data)
-        chosen = choose(path, contents, channel, run)
-        power, told = _power(path, chosen, unit)
-        column = sample(path, chosen, pull(path, chosen, power), rate_hz, contents.zeros)
-        length = chosen.is_length or not chosen.unit
-        quantum, others = value_traps(column.value, column.flags, column.resolution, column.line, length=length)
+        chosen = settle(path, contents, Answers(channel, rate_hz, unit, run, time, time_unit))
+        of, told = measure(path, chosen, unit)
+        column = sample(path, chosen, pull(path, chosen, of.power), rate_hz, contents.zeros)
+        length = of.quantity == "length"
+        value = column.value if of.factor == 1.0 else column.value * of.factor
+        resolution = column.resolution * of.factor
+        distance = length and (chosen.is_length or not chosen.unit)
+        quantum, others = value_traps(value, column.flags, resolution, column.line, length=distance)
         name = PurePath(path).name
         clock = "nominal" if column.timing.grid is not None else chosen.clock
         kind: Kind = "simulated" if says_simulated(f"{contents.title} {chosen.name} {name}") else "replay"
@@ -71,7 +77,7 @@ class ColumnFormat:
             path=path,
             info=info,
             channel=chosen.name,
-            samples=Block(0, column.t, column.value, column.flags),
+            samples=Block(0, column.t, value, column.flags, quantity=of.quantity, unit=of.si),
             traps=(*contents.traps, *told, *column.traps, *others),
             malformed_rows=column.malformed_rows,
             originals=(Original(name, data),),
@@ -82,15 +88,24 @@ class ColumnFormat:
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Tell of every channel what the file says by itself, with nothing chosen or given."""
-        return tuple(self._survey(path, each) for each in self.contents(path, data).channels)
+        channels = self.contents(path, data).channels
+        found = tuple(self._survey(path, each) for each in channels)
+        if not any(each.samples for each in found):
+            pull(path, channels[0], 0)  # says what is wrong
+        return found
 
     def _survey(self, path: str, channel: Channel) -> Survey:
-        pulled = pull(path, channel, length_power(channel.unit) or 0)
-        rows = pulled.value.size
+        rows = 0
         try:
+            pulled = pull(path, channel, length_power(channel.unit) or 0)
+            rows = pulled.value.size
             column = sample(path, channel, pulled, None)
         except NeedsAnswer:
             return Survey(channel.run, channel.name, channel.unit, rows, None, ())
+        except FormatError as error:
+            # One channel without numbers, beside others, is no reason to say nothing of these.
+            none = Trap("empty_channel", str(error).removeprefix(path).lstrip(", :"))
+            return Survey(channel.run, channel.name, channel.unit, 0, None, (none,))
         rate_hz, traps = column.timing.rate_hz, column.traps
         return Survey(channel.run, channel.name, channel.unit, column.t.size, rate_hz, traps)
 
@@ -126,31 +141,6 @@ def headed_format(
         channels = () if first is None else channels_of(Sheet(text, first.next, text.stop, 2, mark), headings)
         if not channels:
             raise FormatError(path, f"expected headings like {example}", "export the run again", line=1)
-        return Contents(channels, zeros=text.zeros)
+        return Contents(channels, zeros=text.zeros, names=tuple(each.name for each in headings))
 
     return ColumnFormat(name, title, evidence, contents)
-
-
-def _power(path: str, channel: Channel, unit: str | None) -> tuple[int, tuple[Trap, ...]]:
-    """Return the power of ten from the channel's unit to metres, and what was assumed for it."""
-    stated = length_power(channel.unit)
-    if unit is not None and unit_words(unit) not in LENGTHS:
-        raise FormatError(path, f'unit must be one of {", ".join(LENGTHS)}, got "{unit}"', "name one of these")
-    if stated is not None:
-        if unit is not None and length_power(unit) != stated:
-            demand = f'unit "{unit}" was asked for, but "{channel.label}" says {unit_words(channel.unit)}'
-            raise FormatError(path, demand, "leave the unit out")
-        return stated, ()
-    if unit is None:
-        what = f'its unit is "{channel.unit}", no length' if channel.unit else "nothing says its unit"
-        demand = f'expected a distance, got channel "{channel.name}": {what}'
-        remedy = "say with --unit m, cm or mm what one unit of it is to count as"
-        raise NeedsAnswer(path, demand, f"{remedy}, or name another with --channel" if channel.unit else remedy)
-    power = LENGTHS[unit_words(unit)]
-    if not channel.unit:
-        return power, (Trap("unit_assumed", f'the unit of "{channel.name}", {unit}, was given by the user'),)
-    message = (
-        f'"{channel.label}" is no distance: one {channel.unit} counts as one {unit}, as the user asked; times, '
-        "frequencies and damping rates hold, everything in metres is in that unit"
-    )
-    return power, (Trap("unit_assumed", message),)

@@ -66,6 +66,8 @@ class MotionSensor:
         rate_hz: float | None = None,
         unit: str | None = None,
         run: str | None = None,
+        time: str | None = None,
+        time_unit: str | None = None,
     ) -> Recording:
         """Read one file, of position or of velocity alone; see :class:`acquisition.recordings.base.Format`.
 
@@ -78,6 +80,9 @@ class MotionSensor:
         """
         if run is not None:
             raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds one run', "leave --run out")
+        if time is not None or time_unit not in (None, "s"):
+            demand = f'the times of this family are its first column, in s; got "{time or time_unit}"'
+            raise NeedsAnswer(path, demand, "leave --time and --time-unit out")
         column = read_column(path, data, channel, rate_hz, unit)
         return _position_alone(column) if column.layout.quantity == "distance" else _velocity_alone(column)
 

@@ -121,7 +121,9 @@ def test_the_unit_of_bare_numbers_is_never_guessed(tmp_path: Path, text: str) ->
     """It is asked for, and what was given is said."""
     path = tmp_path / "run.txt"
     path.write_text(text)
-    with pytest.raises(NeedsAnswer, match="nothing says its unit; say with --unit m, cm or mm"):
+    with pytest.raises(
+        NeedsAnswer, match=r"apart\) and \"column 2\": what is column 2's unit\? springmass analyse .*run.txt --unit m"
+    ):
         open_recording(path)
     recording = open_recording(path, unit="cm")
     assert {"unit_assumed", "nominal_clock"} <= {trap.code for trap in recording.traps}
@@ -132,13 +134,17 @@ def test_the_rate_and_the_channel_of_bare_numbers_are_never_guessed(tmp_path: Pa
     """One column has no times; of three columns the user takes one; row numbers are no times."""
     path = tmp_path / "run.txt"
     path.write_text("2.5\n2.6\n2.7\n")
-    with pytest.raises(NeedsAnswer, match="no column of times and no sampling interval; give the rate with --rate-hz"):
+    with pytest.raises(
+        NeedsAnswer, match=r'column "column 1": what is the rate\? springmass analyse .* --unit cm --rate-hz R'
+    ):
         open_recording(path, unit="cm")
     recording = open_recording(path, unit="cm", rate_hz=50.0)
     assert recording.samples.t.tolist() == [0.0, 0.02, 0.04]
     assert {"rate_assumed", "unit_assumed"} <= {trap.code for trap in recording.traps}
     path.write_text("0 1 2\n1 4 9\n2 9 1\n3 7 5\n")
-    with pytest.raises(NeedsAnswer, match='"column 2", "column 3"; name the one to take with --channel'):
+    with pytest.raises(
+        NeedsAnswer, match=r'which channel of "column 2", "column 3"[?] springmass .* --channel "column 2"'
+    ):
         open_recording(path, unit="cm", rate_hz=50.0)
     recording = open_recording(path, unit="cm", rate_hz=50.0, channel="column 3")
     assert recording.samples.distance.tolist() == [0.02, 0.09, 0.01, 0.05]
@@ -230,7 +236,7 @@ def install(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
 
 
 def test_an_entry_point_adds_a_format(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is listed, recognised and found by name, after those of the table."""
+    """It is listed, recognised and found by name, after those of the table and before the one that takes any."""
     monkeypatch.setitem(sys.modules, "extra_bench", sys.modules[__name__])
     monkeypatch.setattr(EntryPoint, "load", lambda _: EXTRA)
     install(monkeypatch, "extra_bench:EXTRA")
@@ -238,7 +244,7 @@ def test_an_entry_point_adds_a_format(run: Path, tmp_path: Path, monkeypatch: py
     path.write_bytes(b"EXTRA 1")
     assert sniff(path) == "extra"
     assert get_format("extra") is EXTRA
-    assert [each.name for each in formats()][-1] == "extra"
+    assert [each.name for each in formats()][-2:] == ["extra", "table"]
     assert inspect(path).surveys == ()
     assert inspect(path).why == ""
     assert sniff(run) == "motion-sensor"

@@ -1,0 +1,250 @@
+"""What a user says of a file, and what must be asked because neither file nor user says it: all in one line."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from acquisition.block import F8
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.recording import Trap
+from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Sheet, candidates, named, of_run
+from acquisition.recordings.tables.text import parse_number
+from acquisition.recordings.units import TIMES, Measure, known_units, measure_of, time_power, unit_words
+
+__all__ = ["Answers", "measure", "settle"]
+
+_SLOW_S = 0.999
+"""Steps of a second and more without a unit may as well be milliseconds: they are asked about."""
+_FIRST_ROWS = 50
+_ANEW = 0.2
+_LAST_BYTES = 4096
+_LIKELY = (
+    (re.compile(r"theta|θ|phi|φ|ang|winkel|rad", re.IGNORECASE), "rad"),
+    (re.compile(r"volt|spannung|^ch|signal|tens", re.IGNORECASE), "V"),
+    (re.compile(r"acc|beschl|versn", re.IGNORECASE), "m/s2"),
+    (re.compile(r"force|kraft|forza|fuerza", re.IGNORECASE), "N"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What the user says of a file; None where nothing."""
+
+    channel: str | None = None
+    rate_hz: float | None = None
+    unit: str | None = None
+    run: str | None = None
+    time: str | None = None
+    time_unit: str | None = None
+
+
+def settle(path: str, contents: Contents, said: Answers) -> Channel:
+    """Return the channel to take, with its times, or ask for all that is missing at once.
+
+    Raises
+    ------
+    NeedsAnswer
+        With the columns, what is missing of them, and the command line to type.
+    FormatError
+        If what the user says contradicts the file.
+    """
+    questions: list[tuple[str, str]] = []
+    if said.run is None and len(contents.runs) > 1:
+        listed = ", ".join(f'"{name}"' for name in contents.runs)
+        questions.append((f"which of the {len(contents.runs)} runs {listed}", f"--run {_quoted(contents.runs[0])}"))
+    channels = of_run(path, contents, contents.runs[0] if questions else said.run)
+    if said.channel is not None:
+        chosen = named(path, channels, said.channel)
+    else:
+        fit = candidates([each for each in channels if each.name != said.time] or channels)
+        chosen = next((each for each in fit if measure_of(each.unit)), fit[0])
+        if len(fit) > 1:
+            names = ", ".join(f'"{each.label}"' for each in fit)
+            questions.append((f"which channel of {names}", f"--channel {_quoted(chosen.name)}"))
+    if said.time is not None:
+        chosen = _timed_by(path, contents, channels, chosen, said.time)
+    if isinstance(chosen.source, Sheet) and chosen.time is not None and _begins_anew(chosen.source, chosen.time):
+        chosen = replace(chosen, time=None, formula=None)  # chunks: what lies between them is told nowhere
+    chosen = _with_time_unit(path, chosen, said.time_unit)
+    questions.extend(_of_times(contents, chosen, said))
+    if measure_of(chosen.unit) is None and said.unit is None:
+        what = (
+            f"what does one {chosen.unit} of {chosen.name} count as" if chosen.unit else f"what is {chosen.name}'s unit"
+        )
+        questions.append((what, f"--unit {_likely_unit(chosen.name)}"))
+    if questions:
+        demand = f"{_columns(contents, channels, chosen)}: {', and '.join(each for each, _ in questions)}?"
+        given = _given(said)
+        raise NeedsAnswer(
+            path, demand, " ".join([f"springmass analyse {_quoted(path)}", *given, *(q for _, q in questions)])
+        )
+    return chosen
+
+
+def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tuple[Trap, ...]]:
+    """Return what the channel's values are of, and what was assumed for it.
+
+    Raises
+    ------
+    FormatError
+        If the unit given is none, or contradicts the file.
+    """
+    stated = measure_of(channel.unit)
+    given = None if unit is None else measure_of(unit)
+    if unit is not None and given is None:
+        raise FormatError(path, f'unit must be one of {known_units()}, got "{unit}"', "name one of these")
+    if given is None:
+        if stated is None:
+            raise NeedsAnswer(path, f'nothing says the unit of "{channel.name}"', "say it with --unit")
+        return stated, ()
+    if stated == given:
+        return given, ()
+    if stated is not None and (stated.quantity in ("length", given.quantity)):
+        demand = f'unit "{unit}" was asked for, but "{channel.label}" says {unit_words(channel.unit)}'
+        raise FormatError(path, demand, "leave the unit out")
+    if not channel.unit:
+        return given, (Trap("unit_assumed", f'the unit of "{channel.name}", {unit}, was given by the user'),)
+    holds = "times, frequencies and damping rates hold, everything in metres is in that unit"
+    kind = "is no distance" if given.quantity == "length" else f"is no {given.quantity}"
+    message = f'"{channel.label}" {kind}: one {channel.unit} counts as one {unit}, as the user asked; {holds}'
+    return given, (Trap("unit_assumed", message),)
+
+
+def _timed_by(path: str, contents: Contents, channels: Sequence[Channel], chosen: Channel, time: str) -> Channel:
+    """Return the channel with the times of the column that the user names."""
+    source = chosen.source
+    if isinstance(source, Sheet) and time in (names := [*contents.names]):
+        column = names.index(time)
+        if column == chosen.time:
+            return chosen
+        unit = next((each.unit for each in channels if each.name == time), "")
+    else:
+        number = re.fullmatch(r"column (\d+)", time.strip().lower())
+        if isinstance(source, Sheet) and number and time not in {each.name for each in channels}:
+            column, unit = int(number[1]) - 1, ""
+            if column == chosen.time or column < 0:
+                return chosen
+        else:
+            found = named(path, [each for each in channels if each.name != chosen.name] or channels, time, "time")
+            if isinstance(source, Arrays) or isinstance(found.source, Arrays):
+                return _timed_by_values(path, chosen, found)
+            column, unit = found.column, found.unit
+    if column == chosen.column:
+        raise FormatError(path, f'"{time}" cannot be both channel and time', "name another with --channel")
+    return replace(chosen, time=column, time_unit=unit if time_power(unit) is not None else "", formula=None)
+
+
+def _timed_by_values(path: str, chosen: Channel, times: Channel) -> Channel:
+    if not (isinstance(chosen.source, Arrays) and isinstance(times.source, Arrays)):
+        raise FormatError(path, f'"{times.name}" is no time of "{chosen.name}"', "name another with --time")
+    values = times.source.values / 10.0 ** -(time_power(times.unit) or 0)
+    if values.size != chosen.source.values.size:
+        raise FormatError(path, f'"{times.name}" and "{chosen.name}" differ in length', "name another with --time")
+    return replace(chosen, source=Arrays(values, chosen.source.values), formula=None)
+
+
+def _with_time_unit(path: str, chosen: Channel, unit: str | None) -> Channel:
+    if unit is None:
+        return chosen
+    power = time_power(unit)
+    if power is None:
+        raise FormatError(path, f'time unit must be one of {", ".join(TIMES)}, got "{unit}"', "name one of these")
+    if isinstance(chosen.source, Arrays) or chosen.time is None:
+        raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
+    if chosen.time_unit and unit_words(chosen.time_unit) != unit_words(unit):
+        said = unit_words(chosen.time_unit)
+        raise FormatError(path, f'time unit "{unit}" was given, but the file says {said}', "leave it out")
+    return replace(chosen, time_unit=unit)
+
+
+def _of_times(contents: Contents, chosen: Channel, said: Answers) -> list[tuple[str, str]]:
+    source = chosen.source
+    if isinstance(source, Arrays):
+        none = source.t is None and chosen.formula is None
+    else:
+        none = chosen.time is None and chosen.formula is None
+    if none:
+        if said.rate_hz is not None:
+            return []
+        others = [each for each in contents.channels if each.name != chosen.name and each.run == chosen.run]
+        or_time = ", or which column is the time (--time NAME)" if others else ""
+        return [(f"what is the rate{or_time}", "--rate-hz R")]
+    if not isinstance(source, Sheet) or chosen.time_unit or chosen.time is None or chosen.formula is not None:
+        return []
+    steps = np.diff(_first_times(source, chosen.time))
+    if steps.size and float(np.median(steps)) >= _SLOW_S:
+        name = contents.names[chosen.time] if chosen.time < len(contents.names) else "the time"
+        return [(f"what is {name}'s unit", "--time-unit ms")]
+    return []
+
+
+def _begins_anew(sheet: Sheet, column: int) -> bool:
+    """Tell times that fall back again and again: chunks of a few samples."""
+    steps = np.diff(_first_times(sheet, column))
+    return bool(steps.size >= 4 and np.mean(steps < 0) >= _ANEW)
+
+
+def _first_times(sheet: Sheet, column: int) -> F8:
+    read = []
+    for line in sheet.text.lines(sheet.start):
+        cells = line.text.split(sheet.delimiter or None)
+        value = parse_number(cells[column].strip(' "')) if column < len(cells) else None
+        if value is not None:
+            read.append(value)
+        if len(read) == _FIRST_ROWS or line.start > sheet.start + 65536:
+            break
+    return np.array(read)
+
+
+def _columns(contents: Contents, channels: Sequence[Channel], chosen: Channel) -> str:
+    """Name the columns; of the times also where they run."""
+    labels = [f'"{each.label}"' for each in channels]
+    source = chosen.source
+    if isinstance(source, Sheet) and chosen.time is not None:
+        told = contents.names[chosen.time] if chosen.time < len(contents.names) else "time"
+        labels.insert(0, f'"{told}"{_span(source, chosen.time)}')
+    many = len(labels) > 1
+    return f"column{'s' if many else ''} {', '.join(labels[:-1])}{' and ' if many else ''}{labels[-1]}"
+
+
+def _span(sheet: Sheet, column: int) -> str:
+    first = _first_times(sheet, column)
+    tail = max(sheet.start, sheet.stop - _LAST_BYTES)
+    ends = _first_times(replace(sheet, start=tail), column) if tail == sheet.start else _last_times(sheet, tail, column)
+    steps = np.diff(first[np.isfinite(first)])
+    if not steps.size or not ends.size:
+        return ""
+    return f" ({first[0]:.6g} to {ends[-1]:.6g}, {float(np.median(steps)):.3g} apart)"
+
+
+def _last_times(sheet: Sheet, tail: int, column: int) -> F8:
+    line = sheet.text.data.find(b"\n", tail, sheet.stop) + 1 or tail
+    return _first_times(replace(sheet, start=line), column)
+
+
+def _given(said: Answers) -> list[str]:
+    """Return what the user said already, as options."""
+    told = {
+        "run": said.run,
+        "channel": said.channel,
+        "time": said.time,
+        "time-unit": said.time_unit,
+        "rate-hz": said.rate_hz,
+        "unit": said.unit,
+    }
+    return [
+        f"--{name} {_quoted(f'{v:g}' if isinstance(v, float) else str(v))}" for name, v in told.items() if v is not None
+    ]
+
+
+def _quoted(word: str) -> str:
+    return word if re.fullmatch(r"[\w.:/@%+=-]+", word) else f'"{word}"' if '"' not in word else shlex.quote(word)
+
+
+def _likely_unit(name: str) -> str:
+    return next((unit for words, unit in _LIKELY if words.search(name)), "m")

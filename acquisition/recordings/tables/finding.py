@@ -1,0 +1,245 @@
+"""Where in a text the table is: preamble, names, units, rows, and what separates cells; no number is taken yet."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from acquisition.recordings.tables.contents import Heading, is_time, name_and_unit, split_heading
+from acquisition.recordings.tables.text import Line, parse_number, split_cells
+from acquisition.recordings.units import measure_of, time_power
+
+__all__ = ["Found", "clock_s", "find_table", "heading_of"]
+
+_MARKS = ("\t", ";", ",", "")
+_PROBE, _FEWEST, _SOUND = 20, 3, 0.8
+_ABOVE = 6  # lines above the rows among which the names are looked for
+_COMMENT = "#%*!'/ \ufeff"
+_BRACKETS = re.compile(r"[\[\];]")  # rows as MATLAB writes a matrix
+_NUMBERS = re.compile(r"[-+\d.,;eE\s\[\]]*\d[-+\d.,;eE\s\[\]]*")
+_DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}", re.ASCII)
+_CLOCK = re.compile(
+    r"(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d{1,9})?))?"
+    r"\s*(?P<half>[aApP]\.?[mM]\.?)?(?:Z|[+-]\d\d:?\d\d)?",
+    re.ASCII,
+)
+_SLASH = re.compile(r"(?P<name>.*\S)\s*/\s*(?P<unit>[^\s/]+(?:/[^\s/]+)?)")
+_TAIL = re.compile(r"(?P<name>.*[^\W_])[_ ](?:in )?(?P<unit>[^\W_]+|m/s\^?[2²])")
+_TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A table as it stands in a text.
+
+    Parameters
+    ----------
+    preamble : tuple of str
+        Lines above the headings.
+    headings : tuple of Heading
+        One for each column; with empty names where no line names them.
+    spare : tuple of (str, str)
+        Names beyond the last column, with what stands below each in the line of units.
+    line : Line
+        The first row.
+    mark : str
+        What separates cells; empty for runs of white space.
+    brackets : bool
+        Whether rows stand in brackets and end in semicolons.
+    rows : tuple of tuple of str
+        Cells of the first rows, all of one width.
+    """
+
+    preamble: tuple[str, ...]
+    headings: tuple[Heading, ...]
+    spare: tuple[tuple[str, str], ...]
+    line: Line
+    mark: str
+    brackets: bool
+    rows: tuple[tuple[str, ...], ...]
+
+    @property
+    def named(self) -> bool:
+        """Whether a line names the columns."""
+        return any(each.name for each in self.headings)
+
+
+def find_table(lines: Sequence[Line]) -> Found | None:
+    """Find the first rows of numbers of a text, and what names their columns; None where there are none.
+
+    Rows are lines of one width whose columns hold numbers, or words, all the way down. The separator is the one whose
+    rows begin first, of several the one that fits a line of names.
+
+    Examples
+    --------
+    >>> lines = ["A title", "Tempo,Pos", "0,00\\t1,5", "0,02\\t1,7", "0,04\\t1,8"]
+    >>> found = find_table([Line(i, 0, 0, text) for i, text in enumerate(lines, 1)])
+    >>> [each.name for each in found.headings], found.line.number, found.preamble
+    (['Tempo', 'Pos'], 3, ('A title',))
+    """
+    best: tuple[tuple[int, int, int], Found] | None = None
+    for order, mark in enumerate(_MARKS):
+        brackets = mark == "" and any(_BRACKETS.search(each.text) for each in lines)
+        start, rows = _rows(lines, mark, brackets)
+        if rows:
+            found = _with_names(lines, start, mark, brackets, rows)
+            rank = (start, not found.named, order)
+            best = min(best, (rank, found), key=lambda each: each[0]) if best else (rank, found)
+    return best[1] if best else None
+
+
+def _cells(line: str, mark: str, brackets: bool) -> list[str]:
+    cells = split_cells(_BRACKETS.sub(" ", line) if brackets else line, mark)
+    return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells]
+
+
+def _kind(cell: str) -> str:
+    if not cell:
+        return ""
+    if parse_number(cell) is not None:
+        return "number"
+    if _CLOCK.fullmatch(cell):
+        return "clock"
+    if _DATE.fullmatch(cell):
+        return "text"
+    return "mixed" if _NUMBERS.fullmatch(cell) else "text"
+
+
+def _rows(lines: Sequence[Line], mark: str, brackets: bool) -> tuple[int, tuple[tuple[str, ...], ...]]:
+    """Return where the first rows begin among the lines, and the cells of all that are like it; none where none are."""
+    cells = [_cells(each.text, mark, brackets) for each in lines]
+    kinds = [[_kind(cell) for cell in row] for row in cells]
+    filled = [at for at, row in enumerate(kinds) if row]
+    for position, start in enumerate(filled):
+        first = kinds[start]
+        if not _is_row(first) or any("=" in cell for cell in cells[start]):
+            continue
+        probe = filled[position : position + _PROBE]
+        width = max((len(kinds[at]) for at in probe if _is_row(kinds[at])), default=0) if mark else len(first)
+        like = [at for at in probe if _alike(kinds[at], first, width, mark)]
+        near = [at for at in probe[:_FEWEST] if at in like]
+        if len(near) == _FEWEST and len(like) >= _SOUND * len(probe):
+            rows = [cells[at] for at in filled[position:] if _alike(kinds[at], first, width, mark)]
+            return start, tuple(tuple(row + [""] * (width - len(row))) for row in rows)
+    return -1, ()
+
+
+def _is_row(kinds: Sequence[str]) -> bool:
+    values = kinds.count("number") + kinds.count("clock")
+    return "number" in kinds and values >= kinds.count("text") and "mixed" not in kinds
+
+
+def _alike(kinds: Sequence[str], first: Sequence[str], width: int, mark: str) -> bool:
+    """Tell whether a line is a row like the first: text stands below text, numbers below numbers, or nothing."""
+    if not _is_row(kinds) or (not mark and len(kinds) != width) or len(kinds) > width:
+        return False
+    return all(a == b or "" in (a, b) for a, b in zip(kinds, first, strict=False))
+
+
+def _with_names(
+    lines: Sequence[Line], start: int, mark: str, brackets: bool, rows: tuple[tuple[str, ...], ...]
+) -> Found:
+    width = len(rows[0])
+    above = [at for at in range(start - 1, -1, -1) if lines[at].text.strip(_COMMENT)][:_ABOVE]
+    names, units, at_names = [""] * width, [""] * width, start
+    spare: tuple[tuple[str, str], ...] = ()
+    for at in above:
+        found = _names(lines[at].text, mark, width)
+        if not found:
+            continue
+        below = found[:width] + [""] * (width - len(found))
+        if at_names == start and _are_units(found):
+            units, at_names, spare = below, at, tuple(("", each) for each in found[width:])
+            continue
+        names, at_names = below, at
+        behind = [each for _, each in spare] + [""] * len(found)
+        spare = tuple(zip(found[width:], behind, strict=False))
+        break
+    if at_names < start and not any(names) and not any(each.startswith(("(", "[")) for each in units):
+        names, units = units, names  # the one line of words is names, whatever units are called so too
+    headings = []
+    for name, unit in zip(names, units, strict=True):
+        plain, own = heading_of(name)
+        headings.append(Heading(plain, own or unit.strip(" ()[]")))
+    preamble = tuple(text for each in lines[:at_names] if (text := each.text.strip(_COMMENT + "\t")))
+    return Found(preamble, tuple(headings), spare, lines[start], mark, brackets, rows)
+
+
+def _names(line: str, mark: str, width: int) -> list[str]:
+    """Split a line into as many names as there are columns; none where it cannot be."""
+    plain = line.lstrip(_COMMENT).rstrip()
+    for cells in _splits(plain, mark, width):
+        words = [cell for cell in cells if cell and parse_number(cell) is None and not _CLOCK.fullmatch(cell)]
+        if words and 2 * len(words) >= len([cell for cell in cells if cell]) and max(map(len, words)) <= 80 + len(line):
+            return cells
+    return []
+
+
+def _splits(line: str, mark: str, width: int) -> Iterator[list[str]]:
+    """Yield the cells of a line as it may be split, the likeliest first."""
+    by_mark = split_heading(line) if any(each in line for each in "\t;,") else ([line], "")
+    own = [cell.strip().strip('"') for cell in line.split(mark)] if mark and '"' not in line else by_mark[0]
+    if mark and mark in line:
+        while len(own) > width and not own[-1]:
+            own.pop()
+        if len(own) >= width or 2 * len(own) > width > 2:
+            yield own
+        return
+    if len(by_mark[0]) == width and (width > 1 or by_mark[1] == ""):
+        yield by_mark[0]
+    apart = [re.split(r"\s{2,}|\t", line), [each.group() for each in _TOKEN.finditer(line)], line.split()]
+    yield from (each for each in apart if len(each) == width)
+    # Names beyond the columns are believed where they are as short as names are, and begin with a time or x.
+    tokens = line.split()
+    if not mark and width < len(tokens) <= 3 * width and all(len(each) < 6 for each in tokens):
+        yield tokens
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Tell a line of units: all its cells are units, or stand in brackets."""
+    told = [cell for cell in cells if cell]
+    known = [
+        measure_of(plain) is not None or time_power(plain) is not None or plain != cell or not plain
+        for cell in told
+        if parse_number(cell) is None
+        for plain in (cell.strip(" ()[]"),)
+    ]
+    # x, y, m, s and t are names too: one that stands above others as a unit must be in brackets or spelled out.
+    return bool(known) and sum(known) * 2 >= len(known) and not any(is_time(cell) for cell in told)
+
+
+def heading_of(cell: str) -> tuple[str, str]:
+    """Take a heading apart: its unit stands in brackets, behind a slash, or last behind an underscore.
+
+    Examples
+    --------
+    >>> heading_of("Zeit t / s"), heading_of("theta_rad"), heading_of("x_rojo"), heading_of("Time(sec)")
+    (('Zeit t', 's'), ('theta', 'rad'), ('x_rojo', ''), ('Time', 'sec'))
+    """
+    name, unit = name_and_unit(cell)
+    if unit:
+        return name, unit
+    for form in (_SLASH, _TAIL):
+        found = form.fullmatch(name)
+        if found and (form is _SLASH or measure_of(found["unit"]) or time_power(found["unit"]) is not None):
+            return found["name"].strip(), found["unit"].strip()
+    return name, ""
+
+
+def clock_s(cell: str) -> tuple[str, float, int] | None:
+    """Read a time of the day: its date as printed, the second of the day, and the decimals printed; None for others.
+
+    Examples
+    --------
+    >>> clock_s("10:04:59.812"), clock_s("01/08/2024 1:00:36 pm"), clock_s("0.5")
+    (('', 36299.812, 3), ('01/08/2024', 46836.0, 0), None)
+    """
+    found = _CLOCK.fullmatch(cell)
+    if found is None:
+        return None
+    hour = int(found["h"]) % 12 + 12 * (found["half"][0] in "pP") if found["half"] else int(found["h"])
+    seconds = (found["s"] or "0").replace(",", ".")
+    decimals = len(seconds.partition(".")[2])
+    at = hour * 3600 + int(found["m"]) * 60 + float(seconds)
+    return (found["date"] or "").strip(" ,T"), round(at, decimals), decimals
