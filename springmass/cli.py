@@ -16,13 +16,14 @@ from springmass.errors import INTERRUPTED, OK, SENSOR, SOME_FAILED, UNREADABLE, 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from typing import NoReturn
 
 __all__ = ["build_parser", "main"]
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="springmass",
         description="From a rangefinder's samples to period, spring constant and damping law, "
         "with uncertainties that hold.",
@@ -36,6 +37,39 @@ def build_parser() -> argparse.ArgumentParser:
         described = summary[0].upper() + summary[1:] + "."
         add(commands.add_parser(name, help=summary, description=described, formatter_class=_formatter))
     return parser
+
+
+class _Once(argparse.Action):
+    """Keeps an option's value; a second one is refused, where argparse would forget the first in silence."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> None:
+        given = namespace.__dict__.setdefault("_given", set())
+        if self.option_strings and self.dest in given:
+            parser.error(f"{option_string} was given twice; give it once")
+        given.add(self.dest)
+        setattr(namespace, self.dest, values)
+
+
+class _Parser(argparse.ArgumentParser):
+    def __init__(self, *args: object, **kwargs: object) -> None:
+        super().__init__(*args, **kwargs)  # type: ignore[arg-type]
+        self.register("action", None, _Once)
+        self.register("action", "store", _Once)
+
+    def error(self, message: str) -> NoReturn:
+        if "invalid choice: " in message:
+            from difflib import get_close_matches
+
+            word, *choices = message.partition("invalid choice: ")[2].split("'")[1::2]
+            if near := get_close_matches(word, choices, n=1):
+                message += f"; did you mean {near[0]}?"
+        super().error(message)
 
 
 def _formatter(prog: str) -> argparse.HelpFormatter:
@@ -127,7 +161,13 @@ def _add_unverified(parser: argparse.ArgumentParser) -> None:
 
 def _add_analyse(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", nargs="+", metavar="INPUT", help="recordings and run files")
-    parser.add_argument("--scene", metavar="FILE", help="scene file (TOML): masses, disc, air, sensor")
+    parser.add_argument(
+        "--scene",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="scene file (TOML): masses, disc, air, sensor; one for all inputs, or again for each in their order",
+    )
     _add_accuracy(parser)
     parser.add_argument("--method", choices=("classic",), help="the lab report's own method, to compare against")
     _add_input_options(parser)

@@ -27,6 +27,8 @@ class _Quantity(NamedTuple):
     unit: str
     least: float
     greatest: float
+    usual: tuple[float, float] = (-math.inf, math.inf)  # at a bench: what lies beyond is asked about
+    mistaken: str = ""  # for what
 
     def allowed(self) -> str:
         """Return the range in words."""
@@ -37,15 +39,15 @@ class _Quantity(NamedTuple):
 
 
 _QUANTITIES: dict[tuple[str, str], _Quantity] = {
-    ("bob", "mass_kg"): _Quantity("bob_mass_kg", "kg", 1e-12, 1e6),
-    ("spring", "mass_kg"): _Quantity("spring_mass_kg", "kg", 0.0, 1e6),
+    ("bob", "mass_kg"): _Quantity("bob_mass_kg", "kg", 1e-12, 1e6, (1e-3, 20.0), "grams"),
+    ("spring", "mass_kg"): _Quantity("spring_mass_kg", "kg", 0.0, 1e6, (0.0, 2.0), "grams"),
     ("spring", "constant_n_per_m"): _Quantity("spring_constant_n_per_m", "N/m", 1e-12, 1e12),
     ("spring", "cubic_n_per_m3"): _Quantity("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18),
-    ("disc", "diameter_m"): _Quantity("disc_diameter_m", "m", 1e-6, 1e3),
-    ("air", "temperature_c"): _Quantity("air_temperature_c", "degC", -100.0, 200.0),
-    ("air", "pressure_pa"): _Quantity("air_pressure_pa", "Pa", 1e-3, 1e7),
+    ("disc", "diameter_m"): _Quantity("disc_diameter_m", "m", 1e-6, 1e3, (5e-3, 2.0), "centimetres or millimetres"),
+    ("air", "temperature_c"): _Quantity("air_temperature_c", "degC", -100.0, 200.0, (-20.0, 50.0), "fahrenheit"),
+    ("air", "pressure_pa"): _Quantity("air_pressure_pa", "Pa", 1e-3, 1e7, (5e4, 1.1e5), "hectopascals"),
     ("air", "relative_humidity"): _Quantity("air_relative_humidity", "", 0.0, 1.0),
-    ("sensor", "sigma_m"): _Quantity("sensor_sigma_m", "m", 1e-12, 1e3),
+    ("sensor", "sigma_m"): _Quantity("sensor_sigma_m", "m", 1e-12, 1e3, (1e-8, 0.05), "millimetres"),
     ("start", "displacement_m"): _Quantity("start_displacement_m", "m", -1e3, 1e3),
     ("start", "velocity_m_per_s"): _Quantity("start_velocity_m_per_s", "m/s", -1e6, 1e6),
     ("damping", "gamma_per_s"): _Quantity("gamma_per_s", "1/s", 0.0, 1e6),
@@ -140,6 +142,14 @@ class Scene:
         if self.sensor_position is not None:
             tables.setdefault("sensor", {})["position"] = self.sensor_position
         return tables
+
+    def unusual(self) -> tuple[str, ...]:
+        """Return a clause for every value that no bench has, with what its unit may have been mistaken for."""
+        return tuple(
+            f"[{table}] {key} = {found.value:g} is beyond {q.usual[0]:g} to {q.usual[1]:g} {q.unit} ({q.mistaken}?)"
+            for (table, key), q in _QUANTITIES.items()
+            if (found := getattr(self, q.attribute)) is not None and not q.usual[0] <= found.value <= q.usual[1]
+        )
 
     @property
     def tells_of_bench(self) -> bool:

@@ -116,6 +116,9 @@ def judge_scene(scene: Scene, effects: tuple[Effect, ...]) -> tuple[Finding, ...
     }
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
     found = []
+    if unusual := scene.unusual():
+        message = f"the scene states what no bench has: {'; '.join(unusual)}; check value and unit"
+        found.append(Finding("scene_implausible", "warning", message))
     if scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
         message = (
             "the scene does not weigh the spring, a part of which swings along: the spring constant counts none of it, "

@@ -13,7 +13,7 @@ from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder
 from springmass.runs.json_results import REJECTED_WARNINGS, picked
-from springmass.runs.loading import load, read_scene
+from springmass.runs.loading import load, read_scenes
 from storage.errors import StorageError
 
 __all__ = ["run"]
@@ -28,10 +28,10 @@ def run(options: argparse.Namespace) -> int:
             f"--velocity completes one position file, got {len(options.input)} inputs; analyse the pair by itself",
             USAGE,
         )
-    scene = None if options.scene is None else read_scene(options.scene)
+    scenes = read_scenes(options.scene, len(options.input))
     out = make_folder(options.out or ".") if _wants_report(options) else None
     codes: list[int] = []
-    for path, name in zip(options.input, distinct_names(options.input), strict=True):
+    for path, name, scene in zip(options.input, distinct_names(options.input), scenes, strict=True):
         try:
             loaded = load(path, **completions(options), from_s=options.from_s, to_s=options.to_s)
             analysed = analyse_loaded(

@@ -6,13 +6,12 @@ import argparse
 import json
 
 from acquisition.errors import visible
-from pipeline.bench.scene import Scene
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
 from springmass.runs.json_results import picked, provenance_of
-from springmass.runs.loading import load, read_scene
+from springmass.runs.loading import load, read_scenes
 
 __all__ = ["run"]
 
@@ -27,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
         )
     names = distinct_names(options.input)
     # Scenes first: what is wrong with them is known before an hour of records is read.
-    given = _given_scenes(options)
+    given = read_scenes(options.scene, len(options.input))
     out = None if options.out is None else make_folder(options.out)
     cut = {"from_s": options.from_s, "to_s": options.to_s}
     loaded = [load(path, **completions(options), **cut) for path in options.input]
@@ -55,19 +54,6 @@ def run(options: argparse.Namespace) -> int:
         complain(f"rejected under --strict: {', '.join(dict.fromkeys(wrong))}")
         return REJECTED
     return OK
-
-
-def _given_scenes(options: argparse.Namespace) -> list[Scene | None]:
-    """One scene a run; None where the run's own is to be taken."""
-    count = len(options.input)
-    if len(options.scene) not in (0, 1, count):
-        raise ProgramError(
-            f"--scene was given {len(options.scene)} times for {count} runs; give it once for all of them, "
-            "or once for each in their order",
-            USAGE,
-        )
-    scenes: list[Scene | None] = [read_scene(path) for path in options.scene] or [None]
-    return scenes * count if len(scenes) == 1 else scenes
 
 
 def _print_text(compared: Compared, runs: list[Analysed]) -> None:

@@ -31,7 +31,7 @@ from storage.run_file.layout import MAGIC
 from storage.run_file.reading import CHECKED, open_run
 from storage.wire_log.records import MAGIC as WIRE_MAGIC
 
-__all__ = ["Loaded", "kind_of", "load", "read_scene", "sample_data", "to_track"]
+__all__ = ["Loaded", "kind_of", "load", "read_scene", "read_scenes", "sample_data", "to_track"]
 
 UNVERIFIED = "unverified"
 NAMED = 5  # differences that a message names
@@ -240,6 +240,24 @@ def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, float]:
     if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
         known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
     return known
+
+
+def read_scenes(paths: Sequence[str], count: int) -> list[Scene | None]:
+    """Read one scene a run: one file for all of them, or one for each in their order; None without a file.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 for any other number of files, or as :func:`read_scene`.
+    """
+    if len(paths) not in (0, 1, count):
+        raise ProgramError(
+            f"--scene was given {len(paths)} times for {count} runs; give it once for all of them, "
+            "or once for each in their order",
+            USAGE,
+        )
+    scenes: list[Scene | None] = [read_scene(path) for path in paths] or [None]
+    return scenes * count if len(scenes) == 1 else scenes
 
 
 def read_scene(path: str | Path) -> Scene:
