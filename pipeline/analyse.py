@@ -26,6 +26,7 @@ from pipeline.oscillation import condition as conditioning
 from pipeline.oscillation import cycles as cycling
 from pipeline.oscillation import demodulate as demodulation
 from pipeline.oscillation import disturbances as separation
+from pipeline.oscillation import segments as segmentation
 from pipeline.oscillation.condition import Conditioned, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
 from pipeline.results import derive as derivation
@@ -33,6 +34,7 @@ from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
 from pipeline.results.findings import Finding, by_severity, judge, judge_fits, judge_overdamped, judge_scene
 from pipeline.results.sample_findings import count_quality, find_clusters, judge_samples
+from pipeline.results.segment_findings import judge_segments
 from pipeline.track import U8, Track
 
 __all__ = ["STANDARD", "Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]
@@ -44,7 +46,7 @@ class Params:
 
     Parameters
     ----------
-    condition, cycles, demodulate, disturbances, damping, phase, derive, relaxation, motion
+    condition, cycles, demodulate, segments, disturbances, damping, phase, derive, relaxation, motion
         Of the stages of those names.
     full : pipeline.motion.waveform_fit.Params, optional
         Of the fit of the whole waveform; None leaves it out.
@@ -53,6 +55,7 @@ class Params:
     condition: conditioning.Params = field(default_factory=conditioning.Params)
     cycles: cycling.Params = field(default_factory=cycling.Params)
     demodulate: demodulation.Params = field(default_factory=demodulation.Params)
+    segments: segmentation.Params = field(default_factory=segmentation.Params)
     disturbances: separation.Params = field(default_factory=separation.Params)
     damping: dampings.Params = field(default_factory=dampings.Params)
     phase: phases.Params = field(default_factory=phases.Params)
@@ -189,7 +192,16 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     if track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     conditioned = condition(track, params.condition)
-    windows = see_windows(conditioned, params.cycles, params.demodulate, params.disturbances, params.damping)
+    windows = see_windows(
+        conditioned,
+        params.condition,
+        params.cycles,
+        params.demodulate,
+        params.segments,
+        params.disturbances,
+        params.damping,
+    )
+    conditioned = conditioned if isinstance(windows, NoOscillation) else windows.conditioned
     solved = _solve_equation(windows, params)
     relaxed = find_overdamped(conditioned, params.relaxation) if _may_be_overdamped(windows, solved, params) else None
     if isinstance(relaxed, Overdamped):
@@ -242,6 +254,7 @@ def _oscillation(
     derived = derive(demodulated, damping, phase, rest, scene, effects, instrument=instrument, params=params.derive)
     clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]))
     findings = by_severity(
+        judge_segments(windows.segments),
         judge(cycles, demodulated, damping, phase, rest, waveform, disturbances),
         judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters),
         judge_scene(scene, effects),

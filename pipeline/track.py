@@ -22,7 +22,8 @@ UNITS = {"length": "m", "angle": "rad", "voltage": "V", "acceleration": "m/s^2",
 class Quality(enum.IntFlag):
     """Why a sample may not be taken at face value; the bits of the run file's ``quality``.
 
-    The same table as ``acquisition.Flag``, which the pipeline may not import; a test holds them equal.
+    The table of ``acquisition.Flag``, which the pipeline may not import (a test holds them equal), and one more that
+    the analysis alone sets: ``OUTSIDE`` the part in which one free oscillation runs.
     """
 
     MISSING = 1
@@ -32,6 +33,7 @@ class Quality(enum.IntFlag):
     NON_MONOTONIC_TIME = 16
     MALFORMED = 32
     GAP_BEFORE = 64
+    OUTSIDE = 128
 
 
 UNUSABLE = ~np.uint8(Quality.GAP_BEFORE)

@@ -148,10 +148,10 @@ def _stop_row(conditioned: Conditioned) -> int | None:
     """Index of the sample by which the bob has stopped for good; None where it moves to the end, or never."""
     rows = np.flatnonzero(conditioned.used)
     count = rows.size // BLOCK
-    if count < 8 or not conditioned.noise_m > 0.0:
+    noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)
+    if count < 8 or not noise > 0.0:
         return None
     y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
-    noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)
     end = float(np.median(y[blocks[-max(count // 10, 2) :]]))
     # Most bobs move at the end of their record, and the last blocks say so.
     if _away(y[blocks[-4:]], end).max() > 2.0 * noise:

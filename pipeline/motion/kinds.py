@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,15 +15,20 @@ from pipeline.motion.phase import PhaseFit, fit_phase
 from pipeline.motion.waveform import Rest, Waveform, fit_rest, reconstruct
 from pipeline.motion.waveform_fit import FullFit, fit_record
 from pipeline.motion.waveform_fit import Params as WaveformParams
-from pipeline.oscillation.condition import Conditioned
+from pipeline.oscillation.condition import Conditioned, condition
+from pipeline.oscillation.condition import Params as ConditionParams
 from pipeline.oscillation.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.oscillation.cycles import Params as CyclesParams
 from pipeline.oscillation.demodulate import Demodulated, demodulate
 from pipeline.oscillation.demodulate import Params as DemodulateParams
 from pipeline.oscillation.disturbances import Disturbances, separate
 from pipeline.oscillation.disturbances import Params as DisturbancesParams
+from pipeline.oscillation.segments import Params as SegmentsParams
+from pipeline.oscillation.segments import Segments, Span, find_segments
 
 __all__ = ["Fitted", "Windows", "by_equation", "by_windows", "see_windows"]
+
+ROUNDS = 4  # most times that a part is looked for within the part that was found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +38,9 @@ class Windows:
     Parameters
     ----------
     conditioned : Conditioned
-        The whole record.
+        The whole record, what lies outside the analysed part flagged.
+    segments : Segments or None
+        Which part that is; None: the whole record.
     cycles, demodulated, disturbances, damping
         Outputs of the stages of those names.
     stopped : bool
@@ -40,6 +48,7 @@ class Windows:
     """
 
     conditioned: Conditioned
+    segments: Segments | None
     cycles: Cycles
     demodulated: Demodulated
     disturbances: Disturbances
@@ -79,8 +88,10 @@ class Fitted:
 
 def see_windows(
     conditioned: Conditioned,
+    conditioning: ConditionParams,
     cycles: CyclesParams,
     demodulation: DemodulateParams,
+    segmentation: SegmentsParams,
     separation: DisturbancesParams,
     damping: DampingParams,
 ) -> Windows | NoOscillation:
@@ -89,18 +100,44 @@ def see_windows(
     Parameters
     ----------
     conditioned : Conditioned
-    cycles, demodulation, separation, damping
+    conditioning, cycles, demodulation, segmentation, separation, damping
         Options of the stages.
     """
+    segments = None
+    if (rest := _at_rest(conditioned)) is not None:
+        conditioned, segments = condition(rest.flagged(conditioned.track), conditioning), rest
     seen, stopped = _see_cycles(conditioned, cycles)
     if isinstance(seen, NoOscillation):
         return seen
     demodulated = demodulate(conditioned, seen, demodulation)
+    for _ in range(ROUNDS):
+        found = find_segments(conditioned, seen, demodulated, segmentation)
+        if found is None:
+            break
+        # Once more without the rest, which may have hidden the period, the plateaus and the noise of this part.
+        part = condition(found.flagged(conditioned.track), conditioning)
+        trimmed, stops = _see_cycles(part, cycles)
+        if isinstance(trimmed, NoOscillation):
+            break
+        conditioned, seen, stopped, segments = part, trimmed, stops, found.within(segments)
+        demodulated = demodulate(conditioned, seen, demodulation)
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
         return why
     demodulated, disturbances = separate(conditioned, seen, demodulated, separation, demodulation)
     start = float(conditioned.track.t[np.argmax(conditioned.used)])
-    return Windows(conditioned, seen, demodulated, disturbances, fit_damping(demodulated, start, damping), stopped)
+    law = fit_damping(demodulated, start, damping)
+    return Windows(conditioned, segments, seen, demodulated, disturbances, law, stopped)
+
+
+def _at_rest(conditioned: Conditioned) -> Segments | None:
+    """Return what to leave out of a record that goes on long after its bob has stopped."""
+    moving = moving_part(conditioned, 0.25)
+    if moving is None:
+        return None
+    t = conditioned.track.t[conditioned.used]
+    # As much again stays: it shows the rest position and the noise.
+    last_s = float(t[0] + 2.0 * (moving.track.t[-1] - t[0]))
+    return Segments(-math.inf, last_s, (Span("at_rest", last_s, float(t[-1])),))
 
 
 def _see_cycles(conditioned: Conditioned, params: CyclesParams) -> tuple[Cycles | NoOscillation, bool]:

@@ -33,6 +33,7 @@ _QUALITY = {
     "clipped": "clipped",
     "duplicate_time": "at a time seen before",
     "non_monotonic_time": "running backward in time",
+    "outside": "outside the part that was analysed",
     "malformed_rows": "malformed rows",
 }
 # What is wrong with each number of the report's own method; pipeline.results.classic derives it.

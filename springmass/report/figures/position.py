@@ -36,6 +36,7 @@ __all__ = ["ZOOM_PERIODS", "has_error_bars", "is_long", "position_figure"]
 _FLAGGED: tuple[tuple[int, str, str, str], ...] = (
     (int(Quality.CLIPPED), "clipped", "s", ORANGE),
     (int(Quality.FALSE_ECHO), "false echo", "x", VERMILLION),
+    (int(Quality.OUTSIDE), "outside the analysed part", ".", "0.6"),
     (int(UNUSABLE), "otherwise unusable", "+", GREEN),
 )
 ZOOM_PERIODS = 8

@@ -213,6 +213,7 @@ def test_counts_of_quality() -> None:
         "clipped": 1,
         "duplicate_time": 1,
         "non_monotonic_time": 1,
+        "outside": 0,
         "used": 2,
     }
 

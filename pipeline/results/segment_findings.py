@@ -1,0 +1,69 @@
+"""What a record holds beside the part that was analysed: at rest, in the hand, or another oscillation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pipeline.oscillation.segments import Break, Segments, Span
+from pipeline.results.findings import Finding
+
+__all__ = ["judge_segments"]
+
+SHOWN = 5  # spans that are told by their times
+
+
+def judge_segments(segments: Segments | None) -> Iterator[Finding]:
+    """Yield which seconds were left out, and why.
+
+    Parameters
+    ----------
+    segments : Segments or None
+        None: the whole record was analysed.
+    """
+    if segments is None:
+        return
+    others = [span for span in segments.left_out if span.kind == "free"]
+    for kind in dict.fromkeys(one.kind for one in segments.breaks):
+        breaks = [one for one in segments.breaks if one.kind == kind]
+        times = _listed([f"at {one.time_s:.1f} s ({_words_on(one)})" for one in breaks])
+        what = {
+            "restarted": "the bob was stopped and released again",
+            "touched": "amplitude and phase change at once, as by a touch",
+            "phase_jump": "the phase jumps, as where rows are lost or a clock stood still",
+        }[kind]
+        yield Finding(
+            kind,
+            "warning",
+            f"{what}, {times}: the longest part was analysed{_part(segments)}; the others are {_spans(others)}, "
+            "for --from and --to",
+        )
+    handled = [span for span in segments.left_out if span.kind == "handled"]
+    if handled and not segments.breaks:
+        yield Finding(
+            "handled",
+            "warning",
+            f"the bob does not move freely in {_spans(handled)}: left out; amplitude, phase and damping rate are those "
+            f"at the start of what was analysed{_part(segments)}",
+        )
+    still = [span for span in segments.left_out if span.kind == "at_rest"]
+    if still:
+        yield Finding("at_rest", "info", f"nothing but noise moves in {_spans(still)}: left out")
+
+
+def _words_on(one: Break) -> str:
+    return f"amplitude {one.amplitude:+.0%}, phase {one.phase:+.2g} rad"
+
+
+def _part(segments: Segments) -> str:
+    first = f" from {segments.first_s:.2f} s" if segments.first_s > 0.0 else ""
+    last = f" to {segments.last_s:.2f} s" if segments.last_s < float("inf") else ""
+    return f",{first}{last}" if first or last else ""
+
+
+def _spans(spans: list[Span]) -> str:
+    return _listed([f"{span.first_s:.2f} to {span.last_s:.2f} s" for span in spans])
+
+
+def _listed(words: list[str]) -> str:
+    more = f" and {len(words) - SHOWN} more" if len(words) > SHOWN else ""
+    return ", ".join(words[:SHOWN]) + more
