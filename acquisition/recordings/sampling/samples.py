@@ -179,7 +179,7 @@ def value_traps(
         Last printed digit, m.
     line : callable
     length : bool
-        Whether these are distances at all; of volts no target is lost.
+        Whether these are distances at all; of volts no target is lost, and 0 V is a reading.
 
     Returns
     -------
@@ -187,7 +187,7 @@ def value_traps(
     traps : tuple of Trap
     """
     traps = []
-    if (tail := _zero_tail(distance)) < distance.size:
+    if length and (tail := _zero_tail(distance)) < distance.size:
         count = distance.size - tail
         distance[tail:] = np.nan
         flags[tail:] |= Flag.MISSING.value

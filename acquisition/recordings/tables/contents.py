@@ -213,7 +213,7 @@ def is_time(name: str) -> bool:
     words = _WORDS.findall(_CAMEL.sub(" ", name).lower())
     told = [word for word in words if word in _TIME_WORDS]
     beside = [word for word in words if word not in told]
-    if not told or (len(words[0]) == 1 and words[0] not in _TIME_WORDS):
+    if not told or words[0].isdecimal() or (len(words[0]) == 1 and words[0] not in _TIME_WORDS):
         return False
     return all(len(word) == 1 or word.isdecimal() or word in _BESIDE_TIME for word in beside)
 

@@ -24,7 +24,8 @@ _CLOCK = re.compile(
     r"\s*(?P<half>[aApP]\.?[mM]\.?)?(?:Z|[+-]\d\d:?\d\d)?",
     re.ASCII,
 )
-_SLASH = re.compile(r"(?P<name>.*\S)\s*/\s*(?P<unit>[^\s/]+(?:/[^\s/]+)?)")
+_BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
+_SLASH = re.compile(r"(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]+(?:/[^\s/]+)?)")
 _TAIL = re.compile(r"(?P<name>.*[^\W_])[_ ](?:in )?(?P<unit>[^\W_]+|m/s\^?[2²])")
 _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
 
@@ -200,7 +201,7 @@ def _are_units(cells: Sequence[str]) -> bool:
     """Tell a line of units: all its cells are units, or stand in brackets."""
     told = [cell for cell in cells if cell]
     known = [
-        measure_of(plain) is not None or time_power(plain) is not None or plain != cell or not plain
+        measure_of(plain) is not None or time_power(plain) is not None or bool(_BRACKETED.fullmatch(cell))
         for cell in told
         if parse_number(cell) is None
         for plain in (cell.strip(" ()[]"),)

@@ -15,10 +15,11 @@ from acquisition.recordings.units import time_power
 __all__ = ["are_row_numbers", "columns_of", "is_aside", "runs_forward", "times_by_name", "times_by_steps"]
 
 _INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
-_NEUTRAL = re.compile(r"|x|t|x[-_ ]?(axis|value|achse)|column \d+", re.IGNORECASE)
+_NEUTRAL = re.compile(r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|column \d+", re.IGNORECASE)
 """Names that say nothing against a column of times."""
 _SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10", re.IGNORECASE)
 """Names of times that are no clock: how long something took."""
+_CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
 _UNCERTAIN = re.compile(
     r".*\b(u?n?certain\w*|err\w*|sigma|std|incert\w*|unsicher\w*|fehler|sd)\b.*|[dδΔσu][_ ]?[a-zθφ]|[a-zθφ]'|[\d.,]+",
     re.IGNORECASE,
@@ -73,7 +74,7 @@ def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[in
     named = [
         column
         for column, each in enumerate(headings)
-        if (is_time(each.name) and each.name != "T" and not (each.unit and time_power(each.unit) is None))
+        if (is_time(each.name) and not _CAPITAL.search(each.name) and not (each.unit and time_power(each.unit) is None))
         or (column == 0 and time_power(each.unit) is not None and not _SPAN.search(each.name) and _is_even(columns[0]))
     ]
     return [column for column in named if runs_forward(columns[column])]

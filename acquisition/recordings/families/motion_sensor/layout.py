@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.tables.contents import Sheet
+from acquisition.recordings.tables.contents import Sheet, is_time, name_and_unit
 from acquisition.recordings.tables.text import Text, guess_delimiter, parse_number, split_cells
 from acquisition.recordings.units import LENGTHS
 
@@ -56,7 +56,7 @@ def evidence(lines: Sequence[str]) -> str:
     if found := _column_line(lines):
         return f"line {found[0] + 1} is the column line of {found[1].quantity} in {found[1].unit}"
     start = _first_row(lines[:2])
-    shape = _shape(lines[start:]) if start >= 0 else None
+    shape = _shape(lines[start:]) if start >= 0 and not (start and _names_others(*lines[:2])) else None
     return f"the rows have the shape of {shape.assumed}" if shape else ""
 
 
@@ -127,6 +127,13 @@ def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
             if (unit := _DISTANCE.get(cells[1])) and (len(cells) == 2 or _ERROR.get(cells[2]) == unit):
                 return at, Layout("distance", len(cells), unit)
     return None
+
+
+def _names_others(above: str, row: str) -> bool:
+    """Tell a line that names as many columns as the row has: names that are not this family's refuse its guess."""
+    mark = guess_delimiter(row)
+    names = split_cells(above.lstrip("\ufeff#% "), mark)
+    return len(names) == len(split_cells(row, mark)) and (bool(mark) or is_time(name_and_unit(names[0])[0]))
 
 
 def _is_title(line: str) -> bool:

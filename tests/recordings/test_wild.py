@@ -1,0 +1,207 @@
+"""Dialects met in public: each file opens with what its dialect says, or asks in one line for what it leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition.errors import NeedsAnswer, UnknownFormat
+from acquisition.recordings.identify import inspect, open_recording
+
+DEG = np.pi / 180
+
+
+@dataclass(frozen=True)
+class Row:
+    """One file: rows, times and values as counted by grep, head and tail; ``asks`` are the options it must ask for."""
+
+    start: str
+    family: str
+    channel: str
+    samples: int
+    rate_hz: float
+    t: tuple[float, float]
+    ends: tuple[float, float]
+    quantity: str = "length"
+    asks: tuple[str, ...] = ()
+    said: dict[str, Any] = field(default_factory=dict)
+
+
+NAN = float("nan")
+UNIT, CHANNEL, RATE, TIME_UNIT = "--unit", "--channel", "--rate-hz", "--time-unit"
+
+
+def say(channel: str = "", unit: str = "", **more: Any) -> dict[str, Any]:
+    """Return answers, as the reader takes them."""
+    return {**({"channel": channel} if channel else {}), **({"unit": unit} if unit else {}), **more}
+
+
+TABLE = [
+    Row(
+        *("anglelog", "table", "Angle1", 2054, 37.93, (0.008788585662841797, 55.58119797706604), (NAN, -0.62182428783)),
+        *("angle", (CHANNEL, UNIT), say("Angle1", "rad")),
+    ),
+    Row("capstone", "capstone", "Position", 300, 40, (0, 7.475), (0, -0.2454), "length", ("--run",), say(run="1")),
+    Row(
+        *("cassycsv", "table", "Weg &b_A1", 789, 10, (0, 78.80078), (0.42, 0.3)),
+        *("angle", (CHANNEL,), say("Weg &b_A1")),
+    ),
+    Row("chartrec", "table", "Position", 2450, 1, (0, 2450.017), (0.062, 0.06)),
+    Row(
+        *("coupled", "table", "x_rojo", 633, 30, (0, 21.058692499742083), (0.573, 0.592)),
+        *("length", (CHANNEL, UNIT), say("x_rojo", "mm")),
+    ),
+    Row(
+        *("csvnames", "table", "y", 1000, 999, (0, 1), (0.012244149389694231, -0.0069972303705410615)),
+        *("length", (UNIT,), say(unit="m")),
+    ),
+    Row("datcsv", "csv", "Channel 1", 1000, 1000, (0, 0.999), (1.909113020050780538, 0.8965729794617469), "voltage"),
+    Row(
+        *("ecp", "table", "Encoder 1 Pos", 677, 112.95, (0, 5.985), (0, -0.002)),
+        *("length", (CHANNEL, UNIT), say("Encoder 1 Pos", "mm")),
+    ),
+    Row("fluids", "table", "Position", 1000, 4, (0.024, 249.774), (0.007041, NAN)),
+    Row("ga-csv", "table", "CH1", 60, 5e8, (-6e-8, 5.8e-8), (-2.58, 2.5), "voltage", (CHANNEL,), say("CH1")),
+    Row(
+        *("heidelberg", "table", "column 2", 1842, 40, (0.025, 46.082), (0.00838, -0.03136)),
+        *("length", (CHANNEL, UNIT), say("column 2", "cm")),
+    ),
+    Row(
+        *("lvm__spikelucky__test.lvm", "lvm", "Measurement (Gleichspannung)", 251, 100, (0, 2.5), (12.806113, 7.96688)),
+        *("voltage", (CHANNEL, RATE), say("Measurement (Gleichspannung)", rate_hz=100.0)),
+    ),
+    Row(
+        *("lvm__spikelucky__test2", "bare", "column 2", 718, 100, (0, 7.17), (4.482024, -0.003006)),
+        *("voltage", (CHANNEL, RATE, UNIT), say("column 2", "V", rate_hz=100.0)),
+    ),
+    Row(
+        *("lvm__spikelucky__hyd", "lvm", "Lead", 1900, 100, (0, 18.99), (1.392038, 1.021796)),
+        *("voltage", (CHANNEL, RATE), say("Lead", rate_hz=100.0)),
+    ),
+    Row(
+        *("microbit__ES2Spring2019-ComputinginEngineering__L13", "bare", "column 1", 501, 49, (0.019, 10.205)),
+        *((1344, 1104), "acceleration", (CHANNEL, TIME_UNIT, UNIT), say("column 1", "m/s2", time_unit="ms")),
+    ),
+    Row(
+        *("microbit__ES2Spring2019-ComputinginEngineering__data", "bare", "column 2", 415, 42.5, (0.01, 9.81)),
+        *((-2040, -1532), "acceleration", (CHANNEL, TIME_UNIT, UNIT), say("column 2", "m/s2", time_unit="ms")),
+    ),
+    Row(
+        *("moku", "table", "Input A", 1196, 100, (0, 11.95), (1.4646310123, -0.72630122579)),
+        *("voltage", (CHANNEL,), say("Input A")),
+    ),
+    Row(
+        *(
+            "pendser",
+            "table",
+            "peaks",
+            449,
+            22.45,
+            (-9.95967999761, 9.99892000239),
+            (-5.060461956521739, -5.0153985507),
+        ),
+        *("voltage", (UNIT,), say(unit="V")),
+    ),
+    Row("phyphox__tomas", "phyphox", "Altitude", 61, 0.95, (-0.5446145, 62.1287695), (0, 0.2750143392)),
+    Row(
+        *("picoscope", "table", "Kanal A", 50, 381.47, (-0.05295434967, 0.07549620955), (2.986236, -2.670217)),
+        *("voltage", (CHANNEL,), say("Kanal A")),
+    ),
+    Row(
+        *("plasduino", "table", "Pos A", 1830, 19.73, (0.026, 92.740), (0.501, 0.5)),
+        *("length", (CHANNEL, UNIT), say("Pos A", "mm")),
+    ),
+    Row(
+        *("plasduino", "table", "Pos B", 1830, 19.73, (0.051, 92.765), (0.298, 0.452)),
+        *("length", (CHANNEL, UNIT), say("Pos B", "mm")),
+    ),
+    Row(
+        *("qpd", "table", "leftMinusRight", 2500, 50, (0, 49.98), (-0.003122677793726325, -0.003122677793726325)),
+        *("voltage", (CHANNEL, UNIT), say("leftMinusRight", "V")),
+    ),
+    Row(
+        *("runhead", "table", "LR_Signal", 7497, 125, (0.004820, 60.001596), (-0.003043, -0.002956)),
+        *("voltage", (CHANNEL, UNIT), say("LR_Signal", "V")),
+    ),
+    Row("scope", "table", "1", 2000, 40000, (-0.025, 0.024975), (9724.24598694, 9724.24598694), "voltage"),
+    Row(
+        *("tdisp", "bare", "column 2", 10142, 13.2, (1.6270253658294678, 767.7529900074005), (0.105, 0.1515)),
+        *("length", (UNIT,), say(unit="cm")),
+    ),
+    Row("terr", "table", "θ", 9625, 30, (0, 319.91), (-0.156, 0.001), "angle", (UNIT,), say(unit="rad")),
+    Row("tnames", "table", "theta", 2376, 30, (0, 79.229), (0.229270, 0.002382), "angle"),
+    Row(
+        *("torsione", "table", "Pendolo", 4015, 50, (0, 80.28), (0.008, 0.006)),
+        *("angle", (CHANNEL, UNIT), say("Pendolo", "rad")),
+    ),
+    Row(
+        *("tracker", "table", "amp", 4005, 30, (0, 133.52333333333334), (-0.29042339407279855, 0.08850613208159334)),
+        *("angle", (UNIT,), say(unit="rad")),
+    ),
+    Row(
+        *("trkerr", "table", "y", 1999, 30, (0, 66.64422), (19.94714 * DEG, 2.141127 * DEG)),
+        *("angle", (UNIT,), say(unit="deg")),
+    ),
+    Row("tunit", "table", "θ", 3027, 30, (0, 100.8667), (-18.56635 * DEG, -0.8148416 * DEG), "angle"),
+    Row("vernier", "csv", "versnelling", 600, 99.83, (0, 6), (0, 0), "acceleration"),
+    Row("waveforms", "table", "Channel 1", 2000, 100, (0, 19.99), (2.622803, 1.641071), "voltage"),
+    Row("xy_", "table", "y", 3501, 10, (0, 350), (0, -8.98898e-05), "length", (UNIT,), say(unit="m")),
+]
+
+
+def only(recordings: Path, start: str) -> Path:
+    """Return the one file under wild/ of that name."""
+    (path,) = (each for each in (recordings / "wild").iterdir() if each.name.startswith(start))
+    return path
+
+
+every = pytest.mark.parametrize("row", TABLE, ids=lambda row: f"{row.start}:{row.channel}")
+
+
+@every
+def test_a_dialect_is_read_as_it_was_counted(recordings: Path, row: Row) -> None:
+    """Family, channel, rate, number of samples, quantity, first and last time and value."""
+    recording = open_recording(only(recordings, row.start), **row.said)
+    samples = recording.samples
+    told = (recording.format, recording.channel, len(samples), samples.quantity)
+    assert told == (row.family, row.channel, row.samples, row.quantity)
+    span = row.t[1] - row.t[0]
+    assert (row.samples - 1) / span == pytest.approx(row.rate_hz, rel=0.05)
+    # Nominal times are put on their grid, within the rounding of what is printed.
+    np.testing.assert_allclose((samples.t[0], samples.t[-1]), row.t, atol=max(1.1e-2 / row.rate_hz, 1e-12), rtol=1e-9)
+    np.testing.assert_allclose((samples.distance[0], samples.distance[-1]), row.ends, rtol=1e-9, atol=1e-12)
+
+
+@every
+def test_what_a_dialect_leaves_out_is_asked_in_one_line(recordings: Path, row: Row) -> None:
+    """Only what is needed, all of it at once, with the command line to type; what needs nothing opens."""
+    path = only(recordings, row.start)
+    if not row.asks:
+        assert len(open_recording(path).samples) == row.samples
+        return
+    with pytest.raises(NeedsAnswer) as caught:
+        open_recording(path)
+    words = str(caught.value)
+    assert "\n" not in words
+    command = words.partition("? springmass analyse ")[2]
+    options = ("--run", CHANNEL, "--time ", TIME_UNIT, RATE, UNIT)
+    assert {each for each in options if f" {each}" in command} == set(row.asks)
+
+
+@every
+def test_a_dialect_can_be_surveyed(recordings: Path, row: Row) -> None:
+    """What a file holds is told without a question, the channel among it."""
+    found = inspect(only(recordings, row.start))
+    assert found.format == row.family
+    assert row.channel in {each.channel for each in found.surveys}
+
+
+@pytest.mark.parametrize("start", ["xlsx", "zip__", "phyphoxfile"])
+def test_a_workbook_is_named_with_how_to_export_it(recordings: Path, start: str) -> None:
+    """No reader of workbooks is installed: one line says what the file is and what to do."""
+    with pytest.raises(UnknownFormat, match=r"got an Excel workbook \(xlsx?\); export the data as text"):
+        open_recording(only(recordings, start))
