@@ -33,8 +33,10 @@ from pipeline.results import derive as derivation
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
 from pipeline.results.findings import Finding, by_severity, judge, judge_fits, judge_overdamped, judge_scene
-from pipeline.results.sample_findings import count_quality, find_clusters, judge_samples
+from pipeline.results.plausibility import judge_plausibility
+from pipeline.results.sample_findings import STEPS, count_quality, find_clusters, judge_samples
 from pipeline.results.segment_findings import judge_segments
+from pipeline.results.self_check import Checked, check_residuals, holding, judge_held
 from pipeline.track import U8, Track
 
 __all__ = ["STANDARD", "Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]
@@ -251,11 +253,27 @@ def _oscillation(
     instrument = Instrument.of(track, u_crystal=params.derive.u_clock_nominal)
     noise_m = demodulated.noise_m
     effects = tabulate(scene, damping, phase, rest, noise_m=noise_m, instrument=instrument, disturbances=disturbances)
-    derived = derive(demodulated, damping, phase, rest, scene, effects, instrument=instrument, params=params.derive)
+    u_amplitude = damping.best.joint["A0"].u
+    # Strong damping bends every period: its own solution holds what would look like harmonics.
+    bent = isinstance(solved, EquationFit)
+    checked = Checked() if bent else check_residuals(windows.conditioned, demodulated, disturbances, phase, u_amplitude)
+    derived = derive(
+        demodulated,
+        damping,
+        phase,
+        rest,
+        scene,
+        effects,
+        instrument=instrument,
+        params=params.derive,
+        misfits=checked.misfits,
+    )
     clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]))
     findings = by_severity(
         judge_segments(windows.segments),
         judge(cycles, demodulated, damping, phase, rest, waveform, disturbances),
+        checked.findings,
+        judge_plausibility(windows.conditioned, demodulated, phase),
         judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters),
         judge_scene(scene, effects),
         judge_fits(fitted.full, solved),
@@ -272,8 +290,10 @@ def _overdamped(conditioned: Conditioned, scene: Scene, found: Overdamped) -> Fo
 
 def _still(conditioned: Conditioned, why: NoOscillation) -> Found:
     """A record without any motion to fit."""
-    finding = Finding("no_oscillation", "error", why.why)
-    return Still(why.why), (), _findings(conditioned, finding), _at_rest(conditioned)
+    findings = _findings(conditioned, Finding("no_oscillation", "error", why.why))
+    if (held := holding(conditioned)) > 1:
+        findings = by_severity(findings, (judge_held(held, 1.0 / conditioned.track.rate_hz),))
+    return Still(why.why), (), findings, _at_rest(conditioned)
 
 
 def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:
@@ -283,6 +303,8 @@ def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:
         raise AnalysisError("no usable sample is left; see the counts of flagged samples")
     # Where the distance steps or creeps, neighbours say the same: their number would make the mean look certain.
     u = float(np.std(y) * np.sqrt(correlation_length(y) / y.size))
+    if (quantum_m := conditioned.quantum_m or 0.0) > STEPS * noise_m:
+        u = float(np.hypot(u, quantum_m / np.sqrt(12.0)))  # rounding that noise does not reach over stays
     return {
         "offset": Estimate(float(np.mean(y)), u, "m"),
         "noise": Estimate(noise_m, noise_m / np.sqrt(2.0 * y.size), "m"),
@@ -290,4 +312,4 @@ def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:
 
 
 def _findings(conditioned: Conditioned, first: Finding) -> tuple[Finding, ...]:
-    return first, *judge_samples(conditioned, conditioned.flags, conditioned.noise_m)
+    return by_severity((first,), judge_samples(conditioned, conditioned.flags, conditioned.noise_m))

@@ -25,6 +25,7 @@ from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, estimate_of, function_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
+from pipeline.results.self_check import Misfit
 from pipeline.track import F8, UNUSABLE, Quality
 
 __all__ = ["Derived", "Params", "derive"]
@@ -141,6 +142,7 @@ def derive(
     *,
     instrument: Instrument,
     params: Params | None = None,
+    misfits: tuple[Misfit, ...] = (),
 ) -> Derived:
     """Propagate uncertainties to everything that is asked of a run.
 
@@ -155,6 +157,8 @@ def derive(
     instrument : Instrument
         Clock and scale of the sensor.
     params : Params, optional
+    misfits : tuple of Misfit
+        What the record says against its own model: inputs of kind B, uncertain about nothing.
 
     Returns
     -------
@@ -185,9 +189,12 @@ def derive(
     rate = inputs.add("clock_rate", instrument.clock_rate, "B")
     scale = ambient.scale(instrument)
     omega = inputs.add("angular_frequency", phase.angular_frequency, "A") * rate
-    start = laws.start() * scale
-    lam = laws.rate_at_start() * rate
-    v_rms = omega * scale * laws.root_mean_square()
+    amiss = _Amiss(misfits, inputs)
+    lengths = scale * amiss.over("amplitude", laws.best.joint.values[0])
+    rates = rate * amiss.over("damping_rate", laws.rate)
+    start = laws.start() * lengths
+    lam = laws.rate_at_start() * rates
+    v_rms = omega * lengths * laws.root_mean_square()
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, "m"), "B")
     offset = inputs.add("rest_position", rest.mean, "A") * scale
     found: dict[str, tuple[Any, str]] = {
@@ -195,15 +202,15 @@ def derive(
         "frequency": (omega / (2 * math.pi), "Hz"),
         "angular_frequency": (omega, "rad/s"),
         "amplitude": (start, "m"),
-        "offset": (offset + zero, "m"),
-        "phase": (inputs.add("phase", phase.phase, "A"), "rad"),
+        "offset": (offset + zero + amiss["offset"], "m"),
+        "phase": (inputs.add("phase", phase.phase, "A") + amiss["phase"], "rad"),
         "noise": (inputs.add("noise", _noise(demodulated), "A"), "m"),
         "damping_rate": (lam, "1/s"),
         "velocity_rms": (v_rms, "m/s"),
     }
     if laws.rate > 0:
         found["quality_factor"] = (0.5 * omega / lam, "")
-    coefficients = _coefficients(damping, laws, rate, scale)
+    coefficients = _coefficients(damping, laws, rates, lengths)
     diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
@@ -231,6 +238,30 @@ def derive(
         law_weights=laws.weights,
         parts=parts,
     )
+
+
+class _Amiss:
+    """The misfits as inputs: by name of the estimate, a variable of mean zero."""
+
+    def __init__(self, misfits: tuple[Misfit, ...], inputs: Inputs) -> None:
+        self.by_name: dict[str, Any] = {}
+        for misfit in misfits:
+            sizes = {
+                "amplitude": misfit.amplitude_m,
+                "offset": misfit.offset_m,
+                "phase": misfit.phase_rad,
+                "damping_rate": misfit.damping_rate,
+            }
+            variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()}, "B")
+            for name, variable in variables.items():
+                self.by_name[name] = self.by_name.get(name, 0.0) + variable
+
+    def __getitem__(self, name: str) -> Any:
+        return self.by_name.get(name, 0.0)
+
+    def over(self, name: str, value: float) -> Any:
+        """Return the factor that makes an estimate of this value as uncertain as the misfits do."""
+        return 1.0 + self[name] / float(value) if value else 1.0
 
 
 class _Laws:

@@ -14,8 +14,9 @@ from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.findings import Finding
 from pipeline.track import F8, U8, UNUSABLE, Quality
 
-__all__ = ["Clusters", "count_quality", "find_clusters", "judge_samples"]
+__all__ = ["STEPS", "Clusters", "count_quality", "find_clusters", "judge_samples"]
 
+STEPS = 2.6  # times the noise, of which rounding by itself leaves 1 / sqrt 12: from there on it is no white noise
 LEAST = 3  # false echoes that make a cluster
 BRIDGED = 2  # good samples between two false echoes of one cluster, at most
 TURNING = math.pi / 4.0  # phase from a turning point within which half the period's time, but a fourth of its way, lies
@@ -114,11 +115,11 @@ def judge_samples(
             f"the file states an error of {track.stated_error_m * 1e3:.2f} mm for every distance; "
             f"the samples scatter by {noise_m * 1e3:.2g} mm, so the stated error was not used as noise",
         )
-    if quantum_m is not None and noise_m > 0 and quantum_m > 3.0 * noise_m:
+    if quantum_m is not None and quantum_m > STEPS * noise_m:
         yield Finding(
             "quantised",
             "warning",
-            f"distances come in steps of {quantum_m * 1e3:.3g} mm, more than three times their noise: "
+            f"distances come in steps of {quantum_m * 1e3:.3g} mm, which outweigh their noise: "
             "amplitudes may err by several times their stated uncertainty",
         )
 

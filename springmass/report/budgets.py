@@ -34,6 +34,9 @@ INPUTS = {
     "recorded_speed_of_sound": "speed of sound of the record",
     "calibrated_scale": "calibration of the scale",
     "sensor_zero": "calibration of the zero",
+    "model_misfit": "what differs from a sinusoid in every period",
+    "sensor_smoothing": "smoothing by the sensor",
+    "held_samples": "distances held by the sensor",
 }
 """Every input of :mod:`pipeline.results.derive` in words."""
 SAME = ("frequency", "angular_frequency")  # one number with the period

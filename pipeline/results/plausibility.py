@@ -1,0 +1,94 @@
+"""Plausibility: whether a bob on a spring, seen by a distance sensor, can do what the record says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.motion.phase import PhaseFit
+from pipeline.oscillation.condition import Conditioned
+from pipeline.oscillation.demodulate import Demodulated
+from pipeline.results.findings import GRAVITY_M_PER_S2, Finding
+from pipeline.track import UNUSABLE
+
+__all__ = ["judge_plausibility"]
+
+MAINS_HZ = (50.0, 60.0, 100.0, 120.0)
+FARTHEST_M = 11.0  # that ultrasonic sensors of the bench reach
+MOST_GRAVITIES = 1.2
+FEWEST = 4.0  # samples a period
+
+
+def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit) -> Iterator[Finding]:
+    """Yield what no bob on a spring does, or no distance sensor sees.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+        The record as it came.
+    demodulated, phase
+        Outputs of the stages of those names.
+
+    Notes
+    -----
+    A bob hangs from a spring that pulls only, so it never falls faster than freely: :math:`A\\omega^2 \\le g`, and
+    not much more while the spring goes slack.
+    """
+    track = conditioned.track
+    used = (demodulated.flags & UNUSABLE) == 0
+    t, y = track.t[used], track.y[used]
+    omega = phase.angular_frequency.value
+    f = omega / (2.0 * math.pi)
+    amplitude = float(np.max(np.abs(demodulated.amplitude)))
+    rate_hz = 1.0 / float(np.median(np.diff(t))) if t.size > 1 else math.nan
+    if rate_hz < FEWEST * f:
+        yield Finding(
+            "undersampled",
+            "warning",
+            f"only {rate_hz / f:.2g} samples fall on a period: the bob may move several times as fast as the record "
+            "shows, and a wave of the same samples has another period; record at ten samples a period and more",
+        )
+    gravities = amplitude * omega**2 / GRAVITY_M_PER_S2
+    if gravities > MOST_GRAVITIES:
+        mains = _mains(f, rate_hz)
+        if mains is not None:
+            yield Finding(
+                "mains_hum",
+                "warning",
+                f"what oscillates at {f:.4g} Hz is the mains, {mains:.0f} Hz{_alias(f, mains)}, and no bob: "
+                "none of the numbers is of a motion; see to the sensor's supply and earth, and record a bob that moves",
+            )
+        yield Finding(
+            "implausible_motion",
+            "warning",
+            f"an amplitude of {amplitude:.3g} m at {f:.4g} Hz needs {gravities:.2g} times the acceleration of gravity, "
+            "which no bob hanging from a spring reaches: likely a wrong unit, hum, or a velocity read as distance; "
+            "check unit and column",
+        )
+    # Where distances are counted from the first sample, as from a velocity, their zero says nothing.
+    if y.size and track.y[0] != 0.0:
+        low, high = float(np.min(y)), float(np.max(y))
+        mean = float(np.mean(demodulated.offset))
+        if low <= 0.0 or high > FARTHEST_M or amplitude > abs(mean):
+            yield Finding(
+                "implausible_distance",
+                "warning",
+                f"distances from {low:.4g} to {high:.4g} m: no sensor of the bench measures that (0.02 to "
+                f"{FARTHEST_M:g} m). Likely a wrong unit, a velocity read as distance, or displacements, whose offset "
+                "is no distance; check unit and column",
+            )
+
+
+def _mains(f: float, rate_hz: float) -> float | None:
+    """The mains frequency that a line at f is, itself or folded by the sampling."""
+    for mains in MAINS_HZ:
+        folded = abs(mains - rate_hz * round(mains / rate_hz))
+        if min(abs(f - folded), abs(f - mains)) < 0.02 * f:
+            return mains
+    return None
+
+
+def _alias(f: float, mains: float) -> str:
+    return "" if abs(f - mains) < 0.02 * f else " folded by the sampling"
