@@ -27,7 +27,7 @@ from pipeline.oscillation import cycles as cycling
 from pipeline.oscillation import demodulate as demodulation
 from pipeline.oscillation import disturbances as separation
 from pipeline.oscillation import segments as segmentation
-from pipeline.oscillation.condition import Conditioned, condition
+from pipeline.oscillation.condition import Conditioned, coarsest_step, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
 from pipeline.results import derive as derivation
 from pipeline.results.derive import Derived, derive
@@ -303,7 +303,9 @@ def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:
         raise AnalysisError("no usable sample is left; see the counts of flagged samples")
     # Where the distance steps or creeps, neighbours say the same: their number would make the mean look certain.
     u = float(np.std(y) * np.sqrt(correlation_length(y) / y.size))
-    if (quantum_m := conditioned.quantum_m or 0.0) > STEPS * noise_m:
+    # Of a sensor at rest between two steps all but a few distances are alike, and these few were taken for echoes.
+    every = conditioned.track.y[np.isfinite(conditioned.track.y)]
+    if (quantum_m := coarsest_step(np.sort(every), conditioned.quantum_m) or 0.0) > STEPS * noise_m:
         u = float(np.hypot(u, quantum_m / np.sqrt(12.0)))  # rounding that noise does not reach over stays
     return {
         "offset": Estimate(float(np.mean(y)), u, "m"),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.motion.phase import PhaseFit
 from pipeline.oscillation.condition import Conditioned
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
 from pipeline.results.findings import Finding
 from pipeline.track import F8, UNUSABLE
@@ -106,13 +106,15 @@ def check_residuals(
     quantum_m = conditioned.quantum_m or 0.0
     found = []
     wave, folded = _fold(residual, phase.total(t[rows]), demodulated.noise_m, turn)
-    if folded is not None and wave.peak > 0.5 * quantum_m:
+    # Drag bends a sinusoid by itself, and a computed record is exact to its digits only.
+    least = float(np.median(model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)))
+    if folded is not None and wave.peak > max(0.5 * quantum_m, least):
         found.append(_not_sinusoidal(wave, amplitude, seconds))
         residual = residual - folded
     held = holding(conditioned)
     if held > 1:
         found.append(_held(held, step, turn, amplitude))
-    else:
+    elif demodulated.noise_m > least:
         whole = np.zeros(t.size)
         whole[rows] = residual
         smoothed = _smoothed(whole, used, rows.size // demodulated.t.size, step, turn, amplitude)

@@ -1,0 +1,53 @@
+"""What no bob on a spring does, and no distance sensor sees, is said."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.analyse import analyse
+from pipeline.track import Track
+
+
+def codes(amplitude: float, hz: float, *, rest: float = 0.3, rate_hz: float = 100.0, seconds: float = 20.0) -> set[str]:
+    """Return the codes of the warnings on a sinusoid in little noise."""
+    t = np.arange(round(seconds * rate_hz)) / rate_hz
+    rng = np.random.default_rng(3)
+    y = rest + amplitude * np.cos(2.0 * math.pi * hz * t + 0.3) + 0.005 * amplitude * rng.standard_normal(t.size)
+    return {f.code for f in analyse(Track.from_arrays(t, y)).findings if f.severity != "info"}
+
+
+def test_bob_is_plausible() -> None:
+    """A bob of 50 mm at 1.32 Hz, 0.3 m away, gets no warning."""
+    assert codes(0.05, 1.32) == set()
+
+
+def test_distances_in_another_unit() -> None:
+    """Centimetres read as metres lie beyond the range, and move too fast."""
+    assert {"implausible_distance", "implausible_motion"} <= codes(5.0, 1.32, rest=30.0)
+
+
+def test_velocity_read_as_distance() -> None:
+    """What is negative half of the time is no distance."""
+    assert "implausible_distance" in codes(0.4, 1.32, rest=0.0)
+
+
+def test_counted_from_the_first_sample_is_no_complaint() -> None:
+    """Distances counted from the first one, as those summed up from a velocity, may be negative."""
+    t = np.arange(2000) / 100.0
+    y = 0.05 * np.cos(8.3 * t) - 0.05 + 1e-4 * np.random.default_rng(1).standard_normal(t.size)
+    y[0] = 0.0
+    assert not {f.code for f in analyse(Track.from_arrays(t, y)).findings if f.severity != "info"}
+
+
+@pytest.mark.parametrize(("hz", "rate_hz"), [(50.0, 500.0), (50.0, 120.0), (60.0, 500.0)])
+def test_mains_is_named(hz: float, rate_hz: float) -> None:
+    """A line of 0.5 mm at the mains frequency, or where the sampling folds it to, is no bob."""
+    assert {"mains_hum", "implausible_motion"} <= codes(5e-4, hz, rate_hz=rate_hz)
+
+
+def test_fewer_than_four_samples_a_period() -> None:
+    """At 3.4 samples a period the record may show another frequency than the bob's."""
+    assert "undersampled" in codes(0.05, 1.32, rate_hz=1.32 * 3.4, seconds=60.0)
