@@ -15,6 +15,7 @@ from pipeline.motion.phase import PhaseFit, fit_phase
 from pipeline.motion.waveform import Rest, Waveform, fit_rest, reconstruct
 from pipeline.motion.waveform_fit import FullFit, fit_record
 from pipeline.motion.waveform_fit import Params as WaveformParams
+from pipeline.oscillation.clipping import find_cuts
 from pipeline.oscillation.condition import Conditioned, condition
 from pipeline.oscillation.condition import Params as ConditionParams
 from pipeline.oscillation.cycles import Cycles, NoOscillation, find_cycles
@@ -121,6 +122,8 @@ def see_windows(
             break
         conditioned, seen, stopped, segments = part, trimmed, stops, found.within(segments)
         demodulated = demodulate(conditioned, seen, demodulation)
+    if (cut := find_cuts(conditioned, seen, demodulated)) is not None:
+        conditioned, demodulated = cut, demodulate(cut, seen, demodulation)
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
         return why
     demodulated, disturbances = separate(conditioned, seen, demodulated, separation, demodulation)

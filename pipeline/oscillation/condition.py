@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
-__all__ = ["Conditioned", "Params", "coarsest_step", "condition", "fourth_difference_noise"]
+__all__ = ["Conditioned", "Cut", "Params", "coarsest_step", "condition", "fourth_difference_noise"]
 
 # Variance of y[i-2] - 4 y[i-1] + 6 y[i] - 4 y[i+1] + y[i+2] for unit white noise: 1 + 16 + 36 + 16 + 1.
 FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
@@ -39,6 +40,31 @@ class Params:
     plateau_contrast: float = 5.0
 
 
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Where the motion is cut at one end, as its sinusoid tells.
+
+    Parameters
+    ----------
+    end : {"far", "near"}
+    from_m : float
+        Distance from which on samples are left out, m.
+    samples : int
+        Left out.
+    first_s, last_s : float
+        Times of the first and the last of them, s.
+    fixed : bool
+        Whether what cuts is held to be fixed: the distances hardly move with the bob there.
+    """
+
+    end: Literal["far", "near"]
+    from_m: float
+    samples: int
+    first_s: float
+    last_s: float
+    fixed: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Conditioned:
     """A track with every sample judged.
@@ -57,6 +83,8 @@ class Conditioned:
         Step in which the distances come: the track's, or a coarser one that the distances themselves show.
     clipped_from_m : tuple of float
         For each plateau the distance from which on samples were flagged, m.
+    cuts : tuple of Cut
+        What the sinusoid tells in place of the plateaus, see :mod:`pipeline.oscillation.clipping`.
     """
 
     track: Track
@@ -65,6 +93,7 @@ class Conditioned:
     plateaus_m: tuple[float, ...]
     quantum_m: float | None
     clipped_from_m: tuple[float, ...] = ()
+    cuts: tuple[Cut, ...] = ()
 
     @property
     def used(self) -> NDArray[np.bool_]:
