@@ -8,6 +8,7 @@ reaches.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,21 +18,27 @@ from pipeline.oscillation.condition import Conditioned, Cut
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.windows import Windows, solve
-from pipeline.track import F8, UNUSABLE, Quality
+from pipeline.track import F8, Quality
 
 __all__ = ["find_cuts"]
 
-MIDDLE = 0.5  # of the amplitude: no cut is sought within, and the fit begins with what lies there
+INNER = 0.35  # of the amplitude: from here on samples are compared with the fit
+LOWEST = 0.42  # of the amplitude: what begins further in is the shape of the motion, and no cut
+MIDDLE = 0.5  # of the amplitude: the fit begins with what lies within
 CREST = 0.87  # of the amplitude: within 30 degrees of the turning point
-SUSPICIOUS = 8  # samples that fall short by far at one end before an end is looked at
+SUSPICIOUS = 8  # false echoes at one end from which on both ends are looked at
 NOISIER = 1.15  # ratio of the windows' noise to that of neighbours from which on both ends are looked at
 SIGNIFICANT = 4.0  # standard uncertainties by which a crest falls short
 LEAST_CRESTS = 3
 LEAST_SHARE = 0.75  # of the crests between the first and the last cut one; echoes come and go
-LEAST_SLOPE = 0.35  # by how much a cut falls short, over how far the motion goes beyond its level
-PLATEAU = 0.65  # the same, from which on an object is held to be fixed
+LEAST_SLOPE = 0.35  # by how much a crest is off, over how far the motion goes beyond the level
+LEAST_JUMP = 0.7  # how far off samples are in the lowest third beyond the level, over how far the crests are
+FIXED = 0.3  # motion of the distances over that of the bob beyond the level, up to which what cuts is held to be fixed
+LEAST_BEYOND = 6  # samples beyond the level in a crest, for their halves to be compared
 BINS, LEAST_BIN = 30, 12  # of equal number of samples, and how many at least
 SHARE_OFF = 0.08  # of a bin's samples beyond 3.5 standard deviations
+FAR_OFF = 5.0  # standard deviations beyond which a sample is a false echo
+SETTLING = 10  # fits until that through the middle of the swing is free of what the crests made of the first
 ROUNDS = 4
 
 Bools = NDArray[np.bool_]
@@ -56,7 +63,6 @@ class _End:
     sign: float
     level: float
     crests: Bools
-    slope: float
 
 
 def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated) -> Conditioned | None:
@@ -74,13 +80,15 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
     of echoes, by nearly all from a first to a last one it is a cut. Outward from the middle, samples of these crests
     are compared with the fit in bins of equal number; the cut begins beneath the last bin that is off in the mean or in
     more than a few samples, as smoothed ramps and plateaus that wander make it. Then the fit is repeated with all that
-    lies outside. A sample is left out where the model lies beyond, whatever the sample says: what is left is not biased.
+    lies outside. A sample is left out where the model lies beyond, whatever the sample says: that brings no bias.
     Where a law of scale or a harmonic bends the motion, the deviation reaches into the middle or stays small beside the
     way beyond the level, and nothing is left out.
     """
     if not _suspect(conditioned, demodulated):
         return None
-    flags = conditioned.flags & ~np.uint8(Quality.CLIPPED) | conditioned.track.flags
+    flags = conditioned.flags.copy()
+    seen = slice(int(cycles.bounds[0]), int(cycles.bounds[-1]))
+    flags[seen] = flags[seen] & ~np.uint8(Quality.CLIPPED) | conditioned.track.flags[seen]
     windows = Windows.cut(replace(conditioned, flags=flags), cycles.bounds)
     decay = np.interp(windows.centre, demodulated.t, demodulated.decay)
     basis = windows.basis(np.full(decay.size, demodulated.angular_frequency), decay)
@@ -93,18 +101,19 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
         if not ends or _same(before, ends, sigma):
             break
         within = usable & ~_beyond(fit, ends)
-        fit = _fitted(windows, basis, within & (np.abs(fit.residual) < 5.0 * fit.u), sigma)
+        fit = _fitted(windows, basis, within & (np.abs(fit.residual) < FAR_OFF * fit.u), sigma)
     if not ends:
         return None
-    beyond = _beyond(fit, ends) & windows.placed
-    rows = windows.rows[beyond & ((flags[windows.rows] & UNUSABLE) == 0)]
-    flags[rows] |= np.uint8(Quality.CLIPPED)
-    cuts = tuple(_described(end, fit, windows, conditioned, beyond) for end in ends)
-    return replace(conditioned, flags=flags, plateaus_m=(), clipped_from_m=(), cuts=cuts)
+    cuts = []
+    for end in ends:
+        beyond = _beyond(fit, [end]) & usable
+        cuts.append(_described(end, fit, windows, conditioned, beyond))
+        flags[windows.rows[beyond]] |= np.uint8(Quality.CLIPPED if cuts[-1].fixed else Quality.FALSE_ECHO)
+    return replace(conditioned, flags=flags, plateaus_m=(), clipped_from_m=(), cuts=tuple(cuts))
 
 
 def _suspect(conditioned: Conditioned, demodulated: Demodulated) -> bool:
-    """Whether the windows scatter more than neighbours do, or many samples at one end fall short of their fit."""
+    """Whether the windows scatter more than neighbours do, or many samples at one end are false echoes."""
     if conditioned.plateaus_m or demodulated.noise_m > NOISIER * conditioned.noise_m:
         return True
     rows = np.flatnonzero((demodulated.flags & ~conditioned.flags & np.uint8(Quality.FALSE_ECHO)) != 0)
@@ -115,7 +124,7 @@ def _suspect(conditioned: Conditioned, demodulated: Demodulated) -> bool:
     amplitude = np.interp(conditioned.track.t[rows], demodulated.t, demodulated.amplitude)
     crest = np.abs(depth) > MIDDLE * amplitude
     far = crest & (depth > 0.0)
-    return max(np.count_nonzero(far), np.count_nonzero(crest & ~far)) >= SUSPICIOUS
+    return bool(max(np.count_nonzero(far), np.count_nonzero(crest & ~far)) >= SUSPICIOUS)
 
 
 def _fitted(windows: Windows, basis: F8, chosen: Bools, sigma: float) -> _Fit:
@@ -129,57 +138,59 @@ def _fitted(windows: Windows, basis: F8, chosen: Bools, sigma: float) -> _Fit:
 
 def _middle(windows: Windows, basis: F8, usable: Bools, least: float) -> tuple[_Fit, float]:
     """Return the sinusoids through the middle of every swing, and the noise about them, ``least`` at least, m."""
-    fit, sigma, middle = _fitted(windows, basis, usable, least), np.inf, usable
-    for _ in range(10):
-        inside = np.abs(fit.model - fit.rest[:, None]) < MIDDLE * fit.amplitude[:, None]
-        middle = usable & inside & (np.abs(fit.residual) < 5.0 * sigma)
-        fit = _fitted(windows, basis, middle, least)
-        inside = usable & inside & fit.good[:, None]
-        if _ > 5 and inside.any():
+    far = float(np.ptp(windows.y))
+    fit, sigma = _fitted(windows, basis, usable, least), np.inf
+    for step in range(SETTLING):
+        inside = usable & (np.abs(fit.model - fit.rest[:, None]) < MIDDLE * fit.amplitude[:, None])
+        fit = _fitted(windows, basis, inside & (np.abs(fit.residual) < FAR_OFF * sigma), min(sigma, far))
+        inside &= fit.good[:, None]
+        # False echoes are let go of once the fit has come away from the crests.
+        if step > SETTLING // 2 and inside.any():
             sigma = max(least, mad_sigma(fit.residual[inside]))
-    return _fitted(windows, basis, middle, max(least, min(sigma, 1e300))), sigma
+    return fit, sigma
+
+
+def _shortfalls(fit: _Fit, crest: Bools, sign: float, sigma: float) -> tuple[F8, F8, Bools]:
+    """(w,): by how much each window's crest falls short of the fit, its standard uncertainty, m, and where known."""
+    count = crest.sum(axis=1)
+    known = count >= 3
+    short = np.zeros(known.size)
+    short[known] = _median_of_rows(-sign * fit.residual[known], crest[known])
+    u_model = np.sqrt(np.where(crest, np.maximum(fit.u**2 - sigma**2, 0.0), 0.0).max(axis=1))
+    # A median's variance is 1.6 times a mean's.
+    return short, np.sqrt(1.6 * sigma**2 / np.maximum(count, 1) + u_model**2), known
 
 
 def _cut(fit: _Fit, usable: Bools, sign: float, sigma: float) -> _End | None:
     """Return where the motion is cut at one end, if it is."""
-    height = sign * fit.model
-    top = sign * fit.rest + fit.amplitude
+    height, top = sign * fit.model, sign * fit.rest + fit.amplitude
     depth = height - sign * fit.rest[:, None]
     judged = usable & fit.good[:, None]
-    crest = judged & (depth > CREST * fit.amplitude[:, None])
-    count = crest.sum(axis=1)
-    known = count >= 3
-    if np.count_nonzero(known) < LEAST_CRESTS:
-        return None
-    short = np.full(fit.rest.size, 0.0)
-    short[known] = np.nanmedian(np.where(crest, -sign * fit.residual, np.nan)[known], axis=1)
-    u_model = np.sqrt(np.where(crest, np.maximum(fit.u**2 - sigma**2, 0.0), 0.0).max(axis=1))
-    u_short = np.sqrt(1.6 * sigma**2 / np.maximum(count, 1) + u_model**2)
+    short, u_short, known = _shortfalls(fit, judged & (depth > CREST * fit.amplitude[:, None]), sign, sigma)
     off = known & (np.abs(short) > SIGNIFICANT * u_short)
-    if np.count_nonzero(off) < LEAST_CRESTS:
-        return None
-    inward = 1.0 if np.median(short[off]) > 0.0 else -1.0
+    inward = 1.0 if np.sum(np.sign(short[off])) >= 0.0 else -1.0
     off &= inward * short > 0.0
     if np.count_nonzero(off) < LEAST_CRESTS:
         return None
-    outer = judged & (depth > MIDDLE * fit.amplitude[:, None]) & off[:, None]
+    outer = off[:, None] & judged & (depth > INNER * fit.amplitude[:, None])
     level = _onset(height[outer], -inward * sign * fit.residual[outer], fit.u[outer])
-    if level is None:
+    if level is None or np.median((level - sign * fit.rest[off]) / fit.amplitude[off]) < LOWEST:
         return None
     # A crest that reaches well beyond the level and is not off is free of what cuts the others.
     reach = 0.9 * (top - level)
     free = known & ~off & (LEAST_SLOPE * reach > 1.5 * SIGNIFICANT * u_short)
-    first, last = np.flatnonzero(off)[[0, -1]]
-    span = slice(int(first), int(last) + 1)
-    held = np.count_nonzero(off[span])
-    if held < LEAST_SHARE * (held + np.count_nonzero(free[span])):
+    first, last = np.flatnonzero(off)[[0, -1]].tolist()
+    held, others = (np.count_nonzero(these[first : last + 1]) for these in (off, free))
+    if held < LEAST_SHARE * (held + others):
         return None
-    slope = float(np.sum(np.abs(short[off])) / max(np.sum(reach[off]), 1e-300))
-    if slope < LEAST_SLOPE:
+    # What sets in gradually and leads outward is the shape of the motion.
+    size = float(np.median(np.abs(short[off])))
+    lowest = off[:, None] & judged & (height > level) & (height < level + (top - level)[:, None] / 3.0)
+    sudden = np.any(lowest) and abs(float(np.median(fit.residual[lowest]))) >= LEAST_JUMP * size
+    if not sudden and (inward < 0.0 or size < LEAST_SLOPE * float(np.median(reach[off]))):
         return None
     told = np.flatnonzero(off | free)
-    nearest = told[np.abs(np.arange(off.size)[:, None] - told).argmin(axis=1)]
-    return _End(sign, level, off[nearest], slope * inward)
+    return _End(sign, level, np.interp(np.arange(off.size), told, off[told].astype(np.float64)) >= 0.5)
 
 
 def _onset(height: F8, short: F8, u: F8) -> float | None:
@@ -218,13 +229,23 @@ def _same(before: list[_End], ends: list[_End], sigma: float) -> bool:
 
 
 def _described(end: _End, fit: _Fit, windows: Windows, conditioned: Conditioned, beyond: Bools) -> Cut:
-    rows = windows.rows[beyond & end.crests[:, None] & (end.sign * (fit.model - fit.rest[:, None]) > 0.0)]
-    t = conditioned.track.t[rows]
-    return Cut(
-        "far" if end.sign > 0.0 else "near",
-        end.sign * end.level + windows.level,
-        rows.size,
-        float(t.min()),
-        float(t.max()),
-        end.slope >= PLATEAU,
-    )
+    t = conditioned.track.t[windows.rows[beyond]]
+    place: Literal["far", "near"] = "far" if end.sign > 0.0 else "near"
+    level = float(end.sign * end.level + windows.level)
+    return Cut(place, level, int(t.size), float(t.min()), float(t.max()), _stands_still(end, fit, beyond))
+
+
+def _stands_still(end: _End, fit: _Fit, beyond: Bools) -> bool:
+    """Whether the distances hardly move from the lower half of what lies beyond the level in a crest to the upper."""
+    told = beyond.sum(axis=1) >= LEAST_BEYOND
+    height, y = end.sign * fit.model[told], end.sign * (fit.model + fit.residual)[told]
+    height[~beyond[told]] = np.nan
+    upper = height > np.nanmedian(height, axis=1)[:, None]
+    lower = ~upper & np.isfinite(height)
+    way, path = (_median_of_rows(x, upper) - _median_of_rows(x, lower) for x in (y, height))
+    return abs(float(way.sum())) <= FIXED * float(path.sum())
+
+
+def _median_of_rows(values: F8, chosen: Bools) -> F8:
+    """(w,): the median of the values chosen in each row, one at least."""
+    return np.asarray(np.nanmedian(np.where(chosen, values, np.nan), axis=1))

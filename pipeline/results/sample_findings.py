@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.oscillation.condition import Conditioned
+from pipeline.oscillation.condition import Conditioned, Cut
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.findings import Finding
 from pipeline.track import F8, U8, UNUSABLE, Quality
@@ -80,7 +80,8 @@ def judge_samples(
     """
     track, plateaus_m, quantum_m = conditioned.track, conditioned.plateaus_m, conditioned.quantum_m
     counts, n = count_quality(flags), len(track)
-    if counts["clipped"]:
+    yield from (_on_cut(cut, n) for cut in conditioned.cuts)
+    if counts["clipped"] and not any(cut.fixed for cut in conditioned.cuts):
         levels = " and ".join(f"{level * 1e3:.1f} mm" for level in plateaus_m) or "a level flagged in the record"
         yield Finding(
             "clipped",
@@ -154,6 +155,20 @@ def find_clusters(demodulated: Demodulated, phase: Callable[[NDArray[np.int64]],
     residual[~np.isfinite(residual)] = 0.0
     shift = 2.0 * float(residual @ np.cos(angle)) / fitted
     return Clusters(int(np.count_nonzero(clusters)), int(sizes[clusters].sum()), int(np.count_nonzero(turning)), shift)
+
+
+def _on_cut(cut: Cut, n: int) -> Finding:
+    """What is said of an end at which the motion is cut."""
+    where = (
+        f"{cut.samples} of {n} samples ({cut.samples / n:.0%}), between {cut.first_s:.2f} and {cut.last_s:.2f} s "
+        f"at the {cut.end} end from {cut.from_m * 1e3:.1f} mm on,"
+    )
+    out = "they were left out by where the fitted motion goes, and the amplitude comes from the rest of each cycle"
+    if cut.fixed:
+        why = "stay behind the motion that the rest of each cycle shows: a fixed object or a lost target cuts it there"
+        return Finding("clipped", "warning", f"{where} {why}; {out}")
+    why = "move with the bob, but not as it does in the rest of each cycle: an echo by way of something beside it"
+    return Finding("locked_echoes", "warning", f"{where} {why}; {out}")
 
 
 def _words_on(clusters: Clusters | None) -> str:
