@@ -109,12 +109,13 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
         beyond = _beyond(fit, [end]) & usable
         cuts.append(_described(end, fit, windows, conditioned, beyond))
         flags[windows.rows[beyond]] |= np.uint8(Quality.CLIPPED if cuts[-1].fixed else Quality.FALSE_ECHO)
-    return replace(conditioned, flags=flags, plateaus_m=(), clipped_from_m=(), cuts=tuple(cuts))
+    plateaus = tuple(cut.level_m for cut in cuts if cut.fixed)
+    return replace(conditioned, flags=flags, plateaus_m=plateaus, clipped_from_m=(), cuts=tuple(cuts))
 
 
 def _suspect(conditioned: Conditioned, demodulated: Demodulated) -> bool:
     """Whether the windows scatter more than neighbours do, or many samples at one end are false echoes."""
-    if conditioned.plateaus_m or demodulated.noise_m > NOISIER * conditioned.noise_m:
+    if demodulated.noise_m > NOISIER * conditioned.noise_m:
         return True
     rows = np.flatnonzero((demodulated.flags & ~conditioned.flags & np.uint8(Quality.FALSE_ECHO)) != 0)
     if rows.size < SUSPICIOUS:
@@ -231,8 +232,10 @@ def _same(before: list[_End], ends: list[_End], sigma: float) -> bool:
 def _described(end: _End, fit: _Fit, windows: Windows, conditioned: Conditioned, beyond: Bools) -> Cut:
     t = conditioned.track.t[windows.rows[beyond]]
     place: Literal["far", "near"] = "far" if end.sign > 0.0 else "near"
-    level = float(end.sign * end.level + windows.level)
-    return Cut(place, level, int(t.size), float(t.min()), float(t.max()), _stands_still(end, fit, beyond))
+    start = float(end.sign * end.level + windows.level)
+    height, y = end.sign * fit.model[beyond], (fit.model + fit.residual)[beyond]
+    level = float(np.median(y[height >= np.median(height)])) + windows.level
+    return Cut(place, start, level, int(t.size), float(t.min()), float(t.max()), _stands_still(end, fit, beyond))
 
 
 def _stands_still(end: _End, fit: _Fit, beyond: Bools) -> bool:

@@ -49,6 +49,8 @@ class Cut:
     end : {"far", "near"}
     from_m : float
         Distance from which on samples are left out, m.
+    level_m : float
+        Median of the outer half of the distances left out, m.
     samples : int
         Left out.
     first_s, last_s : float
@@ -59,6 +61,7 @@ class Cut:
 
     end: Literal["far", "near"]
     from_m: float
+    level_m: float
     samples: int
     first_s: float
     last_s: float

@@ -165,8 +165,9 @@ def _on_cut(cut: Cut, n: int) -> Finding:
     )
     out = "they were left out by where the fitted motion goes, and the amplitude comes from the rest of each cycle"
     if cut.fixed:
-        why = "stay behind the motion that the rest of each cycle shows: a fixed object or a lost target cuts it there"
-        return Finding("clipped", "warning", f"{where} {why}; {out}")
+        why = "behind the motion that the rest of each cycle shows: a fixed object or a lost target cuts it there"
+        level = f"lie on a plateau at {cut.level_m * 1e3:.1f} mm,"
+        return Finding("clipped", "warning", f"{where} {level} {why}; {out}")
     why = "move with the bob, but not as it does in the rest of each cycle: an echo by way of something beside it"
     return Finding("locked_echoes", "warning", f"{where} {why}; {out}")
 
