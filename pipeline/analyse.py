@@ -214,8 +214,6 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         found = _oscillation(windows, by_equation(windows, solved), solved, scene, params)
     else:
         found = _oscillation(windows, by_windows(windows, params.phase, params.full), solved, scene, params)
-    if isinstance(windows, Windows):
-        conditioned = windows.conditioned
     return Analysis(conditioned.track, scene, params, conditioned, *found)
 
 
