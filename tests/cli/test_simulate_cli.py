@@ -147,7 +147,8 @@ def test_the_prediction_is_that_of_the_method_and_step_asked_for(cli: Callable, 
             every = round(0.01 / step)
             off = get_integrator(method).run(problem, step, 1000 * every, every=every).y - truth
             assert found[method, step] == pytest.approx(np.sqrt(np.mean(off**2)), rel=0.05)
-    assert max(found["exact", 0.01], found["auto", 0.01]) < 1e-8
+    # The start is read off windows of the record, none of whose samples is left out: two millionths of the amplitude.
+    assert max(found["exact", 0.01], found["auto", 0.01]) < 2e-6 * 0.05
     assert found["forward-euler", 0.001] > 1.9 * found["forward-euler", 0.0005] > 1e-3
 
 
