@@ -35,6 +35,7 @@ _TABLE = {
     "vernier": "vernier",
     "logger-pro": "logger_pro",
     "phyphox": "phyphox",
+    "cassy": "cassy",
     "tracker": "tracker",
     "csv": "csv_units",
     "bare": "bare",

@@ -207,6 +207,27 @@ def clock(t: Any, x: Any) -> bytes:
     return "\n".join(["Chart recorder", "Time;Position (m)", *body]).encode()
 
 
+def labx(t: Any, x: Any) -> bytes:
+    """Write CASSY Lab's XML."""
+    told = (("Index", "n", "", range(len(t))), ("Zeit", "t", "s", t), ("Weg", "s_A1", "m", x))
+    channels = "".join(
+        f"<channels><channel><quantity>{name}</quantity><symbol>{symbol}</symbol><unit>{unit}</unit><values>"
+        + "".join(f"<value>{each:.9g}</value>".replace("nan", "NaN") for each in values)
+        + "</values></channel></channels>"
+        for name, symbol, unit, values in told
+    )
+    return f'<?xml version="1.0" encoding="utf-8"?><cassylab><allchannels>{channels}</allchannels></cassylab>'.encode()
+
+
+def lab(t: Any, x: Any) -> bytes:
+    """Write CASSY Lab's text: each channel in three lines and one of settings, rows behind their number."""
+    settings = "0 60 10 0 1 0 0 1 0 0 0 0 0 0 1 1"
+    told = (("Index", "n", ""), ("Zeit", "t", "s"), ("Frequenz", "f", "Hz"), ("Weg", "s_A1", "m"))
+    head = [line for each in told for line in (*each, settings)]
+    body = (f"{i}\t{row}" for i, row in enumerate(rows(t, x, "{t:.3f}\t{x:.5f}"), 1))
+    return "\r\n".join(["CL4", "265 0.1", *head, "4 0 0 3", f"3 {len(t)}", *body]).encode()
+
+
 def height_log(t: Any, x: Any) -> bytes:
     """Write the invented log of the template."""
     body = (f"{i};{row}" for i, row in enumerate(rows(t, x * 1000, "{x:.2f}")))
@@ -236,6 +257,8 @@ CASES = [
     Case("tracker", "masa", tracker, options={"channel": "y", "unit": "m"}),
     Case("csv", "semicolon-comma", columns_with_units),
     Case("example", "template", height_log, times=False),
+    Case("cassy", "labx", labx, None, text=False),
+    Case("cassy", "lab", lab),
     Case("table", "names-alone", names_alone, options={"unit": "m"}),
     Case("table", "oscilloscope", oscilloscope),
     Case("table", "preamble", preamble),

@@ -149,6 +149,12 @@ TABLE = [
     Row("tunit", "table", "θ", 3027, 30, (0, 100.8667), (-18.56635 * DEG, -0.8148416 * DEG), "angle"),
     Row("vernier", "csv", "versnelling", 600, 99.83, (0, 6), (0, 0), "acceleration"),
     Row("waveforms", "table", "Channel 1", 2000, 100, (0, 19.99), (2.622803, 1.641071), "voltage"),
+    Row("lab__", "cassy", "s s", 600, 10, (0, 59.901), (0, 0)),
+    Row(
+        *("lab__", "cassy", "Spannung U_A1", 600, 10, (0, 59.901), (0.807, 0.8115)),
+        *("voltage", (), say("Spannung U_A1")),
+    ),
+    Row("labx", "cassy", "Weg s_A1", 1335, 5, (0, 266.81870875), (0.232, -0.004)),
     Row("xy_", "table", "y", 3501, 10, (0, 350), (0, -8.98898e-05), "length", (UNIT,), say(unit="m")),
 ]
 

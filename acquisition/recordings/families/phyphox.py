@@ -24,6 +24,7 @@ from acquisition.recordings.tables.contents import (
     name_and_unit,
     split_heading,
 )
+from acquisition.recordings.tables.markup import read_markup
 from acquisition.recordings.tables.sheet import ColumnFormat, headed_format
 from acquisition.recordings.tables.text import decode, head_lines, parse_number, text_of
 
@@ -67,14 +68,7 @@ def _contents(path: str, data: bytes) -> Contents:
 
 
 def _of_xml(path: str, data: bytes) -> Contents:
-    from xml.etree import ElementTree
-
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise FormatError(path, "expected plain XML, got a document type", "save the experiment in phyphox again")
-    try:
-        root = ElementTree.fromstring(data)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise FormatError(path, f"expected XML, got {error}", "save the experiment in phyphox again") from error
+    root = read_markup(path, data, "save the experiment in phyphox again")
     buffers = dict(_buffers(root))
     channels = tuple(_channels(root, buffers))
     if not channels:

@@ -286,6 +286,8 @@ class _Rows:
             return None
         # Where exponents are the exception, a number with one is as good as any.
         differs: B1 = (form >= 0) & (form != usual) & (exponent | (form < EXPONENT))
+        # What begins at 0 says so without decimals where zeros at the end are not printed.
+        differs[:1] &= (form[:1] != 0) | (self.values[k][:1] != 0)
         return differs if differs.any() else None
 
     def _is_cut_last(self, k: int, form: I1, usual: int) -> bool:

@@ -1,0 +1,112 @@
+"""CASSY Lab: ``.labx`` (XML with the numbers in clear) and the older ``.lab`` (text that begins with ``CL4`` or alike).
+
+In the XML every ``channel`` has its ``quantity``, ``symbol``, ``unit`` and ``values``; an empty value is none. In the
+text three lines (quantity, symbol, unit) describe each channel, each followed by a line of settings; a line with the
+numbers of columns and rows comes before the rows, which are separated by tabs.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from acquisition.block import F8
+from acquisition.errors import FormatError
+from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Sheet, is_time, numbered_apart
+from acquisition.recordings.tables.markup import read_markup
+from acquisition.recordings.tables.sheet import ColumnFormat
+from acquisition.recordings.tables.text import Text, decode, head_lines, parse_number, text_of
+from acquisition.recordings.units import time_power
+
+__all__ = ["FORMAT"]
+
+_ROOT = re.compile(r"\s*(?:<\?xml[^>]*>\s*)?<cassylab[\s>]")
+_MAGIC = re.compile(r"CL\d")
+_MOST_HEAD_LINES = 1000
+_REMEDY = "save it again, or export it as text in CASSY Lab"
+
+
+def _evidence(head: bytes) -> str:
+    lines = head_lines(head)
+    if _ROOT.match("\n".join(lines)):
+        return "it is XML with the root <cassylab>"
+    if _MAGIC.fullmatch(lines[0].strip()) and len(lines) > 3:
+        return f'line 1 is "{lines[0].strip()}"'
+    return ""
+
+
+def _contents(path: str, data: bytes) -> Contents:
+    text = text_of(path, data)
+    if _ROOT.match(decode(text.data[text.start : text.start + 8192])):
+        return _of_markup(path, text.data[text.start : text.stop])
+    return _of_text(path, text)
+
+
+def _of_markup(path: str, data: bytes) -> Contents:
+    columns: list[tuple[str, str, str, F8]] = []
+    for each in read_markup(path, data, _REMEDY).iter("channel"):
+        cells = [parse_number((value.text or "").strip()) for value in each.iter("value")]
+        if cells:
+            name, symbol, unit = ((each.findtext(tag) or "").strip() for tag in ("quantity", "symbol", "unit"))
+            columns.append((name, symbol, unit, np.array([np.nan if x is None else x for x in cells])))
+    times = [values / 10.0 ** -(time_power(unit) or 0) for name, _, unit, values in columns if is_time(name)]
+    time = times[0] if times else None
+    names = numbered_apart([f"{name} {symbol}".strip() for name, symbol, _, _ in columns])
+    channels = []
+    for label, (name, _, unit, values) in zip(names, columns, strict=True):
+        if is_time(name):
+            continue
+        size = max(values.size, 0 if time is None else time.size)
+        own = None if time is None else _longer(time, size)
+        channels.append(Channel(label, unit, Arrays(own, _longer(values, size)), time_unit="s", aside=name == "Index"))
+    if not channels:
+        raise FormatError(path, "expected channels with values, got none", _REMEDY)
+    return Contents(tuple(channels))
+
+
+def _longer(values: F8, size: int) -> F8:
+    return np.concatenate((values, np.full(size - values.size, np.nan)))
+
+
+def _of_text(path: str, text: Text) -> Contents:
+    lines = text.head(_MOST_HEAD_LINES)
+    for at, line in enumerate(lines[:-1]):
+        size = re.fullmatch(r"(\d+) (\d+)", line.text.strip())
+        row = lines[at + 1].text.rstrip("\t").split("\t")
+        if size and len(row) == int(size[1]) > 1 and all(parse_number(cell) is not None for cell in row if cell):
+            return _of_rows(path, text, [each.text for each in lines[:at]], at + 1, int(size[1]))
+    raise FormatError(path, "expected the numbers of columns and rows, and the rows below", _REMEDY)
+
+
+def _of_rows(path: str, text: Text, above: Sequence[str], first: int, width: int) -> Contents:
+    # A channel is three lines of words and one of sixteen settings.
+    told = [
+        tuple(above[at - back].strip() for back in (3, 2, 1))
+        for at, line in enumerate(above)
+        if at >= 3 and len(cells := line.split()) == 16 and all(parse_number(cell) is not None for cell in cells)
+    ]
+    if len(told) == width + 1 and told[2][2] == "Hz":
+        del told[2]  # the axis of the spectrum is described behind index and time, and has no column
+    if len(told) != width:
+        raise FormatError(path, f"expected {width} channels above the rows, got {len(told)}", _REMEDY)
+    lines = text.head(first + 1)
+    # Settings follow the rows, without a tab among them; where nothing ends their first line, it is a row cut short.
+    tab = text.data.rfind(b"\t", lines[first].start, text.stop)
+    end = next((line.next for line in text.lines(tab)), text.stop)
+    stop = end if b"\n" in text.data[end : text.stop] else text.stop
+    sheet = Sheet(text, lines[first].start, stop, first + 1, "\t")
+    times = [column for column, (name, _, _) in enumerate(told) if is_time(name)]
+    names = numbered_apart([f"{name} {symbol}".strip() for name, symbol, _ in told])
+    time = times[0] if times else None
+    time_unit = told[time][2] if time is not None else ""
+    channels = [
+        Channel(names[column], unit, sheet, "", column, time, time_unit, ragged=True, aside=name == "Index")
+        for column, (name, _, unit) in enumerate(told)
+        if column not in times
+    ]
+    return Contents(tuple(channels), zeros=text.zeros, names=tuple(names))
+
+
+FORMAT = ColumnFormat("cassy", "CASSY Lab: saved as labx (XML) or lab (text)", _evidence, _contents)
