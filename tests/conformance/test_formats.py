@@ -524,6 +524,7 @@ def test_measured_times_stand_and_are_told_from_nominal_ones(case: Case) -> None
         "csv",
         "bare",
         "table",
+        "cassy",
         "capstone",
         "datastudio",
     ):

@@ -81,7 +81,8 @@ def find_table(lines: Sequence[Line]) -> Found | None:
     """
     best: tuple[tuple[int, int, int], Found] | None = None
     for order, mark in enumerate(_MARKS):
-        brackets = mark == "" and any(_BRACKETS.search(each.text) for each in lines)
+        ends = [each.text.rstrip().endswith(";") for each in lines]
+        brackets = mark == "" and sum(ends) > len(ends) / 2  # as each row of a matrix does
         start, rows = _rows(lines, mark, brackets)
         if rows:
             found = _with_names(lines, start, mark, brackets, rows)
