@@ -35,7 +35,7 @@ from pipeline.results.effects import Effect, tabulate
 from pipeline.results.findings import Finding, by_severity, judge, judge_fits, judge_overdamped, judge_scene
 from pipeline.results.plausibility import judge_plausibility
 from pipeline.results.sample_findings import STEPS, count_quality, find_clusters, judge_samples
-from pipeline.results.segment_findings import judge_segments
+from pipeline.results.segment_findings import judge_rows, judge_segments
 from pipeline.results.self_check import Checked, check_residuals, holding, judge_held
 from pipeline.track import U8, Track
 
@@ -236,7 +236,7 @@ def _may_be_overdamped(
 ) -> bool:
     """Whether no oscillation is seen, or one whose damping is strong and, as far as its equation was solved, linear."""
     if isinstance(windows, NoOscillation):
-        return True
+        return windows.code == "no_oscillation"
     linear = not isinstance(solved, EquationFit) or solved.damping.selected == "linear"
     return linear and windows.damping_ratio > params.relaxation.least_damping
 
@@ -271,6 +271,7 @@ def _oscillation(
     clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]))
     findings = by_severity(
         judge_segments(windows.segments),
+        judge_rows(windows.conditioned, waveform.rms_m),
         judge(cycles, demodulated, damping, phase, rest, waveform, disturbances),
         checked.findings,
         judge_plausibility(windows.conditioned, demodulated, phase),
@@ -290,7 +291,7 @@ def _overdamped(conditioned: Conditioned, scene: Scene, found: Overdamped) -> Fo
 
 def _still(conditioned: Conditioned, why: NoOscillation) -> Found:
     """A record without any motion to fit."""
-    findings = _findings(conditioned, Finding("no_oscillation", "error", why.why))
+    findings = _findings(conditioned, Finding(why.code, "error", why.why))
     if (held := holding(conditioned)) > 1:
         findings = by_severity(findings, (judge_held(held, 1.0 / conditioned.track.rate_hz),))
     return Still(why.why), (), findings, _at_rest(conditioned)

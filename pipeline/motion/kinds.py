@@ -24,6 +24,7 @@ from pipeline.oscillation.demodulate import Demodulated, demodulate
 from pipeline.oscillation.demodulate import Params as DemodulateParams
 from pipeline.oscillation.disturbances import Disturbances, separate
 from pipeline.oscillation.disturbances import Params as DisturbancesParams
+from pipeline.oscillation.rows import are_interleaved
 from pipeline.oscillation.segments import Params as SegmentsParams
 from pipeline.oscillation.segments import Segments, Span, find_segments
 
@@ -104,6 +105,11 @@ def see_windows(
     conditioning, cycles, demodulation, segmentation, separation, damping
         Options of the stages.
     """
+    if are_interleaved(conditioned.track):
+        return NoOscillation(
+            "the rows are of two records in turn: no estimate is made of both together; separate every other row",
+            "interleaved_records",
+        )
     segments = None
     if (rest := _at_rest(conditioned)) is not None:
         conditioned, segments = condition(rest.flagged(conditioned.track), conditioning), rest

@@ -70,9 +70,12 @@ class NoOscillation:
     ----------
     why : str
         One sentence.
+    code : str
+        Of the finding that says so.
     """
 
     why: str
+    code: str = "no_oscillation"
 
 
 def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycles | NoOscillation:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pipeline.oscillation.condition import Conditioned
+from pipeline.oscillation.rows import count_lost
 from pipeline.oscillation.segments import Break, Segments, Span
 from pipeline.results.findings import Finding
 
-__all__ = ["judge_segments"]
+__all__ = ["judge_rows", "judge_segments"]
+
+LEFT = 3.0  # times the neighbours' noise that a fit must leave for lost rows to be looked for
 
 SHOWN = 5  # spans that are told by their times
 
@@ -48,6 +52,24 @@ def judge_segments(segments: Segments | None) -> Iterator[Finding]:
     still = [span for span in segments.left_out if span.kind == "at_rest"]
     if still:
         yield Finding("at_rest", "info", f"nothing but noise moves in {_spans(still)}: left out")
+
+
+def judge_rows(conditioned: Conditioned, rms_m: float) -> Iterator[Finding]:
+    """Yield whether rows were lost all over the record while their times were counted on.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    rms_m : float
+        What the fit of the motion leaves, m.
+    """
+    if rms_m > LEFT * conditioned.noise_m and (lost := count_lost(conditioned)):
+        yield Finding(
+            "rows_lost",
+            "error",
+            f"about {lost} rows are missing where times go on as if there were none: the distance makes two steps at "
+            "once there; period, frequency, spring constant and damping rate are wrong by as much as the times",
+        )
 
 
 def _words_on(one: Break) -> str:

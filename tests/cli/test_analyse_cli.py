@@ -32,6 +32,8 @@ CODES = {
     "restarted",
     "touched",
     "phase_jump",
+    "rows_lost",
+    "interleaved_records",
     "nominal_clock",
     "rate_assumed",
     "unit_assumed",

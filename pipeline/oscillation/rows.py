@@ -1,0 +1,58 @@
+"""Rows: records whose rows are not one after another in time, told from the distances alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.oscillation.condition import Conditioned
+from pipeline.track import F8, Track
+
+__all__ = ["are_interleaved", "count_lost"]
+
+SIGMAS = 8.0  # of the noise that a step between rows must have to be told from two steps
+ALIKE = 0.7  # correlation of what alternates, from row to row
+LEAST = 64  # rows
+LEAST_SHARE = 0.015  # of the rows
+
+
+def are_interleaved(track: Track) -> bool:
+    """Return whether the rows are of two records in turn.
+
+    Notes
+    -----
+    What every row is off the mean of its neighbours, with the sign changed from row to row, is correlated over three
+    and five rows where two records alternate; of one record's white noise it is not.
+    """
+    y = track.y[np.isfinite(track.y)]
+    if y.size < LEAST:
+        return False
+    off = y[1:-1] - 0.5 * (y[:-2] + y[2:])
+    off[::2] *= -1.0
+    power = float(off @ off) / off.size
+    return power > 0.0 and all(float(off[lag:] @ off[:-lag]) > ALIKE * power * (off.size - lag) for lag in (3, 5))
+
+
+def count_lost(conditioned: Conditioned) -> int:
+    """Return how many rows were lost while times were counted on; 0 where that cannot be told from noise.
+
+    Notes
+    -----
+    Where a row is missing the distance makes two steps at once: twice the median of the two before and the two after.
+    Where times jitter, or values are held, as many steps are too short.
+    """
+    track, used = conditioned.track, conditioned.used
+    step: F8 = np.diff(track.y)
+    sound = used[1:] & used[:-1] & (np.abs(np.diff(track.t) * track.rate_hz - 1.0) < 0.2)
+    if step.size < LEAST:
+        return 0
+    around = np.median([step[:-4], step[1:-3], step[3:-1], step[4:]], axis=0)
+    whole = np.logical_and.reduce([sound[k : sound.size - 4 + k] for k in range(5)])
+    clear = whole & (np.abs(around) > SIGMAS * conditioned.noise_m)
+    ratio = step[2:-2][clear] / around[clear]
+    lost, short = np.count_nonzero((ratio > 1.6) & (ratio < 3.4)), np.count_nonzero(ratio < 0.4)
+    # Only in the fast part of a period are two steps told from one.
+    return (
+        round(lost * whole.sum() / max(ratio.size, 1))
+        if lost >= max(5, LEAST_SHARE * ratio.size) and lost > 5 * short
+        else 0
+    )
