@@ -21,7 +21,7 @@ def are_interleaved(track: Track) -> bool:
     Notes
     -----
     What every row is off the mean of its neighbours, with the sign changed from row to row, is correlated over three
-    and five rows where two records alternate; of one record's white noise it is not.
+    to nine rows where two records alternate; of one record's white noise it is not.
     """
     y = track.y[np.isfinite(track.y)]
     if y.size < LEAST:
@@ -29,7 +29,7 @@ def are_interleaved(track: Track) -> bool:
     off = y[1:-1] - 0.5 * (y[:-2] + y[2:])
     off[::2] *= -1.0
     power = float(off @ off) / off.size
-    return power > 0.0 and all(float(off[lag:] @ off[:-lag]) > ALIKE * power * (off.size - lag) for lag in (3, 5))
+    return power > 0.0 and all(float(off[lag:] @ off[:-lag]) > ALIKE * power * (off.size - lag) for lag in (3, 5, 7, 9))
 
 
 def count_lost(conditioned: Conditioned) -> int:
