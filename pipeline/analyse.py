@@ -30,6 +30,7 @@ from pipeline.oscillation import segments as segmentation
 from pipeline.oscillation.condition import Conditioned, coarsest_step, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
 from pipeline.results import derive as derivation
+from pipeline.results.clock_findings import judge_clock
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
 from pipeline.results.findings import Finding, by_severity, judge, judge_fits, judge_overdamped, judge_scene
@@ -278,6 +279,7 @@ def _oscillation(
         judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters),
         judge_scene(scene, effects),
         judge_fits(fitted.full, solved),
+        judge_clock(track, instrument),
     )
     motion = Oscillation(demodulated, disturbances, damping, phase, rest, waveform, fitted.full, cycles, derived)
     return motion, effects, findings, derived.estimates
@@ -315,4 +317,6 @@ def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:
 
 
 def _findings(conditioned: Conditioned, first: Finding) -> tuple[Finding, ...]:
-    return by_severity((first,), judge_samples(conditioned, conditioned.flags, conditioned.noise_m))
+    track = conditioned.track
+    samples = judge_samples(conditioned, conditioned.flags, conditioned.noise_m)
+    return by_severity((first,), samples, judge_clock(track, Instrument.of(track)))

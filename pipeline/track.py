@@ -69,6 +69,14 @@ class Track:
     rate_error, u_rate_error : float or None
         By what share the sensor's clock runs faster than the host's, and the standard uncertainty; None where nobody
         compared the two.
+    clock_limit : float or None
+        By what share the sensor's clock may be off at most; None where nobody says.
+    held_samples : int
+        Samples that came later than any jitter explains, in bursts behind a silence: the comparison leaves them out.
+    longest_stall_s : float
+        By which the latest of them came late, s.
+    compared_s : float or None
+        Over how long the clocks were compared, s; None: from the first sample to the last.
     speed_of_sound_m_per_s : float or None
         That made distances of echo times, m/s; None where it is not known.
     u_scale : float
@@ -96,6 +104,10 @@ class Track:
     velocity: F8 | None = None
     rate_error: float | None = None
     u_rate_error: float | None = None
+    clock_limit: float | None = None
+    held_samples: int = 0
+    longest_stall_s: float = 0.0
+    compared_s: float | None = None
     speed_of_sound_m_per_s: float | None = None
     u_scale: float = 0.0
     u_offset_m: float = 0.0

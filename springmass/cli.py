@@ -173,10 +173,20 @@ def _add_analyse(parser: argparse.ArgumentParser) -> None:
     _add_input_options(parser)
     parser.add_argument("--from", dest="from_s", type=_finite, metavar="S", help="use samples from this second on")
     parser.add_argument("--to", dest="to_s", type=_finite, metavar="S", help="use samples up to this second")
+    _add_clock(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for NAME.results (default: here; with --json: none)")
     parser.add_argument("--no-report", action="store_true", help="print, but write no files")
     parser.add_argument("--json", action="store_true", help="one JSON object per input on stdout")
     parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
+
+
+def _add_clock(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--clock-ppm",
+        type=_positive,
+        metavar="PPM",
+        help="what the sensor's clock may be off at most (default: as its family says)",
+    )
 
 
 def _add_accuracy(parser: argparse.ArgumentParser) -> None:
@@ -303,6 +313,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
         help="a still distance by the ruler, m; again for another, then they set the scale too; needs --still",
     )
     parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="applied to echo times, m/s")
+    _add_clock(parser)
     parser.add_argument("--trigger", type=_positive, metavar="M", help="start when the bob leaves its rest by this, m")
     parser.add_argument("--pre", type=_positive, metavar="S", help="seconds to keep from before (default 2)")
     parser.add_argument("--roll-mb", type=_positive, metavar="MB", help="begin another log after this (default 1000)")

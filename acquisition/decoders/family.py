@@ -9,7 +9,10 @@ from typing import Any, Protocol
 from acquisition.errors import SensorError
 from acquisition.readings import Readings
 
-__all__ = ["Decoder", "Encoder", "Family", "Poll", "Polled"]
+__all__ = ["RESONATOR_PPM", "Decoder", "Encoder", "Family", "Poll", "Polled"]
+
+RESONATOR_PPM = 10_000.0
+"""What a ceramic resonator may be off, ppm: 5000 when new, 3000 with temperature, 3000 with age (Murata P16E)."""
 
 
 class Decoder(Protocol):
@@ -109,6 +112,9 @@ class Family:
         Options of the decoder by name, with one line each (column, unit, ...).
     has_device_time : bool
         Whether readings carry the device's clock or counter.
+    clock_ppm : float
+        What the device's clock may be off at most, with temperature and age, ppm: 200 with a crystal, 10 000 with a
+        ceramic resonator, as most boards have one. A comparison with the host that says more is not believed.
     self_framing : bool
         Whether a mark or checksum tells a frame from noise; without one, bytes alone never show the family.
     source : str
@@ -127,6 +133,7 @@ class Family:
     poll: Poll | None = None
     options: Mapping[str, str] = field(default_factory=dict)
     has_device_time: bool = False
+    clock_ppm: float = RESONATOR_PPM
     self_framing: bool = True
     source: str = ""
 

@@ -14,7 +14,8 @@ from acquisition.block import F8, I8, Block, Flag
 from acquisition.decoders.family import Family
 from acquisition.decoders.framed import FramedDecoder
 from acquisition.live.calibration import Calibration
-from acquisition.live.timebase import Timebase, fit_clock
+from acquisition.live.clock_fit import COUNTER_PPM, fit_clock
+from acquisition.live.timebase import Timebase
 from acquisition.readings import NO_READINGS, Reading, Readings
 from acquisition.source import SourceInfo
 
@@ -35,6 +36,8 @@ class SensorChain:
     rate_hz : float, optional
         Readings per second that this sensor is set to; left out, the family's.
     calibration : Calibration, optional
+    clock_ppm : float, optional
+        What its clock may be off at most, ppm; left out, the family's, or a counter's 100 000.
     """
 
     def __init__(
@@ -44,12 +47,14 @@ class SensorChain:
         options: Mapping[str, Any] | None = None,
         rate_hz: float | None = None,
         calibration: Calibration | None = None,
+        clock_ppm: float | None = None,
     ) -> None:
         family.demand_options(options or {})
         self.family = family
         self.calibration = calibration or Calibration()
         self.decoder = family.decoder(**(options or {}))
         self.timebase = Timebase(rate_hz or family.rate_hz)
+        self._clock_ppm = clock_ppm
         self.last: Readings = NO_READINGS
         self._next = 0
         self._held: list[Reading] = []
@@ -102,6 +107,13 @@ class SensorChain:
         self.decoder.flush()
         self._breaks.append(len(self._held))
 
+    @property
+    def clock_ppm(self) -> float:
+        """What the sensor's clock may be off at most, ppm; of a counter once a reading came."""
+        if self._clock_ppm is not None:
+            return self._clock_ppm
+        return COUNTER_PPM if self.timebase.counts else self.family.clock_ppm
+
     def info(self, name: str, kind: str = "live") -> SourceInfo:
         """Return what is known of the source; the clock's kind once a reading came."""
         if kind not in ("live", "simulated", "replay"):
@@ -127,5 +139,10 @@ class SensorChain:
                 "rate_error_ppm": clock.rate_error_ppm if known else None,
                 "u_rate_error_ppm": clock.u_rate_error_ppm if known else None,
                 "host_jitter_s": clock.jitter_s if known else None,
+                "limit_ppm": self.clock_ppm,
+                "stalls": clock.stalls,
+                "held_readings": clock.held,
+                "longest_stall_s": clock.longest_stall_s,
+                "steps": clock.steps,
             },
         }

@@ -13,6 +13,8 @@ __all__ = ["U_CRYSTAL", "Instrument"]
 
 U_CRYSTAL = 50e-6 / math.sqrt(3.0)
 """Relative standard uncertainty of a crystal's rate: 50 ppm as the half-width of a rectangle."""
+HOST_LIMIT = 500e-6
+"""By what share a host's clock may be off, with what steers it: the kernel slews by 500 ppm at most (RFC 5905)."""
 CONTRADICTION = 3.0  # standard uncertainties at which the host's clock contradicts the sensor's
 HOST_DELAY_S = 0.02
 """Time by which a host's stamps may drift within a record though both clocks are right, s: a USB bridge holds bytes for
@@ -31,6 +33,8 @@ class Instrument:
         Factor on every frequency: 1 but where the host's clock contradicts the sensor's.
     clock_words : str
         Where the rate comes from, for the effects table.
+    clock_refused : bool
+        Whether the host's clock contradicts the sensor's by more than either can be off, or could not be compared.
     speed_of_sound_m_per_s : float or None
         That stands in the distances, m/s.
     u_scale : float
@@ -45,6 +49,7 @@ class Instrument:
     speed_of_sound_m_per_s: float | None = None
     u_scale: float = 0.0
     u_offset_m: float = 0.0
+    clock_refused: bool = False
 
     @classmethod
     def of(cls, track: Track, *, u_crystal: float = U_CRYSTAL) -> Instrument:
@@ -72,6 +77,11 @@ class Instrument:
         clock from a host that became busy: nothing is corrected, and the difference counts as the half-width of a
         rectangle.
 
+        A difference beyond what the sensor's clock may be off and 500 ppm of the host's is none of the clocks': nothing
+        is corrected, and the greater of that limit and the difference counts as the half-width of a rectangle. Where
+        readings were held up, a comparison that is left, or none, cannot exclude a clock at its limit: its own
+        uncertainty is added, up to that of the limit.
+
         Examples
         --------
         >>> track = Track.from_arrays([0.0, 0.01], [0.2, 0.2])
@@ -83,38 +93,62 @@ class Instrument:
                 raise TrackError(
                     f"{name} must be finite and not negative, got {u:g}; leave it out where it is not known"
                 )
-        rate, words = _rate(track, u_crystal)
-        return cls(track.clock, rate, words, track.speed_of_sound_m_per_s, track.u_scale, track.u_offset_m)
+        for name, limit in (("clock_limit", track.clock_limit), ("compared_s", track.compared_s)):
+            if limit is not None and not (math.isfinite(limit) and limit >= 0):
+                raise TrackError(f"{name} must be finite and not negative, got {limit:g}; leave it out")
+        rate, words, refused = _rate(track, u_crystal)
+        return cls(track.clock, rate, words, track.speed_of_sound_m_per_s, track.u_scale, track.u_offset_m, refused)
 
 
-def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str]:
+def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
+    """Return the factor on every frequency, where it comes from, and whether a comparison was refused for it."""
     spec = f"a crystal's {u_crystal * 1e6:.0f} ppm"
+    limit = 1.0 if track.clock_limit is None else min(track.clock_limit + HOST_LIMIT, 1.0)
     if track.rate_error is None:
-        words = {
-            "nominal": f"times are row numbers over the nominal rate: {spec} stand in every frequency's uncertainty",
-            "host": f"times are the host's: {spec} stand in every frequency's uncertainty",
-        }
-        return Estimate(1.0, u_crystal), words.get(
-            track.clock, f"times were measured by the device: {spec} stand in every frequency's uncertainty"
-        )
-    u = track.u_rate_error
-    if u is None or not (math.isfinite(track.rate_error) and math.isfinite(u) and u >= 0):
+        return _uncompared(track, u_crystal, limit, spec)
+    rate, u = track.rate_error, track.u_rate_error
+    if u is None or not (math.isfinite(rate) and math.isfinite(u) and u >= 0):
         raise TrackError(
-            f"a rate error needs a finite value and an uncertainty that is not negative, got {track.rate_error} and "
+            f"a rate error needs a finite value and an uncertainty that is not negative, got {rate} and "
             f"{u}; leave both out where the clocks were not compared"
         )
-    told = f"the device's clock runs {track.rate_error * 1e6:+.0f} ppm against the host's (u {u * 1e6:.0f} ppm)"
-    if abs(track.rate_error) > CONTRADICTION * math.hypot(u, math.sqrt(2.0) * u_crystal):
-        apart_s = abs(track.rate_error) * float(track.t[-1] - track.t[0])
-        if apart_s < HOST_DELAY_S:
-            return (
-                Estimate(1.0, math.hypot(u_crystal, track.rate_error / math.sqrt(3.0))),
-                f"{told}, {apart_s * 1e3:.2g} ms in all, which the host's delays may be too: nothing is corrected, and "
-                "the difference stands in every frequency's uncertainty",
-            )
-        rate = Estimate(1.0 + track.rate_error, (1.0 + track.rate_error) * math.hypot(u, u_crystal))
-        return (
-            rate,
-            f"{told}, more than two crystals can differ: frequencies are corrected to the host's",
+    told = f"the device's clock runs {rate * 1e6:+.0f} ppm against the host's (u {u * 1e6:.0f} ppm)"
+    if track.clock_limit is not None and abs(rate) > limit:
+        half = max(limit, min(abs(rate), 1.0))
+        words = (
+            f"{told}, where it may be off by {track.clock_limit * 1e6:.0f} ppm and the host's by "
+            f"{HOST_LIMIT * 1e6:.0f}: nothing is corrected, and {half * 1e6:.0f} ppm stand in every frequency's "
+            "uncertainty as the half-width of a rectangle"
         )
-    return Estimate(1.0, u_crystal), f"{told}, as two crystals may: {spec} stand in every frequency's uncertainty"
+        return Estimate(1.0, math.hypot(u_crystal, half / math.sqrt(3.0))), words, True
+    if abs(rate) > CONTRADICTION * math.hypot(u, math.sqrt(2.0) * u_crystal):
+        span_s = float(track.t[-1] - track.t[0])
+        apart_s = abs(rate) * (span_s if track.compared_s is None else min(track.compared_s, span_s))
+        if apart_s < HOST_DELAY_S:
+            words = (
+                f"{told}, {apart_s * 1e3:.2g} ms in all, which the host's delays may be too: nothing is corrected, and "
+                "the difference stands in every frequency's uncertainty"
+            )
+            return Estimate(1.0, math.hypot(u_crystal, rate / math.sqrt(3.0))), words, False
+        words = f"{told}, more than two crystals can differ: frequencies are corrected to the host's"
+        return Estimate(1.0 + rate, (1.0 + rate) * math.hypot(u, u_crystal)), words, False
+    if track.held_samples:
+        u_all = math.hypot(u_crystal, min(u, limit / math.sqrt(3.0)))
+        words = f"{told}, as two crystals may: {u_all * 1e6:.0f} ppm stand in every frequency's uncertainty"
+        return Estimate(1.0, u_all), words, False
+    words = f"{told}, as two crystals may: {spec} stand in every frequency's uncertainty"
+    return Estimate(1.0, u_crystal), words, False
+
+
+def _uncompared(track: Track, u_crystal: float, limit: float, spec: str) -> tuple[Estimate, str, bool]:
+    """Return the same of a clock that was not compared, or could not be: a stall leaves too few stamps in time."""
+    if track.clock == "device" and track.held_samples:
+        words = (
+            "too few readings came in time to compare the device's clock with the host's: the "
+            f"{limit * 1e6:.0f} ppm that they may be apart stand in every frequency's uncertainty as the half-width of "
+            "a rectangle"
+        )
+        return Estimate(1.0, math.hypot(u_crystal, limit / math.sqrt(3.0))), words, True
+    source = {"nominal": "are row numbers over the nominal rate", "host": "are the host's"}
+    times = source.get(track.clock, "were measured by the device")
+    return Estimate(1.0, u_crystal), f"times {times}: {spec} stand in every frequency's uncertainty", False

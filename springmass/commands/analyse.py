@@ -18,7 +18,7 @@ from storage.errors import StorageError
 
 __all__ = ["run"]
 
-PARAMETERS = ("accuracy", "method", "velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "strict")
+PARAMETERS = ("accuracy", "method", "velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "clock_ppm", "strict")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -33,7 +33,9 @@ def run(options: argparse.Namespace) -> int:
     codes: list[int] = []
     for path, name, scene in zip(options.input, distinct_names(options.input), scenes, strict=True):
         try:
-            loaded = load(path, **completions(options), from_s=options.from_s, to_s=options.to_s)
+            loaded = load(
+                path, **completions(options), from_s=options.from_s, to_s=options.to_s, clock_ppm=options.clock_ppm
+            )
             analysed = analyse_loaded(
                 loaded,
                 scene,

@@ -246,7 +246,7 @@ def _sensors(options: argparse.Namespace, scene: Scene | None) -> Iterator[tuple
         for address, family in zip(options.port, families, strict=True):
             baud = options.baud or family.baud
             port = SerialPort(address, baud)
-            sensors.append(Sensor(family, port, options.rate_hz, family_options, calibration, baud))
+            sensors.append(Sensor(family, port, options.rate_hz, family_options, calibration, baud, options.clock_ppm))
         yield sensors, "live"
     finally:
         for sensor in sensors:
@@ -281,7 +281,7 @@ def _simulated(
         port = SerialPort(bench.path, family.baud)
         bench.start()
         try:
-            yield Sensor(family, port, options.rate_hz, family_options, calibration, family.baud)
+            yield Sensor(family, port, options.rate_hz, family_options, calibration, family.baud, options.clock_ppm)
         finally:
             port.close()
 

@@ -15,8 +15,9 @@ from typing import Any, Literal
 import numpy as np
 
 from acquisition.block import Block
+from acquisition.decoders.family import RESONATOR_PPM
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
-from acquisition.live.timebase import fit_clock
+from acquisition.live.clock_fit import fit_clock
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular import open_regular
@@ -127,6 +128,7 @@ def load(
     from_s: float | None = None,
     to_s: float | None = None,
     unverified: bool = False,
+    clock_ppm: float | None = None,
 ) -> Loaded:
     """Read a recording, a run file or a wire log.
 
@@ -145,6 +147,8 @@ def load(
     unverified : bool
         Whether a run file that is not what was written is read all the same. What differs is said on stderr, and in a
         trap of the code "unverified" that goes into whatever is made of it.
+    clock_ppm : float, optional
+        What the sensor's clock may be off at most, ppm; left out, what the run file or the sensor's family says.
 
     Raises
     ------
@@ -177,13 +181,15 @@ def load(
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             complain(f"{where}: {trap.message}")
+    if clock_ppm is not None:
+        loaded = replace(loaded, track=replace(loaded.track, clock_limit=clock_ppm * 1e-6))
     if from_s is None and to_s is None:
         return loaded
     return replace(loaded, track=_between(loaded, from_s, to_s))
 
 
 def to_track(
-    samples: Block, info: SourceInfo, *, recorded_format: str = "", sensor: Mapping[str, Any] | None = None
+    samples: Block, info: SourceInfo, *, recorded_format: str = "", provenance: Mapping[str, Any] | None = None
 ) -> Track:
     """Hand samples over to the pipeline.
 
@@ -193,8 +199,8 @@ def to_track(
     info : SourceInfo
     recorded_format : str
         Family of the recording that they come from, if any: it says which speed of sound stands in the distances.
-    sensor : mapping, optional
-        What a run file says of the sensor that it was recorded with.
+    provenance : mapping, optional
+        What a run file says of its origin: the sensor that it was recorded with, and what its clock may be off.
 
     Notes
     -----
@@ -213,22 +219,25 @@ def to_track(
         velocity=samples.velocity,
         quantity=samples.quantity,
         unit=samples.unit,
-        **_clock_comparison(samples, info),
-        **_scale(recorded_format, sensor or {}),
+        **_clock_comparison(samples, info, provenance or {}),
+        **_scale(recorded_format, (provenance or {}).get("sensor") or {}),
     )
 
 
-def _clock_comparison(samples: Block, info: SourceInfo) -> dict[str, float]:
-    """How the device's clock ran against the host's, where stamps of both are there."""
+def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """How the device's clock ran against the host's, where stamps of both are there, and what it may be off."""
     if info.clock != "device" or samples.host_ns is None or not (samples.host_ns >= 0).all():
         return {}
     fit = fit_clock(samples.t, samples.host_ns)
+    limit_ppm = provenance.get("decoding", {}).get("clock", {}).get("limit_ppm", RESONATOR_PPM)
+    told = {"clock_limit": limit_ppm * 1e-6, "held_samples": fit.held, "longest_stall_s": fit.longest_stall_s}
     if not np.isfinite(fit.rate_error_ppm):
-        return {}
-    return {"rate_error": fit.rate_error_ppm * 1e-6, "u_rate_error": fit.u_rate_error_ppm * 1e-6}
+        return told
+    rate, u_rate = fit.rate_error_ppm * 1e-6, fit.u_rate_error_ppm * 1e-6
+    return {**told, "rate_error": rate, "u_rate_error": u_rate, "compared_s": fit.span_s}
 
 
-def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, float]:
+def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
     """What made distances: the speed of sound where echo times were recorded, and the calibration's uncertainties."""
     if recorded_format == MOTION_SENSOR:
         return {"speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
@@ -367,7 +376,7 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
             run.channel,
             run.title,
             samples,
-            to_track(samples, run.info, recorded_format=run.format, sensor=run.provenance.get("sensor")),
+            to_track(samples, run.info, recorded_format=run.format, provenance=run.provenance),
             traps,
             run.malformed_rows,
             lambda: _originals_of(path, stamp, unverified),

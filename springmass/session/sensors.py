@@ -66,6 +66,8 @@ class Sensor:
         Of the decoder.
     calibration : Calibration
     baud : int
+    clock_ppm : float or None
+        What its clock may be off at most, ppm; None: the family's.
     """
 
     family: Family
@@ -74,10 +76,17 @@ class Sensor:
     options: Mapping[str, Any] = field(default_factory=dict)
     calibration: Calibration = field(default_factory=Calibration)
     baud: int = 0
+    clock_ppm: float | None = None
 
     def chain(self) -> SensorChain:
         """Return a fresh chain."""
-        return SensorChain(self.family, options=self.options, rate_hz=self.rate_hz, calibration=self.calibration)
+        return SensorChain(
+            self.family,
+            options=self.options,
+            rate_hz=self.rate_hz,
+            calibration=self.calibration,
+            clock_ppm=self.clock_ppm,
+        )
 
     def proof(self) -> Proof | None:
         """Return what tells this sensor from another on a port that came back; None where bytes cannot tell."""
@@ -90,7 +99,14 @@ class Sensor:
         """Return what the log's header says of it."""
         calibration = self.calibration.to_mapping()
         return SensorEntry(
-            channel, self.family.name, self.transport.name, self.baud, self.rate_hz, dict(self.options), calibration
+            channel,
+            self.family.name,
+            self.transport.name,
+            self.baud,
+            self.rate_hz,
+            dict(self.options),
+            calibration,
+            self.clock_ppm,
         )
 
     def not_heard(self, heard: bytes) -> str:

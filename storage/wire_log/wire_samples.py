@@ -38,6 +38,7 @@ def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
             options=sensor.options,
             rate_hz=sensor.rate_hz,
             calibration=Calibration.from_mapping(sensor.calibration) if sensor.calibration else None,
+            clock_ppm=sensor.clock_ppm,
         )
         for sensor in sensors
     ]
