@@ -114,7 +114,7 @@ class Family:
         Whether readings carry the device's clock or counter.
     clock_ppm : float
         What the device's clock may be off at most, with temperature and age, ppm: 200 with a crystal, 10 000 with a
-        ceramic resonator, as most boards have one. A comparison with the host that says more is not believed.
+        ceramic resonator, as common boards have it. A comparison with the host that says more is not believed.
     self_framing : bool
         Whether a mark or checksum tells a frame from noise; without one, bytes alone never show the family.
     source : str

@@ -100,14 +100,20 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     """
     n = int(t.size)
     nothing = ClockFit(math.nan, math.inf, math.nan, n)
-    # Stamps half the range of their type apart are no clock's, and their difference would wrap.
-    if n < FEWEST or t[-1] <= t[0] or int(host_ns.max()) - int(host_ns.min()) >= 1 << 62:
+    if n < FEWEST or not np.isfinite(t).all() or t[-1] <= t[0]:
         return nothing
+    # Stamps half the range of their type apart are no clock's, and their difference would wrap.
+    if int(host_ns.max()) - int(host_ns.min()) >= 1 << 62:
+        return nothing
+    if not (ahead := np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])).all():
+        t, host_ns = t[ahead], host_ns[ahead]  # repeats, and what runs backward
+        if t.size < FEWEST:
+            return nothing
     x = t - 0.5 * (t[0] + t[-1])
     delay = (host_ns - host_ns[0]) * NANO - (t - t[0])
     late = _lateness(x, delay)
     stalls = _stalls(x, delay, late)
-    held = np.zeros(n, np.bool_)
+    held = np.zeros(t.size, np.bool_)
     for start, stop in stalls:
         held[start:stop] = True
     found = (int(held.sum()), len(stalls), max((float(late[a:b].max()) for a, b in stalls), default=0.0))

@@ -78,7 +78,7 @@ class Instrument:
         rectangle.
 
         A difference beyond what the sensor's clock may be off and 500 ppm of the host's is none of the clocks': nothing
-        is corrected, and the greater of that limit and the difference counts as the half-width of a rectangle. Where
+        is corrected, and the difference counts as the half-width of a rectangle. Where
         readings were held up, a comparison that is left, or none, cannot exclude a clock at its limit: its own
         uncertainty is added, up to that of the limit.
 
@@ -103,7 +103,7 @@ class Instrument:
 def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
     """Return the factor on every frequency, where it comes from, and whether a comparison was refused for it."""
     spec = f"a crystal's {u_crystal * 1e6:.0f} ppm"
-    limit = 1.0 if track.clock_limit is None else min(track.clock_limit + HOST_LIMIT, 1.0)
+    limit = math.inf if track.clock_limit is None else track.clock_limit + HOST_LIMIT
     if track.rate_error is None:
         return _uncompared(track, u_crystal, limit, spec)
     rate, u = track.rate_error, track.u_rate_error
@@ -113,12 +113,11 @@ def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
             f"{u}; leave both out where the clocks were not compared"
         )
     told = f"the device's clock runs {rate * 1e6:+.0f} ppm against the host's (u {u * 1e6:.0f} ppm)"
-    if track.clock_limit is not None and abs(rate) > limit:
-        half = max(limit, min(abs(rate), 1.0))
+    if abs(rate) > limit:
+        half = min(abs(rate), 1.0)
         words = (
-            f"{told}, where it may be off by {track.clock_limit * 1e6:.0f} ppm and the host's by "
-            f"{HOST_LIMIT * 1e6:.0f}: nothing is corrected, and {half * 1e6:.0f} ppm stand in every frequency's "
-            "uncertainty as the half-width of a rectangle"
+            f"{told}, and {limit * 1e6:.0f} ppm are all that the two can be apart: nothing is corrected, and "
+            f"{half * 1e6:.0f} ppm stand in every frequency's uncertainty as the half-width of a rectangle"
         )
         return Estimate(1.0, math.hypot(u_crystal, half / math.sqrt(3.0))), words, True
     if abs(rate) > CONTRADICTION * math.hypot(u, math.sqrt(2.0) * u_crystal):
@@ -133,7 +132,7 @@ def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
         words = f"{told}, more than two crystals can differ: frequencies are corrected to the host's"
         return Estimate(1.0 + rate, (1.0 + rate) * math.hypot(u, u_crystal)), words, False
     if track.held_samples:
-        u_all = math.hypot(u_crystal, min(u, limit / math.sqrt(3.0)))
+        u_all = math.hypot(u_crystal, min(u, limit / math.sqrt(3.0), 1.0))
         words = f"{told}, as two crystals may: {u_all * 1e6:.0f} ppm stand in every frequency's uncertainty"
         return Estimate(1.0, u_all), words, False
     words = f"{told}, as two crystals may: {spec} stand in every frequency's uncertainty"
@@ -143,12 +142,13 @@ def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
 def _uncompared(track: Track, u_crystal: float, limit: float, spec: str) -> tuple[Estimate, str, bool]:
     """Return the same of a clock that was not compared, or could not be: a stall leaves too few stamps in time."""
     if track.clock == "device" and track.held_samples:
+        half = min(limit, 1.0)
         words = (
             "too few readings came in time to compare the device's clock with the host's: the "
-            f"{limit * 1e6:.0f} ppm that they may be apart stand in every frequency's uncertainty as the half-width of "
+            f"{half * 1e6:.0f} ppm that they may be apart stand in every frequency's uncertainty as the half-width of "
             "a rectangle"
         )
-        return Estimate(1.0, math.hypot(u_crystal, limit / math.sqrt(3.0))), words, True
+        return Estimate(1.0, math.hypot(u_crystal, half / math.sqrt(3.0))), words, True
     source = {"nominal": "are row numbers over the nominal rate", "host": "are the host's"}
     times = source.get(track.clock, "were measured by the device")
     return Estimate(1.0, u_crystal), f"times {times}: {spec} stand in every frequency's uncertainty", False

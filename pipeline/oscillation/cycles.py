@@ -12,6 +12,8 @@ from pipeline.oscillation.condition import Conditioned
 from pipeline.track import F8
 
 FEW_PERIODS = 4.5  # below which the spectrum's peak is displaced by the line's own image
+HOLE = 8.0  # sample intervals without a usable sample that make a hole
+MOSTLY_HOLES = 0.2  # share of the record beyond which straight lines over holes would be seen for a motion
 SHORTFALL = 0.05  # periods by which a record of one and a half may be misjudged
 
 __all__ = ["Cycles", "NoOscillation", "Params", "find_cycles"]
@@ -94,11 +96,11 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     Notes
     -----
     The spectrum is a Hann-windowed, zero-padded periodogram of the detrended record with flagged samples bridged
-    by straight lines; the peak is interpolated by a parabola through the logarithms [1]_. For white noise the
-    ratio of a bin to the mean is exponentially distributed, so the largest of n exceeds :math:`\\ln(n/\\alpha)` with
-    probability :math:`\\alpha`. A line too weak for that is looked for once more without the window, which costs
-    1.8 dB. Under four periods the peak is off by up to a tenth: there the frequency is the one at which a sinusoid
-    with an offset leaves least.
+    by straight lines, or by the mean where holes make up a fifth of it; the peak is interpolated by a parabola
+    through the logarithms [1]_. For white noise the ratio of a bin to the mean is exponentially distributed, so the
+    largest of n exceeds :math:`\\ln(n/\\alpha)` with probability :math:`\\alpha`. A line too weak for that
+    is looked for once more without the window, which costs 1.8 dB. Under four periods the peak is off by up to a tenth:
+    there the frequency is the one at which a sinusoid with an offset leaves least.
 
     A window of N samples knows its phase to :math:`\\sqrt{2/N}\\,\\sigma/A`; it spans as many periods as bring that to
     ``u_phase``.
@@ -145,7 +147,7 @@ def _spectral_line(t: F8, y: F8, rate_hz: float, false_alarm: float) -> tuple[fl
     grid = t[0] + ordinal / rate_hz
     # Times that are equally spaced but for rounding need no interpolation.
     regular = t.size == n and float(np.abs(t - grid).max()) <= 1e-9 / rate_hz
-    values = y if regular else np.interp(grid, t, y)
+    values = y if regular else _bridged(grid, t, y, rate_hz)
     centred = ordinal - 0.5 * (n - 1)
     values = values - values.sum() / n
     values -= centred * (float(centred @ values) / float(centred @ centred))
@@ -157,6 +159,17 @@ def _spectral_line(t: F8, y: F8, rate_hz: float, false_alarm: float) -> tuple[fl
         if ratio >= threshold:
             return frequency_hz, 2.0 * math.sqrt(power) / float(window.sum())
     return NoOscillation("no line stands out of the spectrum's noise: there is no oscillation to be seen")
+
+
+def _bridged(grid: F8, t: F8, y: F8, rate_hz: float) -> F8:
+    """Return samples at the times of a grid."""
+    values = np.asarray(np.interp(grid, t, y))
+    step = np.diff(t)
+    holes = np.flatnonzero(step > HOLE / rate_hz)
+    if float(step[holes].sum()) > MOSTLY_HOLES * float(t[-1] - t[0]):
+        before = np.searchsorted(t, grid, side="right") - 1
+        values[np.isin(before, holes)] = y.mean()
+    return values
 
 
 def _peak(values: F8, rate_hz: float, finer: int) -> tuple[float, float, float]:

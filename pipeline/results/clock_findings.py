@@ -31,5 +31,5 @@ def judge_clock(track: Track, instrument: Instrument) -> Iterator[Finding]:
             "late_readings",
             "info",
             f"{track.held_samples} readings came up to {track.longest_stall_s:.3g} s late, at once behind a silence: "
-            "the link stalled. Their times are the device's and stand; the host's stamps of them say nothing of its clock",
+            "the link stalled. Their times are the device's and stand; the clocks were compared by the other readings",
         )

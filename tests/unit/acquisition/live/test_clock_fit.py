@@ -81,3 +81,79 @@ def test_two_bunches_of_readings_claim_no_certainty() -> None:
     fit = fit_clock(t, np.round((t + rng.exponential(0.02, t.size)) * 1e9).astype(np.int64))
     assert fit.u_rate_error_ppm > 1.0
     assert abs(fit.rate_error_ppm) < 5.0 * fit.u_rate_error_ppm
+
+
+def stamped(true_s: np.ndarray, *stalls: tuple[float, float], seed: int = 1) -> np.ndarray:
+    """Return stamps in ns of readings that come a millisecond late, or at once at the end of a stall."""
+    host = true_s + np.random.default_rng(seed).exponential(1e-3, true_s.size)
+    for start, stop in stalls:
+        host[(true_s >= start) & (true_s < stop)] = stop + 1e-3
+    return np.round(np.maximum.accumulate(host) * 1e9).astype(np.int64)
+
+
+@pytest.mark.parametrize("ppm", [-30_000.0, -3000.0, 40.0, 5000.0])
+@pytest.mark.parametrize("stall", [(2.0, 15.0), (-1.0, 13.0), (7.0, 21.0), (9.0, 9.5)])
+def test_a_stall_says_nothing_of_the_clock(stall: tuple[float, float], ppm: float) -> None:
+    """Readings that came at once behind a silence are counted and left out, wherever the silence was."""
+    t = np.arange(2000) / RATE_HZ
+    fit = fit_clock(t, stamped(t / (1.0 + ppm * 1e-6), stall))
+    held = np.count_nonzero((t >= stall[0]) & (t < stall[1]))
+    assert fit.rate_error_ppm == pytest.approx(ppm, abs=60.0)
+    assert fit.stalls == 1
+    assert fit.held == pytest.approx(held, abs=0.05 * held + 3)
+    assert fit.longest_stall_s == pytest.approx(min(stall[1], 20.0) - max(stall[0], 0.0), rel=0.05)
+
+
+def test_two_stalls_are_two() -> None:
+    """Each burst is one; what lies between them is believed."""
+    t = np.arange(6000) / RATE_HZ
+    fit = fit_clock(t, stamped(t, (5.0, 9.0), (30.0, 50.0)))
+    assert (fit.stalls, fit.longest_stall_s) == (2, pytest.approx(20.0, rel=0.01))
+    assert abs(fit.rate_error_ppm) < 5.0
+
+
+@pytest.mark.parametrize("step_s", [-6.0, -0.1, 0.1, 30.0])
+def test_a_jump_that_stays_is_no_rate(step_s: float) -> None:
+    """A host that slept, a device that counts anew: the lines on either side have one slope and zeros of their own."""
+    t = np.arange(6000) / RATE_HZ
+    host = stamped(t / (1.0 + 50e-6)) + np.where(t > 21.0, round(step_s * 1e9), 0)
+    fit = fit_clock(t, host)
+    assert (fit.steps, fit.stalls) == (1, 0)
+    assert fit.rate_error_ppm == pytest.approx(50.0, abs=5.0)
+    assert fit.span_s == pytest.approx(39.0, abs=1.5)
+
+
+@pytest.mark.parametrize("n", [24, 128, 1000])
+def test_readings_of_one_read_tell_no_rate(n: int) -> None:
+    """All of them in one burst: a stall, no number, and no division by zero."""
+    fit = fit_clock(np.arange(n) / RATE_HZ, np.full(n, 7 * SECOND_NS))
+    assert math.isnan(fit.rate_error_ppm)
+    assert (fit.held, fit.stalls) == ((n - 1, 1) if n > 25 else (0, 0))
+
+
+@pytest.mark.parametrize("true_hz", [20.0, 99.0, 500.0])
+def test_a_rate_that_is_wrong_by_a_multiple_is_no_stall(true_hz: float) -> None:
+    """A counter over a nominal 100 Hz that runs at another rate: every stamp tells it."""
+    number = np.arange(3000)
+    fit = fit_clock(number / RATE_HZ, stamped(number / true_hz))
+    assert fit.stalls == 0
+    assert fit.rate_error_ppm == pytest.approx((true_hz / RATE_HZ - 1.0) * 1e6, abs=100.0)
+
+
+def test_stamps_of_the_whole_range_overflow_nothing() -> None:
+    """The least and the greatest stamp that a log can hold say nothing, without a warning."""
+    host = np.linspace(-(2**63), 2**63 - 2048, 100).astype(np.int64)
+    assert math.isnan(fit_clock(np.arange(100.0), host).rate_error_ppm)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_any_times_and_stamps_give_a_fit(seed: int) -> None:
+    """Times that repeat, run backward or leap, stamps of any order: a number with an uncertainty, or none."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 300))
+    t = np.cumsum(rng.choice([0.0, 0.01, -0.01, 1e-6, 1e4], n))
+    host = np.cumsum(rng.choice([0, 1, 10_000_000, -10_000_000, 10**15], n)).astype(np.int64)
+    fit = fit_clock(t, host)
+    assert isinstance(fit, ClockFit)
+    assert math.isnan(fit.rate_error_ppm) or (math.isfinite(fit.u_rate_error_ppm) and fit.u_rate_error_ppm >= 0.0)
+    assert fit.readings == n

@@ -191,3 +191,35 @@ def test_a_rate_is_positive_and_finite(rate_hz: float) -> None:
     """Any other rate is refused with its value."""
     with pytest.raises(ValueError, match=r"rate_hz must be positive and finite, got"):
         Timebase(rate_hz)
+
+
+def test_readings_held_by_a_link_have_no_time_of_the_host() -> None:
+    """A burst behind a silence is flagged where only the host's stamps are times; what comes in time is not."""
+    host = 7 * SECOND_NS + np.arange(40) * SECOND_NS // 100
+    host[10:25] = host[24] + np.arange(15) * 200_000
+    host[25:] += 5 * SECOND_NS
+    host[10:25] += 5 * SECOND_NS
+    _, flags, base = pushed(readings(host_ns=host))
+    assert flags[10] == Flag.GAP_BEFORE
+    assert (flags[11:25] == Flag.DUPLICATE_TIME).all()
+    assert not flags[:10].any()
+    assert not flags[26:].any()
+    assert len(base.gaps) == 1
+
+
+def test_a_silence_that_loses_readings_is_a_gap_and_flags_nothing_behind_it() -> None:
+    """Where the readings behind a silence come in their time, their stamps are theirs."""
+    host = 7 * SECOND_NS + np.arange(40) * SECOND_NS // 100
+    host[10:] += 5 * SECOND_NS
+    _, flags, _ = pushed(readings(host_ns=host))
+    assert np.flatnonzero(flags).tolist() == [10]
+
+
+def test_a_stall_that_lost_a_few_readings_is_no_restart() -> None:
+    """A young device whose clock goes on 40 ms later behind 13 s of silence has not started again."""
+    device = 1_500_000 + np.concatenate([np.arange(10), np.arange(13, 40)]) * STEP_US
+    host = np.concatenate([np.arange(10), np.full(27, 1310)]) * SECOND_NS // 100
+    t, flags, base = pushed(readings(device_us=device, host_ns=host))
+    assert base.restarts == 0
+    assert np.flatnonzero(flags).tolist() == [10]
+    np.testing.assert_allclose(t, (device - device[0]) * 1e-6, atol=1e-12)

@@ -12,6 +12,7 @@ import pytest
 from pipeline.analyse import analyse
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.errors import TrackError
+from pipeline.results.clock_findings import judge_clock
 from pipeline.track import Track
 
 PLAIN = Track.from_arrays(np.arange(100) / 100.0, np.zeros(100))
@@ -58,6 +59,50 @@ def test_a_host_that_became_busy_overrules_nobody() -> None:
     assert Instrument.of(replace(LONG, clock="device", rate_error=1.2e-3, u_rate_error=1e-5)).clock_rate.value > 1.001
 
 
+@pytest.mark.parametrize(("rate", "half"), [(1.017, 1.0), (-0.5, 0.5), (0.03, 0.03), (0.0106, 0.0106)])
+def test_a_correction_that_no_clock_can_need_is_refused(rate: float, half: float) -> None:
+    """Beyond the clock's limit and the host's 500 ppm the difference is a rectangle's half-width, and nothing else."""
+    track = replace(LONG, clock="device", rate_error=rate, u_rate_error=1e-5, clock_limit=0.01)
+    found = Instrument.of(track)
+    assert (found.clock_rate.value, found.clock_refused) == (1.0, True)
+    assert found.clock_rate.u == pytest.approx(math.hypot(half / math.sqrt(3.0), U_CRYSTAL))
+    assert not Instrument.of(replace(track, clock_limit=1.1 * abs(rate))).clock_refused
+    (told,) = judge_clock(track, found)
+    assert (told.code, told.severity) == ("clock_refused", "warning")
+
+
+def test_a_correction_within_the_limit_is_made() -> None:
+    """A resonator's 9000 ppm are corrected under a limit of 10 000, and of a crystal's 200 refused."""
+    track = replace(LONG, clock="device", rate_error=9e-3, u_rate_error=1e-5, clock_limit=0.01)
+    assert Instrument.of(track).clock_rate.value == 1.009
+    assert Instrument.of(replace(track, clock_limit=2e-4)).clock_refused
+
+
+def test_a_stall_that_leaves_no_comparison_leaves_the_clock_at_its_limit() -> None:
+    """With too few stamps in time the clock may be anything within its limit; without a stall it is a crystal."""
+    track = replace(LONG, clock="device", clock_limit=0.01)
+    assert Instrument.of(track).clock_rate.u == U_CRYSTAL
+    stalled = replace(track, held_samples=2000, longest_stall_s=13.0)
+    found = Instrument.of(stalled)
+    assert found.clock_refused
+    assert found.clock_rate.u == pytest.approx(math.hypot(0.0105 / math.sqrt(3.0), U_CRYSTAL))
+    assert [told.code for told in judge_clock(stalled, found)] == ["clock_refused", "late_readings"]
+
+
+def test_a_comparison_that_a_stall_made_coarse_counts_as_coarse() -> None:
+    """Its uncertainty is added, never more than the limit's."""
+    track = replace(LONG, clock="device", rate_error=1e-4, u_rate_error=2e-4, clock_limit=0.01, held_samples=1000)
+    assert Instrument.of(track).clock_rate.u == pytest.approx(math.hypot(2e-4, U_CRYSTAL))
+    coarse = Instrument.of(replace(track, u_rate_error=0.5))
+    assert coarse.clock_rate.u == pytest.approx(math.hypot(0.0105 / math.sqrt(3.0), U_CRYSTAL))
+
+
+def test_a_short_comparison_in_a_long_record_overrules_nobody() -> None:
+    """Three seconds before a stall tell 3.6 ms of drift, however long the record goes on."""
+    track = replace(LONG, clock="device", rate_error=1.2e-3, u_rate_error=1e-5, compared_s=3.0)
+    assert Instrument.of(track).clock_rate.value == 1.0
+
+
 def test_period_is_corrected(synthetic: ModuleType) -> None:
     """A device that counts 1.002 s in a second shows periods 0.2 % too long; analyse gives the true one."""
     t = synthetic.times(20)
@@ -75,6 +120,9 @@ def test_period_is_corrected(synthetic: ModuleType) -> None:
         {"rate_error": 1e-3},
         {"rate_error": 1e-3, "u_rate_error": -1e-6},
         {"rate_error": math.nan, "u_rate_error": 1e-6},
+        {"clock_limit": -1e-3},
+        {"clock_limit": math.inf},
+        {"compared_s": math.nan},
         {"u_scale": -1e-3},
         {"u_offset_m": math.nan},
     ],
