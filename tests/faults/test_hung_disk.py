@@ -1,0 +1,247 @@
+"""A disk that hangs: nothing is lost until the queue is full, and what finds it full is counted to the byte.
+
+The sensors are written here and share no code with the decoders. The seconds of a hang are simulated: what would be
+read in them is put while a write stands still. ``SPRINGMASS_TRIALS`` asks for all 50.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import sys
+import termios
+import threading
+import tty
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.clock import SystemClock, VirtualClock
+from acquisition.live.reader import Line, PortReader
+from acquisition.live.serial_port import SerialPort
+from springmass.cli import main
+from storage.recorder import QUEUE_BYTES, Recorder
+from storage.run_file.reading import open_run
+from storage.wire_log.appending import LogFile, open_log_file
+from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry
+from storage.wire_log.scanning import read_log
+
+TRIALS = 50 if os.environ.get("SPRINGMASS_TRIALS") else 12
+SECOND_NS = 1_000_000_000
+WAIT_S = 30.0
+
+
+class Hanging:
+    """A real file whose writes stand still until they are let go; a sync may stand still with them."""
+
+    def __init__(self, path: Path) -> None:
+        self._file: LogFile = open_log_file(path)
+        self.goes = threading.Event()
+        self.goes.set()
+        self.hangs = threading.Event()
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Write, when the disk goes."""
+        self._wait()
+        return self._file.write(data)
+
+    def sync(self) -> None:
+        """Sync, when the disk goes."""
+        self._wait()
+        self._file.sync()
+
+    def close(self) -> None:
+        """Close."""
+        self._file.close()
+
+    def _wait(self) -> None:
+        if not self.goes.is_set():
+            self.hangs.set()
+            assert self.goes.wait(WAIT_S)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Sensors by channel: reads a second of each, and bytes of a read."""
+
+    reads_hz: list[float]
+    read_bytes: list[int]
+
+    def wire(self, from_s: float, to_s: float) -> Iterator[tuple[int, int, bytes]]:
+        """Yield what is read in that time, in order: channel, stamp, bytes that say which read they are."""
+        due = [
+            (number / rate, channel, number)
+            for channel, rate in enumerate(self.reads_hz)
+            for number in range(int(np.ceil(from_s * rate)), int(np.ceil(to_s * rate)))
+        ]
+        for at, channel, number in sorted(due):
+            yield channel, round(at * 1e9), b"%d:%d;" % (channel, number) + b"." * self.read_bytes[channel]
+
+
+def bench(rng: np.random.Generator) -> Bench:
+    """Return one to sixteen sensors: rangefinders at 10 to 100 Hz, or the flood of a link that runs full."""
+    n = int(rng.integers(1, 17))
+    flood = rng.random() < 0.4
+    reads_hz = rng.choice([10.0, 50.0, 100.0], n)
+    sizes = rng.integers(1500, 4000, n) if flood else rng.integers(4, 100, n)
+    return Bench(reads_hz.tolist(), sizes.tolist())
+
+
+@pytest.mark.parametrize("seed", range(TRIALS))
+def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_path: Path) -> None:
+    """Of 5 to 60 s: every read is in the log, or in the count of the one overflow event of its channel."""
+    rng = np.random.default_rng([seed, 14])
+    sensors, hang_s = bench(rng), float(rng.uniform(5.0, 60.0))
+    header = LogHeader(
+        sensors=tuple(SensorEntry(channel, "ffhls") for channel in range(len(sensors.reads_hz))), mono_ns=0, unix_ns=0
+    )
+    disk: list[Hanging] = []
+
+    def hanging(path: Path) -> LogFile:
+        disk.append(Hanging(path))
+        return disk[0]
+
+    def hung(stamp_ns: int) -> bool:
+        return SECOND_NS <= stamp_ns < (1.0 + hang_s) * SECOND_NS
+
+    put: dict[int, list[tuple[int, bytes]]] = defaultdict(list)
+
+    def send(recorder: Recorder, from_s: float, to_s: float) -> None:
+        for channel, stamp_ns, data in sensors.wire(from_s, to_s):
+            put[channel].append((stamp_ns, data))
+            recorder.reads([(channel, stamp_ns, data)])
+
+    with Recorder(tmp_path / "run.wire", header, VirtualClock(), open_file=hanging) as recorder:
+        send(recorder, 0.0, 1.0)
+        recorder.drain()
+        disk[0].goes.clear()
+        send(recorder, 1.0, 1.1)
+        assert disk[0].hangs.wait(WAIT_S)
+        send(recorder, 1.1, 1.0 + hang_s)
+        status = recorder.status
+        disk[0].goes.set()
+        recorder.drain()
+        send(recorder, 1.0 + hang_s, 2.0 + hang_s)
+    # What was put while the disk hung, but for the read that hung with it and those that went along.
+    sizes = [HEAD_BYTES + len(data) for each in put.values() for stamp_ns, data in each if hung(stamp_ns)]
+    if status.dropped_records:
+        assert QUEUE_BYTES - max(sizes) < status.queued_bytes <= QUEUE_BYTES
+        assert sum(sizes) > status.queued_bytes
+    else:
+        assert status.queued_bytes <= min(sum(sizes), QUEUE_BYTES)
+    records = list(read_log(tmp_path / "run.wire"))
+    dropped = sum(demand_complete(put[channel], records, channel) for channel in put)
+    assert dropped == status.dropped_records == recorder.status.dropped_records
+    assert records[-1].json()["dropped_records"] == dropped
+
+
+def demand_complete(put: list[tuple[int, bytes]], records: list[Record], channel: int) -> int:
+    """Demand every read of a channel, but those that its overflow event counts in its place; return their number."""
+    of_channel = [record for record in records if record.channel == channel]
+    events = [record for record in of_channel if record.kind is Kind.EVENT and record.json()["kind"] == "overflow"]
+    kept = [(record.mono_ns, record.payload) for record in of_channel if record.kind is Kind.DATA]
+    if not events:
+        assert kept == put
+        return 0
+    (event,) = events
+    facts = event.json()["facts"]
+    first = next(i for i, (stamp_ns, _) in enumerate(put) if stamp_ns >= facts["first_ns"])
+    lost = put[first : first + facts["records"]]
+    assert (lost[0][0], lost[-1][0]) == (facts["first_ns"], event.mono_ns)
+    assert sum(len(data) for _, data in lost) == facts["bytes"]
+    assert kept == put[:first] + put[first + len(lost) :]
+    before = [record for record in of_channel[: of_channel.index(event)] if record.kind is Kind.DATA]
+    assert len(before) == first
+    return len(lost)
+
+
+def test_the_reading_thread_never_waits_for_the_disk(tmp_path: Path) -> None:
+    """A port whose own buffer holds 4 KiB is read on while the disk hangs: 200 kB that were sent then are all there."""
+    disk: list[Hanging] = []
+
+    def hanging(path: Path) -> LogFile:
+        disk.append(Hanging(path))
+        return disk[0]
+
+    sent = b"".join(b"%06d line by line\n" % number for number in range(10_000))
+    device, port = os.openpty()
+    tty.setraw(port)
+    header = LogHeader(sensors=(SensorEntry(0, "text-lines"),), mono_ns=0, unix_ns=0)
+    writer = threading.Thread(target=write_all, args=(device, sent), daemon=True)
+    with Recorder(tmp_path / "run.wire", header, SystemClock(), open_file=hanging) as recorder:
+        reader = PortReader([Line(SerialPort(os.ttyname(port), 9600))], recorder, SystemClock())
+        reader.start()
+        disk[0].goes.clear()
+        writer.start()
+        writer.join(WAIT_S)
+        assert not writer.is_alive()
+        deadline_ns = SystemClock().now_ns() + int(WAIT_S * 1e9)
+        while fionread(port) and SystemClock().now_ns() < deadline_ns:
+            SystemClock().sleep_until_ns(SystemClock().now_ns() + SECOND_NS // 1000)
+        reader.stop()
+        assert disk[0].hangs.wait(WAIT_S)
+        assert (recorder.status.dropped_records, recorder.status.records) == (0, 1)
+        disk[0].goes.set()
+    os.close(device)
+    os.close(port)
+    data = [record.payload for record in read_log(tmp_path / "run.wire") if record.kind is Kind.DATA]
+    assert b"".join(data) == sent
+
+
+def write_all(device: int, data: bytes) -> None:
+    """Write everything; it waits where nobody reads."""
+    while data:
+        data = data[os.write(device, data) :]
+
+
+def fionread(port: int) -> int:
+    """Return how many bytes a terminal holds that nobody has read."""
+    return int.from_bytes(fcntl.ioctl(port, termios.FIONREAD, b"\0" * 4), sys.byteorder)
+
+
+def swinging(number: int) -> bytes:
+    """One frame of an A02YYUW, ten a second, over a bob of 0.9 s."""
+    high, low = divmod(round(400.0 + 50.0 * np.cos(2.0 * np.pi * number / 9.0)), 256)
+    return bytes([0xFF, high, low, (0xFF + high + low) % 256])
+
+
+def test_what_did_not_fit_is_a_gap_with_its_time_and_length(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Ten seconds beyond a small queue: the run has the event, the gap where they are missing, and says so."""
+    disk: list[Hanging] = []
+
+    def hanging(path: Path) -> LogFile:
+        disk.append(Hanging(path))
+        return disk[0]
+
+    header = LogHeader(sensors=(SensorEntry(0, "ffhls"),), mono_ns=0, unix_ns=0)
+    room = 50 * (HEAD_BYTES + 4)
+    with Recorder(tmp_path / "run.wire", header, VirtualClock(), queue_bytes=room, open_file=hanging) as recorder:
+        for number in range(400):
+            if number == 100:
+                recorder.drain()
+                disk[0].goes.clear()
+            recorder.put(0, SECOND_NS * number // 10, swinging(number))
+            if number == 100:
+                assert disk[0].hangs.wait(WAIT_S)
+            if number == 249:
+                disk[0].goes.set()
+            if disk[0].goes.is_set():
+                recorder.drain()
+    assert recorder.status.dropped_records == 99
+    assert main(["recover", str(tmp_path / "run.wire")]) == 0
+    with open_run(tmp_path / "run.h5") as run:
+        (event,) = run.provenance["events"]
+        (gap,) = run.provenance["decoding"]["gaps"]
+    assert event["kind"] == "overflow"
+    assert (event["facts"]["records"], event["facts"]["first_ns"]) == (99, 15_100_000_000)
+    assert event["t_s"] == pytest.approx(24.9)
+    assert gap == {"index": 151, "length_s": pytest.approx(10.0), "lost": 99}
+    capsys.readouterr()
+    assert main(["analyse", str(tmp_path / "run.h5"), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["estimates"]["period"]["value"] == pytest.approx(0.9, rel=1e-3)
