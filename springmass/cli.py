@@ -183,7 +183,7 @@ def _add_analyse(parser: argparse.ArgumentParser) -> None:
 def _add_clock(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--clock-ppm",
-        type=_positive,
+        type=_ppm,
         metavar="PPM",
         help="what the sensor's clock may be off at most (default: as its family says)",
     )
@@ -301,7 +301,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--title", default="", metavar="TEXT", help="title of the run")
     parser.add_argument("--baud", type=int, metavar="B", help="speed of the port (default: the family's)")
-    parser.add_argument("--rate-hz", type=_positive, metavar="R", help="readings per second that the sensor is set to")
+    parser.add_argument("--rate-hz", type=_pace, metavar="R", help="readings per second that the sensor is set to")
     parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="option of the decoder")
     parser.add_argument("--still", type=_positive, metavar="S", help="measure rest position and noise first, so long")
     parser.add_argument(
@@ -320,7 +320,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--roll-hours", type=_positive, metavar="H", help="begin another log after this, too")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated bench's noise (default 0)")
     parser.add_argument(
-        "--crystal-ppm", type=_finite, default=0.0, metavar="PPM", help="of the simulated sensor's clock"
+        "--crystal-ppm", type=_crystal, default=0.0, metavar="PPM", help="of the simulated sensor's clock"
     )
 
 
@@ -364,6 +364,9 @@ def _where(holds: Callable[[float], bool], demand: str) -> Callable[[str], float
 
 _share = _where(lambda x: 0.0 <= x <= 1.0, "must lie in 0 to 1")
 _echo_share = _where(lambda x: 0.0 <= x <= 0.4, "must lie between 0 and 0.4")
+_pace = _where(lambda x: 1e-4 <= x <= 1e6, "must lie in 0.0001 to 1000000")
+_ppm = _where(lambda x: 1e-3 <= x <= 1e6, "must lie in 0.001 to 1000000")
+_crystal = _where(lambda x: abs(x) <= 5e5, "must lie in -500000 to 500000")
 _positive = _where(lambda x: x > 0.0, "must be positive")
 _not_negative = _where(lambda x: x >= 0.0, "must not be negative")
 

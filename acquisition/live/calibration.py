@@ -16,6 +16,7 @@ from acquisition.errors import CalibrationError
 __all__ = ["Calibration", "StillPoint", "against_ruler", "from_still"]
 
 SPEED_OF_SOUND_M_PER_S = 344.0
+RANGES = {"scale": (0.01, 100.0), "offset_m": (-1000.0, 1000.0), "u_scale": (0.0, 100.0), "u_offset_m": (0.0, 1000.0)}
 MAD_TO_SIGMA = 1.482602218505602
 
 
@@ -49,8 +50,11 @@ class Calibration:
                 f"the speed of sound must lie between 100 and 2000 m/s, got {self.speed_of_sound_m_per_s:g}; "
                 "air at room temperature has 344"
             )
-        if not (math.isfinite(self.scale) and self.scale > 0 and math.isfinite(self.offset_m)):
-            raise CalibrationError(f"scale must be positive and offset finite, got {self.scale:g}, {self.offset_m:g} m")
+        for name, (low, high) in RANGES.items():
+            if not low <= getattr(self, name) <= high:
+                raise CalibrationError(
+                    f"{name} of a calibration must lie in {low:g} to {high:g}, got {getattr(self, name):g}"
+                )
 
     def distance(self, echo_us: ArrayLike, distance_m: ArrayLike) -> F8:
         """Return distances in m of echo times in us, or of stated ones in m where there are none; NaN for neither."""

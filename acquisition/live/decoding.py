@@ -15,13 +15,15 @@ from acquisition.decoders.family import Family
 from acquisition.decoders.framed import FramedDecoder
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM, fit_clock
-from acquisition.live.timebase import Timebase
+from acquisition.live.timebase import Timebase, demand_within
 from acquisition.readings import NO_READINGS, Reading, Readings
 from acquisition.source import SourceInfo
 
 __all__ = ["SensorChain"]
 
 _NONE: tuple[tuple[float, ...], ...] = ((),) * len(Reading._fields)
+CLOCKS_PPM = (1e-3, 1e6)
+"""What anybody may say of a clock: from an atomic one to one that may stand still."""
 MISSING, GAP_BEFORE = np.uint8(Flag.MISSING), np.uint8(Flag.GAP_BEFORE)
 
 
@@ -38,6 +40,11 @@ class SensorChain:
     calibration : Calibration, optional
     clock_ppm : float, optional
         What its clock may be off at most, ppm; left out, the family's, or a counter's 100 000.
+
+    Raises
+    ------
+    SensorError
+        If an option, the rate or the clock is none that a sensor can have.
     """
 
     def __init__(
@@ -53,7 +60,9 @@ class SensorChain:
         self.family = family
         self.calibration = calibration or Calibration()
         self.decoder = family.decoder(**(options or {}))
-        self.timebase = Timebase(rate_hz or family.rate_hz)
+        self.timebase = Timebase(family.rate_hz if rate_hz is None else rate_hz)
+        if clock_ppm is not None:
+            demand_within("clock_ppm", clock_ppm, *CLOCKS_PPM)
         self._clock_ppm = clock_ppm
         self.last: Readings = NO_READINGS
         self._next = 0

@@ -6,14 +6,17 @@ is used wherever it is sent, and the host clock is regressed on it to find the c
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from acquisition.block import Flag
+from acquisition.errors import SensorError
 from acquisition.readings import Reading
 from acquisition.source import ClockKind
 
-__all__ = ["Gap", "Timebase"]
+__all__ = ["RATES_HZ", "Gap", "Timebase", "demand_within"]
+
+RATES_HZ = (1e-4, 1e6)
+"""Readings per second that a sensor may be set to: one in three hours, and more than any wire carries."""
 
 WRAP_US = 1 << 32
 WRAP_S = WRAP_US * 1e-6
@@ -39,6 +42,18 @@ class Gap:
     lost: int
 
 
+def demand_within(what: str, value: object, low: float, high: float) -> None:
+    """Demand a number of a range.
+
+    Raises
+    ------
+    SensorError
+        Naming what, the range and what it was.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise SensorError(f"{what} of a sensor must be a number from {low:g} to {high:g}, got {value!r}")
+
+
 class Timebase:
     """Gives every reading its sensor time, run by run.
 
@@ -46,6 +61,11 @@ class Timebase:
     ----------
     rate_hz : float
         Nominal readings per second, Hz: turns a counter into time, and a missing stretch into lost readings.
+
+    Raises
+    ------
+    SensorError
+        If the rate is not of :data:`RATES_HZ`.
 
     Notes
     -----
@@ -60,8 +80,7 @@ class Timebase:
     """
 
     def __init__(self, rate_hz: float) -> None:
-        if not (math.isfinite(rate_hz) and rate_hz > 0):
-            raise ValueError(f"rate_hz must be positive and finite, got {rate_hz}")
+        demand_within("rate_hz", rate_hz, *RATES_HZ)
         self.rate_hz = rate_hz
         self._period_s = 1.0 / rate_hz
         self._jitter_s = max(0.25, 3.0 / rate_hz)

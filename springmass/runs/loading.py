@@ -229,7 +229,8 @@ def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str,
     if info.clock != "device" or samples.host_ns is None or not (samples.host_ns >= 0).all():
         return {}
     fit = fit_clock(samples.t, samples.host_ns)
-    limit_ppm = provenance.get("decoding", {}).get("clock", {}).get("limit_ppm", RESONATOR_PPM)
+    noted = provenance.get("decoding", {}).get("clock", {}).get("limit_ppm")
+    limit_ppm = noted if isinstance(noted, (int, float)) else RESONATOR_PPM
     told = {"clock_limit": limit_ppm * 1e-6, "held_samples": fit.held, "longest_stall_s": fit.longest_stall_s}
     if not np.isfinite(fit.rate_error_ppm):
         return told

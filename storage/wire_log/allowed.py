@@ -34,7 +34,6 @@ _SENSOR = Table(
         "options": Table(other=Json(1)),
         "calibration": _CALIBRATION,
         "clock_ppm": Optional(Number(1e-3, 1e6)),
-        "clock_ppm": Optional(Number(0.0, 1e6)),
     },
 )
 _HEADER = Table(
