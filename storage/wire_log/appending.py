@@ -16,7 +16,7 @@ Examples
 ...     for record in read_log(folder + "/run.wire"):
 ...         print(record.sequence, record.kind.name, len(record.payload))
 1
-0 HEADER 248
+0 HEADER 265
 1 DATA 6
 """
 
