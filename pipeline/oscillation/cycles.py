@@ -12,7 +12,7 @@ from pipeline.oscillation.condition import Conditioned
 from pipeline.track import F8
 
 FEW_PERIODS = 4.5  # below which the spectrum's peak is displaced by the line's own image
-HOLE = 8.0  # sample intervals without a usable sample that make a hole
+HOLE = 8.0  # sample intervals without a sample that make a hole
 MOSTLY_HOLES = 0.2  # share of the record beyond which straight lines over holes would be seen for a motion
 SHORTFALL = 0.05  # periods by which a record of one and a half may be misjudged
 
@@ -120,7 +120,7 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
         return NoOscillation(
             f"the distance stays within {spread * 1e3:.3g} mm: nothing moves, or the sensor reads one fixed object"
         )
-    line = _spectral_line(t, y, track.rate_hz, params.false_alarm)
+    line = _spectral_line(t, y, track.t, track.rate_hz, params.false_alarm)
     if isinstance(line, NoOscillation):
         return line
     frequency_hz, amplitude_m = line
@@ -138,7 +138,9 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     return Cycles(frequency_hz, count, _bounds(track.t, used, frequency_hz, track.rate_hz, periods), periods)
 
 
-def _spectral_line(t: F8, y: F8, rate_hz: float, false_alarm: float) -> tuple[float, float] | NoOscillation:
+def _spectral_line(
+    t: F8, y: F8, recorded: F8, rate_hz: float, false_alarm: float
+) -> tuple[float, float] | NoOscillation:
     """Frequency, Hz, and mean amplitude, m, of the strongest line."""
     n = max(round(float(t[-1] - t[0]) * rate_hz) + 1, 8)
     if n > 50 * t.size:
@@ -147,7 +149,7 @@ def _spectral_line(t: F8, y: F8, rate_hz: float, false_alarm: float) -> tuple[fl
     grid = t[0] + ordinal / rate_hz
     # Times that are equally spaced but for rounding need no interpolation.
     regular = t.size == n and float(np.abs(t - grid).max()) <= 1e-9 / rate_hz
-    values = y if regular else _bridged(grid, t, y, rate_hz)
+    values = y if regular else _bridged(grid, t, y, recorded, HOLE / rate_hz)
     centred = ordinal - 0.5 * (n - 1)
     values = values - values.sum() / n
     values -= centred * (float(centred @ values) / float(centred @ centred))
@@ -161,14 +163,14 @@ def _spectral_line(t: F8, y: F8, rate_hz: float, false_alarm: float) -> tuple[fl
     return NoOscillation("no line stands out of the spectrum's noise: there is no oscillation to be seen")
 
 
-def _bridged(grid: F8, t: F8, y: F8, rate_hz: float) -> F8:
-    """Return samples at the times of a grid."""
+def _bridged(grid: F8, t: F8, y: F8, recorded: F8, hole_s: float) -> F8:
+    """Return samples at the times of a grid: by straight lines, by their mean where mostly nothing was recorded."""
     values = np.asarray(np.interp(grid, t, y))
-    step = np.diff(t)
-    holes = np.flatnonzero(step > HOLE / rate_hz)
-    if float(step[holes].sum()) > MOSTLY_HOLES * float(t[-1] - t[0]):
-        before = np.searchsorted(t, grid, side="right") - 1
-        values[np.isin(before, holes)] = y.mean()
+    latest = np.maximum.accumulate(recorded[np.isfinite(recorded)])
+    step = np.diff(latest)
+    if float(step[step > hole_s].sum()) > MOSTLY_HOLES * float(latest[-1] - latest[0]):
+        before = np.searchsorted(latest, grid, side="right") - 1
+        values[np.append(step > hole_s, False)[before]] = y.mean()
     return values
 
 
