@@ -364,8 +364,8 @@ def _where(holds: Callable[[float], bool], demand: str) -> Callable[[str], float
 
 _share = _where(lambda x: 0.0 <= x <= 1.0, "must lie in 0 to 1")
 _echo_share = _where(lambda x: 0.0 <= x <= 0.4, "must lie between 0 and 0.4")
-_pace = _where(lambda x: 1e-4 <= x <= 1e6, "must lie in 0.0001 to 1000000")
-_ppm = _where(lambda x: 1e-3 <= x <= 1e6, "must lie in 0.001 to 1000000")
+_pace = _where(lambda x: 1e-3 <= x <= 1e6, "must lie in 0.001 to 1000000")
+_ppm = _where(lambda x: 0.0 <= x <= 1e6, "must lie in 0 to 1000000")
 _crystal = _where(lambda x: abs(x) <= 5e5, "must lie in -500000 to 500000")
 _positive = _where(lambda x: x > 0.0, "must be positive")
 _not_negative = _where(lambda x: x >= 0.0, "must not be negative")

@@ -16,7 +16,7 @@ from acquisition.errors import CalibrationError
 __all__ = ["Calibration", "StillPoint", "against_ruler", "from_still"]
 
 SPEED_OF_SOUND_M_PER_S = 344.0
-RANGES = {"scale": (0.01, 100.0), "offset_m": (-1000.0, 1000.0), "u_scale": (0.0, 100.0), "u_offset_m": (0.0, 1000.0)}
+RANGES = {"scale": (1e-3, 1e3), "offset_m": (-1e4, 1e4), "u_scale": (0.0, 1e3), "u_offset_m": (0.0, 1e4)}
 MAD_TO_SIGMA = 1.482602218505602
 
 

@@ -22,8 +22,8 @@ from acquisition.source import SourceInfo
 __all__ = ["SensorChain"]
 
 _NONE: tuple[tuple[float, ...], ...] = ((),) * len(Reading._fields)
-CLOCKS_PPM = (1e-3, 1e6)
-"""What anybody may say of a clock: from an atomic one to one that may stand still."""
+CLOCKS_PPM = (0.0, 1e6)
+"""What anybody may say of a clock: from one that is right to one that may stand still."""
 MISSING, GAP_BEFORE = np.uint8(Flag.MISSING), np.uint8(Flag.GAP_BEFORE)
 
 

@@ -15,8 +15,8 @@ from acquisition.source import ClockKind
 
 __all__ = ["RATES_HZ", "Gap", "Timebase", "demand_within"]
 
-RATES_HZ = (1e-4, 1e6)
-"""Readings per second that a sensor may be set to: one in three hours, and more than any wire carries."""
+RATES_HZ = (1e-6, 1e9)
+"""Readings per second that a sensor may be set to: more and fewer than any bench has."""
 
 WRAP_US = 1 << 32
 WRAP_S = WRAP_US * 1e-6

@@ -30,10 +30,10 @@ _SENSOR = Table(
     may={
         "port": Text(4096),
         "baud": Number(0, 1e9, whole=True),
-        "rate_hz": Optional(Number(1e-4, 1e6)),
+        "rate_hz": Optional(Number(1e-6, 1e9)),
         "options": Table(other=Json(1)),
         "calibration": _CALIBRATION,
-        "clock_ppm": Optional(Number(1e-3, 1e6)),
+        "clock_ppm": Optional(Number(0.0, 1e6)),
     },
 )
 _HEADER = Table(

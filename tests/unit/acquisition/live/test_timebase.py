@@ -188,10 +188,10 @@ def test_the_first_reading_decides_the_clock() -> None:
     assert base.clock == "device"
 
 
-@pytest.mark.parametrize("rate_hz", [0.0, -1.0, math.nan, math.inf, 1e-320, 1e-5, 1e7, 1e300, "100", True, None])
+@pytest.mark.parametrize("rate_hz", [0.0, -1.0, math.nan, math.inf, 1e-320, 1e-7, 1e10, 1e300, "100", True, None])
 def test_a_rate_is_of_a_range(rate_hz: Any) -> None:
     """Any other rate, or what is no number, is refused with the range and its value."""
-    with pytest.raises(SensorError, match=r"rate_hz of a sensor must be a number from 0.0001 to 1e\+06, got"):
+    with pytest.raises(SensorError, match=r"rate_hz of a sensor must be a number from 1e-06 to 1e\+09, got"):
         Timebase(rate_hz)
 
 
