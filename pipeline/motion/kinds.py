@@ -113,7 +113,7 @@ def see_windows(
     segments = None
     if (rest := _at_rest(conditioned)) is not None:
         conditioned, segments = condition(rest.flagged(conditioned.track), conditioning), rest
-    seen, stopped = _see_cycles(conditioned, cycles)
+    seen, stopped = _see_cycles(conditioned, cycles, 0.25 if rest is None else 0.75)
     if isinstance(seen, NoOscillation):
         return seen
     demodulated = demodulate(conditioned, seen, demodulation)
@@ -149,10 +149,12 @@ def _at_rest(conditioned: Conditioned) -> Segments | None:
     return Segments(-math.inf, last_s, (Span("at_rest", last_s, float(t[-1])),))
 
 
-def _see_cycles(conditioned: Conditioned, params: CyclesParams) -> tuple[Cycles | NoOscillation, bool]:
-    """Return the cycles, of the moving part where the bob stops early, and whether it does."""
+def _see_cycles(
+    conditioned: Conditioned, params: CyclesParams, early: float = 0.25
+) -> tuple[Cycles | NoOscillation, bool]:
+    """Return the cycles, of the moving part where the bob stops early in the record, and whether it does."""
     cycles = find_cycles(conditioned, params)
-    moving = moving_part(conditioned, 0.75 if isinstance(cycles, NoOscillation) else 0.25)
+    moving = moving_part(conditioned, 0.75 if isinstance(cycles, NoOscillation) else early)
     if moving is None or isinstance(trimmed := find_cycles(moving, params), NoOscillation):
         return cycles, False
     return trimmed, True

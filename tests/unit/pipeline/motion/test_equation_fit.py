@@ -89,7 +89,8 @@ def test_strong_damping_gives_law_spring_constant_and_coefficients(law: str, coe
         assert "strongly_damped" in {finding.code for finding in result.findings}
         assert law in damping.admissible
         found.append(damping.selected == law)
-        e, joint = result.estimates, damping.fits[law].joint
+        # Scale and spring have uncertainties of their own, which no noise uses up.
+        e, joint = result.motion.derived.statistical, damping.fits[law].joint
         assert damping.fits[law].reduced_chi2 == pytest.approx(1.0, abs=0.05)
         assert abs(e["noise"].value - 3e-4) < 4.0 * e["noise"].u
         assert e["noise"].u < 0.2 * 3e-4
@@ -178,7 +179,8 @@ def test_false_echoes_leave_the_fit() -> None:
     echoes = rng.random(T.size) < 0.05
     y[echoes] = rng.uniform(0.1, 1.5, np.count_nonzero(echoes))
     result = analyse(Track.from_arrays(T, y), SPRING)
-    k = result.estimates["spring_constant"]
+    assert isinstance(result.motion, Oscillation)
+    k = result.motion.derived.statistical["spring_constant"]
     assert abs(k.value - OMEGA**2 * MASS) < 3.0 * k.u
     assert k.u < 3e-4 * k.value
     assert result.quality["false_echo"] >= 0.9 * np.count_nonzero(echoes)

@@ -48,12 +48,10 @@ def share(result: Analysis, quantity: str, name: str) -> float:
     [
         (lambda x: x + 0.05 * x**2 / AMPLITUDE, "a scale that is bent"),
         (lambda x: AMPLITUDE * np.tanh(x / AMPLITUDE), "odd harmonics"),
-        (lambda x: np.where(x > 0.5 * AMPLITUDE, 0.25 * AMPLITUDE + 0.5 * x, x), "towards the far turning point"),
-        (lambda x: np.where(x < -0.5 * AMPLITUDE, -0.25 * AMPLITUDE + 0.5 * x, x), "towards the near turning point"),
     ],
 )
 def test_waves_locked_to_the_oscillation_are_named(bend: object, words: str) -> None:
-    """A bent scale, one that levels off, an echo near either end are named, and amplitude and rest covered."""
+    """A bent scale and one that levels off are named, and amplitude and rest covered."""
     assert callable(bend)
     result = analysed(REST + bend(displaced()) + noise(1))
     assert words in told(result)["not_sinusoidal"]
@@ -62,6 +60,16 @@ def test_waves_locked_to_the_oscillation_are_named(bend: object, words: str) -> 
         abs(result.estimates["amplitude"].value - AMPLITUDE) < 4.0 * result.estimates["amplitude"].u + 0.2 * AMPLITUDE
     )
     assert abs(result.estimates["offset"].value - REST) < 4.0 * result.estimates["offset"].u
+
+
+@pytest.mark.parametrize("end", [1.0, -1.0])
+def test_an_echo_that_moves_slower_near_one_end_is_left_out(end: float) -> None:
+    """Half the bob's speed beyond half the swing is no motion: it is named, and amplitude and rest are the bob's."""
+    slower = np.where(end * displaced() > 0.5 * AMPLITUDE, end * 0.25 * AMPLITUDE + 0.5 * displaced(), displaced())
+    result = analysed(REST + slower + noise(1))
+    assert "locked_echoes" in told(result)
+    for name, true in (("amplitude", AMPLITUDE), ("offset", REST)):
+        assert abs(result.estimates[name].value - true) < 4.0 * result.estimates[name].u
 
 
 def test_wave_too_small_to_tell_enters_the_uncertainty_without_a_word() -> None:
