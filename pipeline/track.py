@@ -151,6 +151,7 @@ class Track:
         Parameters
         ----------
         t : (n,) array_like, s
+            NaN, or infinite, where unknown.
         y : (n,) array_like, m
             NaN where unmeasured.
         rate_hz : float, optional

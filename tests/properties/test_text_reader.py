@@ -10,7 +10,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from acquisition.errors import FormatError
@@ -176,6 +176,7 @@ def read_both(oracle: ModuleType, body: str, columns: int, delimiter: str, newli
 
 @settings(max_examples=600, deadline=None)
 @given(drawn=bodies())
+@example(drawn=("\n", 1, "\t"))  # no row at all
 def test_pages_are_read_as_plain_python_reads_rows(rows_oracle: ModuleType, drawn: tuple[str, int, str]) -> None:
     """Reading all rows at once gives the same numbers as reading row by row with float()."""
     read_both(rows_oracle, *drawn)

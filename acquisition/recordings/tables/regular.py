@@ -173,6 +173,8 @@ def read_single(cell: str, shift: int) -> tuple[float, int]:
 def _load(lines: bytes, mark: str, columns: Sequence[int], cells: int, dtype: type[np.generic]) -> NDArray[Any] | None:
     """Hand lines that are not empty to numpy.loadtxt; None where a cell asked for is no number, or not ASCII."""
     some = None if list(columns) == list(range(cells)) else columns
+    if not lines.strip(b"\n"):  # loadtxt warns of what holds no row
+        return None
     try:
         return np.loadtxt(lines.decode("ascii").split("\n"), dtype, None, mark, usecols=some, ndmin=2)
     except ValueError:
