@@ -30,6 +30,7 @@ MOVING = 4.0  # standard uncertainties that two windows running must have for th
 HELD = 0.75  # periods for which a distance stays on a plateau only where a hand holds the bob
 BRIDGED = 3  # samples off such a plateau that noise takes there
 STRONG = 0.06  # fall of the logarithm of the amplitude in a window beyond which no five windows tell the next
+ECHOED = 0.9  # of the samples of the fullest window: what half of the windows have at least
 THIRD = 0.3853204664075677  # 0.3-quantile of |x| for a standard normal x
 PAUSE = 4  # windows without any free oscillation between two that make a restart
 TURNED = 0.06  # relative change of the amplitude below which, if less than a third of the turn, the phase alone jumped
@@ -161,6 +162,9 @@ def find_segments(
     if moving < (1.0 - params.rest_share) * seen.t.size:
         return _faded(seen, moving)
     if seen.fall > STRONG or seen.runs_on(params.sigmas):
+        return None
+    # Echoes in clusters all over a record pull whole windows: what looks like a touch there is none.
+    if np.median(demodulated.count) < ECHOED * np.max(demodulated.count):
         return None
     across = seen.across()
     # A third of the windows show what the motion does by itself, however much the hand did in the others.

@@ -103,7 +103,7 @@ ANY_FLOATS = st.lists(st.floats(width=64), max_size=12)
 
 @given(ANY_FLOATS, ANY_FLOATS, st.one_of(st.none(), st.floats()))
 def test_any_numbers_make_a_track_or_a_track_error(t: list[float], y: list[float], rate: float | None) -> None:
-    """Whatever the numbers, there is a track of them, infinite times as unknown ones, or a PipelineError; no warning."""
+    """Whatever the numbers, there is a track of them, infinite times as unknown, or a PipelineError; no warning."""
     try:
         track = Track.from_arrays(t, y, rate_hz=rate)
     except PipelineError:
