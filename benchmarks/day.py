@@ -24,7 +24,7 @@ from pathlib import Path
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from springmass.session.session import Progress, Sensor, Session
-from storage.recover import recover
+from storage.recovery.recover import recover
 from storage.wire_log.scanning import read_log
 
 RATE_HZ = 100

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.analyse import analyse
 from springmass import load, sample_data
-from springmass.runs.loading import read_scene
+from springmass.runs.scenes import read_scene
 
 RATIOS = Path(__file__).with_name("ratios.py")
 

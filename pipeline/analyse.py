@@ -9,6 +9,12 @@ import numpy as np
 
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
+from pipeline.checks.clock_findings import judge_clock
+from pipeline.checks.finding import Finding, by_severity
+from pipeline.checks.plausibility import judge_plausibility
+from pipeline.checks.sample_findings import STEPS, count_quality, find_clusters, judge_samples
+from pipeline.checks.segment_findings import judge_rows, judge_segments
+from pipeline.checks.self_check import Checked, check_residuals, holding, judge_held
 from pipeline.damping import select as dampings
 from pipeline.errors import AnalysisError
 from pipeline.motion import equation_fit as equations
@@ -30,14 +36,9 @@ from pipeline.oscillation import segments as segmentation
 from pipeline.oscillation.condition import Conditioned, coarsest_step, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
 from pipeline.results import derive as derivation
-from pipeline.results.clock_findings import judge_clock
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
-from pipeline.results.findings import Finding, by_severity, judge, judge_fits, judge_overdamped, judge_scene
-from pipeline.results.plausibility import judge_plausibility
-from pipeline.results.sample_findings import STEPS, count_quality, find_clusters, judge_samples
-from pipeline.results.segment_findings import judge_rows, judge_segments
-from pipeline.results.self_check import Checked, check_residuals, holding, judge_held
+from pipeline.results.findings import judge, judge_fits, judge_overdamped, judge_scene
 from pipeline.track import U8, Track
 
 __all__ = ["STANDARD", "Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from pipeline.results.classic import classic
     from pipeline.results.compare import SpringRun, compare_springs
     from pipeline.track import Track
-    from springmass.runs.loading import Loaded, load, read_scene, sample_data
+    from springmass.runs.loading import Loaded, load, sample_data
+    from springmass.runs.scenes import read_scene
     from storage.run_file.reading import open_run
     from storage.run_file.writing import write_run
 
@@ -65,7 +66,7 @@ _WHERE = {
     "compare_springs": "pipeline.results.compare",
     "load": "springmass.runs.loading",
     "open_run": "storage.run_file.reading",
-    "read_scene": "springmass.runs.loading",
+    "read_scene": "springmass.runs.scenes",
     "sample_data": "springmass.runs.loading",
     "write_run": "storage.run_file.writing",
 }

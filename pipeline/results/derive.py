@@ -14,6 +14,7 @@ from pipeline.bench.added_mass import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
+from pipeline.checks.self_check import Misfit
 from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
@@ -25,7 +26,6 @@ from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, estimate_of, function_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
-from pipeline.results.self_check import Misfit
 from pipeline.track import F8, UNUSABLE, Quality
 
 __all__ = ["Derived", "Params", "derive"]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterator
 
 import numpy as np
 
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE
+from pipeline.checks.finding import GRAVITY_M_PER_S2, Finding, by_severity
 from pipeline.damping.laws import LAWS
 from pipeline.damping.mixture import MixedDrag, find_mixed
 from pipeline.damping.select import Damping
@@ -24,29 +23,7 @@ from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
 from pipeline.results.effects import Effect
 
-__all__ = ["Finding", "Severity", "by_severity", "judge", "judge_fits", "judge_overdamped", "judge_scene"]
-
-GRAVITY_M_PER_S2 = 9.81
-
-Severity = Literal["info", "warning", "error"]
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One sentence about a run.
-
-    Parameters
-    ----------
-    code : str
-        From the closed list of the program's findings.
-    severity : {"info", "warning", "error"}
-        An error means that a number of the result must not be used.
-    message : str
-    """
-
-    code: str
-    severity: Severity
-    message: str
+__all__ = ["judge", "judge_fits", "judge_overdamped", "judge_scene"]
 
 
 def judge_overdamped(found: Overdamped) -> Finding:
@@ -156,12 +133,6 @@ def judge(
         *_mode_findings(demodulated, phase, disturbances),
     ]
     return by_severity(findings)
-
-
-def by_severity(*groups: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return all findings, the gravest first, else in their order."""
-    rank = {"error": 0, "warning": 1, "info": 2}
-    return tuple(sorted((one for group in groups for one in group), key=lambda finding: rank[finding.severity]))
 
 
 def _damping_findings(damping: Damping) -> Iterator[Finding]:

@@ -13,7 +13,8 @@ from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder
 from springmass.runs.json_results import REJECTED_WARNINGS, picked
-from springmass.runs.loading import load, read_scenes
+from springmass.runs.loading import load
+from springmass.runs.scenes import read_scenes
 from storage.errors import StorageError
 
 __all__ = ["run"]

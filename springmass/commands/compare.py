@@ -11,7 +11,8 @@ from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
 from springmass.runs.json_results import picked, provenance_of
-from springmass.runs.loading import load, read_scenes
+from springmass.runs.loading import load
+from springmass.runs.scenes import read_scenes
 
 __all__ = ["run"]
 

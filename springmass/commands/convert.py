@@ -12,7 +12,8 @@ from acquisition.recordings.writers import WRITERS
 from springmass.commands import completions
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, tell
 from springmass.runs.analysing import made_now
-from springmass.runs.loading import Loaded, load, read_scene
+from springmass.runs.loading import Loaded, load
+from springmass.runs.scenes import read_scene
 from storage.atomic import write_whole
 from storage.run_file.writing import write_run
 

@@ -14,7 +14,8 @@ from springmass.report.tables import text_table
 from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed, analyse_loaded, make_folder
 from springmass.runs.comparing import compare_analysed
-from springmass.runs.loading import load, read_scene, sample_data
+from springmass.runs.loading import load, sample_data
+from springmass.runs.scenes import read_scene
 
 __all__ = ["run"]
 

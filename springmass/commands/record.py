@@ -26,7 +26,7 @@ from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
 from springmass.runs.analysing import made_now
-from springmass.runs.loading import read_scene
+from springmass.runs.scenes import read_scene
 from springmass.session.console import Console
 from springmass.session.output import demand_new
 from springmass.session.progress_line import ProgressLine
@@ -34,7 +34,7 @@ from springmass.session.session import BYTES_PER_READ, Ended, Sensor, Session, T
 from springmass.session.stops import Stops
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
-from storage.recover import RecoverReport, recover
+from storage.recovery.recover import RecoverReport, recover
 from storage.wire_log.appending import Roll
 
 __all__ = ["run"]

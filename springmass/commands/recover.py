@@ -7,7 +7,7 @@ from pathlib import Path
 
 from springmass.errors import OK, tell
 from springmass.runs.analysing import made_now
-from storage.recover import recover
+from storage.recovery.recover import recover
 
 __all__ = ["run"]
 

@@ -25,7 +25,8 @@ from pipeline.track import F8
 from springmass.commands import completions
 from springmass.errors import OK, USAGE, ProgramError, tell
 from springmass.runs.analysing import in_a_name, made_now, make_folder
-from springmass.runs.loading import load, read_scene
+from springmass.runs.loading import load
+from springmass.runs.scenes import read_scene
 from springmass.runs.simulation import (
     Against,
     Simulation,

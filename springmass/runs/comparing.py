@@ -8,11 +8,11 @@ from typing import Any
 
 from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
+from pipeline.checks.finding import Finding
 from pipeline.damping.joint import JointDamping, JointFit, fit_joint
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
-from pipeline.results.findings import Finding
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.analysing import Analysed
 from springmass.runs.json_results import SCHEMA, picked, plain

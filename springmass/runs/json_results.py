@@ -11,9 +11,9 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from pipeline.analyse import Analysis, Oscillation
+from pipeline.checks.finding import Finding, by_severity
 from pipeline.results.budget import Contribution
 from pipeline.results.classic import Classic
-from pipeline.results.findings import Finding, by_severity
 from springmass import __version__
 from springmass.runs.loading import Loaded
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,30 +14,23 @@ from typing import Any, Literal
 import numpy as np
 
 from acquisition.block import Block
-from acquisition.decoders.family import RESONATOR_PPM
-from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
-from acquisition.live.clock_fit import fit_clock
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular import open_regular
 from acquisition.source import SourceInfo
-from pipeline.bench.scene import Scene
-from pipeline.errors import SceneError
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, USAGE, ProgramError, complain
+from springmass.runs.tracks import to_track
 from storage.errors import RunDamaged
-from storage.recover import recover
+from storage.recovery.recover import recover
 from storage.run_file.layout import MAGIC
 from storage.run_file.reading import CHECKED, open_run
 from storage.wire_log.records import MAGIC as WIRE_MAGIC
 
-__all__ = ["Loaded", "kind_of", "load", "read_scene", "read_scenes", "sample_data", "to_track"]
+__all__ = ["Loaded", "kind_of", "load", "sample_data"]
 
 UNVERIFIED = "unverified"
 NAMED = 5  # differences that a message names
-LONGEST_SCENE = 1 << 14  # bytes; of longer ones some take seconds to parse
-MOTION_SENSOR = "motion-sensor"  # fixes the speed of sound
-LINE_PROTOCOL = "line-protocol"  # sends echo times
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,119 +178,6 @@ def load(
     if from_s is None and to_s is None:
         return loaded
     return replace(loaded, track=_between(loaded, from_s, to_s))
-
-
-def to_track(
-    samples: Block, info: SourceInfo, *, recorded_format: str = "", provenance: Mapping[str, Any] | None = None
-) -> Track:
-    """Hand samples over to the pipeline.
-
-    Parameters
-    ----------
-    samples : Block
-    info : SourceInfo
-    recorded_format : str
-        Family of the recording that they come from, if any: it says which speed of sound stands in the distances.
-    provenance : mapping, optional
-        What a run file says of its origin: the sensor that it was recorded with, and what its clock may be off.
-
-    Notes
-    -----
-    The noise stated by a source is passed on; the error column of a file is not noise and travels apart.
-    """
-    return Track(
-        t=samples.t,
-        y=samples.distance,
-        flags=samples.flags,
-        rate_hz=info.rate_hz,
-        sigma_m=info.sigma_m,
-        quantum_m=info.quantum_m,
-        stated_error_m=info.stated_error_m,
-        clock=info.clock,
-        kind=info.kind,
-        velocity=samples.velocity,
-        quantity=samples.quantity,
-        unit=samples.unit,
-        **_clock_comparison(samples, info, provenance or {}),
-        **_scale(recorded_format, (provenance or {}).get("sensor") or {}),
-    )
-
-
-def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """How the device's clock ran against the host's, where stamps of both are there, and what it may be off."""
-    if info.clock != "device" or samples.host_ns is None or not (samples.host_ns >= 0).all():
-        return {}
-    fit = fit_clock(samples.t, samples.host_ns)
-    noted = provenance.get("decoding", {}).get("clock", {}).get("limit_ppm")
-    limit_ppm = noted if isinstance(noted, (int, float)) else RESONATOR_PPM
-    told = {"clock_limit": limit_ppm * 1e-6, "held_samples": fit.held, "longest_stall_s": fit.longest_stall_s}
-    if not np.isfinite(fit.rate_error_ppm):
-        return told
-    rate, u_rate = fit.rate_error_ppm * 1e-6, fit.u_rate_error_ppm * 1e-6
-    return {**told, "rate_error": rate, "u_rate_error": u_rate, "compared_s": fit.span_s}
-
-
-def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
-    """What made distances: the speed of sound where echo times were recorded, and the calibration's uncertainties."""
-    if recorded_format == MOTION_SENSOR:
-        return {"speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
-    if not sensor:
-        return {}
-    calibration = Calibration.from_mapping(sensor.get("calibration", {}))
-    known = {"u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
-    # Families that state a distance have applied a speed of their own that nobody knows.
-    if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
-        known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
-    return known
-
-
-def read_scenes(paths: Sequence[str], count: int) -> list[Scene | None]:
-    """Read one scene a run: one file for all of them, or one for each in their order; None without a file.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 for any other number of files, or as :func:`read_scene`.
-    """
-    if len(paths) not in (0, 1, count):
-        raise ProgramError(
-            f"--scene was given {len(paths)} times for {count} runs; give it once for all of them, "
-            "or once for each in their order",
-            USAGE,
-        )
-    scenes: list[Scene | None] = [read_scene(path) for path in paths] or [None]
-    return scenes * count if len(scenes) == 1 else scenes
-
-
-def read_scene(path: str | Path) -> Scene:
-    """Read a scene file (TOML).
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if it is absent, no TOML, or says something impossible; the line names file, key and value.
-    """
-    try:
-        with open_regular(path) as file:
-            content = file.read(LONGEST_SCENE + 1) or b""
-        if len(content) > LONGEST_SCENE:
-            raise ProgramError(
-                f"{path}: a scene file of at most {LONGEST_SCENE} bytes was demanded, got a longer one; "
-                "name the scene, not the recording",
-                USAGE,
-            )
-        return Scene.from_mapping(tomllib.loads(content.decode()), where=str(path))
-    except OSError as error:
-        raise ProgramError(
-            f"{path}: a scene file was demanded, got none ({error.strerror}); check the name", USAGE
-        ) from error
-    # A number of thousands of digits is a plain ValueError, brackets nested by the thousand end Python's own reader.
-    except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())
-        demand = f"not a TOML file ({reason}); see the scene file in the reference"
-        raise ProgramError(f"{path}: {demand}", USAGE) from error
-    except SceneError as error:
-        raise ProgramError(str(error), USAGE) from error
 
 
 def sample_data() -> Path:

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from springmass.errors import USAGE, ProgramError
-from storage.recover import run_paths
+from storage.recovery.recover import run_paths
 
 __all__ = ["demand_new"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from acquisition.block import UNITS
+from storage.calibration import CALIBRATION_RULE
 from storage.checked import Choice, Json, Number, Optional, Rows, Table, Text
 
 __all__ = ["HEADER_RULE", "LONGEST_HEADER", "MOST_UNWRITTEN"]
@@ -38,17 +39,8 @@ _COLUMNS = Table(
     keys={"time": _SHA256, "distance": _SHA256, "quality": _SHA256},
     may={"distance_errors": _SHA256, "velocity": _SHA256, "sequence": _SHA256, "host_mono_ns": _SHA256},
 )
-_CALIBRATION = Table(
-    may={
-        "speed_of_sound_m_per_s": Number(100.0001, 1999.9999),
-        "scale": Number(1e-9, 1e9),
-        "offset_m": Number(-1e6, 1e6),
-        "u_scale": Number(0.0, 1e9),
-        "u_offset_m": Number(0.0, 1e6),
-    }
-)
 _SENSOR = Table(
-    may={"calibration": _CALIBRATION, "family": Text(), "options": Table(other=Json())},
+    may={"calibration": CALIBRATION_RULE, "family": Text(), "options": Table(other=Json())},
     other=Json(),
 )
 _PROVENANCE = Table(may={"sensor": _SENSOR, "start_time": Optional(Text(200))}, other=Json())

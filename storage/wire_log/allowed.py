@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from storage.calibration import CALIBRATION_RULE
 from storage.checked import Choice, Json, Number, Optional, Rows, Table, Text, ValueRefused, demand, parsed
 
 __all__ = ["LATEST_NS", "LOG_VERSION", "LONGEST_TEXT", "demand_calibration", "event_content", "header_content"]
@@ -16,15 +17,6 @@ LATEST_NS = 1 << 62
 """A host's clock that counts from its start never comes there in 146 years, and UTC in 2116."""
 
 _NS = Number(0, LATEST_NS, whole=True)
-_CALIBRATION = Table(
-    may={
-        "speed_of_sound_m_per_s": Number(100.001, 1999.999),
-        "scale": Number(1e-3, 1e3),
-        "offset_m": Number(-1e4, 1e4),
-        "u_scale": Number(0.0, 1e3),
-        "u_offset_m": Number(0.0, 1e4),
-    }
-)
 _SENSOR = Table(
     keys={"channel": Number(0, 255, whole=True), "family": Text(100)},
     may={
@@ -32,7 +24,7 @@ _SENSOR = Table(
         "baud": Number(0, 1e9, whole=True),
         "rate_hz": Optional(Number(1e-6, 1e9)),
         "options": Table(other=Json(1)),
-        "calibration": _CALIBRATION,
+        "calibration": CALIBRATION_RULE,
         "clock_ppm": Optional(Number(0.0, 1e6)),
     },
 )
@@ -98,4 +90,4 @@ def demand_calibration(facts: Mapping[str, Any]) -> None:
     ------
     ValueRefused
     """
-    demand(_CALIBRATION, facts, "calibration event")
+    demand(CALIBRATION_RULE, facts, "calibration event")

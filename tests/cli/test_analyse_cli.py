@@ -16,8 +16,8 @@ import pytest
 
 import springmass
 from pipeline.accuracy import params_for
+from pipeline.checks.finding import Finding
 from pipeline.results.classic import classic
-from pipeline.results.findings import Finding
 
 Cli = Callable[..., Any]
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import springmass
-from springmass.cli import COMMANDS
+from springmass.arguments import COMMANDS
 
 HEAVY = {
     "numpy",

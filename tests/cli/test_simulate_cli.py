@@ -13,7 +13,7 @@ from acquisition.block import Block
 from acquisition.source import SourceInfo
 from pipeline.dynamics import Equation, Problem, get_integrator
 from springmass import analyse, load
-from springmass.runs.loading import read_scene
+from springmass.runs.scenes import read_scene
 from storage.run_file.writing import write_run
 
 LINEAR = """

@@ -16,10 +16,11 @@ from acquisition.recordings.identify import formats
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS
 from springmass import analyse, load, sample_data
-from springmass.cli import COMMANDS, build_parser, main
+from springmass.arguments import COMMANDS
+from springmass.cli import build_parser, main
 from springmass.runs.analysing import analyse_loaded
 from springmass.runs.json_results import all_findings
-from springmass.runs.loading import read_scene
+from springmass.runs.scenes import read_scene
 from storage.run_file.layout import COLUMNS
 
 ROOT = Path(__file__).resolve().parents[2]

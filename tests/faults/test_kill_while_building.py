@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from storage.recover import recover
+from storage.recovery.recover import recover
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry

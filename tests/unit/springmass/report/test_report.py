@@ -17,10 +17,10 @@ import pytest
 
 from pipeline.analyse import Analysis, Oscillation, Overdamped, Still, analyse
 from pipeline.bench.scene import Scene
+from pipeline.checks.finding import Finding
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
-from pipeline.results.findings import Finding
 from pipeline.track import UNUSABLE, Track
 from springmass.report.budgets import INPUTS, budget_csv, budget_text, budgets_of
 from springmass.report.figures import comparison_figure, draw, motion_figure, render

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from storage.errors import WriteFailed
-from storage.recover import recover, verify_against_log
+from storage.recovery.recover import recover, verify_against_log
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import LogFile, Roll, WireLogWriter, open_log_file
 from storage.wire_log.records import Kind, LogHeader, SensorEntry

@@ -14,12 +14,12 @@ from acquisition.clock import VirtualClock
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from storage import building
-from storage import recover as module
 from storage.atomic import whole_file
 from storage.errors import OutOfMemory, RunDamaged, RunExists
 from storage.recorder import Recorder
-from storage.recover import recover, verify_against_log
+from storage.recovery import building
+from storage.recovery import recover as module
+from storage.recovery.recover import recover, verify_against_log
 from storage.run_file.arrays import Columns, Originals
 from storage.run_file.reading import Run, open_run
 from storage.wire_log import notes

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from storage.losses import Losses
+from storage.recovery.losses import Losses
 from storage.wire_log.records import SensorEntry
 from storage.wire_log.scanning import Damage
 

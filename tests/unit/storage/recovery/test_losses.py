@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.block import Block, Flag
-from storage.losses import Event, LossCount, Losses, end_of
+from storage.recovery.losses import Event, LossCount, Losses, end_of
 
 SECOND_NS = 1_000_000_000
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.checks.finding import GRAVITY_M_PER_S2, Finding
 from pipeline.motion.phase import PhaseFit
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.results.findings import GRAVITY_M_PER_S2, Finding
 from pipeline.track import UNUSABLE
 
 __all__ = ["judge_plausibility"]

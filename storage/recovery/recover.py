@@ -16,11 +16,11 @@ from typing import Any
 
 from acquisition.errors import AcquisitionError
 from storage.atomic import remove_leftovers
-from storage.building import SensorRun
 from storage.checked import ValueRefused
 from storage.errors import RunDamaged, RunExists, StorageError
-from storage.losses import Losses
-from storage.recovered import RecoveredRun, RecoverReport
+from storage.recovery.building import SensorRun
+from storage.recovery.losses import Losses
+from storage.recovery.recovered import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
 from storage.run_file.writing import RunWriter, run_writer
 from storage.wire_log.notes import Notes

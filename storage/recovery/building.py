@@ -12,8 +12,8 @@ import numpy as np
 from acquisition.block import F8, I8, Block
 from acquisition.live.decoding import SensorChain
 from acquisition.recordings.recording import Trap
-from storage.losses import LossCount, end_of
-from storage.recovered import RecoveredRun
+from storage.recovery.losses import LossCount, end_of
+from storage.recovery.recovered import RecoveredRun
 from storage.run_file.writing import RunWriter
 from storage.wire_log.notes import Notes
 from storage.wire_log.records import LogHeader, SensorEntry

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.checks.finding import Finding
 from pipeline.motion.phase import PhaseFit
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
-from pipeline.results.findings import Finding
 from pipeline.track import F8, UNUSABLE
 
 __all__ = ["Checked", "Misfit", "check_residuals", "holding", "judge_held"]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pipeline.checks.finding import Finding
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.rows import count_lost
 from pipeline.oscillation.segments import Break, Segments, Span
-from pipeline.results.findings import Finding
 
 __all__ = ["judge_rows", "judge_segments"]
 

@@ -1,0 +1,283 @@
+"""The arguments of every command and the types of their values; argparse is all that this imports."""
+
+from __future__ import annotations
+
+import argparse
+import math
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["COMMANDS"]
+
+
+def _add_input_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--velocity", metavar="FILE", help="velocity file that belongs to the one position file given")
+    _add_completions(parser)
+
+
+def _add_completions(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--channel", metavar="NAME", help="which channel of the file to take")
+    parser.add_argument("--run", metavar="NAME", help="which run of the file to take, where it holds several")
+    parser.add_argument(
+        "--rate-hz", type=_positive, metavar="R", help="samples per second, where the file does not say"
+    )
+    parser.add_argument(
+        "--unit", metavar="U", help="unit of the channel where the file does not say: m, cm, mm, rad, V, m/s2, N ..."
+    )
+    parser.add_argument("--time", metavar="NAME", help="which column is the time, where the file does not say")
+    parser.add_argument(
+        "--time-unit", metavar="U", help="unit of the times where the file does not say: s, ms, us, ns or min"
+    )
+    _add_unverified(parser)
+
+
+def _add_unverified(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--unverified", action="store_true", help="read a run file that is not what was written; what is made says so"
+    )
+
+
+def _add_analyse(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="+", metavar="INPUT", help="recordings and run files")
+    parser.add_argument(
+        "--scene",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="scene file (TOML): masses, disc, air, sensor; one for all inputs, or again for each in their order",
+    )
+    _add_accuracy(parser)
+    parser.add_argument("--method", choices=("classic",), help="the lab report's own method, to compare against")
+    _add_input_options(parser)
+    parser.add_argument("--from", dest="from_s", type=_finite, metavar="S", help="use samples from this second on")
+    parser.add_argument("--to", dest="to_s", type=_finite, metavar="S", help="use samples up to this second")
+    _add_clock(parser)
+    parser.add_argument("--out", metavar="DIR", help="folder for NAME.results (default: here; with --json: none)")
+    parser.add_argument("--no-report", action="store_true", help="print, but write no files")
+    parser.add_argument("--json", action="store_true", help="one JSON object per input on stdout")
+    parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
+
+
+def _add_clock(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--clock-ppm",
+        type=_ppm,
+        metavar="PPM",
+        help="what the sensor's clock may be off at most (default: as its family says)",
+    )
+
+
+def _add_accuracy(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--accuracy",
+        choices=("fast", "standard", "best"),
+        default="standard",
+        help="how much time to spend for how much accuracy (default standard)",
+    )
+
+
+def _add_compare(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="+", metavar="RUN", help="two recordings or run files and more, of one spring")
+    parser.add_argument(
+        "--scene",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="scene file: one for all runs, or again for each in their order (default: what run files carry)",
+    )
+    _add_accuracy(parser)
+    parser.add_argument(
+        "--mass-correlation",
+        type=_share,
+        default=0.0,
+        metavar="R",
+        help="correlation of the masses' errors, 0 to 1: 1 for one balance whose calibration is the error (default 0)",
+    )
+    _add_completions(parser)
+    parser.add_argument("--from", dest="from_s", type=_finite, metavar="S", help="use samples from this second on")
+    parser.add_argument("--to", dest="to_s", type=_finite, metavar="S", help="use samples up to this second")
+    parser.add_argument("--out", metavar="DIR", help="folder for the report (default: none is written)")
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
+
+
+def _add_demo(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--out", metavar="DIR", default="springmass-demo", help="folder for what it makes (default %(default)s)"
+    )
+
+
+def _add_replay(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", metavar="INPUT", help="recording or run file")
+    parser.add_argument("--speed", type=_speed, default=1.0, metavar="X", help="times real time, or max (default 1)")
+    parser.add_argument("--seek", type=_finite, metavar="S", help="start at this second of the record")
+    parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
+    parser.add_argument("-o", "--output", metavar="RUN.h5", help="write the samples to a run file instead of stdout")
+    parser.add_argument("--overwrite", action="store_true", help="replace RUN.h5 where it exists")
+    _add_input_options(parser)
+
+
+def _add_simulate(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--scene", required=True, metavar="S.toml", help="scene file: masses, spring, start, damping")
+    parser.add_argument("--method", default="auto", metavar="NAME", help="integrator, or auto (default auto)")
+    parser.add_argument(
+        "--dt", type=_finite, default=0.01, metavar="S", help="time between samples, and step (default 0.01)"
+    )
+    parser.add_argument("--seconds", type=_positive, default=10.0, metavar="N", help="how long (default 10)")
+    parser.add_argument(
+        "--tolerance", type=_finite, metavar="E", help="largest error over the amplitude (auto: default 1e-6)"
+    )
+    parser.add_argument("--force", action="store_true", help="run a step that is unstable")
+    parser.add_argument("--against", metavar="RUN", help="measured run to lay the prediction over")
+    _add_unverified(parser)
+    parser.add_argument("--out", metavar="DIR", help="folder for NAME.simulated (default: here; with --json: none)")
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
+
+
+def _add_convert(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", metavar="IN", help="recording, or run file")
+    parser.add_argument(
+        "output",
+        metavar="OUT",
+        help="by its suffix: .h5 run file, .txt MotionSensor.vi pair, .lvm, .csv; or a folder for the original",
+    )
+    parser.add_argument("--scene", metavar="FILE", help="scene file to put into the run file")
+    parser.add_argument("--overwrite", action="store_true", help="replace OUT where it exists")
+    _add_input_options(parser)
+
+
+def _add_trade(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="?", metavar="INPUT", help="put this record before all methods instead")
+    parser.add_argument("--seeds", type=_count, metavar="N", help="simulated records (default 100)")
+    parser.add_argument("--noise-m", type=_positive, metavar="S", help="their noise, m (default 0.0003)")
+    parser.add_argument("--seconds", type=_positive, metavar="N", help="their length, s (default 120)")
+    parser.add_argument(
+        "--damping", type=_not_negative, metavar="G", help="their linear damping, 1/s (default 0.01463)"
+    )
+    parser.add_argument("--echoes", type=_echo_share, metavar="X", help="share of false echoes, 0 to 0.4 (default 0)")
+    parser.add_argument("--hostile", action="store_true", help="measure the accuracies on records that are not simple")
+    parser.add_argument("--integrators", action="store_true", help="measure trajectories instead: error against time")
+    parser.add_argument("--out", metavar="DIR", help="folder for trade.svg, trade.pdf and trade.json")
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    _add_input_options(parser)
+
+
+def _add_formats(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="?", metavar="FILE", help="say what this file is")
+    parser.add_argument("--json", action="store_true", help="as JSON on stdout")
+    _add_input_options(parser)
+
+
+def _add_record(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--port", action="append", default=[], metavar="P", help="port of a sensor; again for another")
+    parser.add_argument("--sensor", action="append", default=[], metavar="NAME", help="its family, see `sensors`")
+    parser.add_argument("--simulate", metavar="SCENE.toml", help="a simulated bench behind a pseudo-terminal instead")
+    parser.add_argument("-o", "--output", required=True, metavar="RUN.h5", help="run file to make; never replaced")
+    parser.add_argument("--seconds", type=_positive, metavar="N", help="how long (default: until Ctrl-C)")
+    parser.add_argument(
+        "--scene", metavar="FILE", help="scene file stored with the run; its air sets the speed of sound"
+    )
+    parser.add_argument("--title", default="", metavar="TEXT", help="title of the run")
+    parser.add_argument("--baud", type=int, metavar="B", help="speed of the port (default: the family's)")
+    parser.add_argument("--rate-hz", type=_pace, metavar="R", help="readings per second that the sensor is set to")
+    parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="option of the decoder")
+    parser.add_argument("--still", type=_positive, metavar="S", help="measure rest position and noise first, so long")
+    parser.add_argument(
+        "--ruler",
+        action="append",
+        default=[],
+        type=_positive,
+        metavar="M",
+        help="a still distance by the ruler, m; again for another, then they set the scale too; needs --still",
+    )
+    parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="applied to echo times, m/s")
+    _add_clock(parser)
+    parser.add_argument("--trigger", type=_positive, metavar="M", help="start when the bob leaves its rest by this, m")
+    parser.add_argument("--pre", type=_positive, metavar="S", help="seconds to keep from before (default 2)")
+    parser.add_argument("--roll-mb", type=_positive, metavar="MB", help="begin another log after this (default 1000)")
+    parser.add_argument("--roll-hours", type=_positive, metavar="H", help="begin another log after this, too")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated bench's noise (default 0)")
+    parser.add_argument(
+        "--crystal-ppm", type=_crystal, default=0.0, metavar="PPM", help="of the simulated sensor's clock"
+    )
+
+
+def _add_recover(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", metavar="RUN.wire", help="wire log")
+    parser.add_argument("-o", "--output", metavar="RUN.h5", help="run file to make (default: beside the log)")
+    parser.add_argument("--overwrite", action="store_true", help="replace a run file that is there")
+    parser.add_argument("--speed-of-sound", type=_positive, metavar="C", help="apply this to echo times instead, m/s")
+
+
+def _add_ports(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--no-probe", action="store_true", help="only list the ports, open none")
+    parser.add_argument("--port", action="append", default=[], metavar="P", help="listen to this address too")
+    parser.add_argument("--json", action="store_true", help="as JSON on stdout")
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="as JSON on stdout")
+
+
+def _finite(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"must be a finite number, got {text!r}")
+    return value
+
+
+def _where(holds: Callable[[float], bool], demand: str) -> Callable[[str], float]:
+    """Return the type of a number for which something holds."""
+
+    def number(text: str) -> float:
+        if not holds(value := _finite(text)):
+            raise argparse.ArgumentTypeError(f"{demand}, got {text!r}")
+        return value
+
+    return number
+
+
+_share = _where(lambda x: 0.0 <= x <= 1.0, "must lie in 0 to 1")
+_echo_share = _where(lambda x: 0.0 <= x <= 0.4, "must lie between 0 and 0.4")
+_pace = _where(lambda x: 1e-3 <= x <= 1e6, "must lie in 0.001 to 1000000")
+_ppm = _where(lambda x: 0.0 <= x <= 1e6, "must lie in 0 to 1000000")
+_crystal = _where(lambda x: abs(x) <= 5e5, "must lie in -500000 to 500000")
+_positive = _where(lambda x: x > 0.0, "must be positive")
+_not_negative = _where(lambda x: x >= 0.0, "must not be negative")
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"must be 1 or more, got {text!r}")
+    return value
+
+
+def _speed(text: str) -> float:
+    return math.inf if text == "max" else _positive(text)
+
+
+# Command to what adds its arguments, and its help; the module of its name in springmass.commands does its work.
+COMMANDS = {
+    "demo": (_add_demo, "replay, analyse and compare the bundled recordings: Table 1 in one command"),
+    "analyse": (_add_analyse, "turn recordings into Table 1, findings and a report"),
+    "compare": (_add_compare, "compare several runs of one spring: do they agree, and does one damping law hold"),
+    "record": (_add_record, "record a run from the bench, so that nothing is lost"),
+    "recover": (_add_recover, "build a run file from a wire log, however torn"),
+    "replay": (_add_replay, "play a recording back through the interface of a live sensor"),
+    "simulate": (
+        _add_simulate,
+        "solve the equation of motion of a scene, to a tolerance or by a method of your choice",
+    ),
+    "convert": (_add_convert, "write a recording as a run file, or give back the original inside one"),
+    "trade": (_add_trade, "measure what accuracy costs on this machine: error over the bound against time"),
+    "formats": (_add_formats, "list the families of recordings, or say what a file is"),
+    "sensors": (_add_json, "list the families of rangefinders with their rate, resolution, range and limits"),
+    "ports": (_add_ports, "list the serial ports and what speaks on them"),
+    "doctor": (_add_json, "check this installation"),
+}

@@ -1,0 +1,65 @@
+"""Scene files: one for all runs, or one for each."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+from acquisition.regular import open_regular
+from pipeline.bench.scene import Scene
+from pipeline.errors import SceneError
+from springmass.errors import USAGE, ProgramError
+
+__all__ = ["read_scene", "read_scenes"]
+
+LONGEST_SCENE = 1 << 14  # bytes; of longer ones some take seconds to parse
+
+
+def read_scenes(paths: Sequence[str], count: int) -> list[Scene | None]:
+    """Read one scene a run: one file for all of them, or one for each in their order; None without a file.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 for any other number of files, or as :func:`read_scene`.
+    """
+    if len(paths) not in (0, 1, count):
+        raise ProgramError(
+            f"--scene was given {len(paths)} times for {count} runs; give it once for all of them, "
+            "or once for each in their order",
+            USAGE,
+        )
+    scenes: list[Scene | None] = [read_scene(path) for path in paths] or [None]
+    return scenes * count if len(scenes) == 1 else scenes
+
+
+def read_scene(path: str | Path) -> Scene:
+    """Read a scene file (TOML).
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if it is absent, no TOML, or says something impossible; the line names file, key and value.
+    """
+    try:
+        with open_regular(path) as file:
+            content = file.read(LONGEST_SCENE + 1) or b""
+        if len(content) > LONGEST_SCENE:
+            raise ProgramError(
+                f"{path}: a scene file of at most {LONGEST_SCENE} bytes was demanded, got a longer one; "
+                "name the scene, not the recording",
+                USAGE,
+            )
+        return Scene.from_mapping(tomllib.loads(content.decode()), where=str(path))
+    except OSError as error:
+        raise ProgramError(
+            f"{path}: a scene file was demanded, got none ({error.strerror}); check the name", USAGE
+        ) from error
+    # A number of thousands of digits is a plain ValueError, brackets nested by the thousand end Python's own reader.
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        demand = f"not a TOML file ({reason}); see the scene file in the reference"
+        raise ProgramError(f"{path}: {demand}", USAGE) from error
+    except SceneError as error:
+        raise ProgramError(str(error), USAGE) from error

@@ -1,0 +1,84 @@
+"""From samples and what is known of their sensor to the pipeline's track."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from acquisition.block import Block
+from acquisition.decoders.family import RESONATOR_PPM
+from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
+from acquisition.live.clock_fit import fit_clock
+from acquisition.source import SourceInfo
+from pipeline.track import Track
+
+__all__ = ["to_track"]
+
+MOTION_SENSOR = "motion-sensor"  # fixes the speed of sound
+LINE_PROTOCOL = "line-protocol"  # sends echo times
+
+
+def to_track(
+    samples: Block, info: SourceInfo, *, recorded_format: str = "", provenance: Mapping[str, Any] | None = None
+) -> Track:
+    """Hand samples over to the pipeline.
+
+    Parameters
+    ----------
+    samples : Block
+    info : SourceInfo
+    recorded_format : str
+        Family of the recording that they come from, if any: it says which speed of sound stands in the distances.
+    provenance : mapping, optional
+        What a run file says of its origin: the sensor that it was recorded with, and what its clock may be off.
+
+    Notes
+    -----
+    The noise stated by a source is passed on; the error column of a file is not noise and travels apart.
+    """
+    return Track(
+        t=samples.t,
+        y=samples.distance,
+        flags=samples.flags,
+        rate_hz=info.rate_hz,
+        sigma_m=info.sigma_m,
+        quantum_m=info.quantum_m,
+        stated_error_m=info.stated_error_m,
+        clock=info.clock,
+        kind=info.kind,
+        velocity=samples.velocity,
+        quantity=samples.quantity,
+        unit=samples.unit,
+        **_clock_comparison(samples, info, provenance or {}),
+        **_scale(recorded_format, (provenance or {}).get("sensor") or {}),
+    )
+
+
+def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """How the device's clock ran against the host's, where stamps of both are there, and what it may be off."""
+    if info.clock != "device" or samples.host_ns is None or not (samples.host_ns >= 0).all():
+        return {}
+    fit = fit_clock(samples.t, samples.host_ns)
+    noted = provenance.get("decoding", {}).get("clock", {}).get("limit_ppm")
+    limit_ppm = noted if isinstance(noted, (int, float)) else RESONATOR_PPM
+    told = {"clock_limit": limit_ppm * 1e-6, "held_samples": fit.held, "longest_stall_s": fit.longest_stall_s}
+    if not np.isfinite(fit.rate_error_ppm):
+        return told
+    rate, u_rate = fit.rate_error_ppm * 1e-6, fit.u_rate_error_ppm * 1e-6
+    return {**told, "rate_error": rate, "u_rate_error": u_rate, "compared_s": fit.span_s}
+
+
+def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
+    """What made distances: the speed of sound where echo times were recorded, and the calibration's uncertainties."""
+    if recorded_format == MOTION_SENSOR:
+        return {"speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
+    if not sensor:
+        return {}
+    calibration = Calibration.from_mapping(sensor.get("calibration", {}))
+    known = {"u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
+    # Families that state a distance have applied a speed of their own that nobody knows.
+    if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
+        known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
+    return known
