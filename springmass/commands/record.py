@@ -26,7 +26,7 @@ from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
 from springmass.runs.analysing import made_now
-from springmass.runs.scenes import read_scene
+from springmass.runs.scenes import ask_about, read_scene
 from springmass.session.console import Console
 from springmass.session.output import demand_new
 from springmass.session.progress_line import ProgressLine
@@ -53,6 +53,8 @@ def run(options: argparse.Namespace) -> int:
     _fill_standard_streams()
     scene_path = options.scene or options.simulate
     scene = None if scene_path is None else read_scene(scene_path)
+    if scene is not None:
+        ask_about(scene, scene_path)
     log = out.with_suffix(".wire")
     with Stops() as stops, _sensors(options, scene) as (sensors, kind):
         rate = sum(sensor.rate_hz or sensor.family.rate_hz for sensor in sensors)

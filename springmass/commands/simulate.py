@@ -26,7 +26,7 @@ from springmass.commands import completions
 from springmass.errors import OK, USAGE, ProgramError, tell
 from springmass.runs.analysing import in_a_name, made_now, make_folder
 from springmass.runs.loading import load
-from springmass.runs.scenes import read_scene
+from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulation import (
     Against,
     Simulation,
@@ -48,6 +48,7 @@ def run(options: argparse.Namespace) -> int:
         raise ProgramError(f"--dt must be more than 0 s, got {options.dt:g}", USAGE)
     count = count_of(options.seconds, options.dt)
     scene, analysis, measured = read_scene(options.scene), None, None
+    ask_about(scene, options.scene)
     seconds = options.seconds
     if options.against is not None:
         from pipeline.analyse import analyse

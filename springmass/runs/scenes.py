@@ -9,9 +9,9 @@ from pathlib import Path
 from acquisition.regular import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import USAGE, ProgramError, complain
 
-__all__ = ["read_scene", "read_scenes"]
+__all__ = ["ask_about", "read_scene", "read_scenes"]
 
 LONGEST_SCENE = 1 << 14  # bytes; of longer ones some take seconds to parse
 
@@ -63,3 +63,9 @@ def read_scene(path: str | Path) -> Scene:
         raise ProgramError(f"{path}: {demand}", USAGE) from error
     except SceneError as error:
         raise ProgramError(str(error), USAGE) from error
+
+
+def ask_about(scene: Scene, where: str | Path) -> None:
+    """Ask on stderr about every value that no bench has, where no finding does: a recording, a simulation."""
+    for clause in scene.unusual():
+        complain(f"{where}: {clause}; check value and unit")

@@ -63,4 +63,4 @@ def test_a_mass_in_grams_is_asked_about(cli: Cli, data: Path, tmp_path: Path) ->
     done = cli("analyse", data / "damped_simulated_position.txt", "--json", "--accuracy", "fast", "--scene", scene)
     said = [f["message"] for f in done.results[0]["findings"] if f["code"] == "scene_implausible"]
     assert len(said) == 1
-    assert "[bob] mass_kg = 217.6 is beyond 0.001 to 20 kg (grams?)" in said[0]
+    assert "[bob] mass_kg = 217.6 is beyond 0.001 to 20 kg (did you mean grams: 0.2176?)" in said[0]

@@ -255,3 +255,13 @@ def test_friction_stops_the_simulated_bob(cli: Callable, tmp_path: Path) -> None
     samples = load(tmp_path / "friction.simulated" / "run.h5").samples
     assert np.ptp(samples.distance[-400:]) == 0.0
     assert np.all(samples.velocity[-400:] == 0.0)
+
+
+def test_a_start_in_millimetres_is_asked_about(cli: Callable, tmp_path: Path) -> None:
+    """A simulation has no findings: the question stands on stderr, and the numbers are those asked for."""
+    path = tmp_path / "far.toml"
+    path.write_text(LINEAR.replace("displacement_m = 0.05", "displacement_m = 50"))
+    done = cli("simulate", "--scene", path, "--json")
+    assert done.code == 0
+    assert "[start] displacement_m = 50 is beyond -1 to 1 m (did you mean centimetres: 0.5" in done.err
+    assert done.results[0]["amplitude_m"] == 50.0

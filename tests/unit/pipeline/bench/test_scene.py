@@ -214,3 +214,36 @@ def test_any_tables_make_a_scene_or_a_scene_error(tables: dict[str, Any]) -> Non
         refusal = str(error)
     assert not refusal or refusal.startswith("any.toml:")
     assert "\n" not in refusal
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "value", "meant"),
+    [
+        ("bob", "mass_kg", 217.6, "grams: 0.2176"),
+        ("spring", "mass_kg", 10.0, "grams: 0.01"),
+        ("spring", "constant_n_per_m", 0.014, "N/mm: 14 or N/cm: 1.4"),
+        ("disc", "diameter_m", 10.2, "centimetres: 0.102 or millimetres: 0.0102"),
+        ("air", "temperature_c", 68.0, "fahrenheit: 20"),
+        ("air", "pressure_pa", 1013.25, "hectopascals: 101325"),
+        ("sensor", "sigma_m", 0.3, "centimetres: 0.003 or millimetres: 0.0003"),
+        ("start", "displacement_m", -50.0, "centimetres: -0.5 or millimetres: -0.05"),
+        ("start", "velocity_m_per_s", 100.0, "cm/s: 1 or mm/s: 0.1"),
+        ("damping", "mu_m_per_s", 2.0, "cm/s: 0.02 or mm/s: 0.002"),
+    ],
+)
+def test_a_value_that_no_bench_has_is_asked_about_with_its_likely_unit(
+    table: str, key: str, value: float, meant: str
+) -> None:
+    """Range and likely unit stand in the clause; the unit's value is asked about no more."""
+    (clause,) = Scene.from_mapping({table: {key: value}}).unusual()
+    assert f"[{table}] {key} = {value:g} is beyond" in clause
+    assert f"(did you mean {meant}?)" in clause
+    assert Scene.from_mapping({table: {key: float(meant.rpartition(" ")[2])}}).unusual() == ()
+
+
+def test_a_percentage_and_an_uncertainty_in_another_unit_are_asked_about() -> None:
+    """A humidity of 40 is refused with what was meant; u = 0.5 of 0.2 kg is asked about."""
+    with pytest.raises(SceneError, match=r"did you mean percent: 0\.4\?"):
+        Scene.from_mapping({"air": {"relative_humidity": 40}})
+    (clause,) = Scene.from_mapping({"bob": {"mass_kg": {"value": 0.2176, "u": 0.5}}}).unusual()
+    assert "its own size, u = 0.5" in clause
