@@ -116,7 +116,7 @@ class Scene:
         Examples
         --------
         >>> Scene.from_mapping({"bob": {"mass_kg": 0.2007}}).bob_mass_kg
-        Estimate(value=0.2007, u=0.0, unit='kg')
+        0.2007 kg
         """
         known: dict[str, Any] = {}
         for table, content in tables.items():

@@ -1,18 +1,22 @@
-"""Numbers with their uncertainties, alone and jointly."""
+"""Numbers with their uncertainties, alone and jointly; they calculate by the ``uncertainties`` package."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from pipeline.track import F8
 
-__all__ = ["Estimate", "Joint", "format_value"]
+__all__ = ["Estimate", "Joint", "format_value", "in_brackets"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Estimate:
-    """A value with its standard uncertainty.
+    """A value with its standard uncertainty; it calculates as a number does.
 
     Parameters
     ----------
@@ -22,14 +26,86 @@ class Estimate:
         Standard uncertainty (k = 1), in ``unit``; 0 where the value is taken as exact.
     unit : str
         SI unit as printed, "" for a ratio.
+    variable : uncertainties.UFloat, optional
+        What the estimate was calculated from; left out, it depends on nothing else. No part of its value.
+
+    Notes
+    -----
+    Results of arithmetic are :class:`uncertainties.UFloat` in SI units, or plain numbers where nothing is uncertain.
+    Estimates of one analysis know what they were calculated from, so that their correlations are kept.
+
+    Examples
+    --------
+    >>> period = Estimate(0.7431, 0.0002, "s")
+    >>> period
+    0.74310(20) s
+    >>> 2 * period, period - period, float(period)
+    (1.4862+/-0.0004, 0.0+/-0, 0.7431)
     """
 
     value: float
     u: float
     unit: str = ""
+    variable: Any = field(default=None, compare=False)
+
+    @property
+    def ufloat(self) -> Any:
+        """The estimate for calculations: an ``uncertainties.UFloat``, or the value alone where it is exact."""
+        if self.variable is None:
+            from uncertainties import ufloat
+
+            # Kept, so that an estimate is always the same variable: x - x is 0 and not 0 +- 1.4 u.
+            object.__setattr__(self, "variable", ufloat(self.value, self.u) if self.u > 0 else self.value)
+        return self.variable
 
     def __str__(self) -> str:
         return format_value(self.value, self.u, self.unit)
+
+    def __repr__(self) -> str:
+        return in_brackets(str(self))
+
+    def __format__(self, spec: str) -> str:
+        return format(self.ufloat, spec) if spec else str(self)
+
+    def __float__(self) -> float:
+        return self.value
+
+    def __add__(self, other: Any) -> Any:
+        return self.ufloat + _number(other)
+
+    def __radd__(self, other: Any) -> Any:
+        return other + self.ufloat
+
+    def __sub__(self, other: Any) -> Any:
+        return self.ufloat - _number(other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return other - self.ufloat
+
+    def __mul__(self, other: Any) -> Any:
+        return self.ufloat * _number(other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return other * self.ufloat
+
+    def __truediv__(self, other: Any) -> Any:
+        return self.ufloat / _number(other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return other / self.ufloat
+
+    def __pow__(self, other: Any) -> Any:
+        return self.ufloat ** _number(other)
+
+    def __rpow__(self, other: Any) -> Any:
+        return other**self.ufloat
+
+    def __neg__(self) -> Any:
+        return -self.ufloat
+
+
+def _number(other: Any) -> Any:
+    return other.ufloat if isinstance(other, Estimate) else other
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +134,14 @@ class Joint:
     def estimates(self) -> dict[str, Estimate]:
         """Return every parameter by name."""
         return {name: self[name] for name in self.names}
+
+    @property
+    def correlation(self) -> F8:
+        """(p, p) float64: coefficients of correlation, 1 on the diagonal; 0 beside a parameter that is exact."""
+        u = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        found = self.covariance / np.where(u > 0, u, 1.0) / np.where(u > 0, u, 1.0)[:, None]
+        np.fill_diagonal(found, 1.0)
+        return np.clip(found, -1.0, 1.0)
 
 
 def format_value(value: float, u: float, unit: str = "") -> str:
@@ -89,3 +173,18 @@ def format_value(value: float, u: float, unit: str = "") -> str:
         step = 10.0 ** (exponent - 1)
         return f"{round(value / step) * step:.0f} +- {round(u / step) * step:.0f}{tail}"
     return f"{value:.{digits}f} +- {u:.{digits}f}{tail}"
+
+
+def in_brackets(text: str) -> str:
+    """Write the uncertainty of :func:`format_value` in brackets: its digits count in the value's last places.
+
+    Examples
+    --------
+    >>> in_brackets("0.7529 +- 0.0014 s"), in_brackets("12.3 +- 1.4"), in_brackets("(1.500 +- 0.020)e-07 m")
+    ('0.7529(14) s', '12.3(1.4)', '1.500(20)e-07 m')
+    """
+    found = re.fullmatch(r"\(?(-?[\d.]+) \+- ([\d.]+)\)?(.*)", text)
+    if found is None:
+        return text
+    value, u, tail = found.groups()
+    return f"{value}({u.lstrip('0.') if u.startswith('0.') else u}){tail}"

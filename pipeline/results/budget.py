@@ -11,12 +11,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
 
-__all__ = ["Budget", "Contribution", "Inputs", "Kind", "estimate_of", "function_of"]
+__all__ = ["COVERAGE", "Budget", "Contribution", "Inputs", "Kind", "estimate_of", "function_of", "joint_of"]
 
 Kind = Literal["A", "B"]
+
+COVERAGE = 0.9545
+"""Probability with which the expanded uncertainty covers; its factor is 2.00 where the degrees of freedom are many."""
+MANY = 1e6  # degrees of freedom that no factor's fifth digit tells from infinitely many
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +43,8 @@ class Contribution:
         What the input contributes to the result's standard uncertainty, in the result's unit.
     share : float
         Of the result's variance; the shares of a budget add up to 1.
+    dof : float
+        Degrees of freedom from which u is known; infinite where it was not estimated from scatter.
     """
 
     name: str
@@ -45,6 +53,7 @@ class Contribution:
     sensitivity: float | None
     u: float
     share: float
+    dof: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +76,35 @@ class Budget:
         """Return the part of the standard uncertainty that inputs of one kind contribute, in the result's unit."""
         return math.hypot(*(c.u for c in self.contributions if c.kind == kind))
 
+    @property
+    def dof(self) -> float:
+        """Effective degrees of freedom: :math:`\\nu = u^4 / \\sum_i u_i^4/\\nu_i` (Welch-Satterthwaite) [1]_.
+
+        Infinite beyond a million.
+
+        References
+        ----------
+        .. [1] JCGM 100:2008, G.4.1.
+        """
+        below = sum(c.share**2 / c.dof for c in self.contributions)
+        return 1.0 / below if below > 1.0 / MANY else math.inf
+
+    @property
+    def coverage_factor(self) -> float:
+        """Factor k on u: Student's t of :attr:`dof` that covers :data:`COVERAGE`, 2.00 where these are infinite.
+
+        As in EA-4/02 M:2022, appendix E.
+        """
+        from scipy.special import ndtri, stdtrit
+
+        tail, dof = 0.5 * (1.0 + COVERAGE), self.dof
+        return float(stdtrit(dof, tail) if math.isfinite(dof) else ndtri(tail))
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty U = k u, in the result's unit."""
+        return self.coverage_factor * self.estimate.u
+
 
 class Inputs:
     """Input quantities by name, as variables to calculate with.
@@ -87,9 +125,10 @@ class Inputs:
 
     def __init__(self) -> None:
         self._kinds: dict[str, Kind] = {}
+        self._dofs: dict[str, float] = {}
         self._single: dict[str, Estimate] = {}
 
-    def add(self, name: str, estimate: Estimate, kind: Kind) -> Any:
+    def add(self, name: str, estimate: Estimate, kind: Kind, dof: float = math.inf) -> Any:
         """Return an input as a variable; a plain number where it is exact.
 
         Parameters
@@ -98,6 +137,8 @@ class Inputs:
             Unique.
         estimate : Estimate
         kind : {"A", "B"}
+        dof : float
+            Degrees of freedom from which its uncertainty was estimated; 1 at least.
 
         Raises
         ------
@@ -108,7 +149,7 @@ class Inputs:
         """
         from uncertainties import ufloat
 
-        self._register(name, kind)
+        self._register(name, kind, dof)
         if not (math.isfinite(estimate.u) and estimate.u >= 0):
             raise AnalysisError(
                 f"{name}: a standard uncertainty must be finite and not negative, got {estimate.u:g}; check the input"
@@ -116,7 +157,7 @@ class Inputs:
         self._single[name] = estimate
         return ufloat(estimate.value, estimate.u, name) if estimate.u > 0 else estimate.value
 
-    def add_joint(self, name: str, joint: Joint, kind: Kind) -> list[Any]:
+    def add_joint(self, name: str, joint: Joint, kind: Kind, dof: float = math.inf) -> list[Any]:
         """Return parameters estimated together as correlated variables; they are one line in every budget.
 
         Parameters
@@ -125,10 +166,12 @@ class Inputs:
             Of the group.
         joint : Joint
         kind : {"A", "B"}
+        dof : float
+            As in :meth:`add`.
         """
         from uncertainties import correlated_values
 
-        self._register(name, kind)
+        self._register(name, kind, dof)
         return list(correlated_values(joint.values.tolist(), joint.covariance, [name] * joint.values.size))
 
     def add_alternatives(self, name: str, weights: Mapping[str, float], kind: Kind) -> dict[str, Any]:
@@ -169,20 +212,47 @@ class Inputs:
             if variance > 1e-12 * whole:  # less is rounding where a dependence cancels
                 given = self._single.get(name)
                 slope = None if given is None else slopes[name]
-                lines.append(Contribution(name, self._kinds[name], given, slope, math.sqrt(variance), variance / whole))
-        return Budget(quantity, Estimate(float(x.nominal_value), math.sqrt(whole), unit), tuple(lines))
+                u, share = math.sqrt(variance), variance / whole
+                lines.append(Contribution(name, self._kinds[name], given, slope, u, share, self._dofs[name]))
+        return Budget(quantity, Estimate(float(x.nominal_value), math.sqrt(whole), unit, x), tuple(lines))
 
-    def _register(self, name: str, kind: Kind) -> None:
+    def _register(self, name: str, kind: Kind, dof: float = math.inf) -> None:
         if name in self._kinds:
             raise ValueError(f"an input {name!r} is there already")
-        self._kinds[name] = kind
+        self._kinds[name], self._dofs[name] = kind, max(dof, 1.0)
 
 
 def estimate_of(x: Any, unit: str) -> Estimate:
     """Return value and standard uncertainty of a variable, or of an exact number."""
     from uncertainties import nominal_value, std_dev
 
-    return Estimate(float(nominal_value(x)), float(std_dev(x)), unit)
+    return Estimate(float(nominal_value(x)), float(std_dev(x)), unit, x)
+
+
+def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
+    """Return estimates with their covariance, as far as they know what they were calculated from.
+
+    Parameters
+    ----------
+    estimates : mapping of str to Estimate
+        Of one analysis, or scripts' own.
+
+    Examples
+    --------
+    >>> period = Estimate(0.8, 0.001, "s")
+    >>> print(joint_of({"period": period, "frequency": estimate_of(1 / period, "Hz")}).correlation.round(6).tolist())
+    [[1.0, -1.0], [-1.0, 1.0]]
+    """
+    from uncertainties import covariance_matrix
+
+    each = list(estimates.values())
+    # What is exact varies with nothing; the package takes none of it.
+    uncertain = [i for i, estimate in enumerate(each) if estimate.u > 0]
+    covariance = np.zeros((len(each), len(each)))
+    if uncertain:
+        covariance[np.ix_(uncertain, uncertain)] = covariance_matrix([each[i].ufloat for i in uncertain])
+    values = np.array([estimate.value for estimate in each])
+    return Joint(tuple(estimates), values, covariance, tuple(estimate.unit for estimate in each))
 
 
 def function_of(formula: Callable[..., float], *xs: Any) -> Any:

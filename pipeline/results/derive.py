@@ -19,11 +19,11 @@ from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.waveform import Rest
-from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.ambient import Ambient
-from pipeline.results.budget import Budget, Inputs, estimate_of, function_of
+from pipeline.results.budget import Budget, Inputs, estimate_of, function_of, joint_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality
@@ -79,6 +79,11 @@ class Derived:
     def statistical(self) -> Mapping[str, Estimate]:
         """The estimates with what the record's own scatter contributes to their uncertainties alone (Type A)."""
         return {name: Estimate(e.value, self.budgets[name].u_of("A"), e.unit) for name, e in self.estimates.items()}
+
+    @cached_property
+    def joint(self) -> Joint:
+        """All estimates and coefficients with their covariance; where both name one, as of A0, the estimate."""
+        return joint_of({**self.coefficients, **self.estimates})
 
     @cached_property
     def effective_mass_kg(self) -> Estimate | None:
@@ -188,7 +193,11 @@ def derive(
     laws = _Laws(damping, inputs, demodulated.t - damping.t0)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B")
     scale = ambient.scale(instrument)
-    omega = inputs.add("angular_frequency", phase.angular_frequency, "A") * rate
+    windows = phase.residual.size
+    # Of one window or two the uncertainty is by the samples.
+    free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
+    slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
+    omega = slope * rate
     amiss = _Amiss(misfits, inputs)
     lengths = scale * amiss.over("amplitude", laws.best.joint.values[0])
     rates = rate * amiss.over("damping_rate", laws.rate)
@@ -196,15 +205,15 @@ def derive(
     lam = laws.rate_at_start() * rates
     v_rms = omega * lengths * laws.root_mean_square()
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, "m"), "B")
-    offset = inputs.add("rest_position", rest.mean, "A") * scale
+    offset = inputs.add("rest_position", rest.mean, "A", free) * scale
     found: dict[str, tuple[Any, str]] = {
         "period": (2 * math.pi / omega, "s"),
         "frequency": (omega / (2 * math.pi), "Hz"),
         "angular_frequency": (omega, "rad/s"),
         "amplitude": (start, "m"),
         "offset": (offset + zero + amiss["offset"], "m"),
-        "phase": (inputs.add("phase", phase.phase, "A") + amiss["phase"], "rad"),
-        "noise": (inputs.add("noise", _noise(demodulated), "A"), "m"),
+        "phase": (_start_phase(phase, slope, inputs, free) + amiss["phase"], "rad"),
+        "noise": (inputs.add("noise", _noise(demodulated), "A", demodulated.residual.size - 3.0 * windows), "m"),
         "damping_rate": (lam, "1/s"),
         "velocity_rms": (v_rms, "m/s"),
     }
@@ -269,7 +278,7 @@ class _Laws:
 
     def __init__(self, damping: Damping, inputs: Inputs, elapsed: F8) -> None:
         self.best = damping.best
-        self.variables = inputs.add_joint("damping_law", self.best.joint, "A")
+        self.variables = inputs.add_joint("damping_law", self.best.joint, "A", self.best.dof)
         names = damping.admissible or (damping.selected,)
         odds = {name: math.exp(-0.5 * (damping.fits[name].bic - self.best.bic)) for name in names}
         total = sum(odds.values())
@@ -307,6 +316,16 @@ class _Laws:
         departures = [x - value for x, value in zip(self.variables, self.best.joint.values.tolist(), strict=True)]
         moved = sum(slope * x for slope, x in zip(slopes, departures, strict=True))
         return values[0] + moved + sum((x - values[0]) * z for x, z in zip(values[1:], self.choices, strict=True))
+
+
+def _start_phase(phase: PhaseFit, slope: Any, inputs: Inputs, dof: float) -> Any:
+    """The phase at the start: the line's own at its middle, and what the slope's error makes of it over the way."""
+    omega, at_start = phase.angular_frequency, phase.phase
+    way = phase.t0 - phase.middle
+    if omega.u > 0:
+        way = math.copysign(min(abs(way), at_start.u / omega.u), way)
+    own = math.sqrt(max(at_start.u**2 - (way * omega.u) ** 2, 0.0))
+    return inputs.add("phase", Estimate(at_start.value, own, at_start.unit), "A", dof) + way * (slope - omega.value)
 
 
 def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:

@@ -85,6 +85,7 @@ def result_of(
         "quality": _quality(loaded, analysis),
         "estimates": estimates,
         "budget": _budgets(analysis) if classic is None else {},
+        "correlations": _correlations(analysis, wanted=classic is None),
         "damping": _damping(analysis, wanted=classic is None),
         "effects": analysis.effects,
         "findings": all_findings(loaded, analysis),
@@ -134,15 +135,26 @@ def _budgets(analysis: Analysis) -> dict[str, Any]:
     if not isinstance(analysis.motion, Oscillation):
         return {}
     return {
-        name: {**plain(budget.estimate), "inputs": [_contribution(c) for c in budget.contributions]}
+        name: {
+            **plain(budget.estimate),
+            **plain({"dof": budget.dof, "coverage_factor": budget.coverage_factor, "expanded": budget.expanded}),
+            "inputs": [_contribution(c) for c in budget.contributions],
+        }
         for name, budget in analysis.motion.derived.budgets.items()
     }
 
 
 def _contribution(c: Contribution) -> dict[str, Any]:
     given = {"value": None, "u": None, "unit": ""} if c.input is None else plain(c.input)
-    numbers = {"sensitivity": c.sensitivity, "contribution": c.u, "share": c.share}
+    numbers = {"sensitivity": c.sensitivity, "contribution": c.u, "share": c.share, "dof": plain(c.dof)}
     return {"name": c.name, "type": c.kind, **given, **numbers}
+
+
+def _correlations(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
+    if not wanted or not isinstance(analysis.motion, Oscillation):
+        return {"names": [], "matrix": []}
+    joint = analysis.motion.derived.joint
+    return {"names": joint.names, "matrix": joint.correlation.round(6)}
 
 
 def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
@@ -160,11 +172,14 @@ def picked(thing: object, names: Sequence[str]) -> dict[str, Any]:
 
 
 def plain(value: object) -> Any:
-    """Return a value as strict JSON can hold it: a dataclass is its fields, a number that is none becomes null."""
+    """Return a value as strict JSON can hold it: a dataclass is its fields, a number that is none becomes null.
+
+    Fields that do not count where two are compared, such as what an estimate was calculated from, are left out.
+    """
     if isinstance(value, Mapping):
         return {str(key): plain(inner) for key, inner in value.items()}
     if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value) if field.compare}
     if hasattr(value, "tolist"):  # numpy's scalars and arrays
         return plain(value.tolist())
     if isinstance(value, list | tuple | set | frozenset):

@@ -111,6 +111,7 @@ def check_schema(result: Mapping[str, Any]) -> None:
         "quality",
         "estimates",
         "budget",
+        "correlations",
         "damping",
         "effects",
         "findings",
@@ -142,6 +143,13 @@ def check_schema(result: Mapping[str, Any]) -> None:
     assert {type(count) for count in result["quality"].values()} == {int}
     for estimate in result["estimates"].values():
         check_estimate(estimate)
+    assert set(result["correlations"]["names"]) == set(result["budget"])
+    matrix = result["correlations"]["matrix"]
+    assert np.array_equal(matrix, np.transpose(matrix))
+    assert len(matrix) == len(result["budget"])
+    for each in result["budget"].values():
+        assert each["expanded"] == pytest.approx(each["coverage_factor"] * each["u"])
+        assert is_number(each["dof"])
     damping = result["damping"]
     assert set(damping) == {"selected", "admissible", "laws"}
     assert damping["selected"] is None or damping["selected"] in damping["laws"]

@@ -110,3 +110,58 @@ def test_unknown_parameter_is_an_error() -> None:
 def test_rounding_below_zero_variance_is_no_uncertainty() -> None:
     """A variance that rounding made negative counts as 0."""
     assert Joint(("x",), np.array([1.0]), np.array([[-1e-30]]), ("",))["x"].u == 0.0
+
+
+def test_estimates_calculate_with_their_uncertainties() -> None:
+    """Sums, products, ratios and powers on either side of a number, an array or another estimate, by first order."""
+    a, b = Estimate(3.0, 0.03, "m"), Estimate(2.0, 0.04, "s")
+    for found, value, u in (
+        (a + b, 5.0, 0.05),
+        (a - 1, 2.0, 0.03),
+        (1 - a, -2.0, 0.03),
+        (2 * a, 6.0, 0.06),
+        (a / b, 1.5, 1.5 * math.hypot(0.01, 0.02)),
+        (6 / a, 2.0, 0.02),
+        (b**2, 4.0, 0.16),
+        (2**b, 4.0, 4.0 * math.log(2.0) * 0.04),
+        (-a, -3.0, 0.03),
+        ((a * np.array([1.0, 2.0]))[1], 6.0, 0.06),
+    ):
+        assert (found.nominal_value, found.std_dev) == (pytest.approx(value), pytest.approx(u))
+    assert float(a) == 3.0
+    assert (f"{a:.1f}", f"{a}") == ("3.0+/-0.0", "3.000 +- 0.030 m")
+
+
+def test_an_estimate_is_one_variable_and_an_exact_one_is_a_number() -> None:
+    """What depends on itself cancels, two alike do not, and nothing is made uncertain that is not."""
+    a, b = Estimate(3.0, 0.03), Estimate(3.0, 0.03)
+    assert (a - a).std_dev == 0.0
+    assert (a - b).std_dev == pytest.approx(0.03 * math.sqrt(2.0))
+    assert (a, hash(a)) == (b, hash(b))
+    exact = Estimate(4.0, 0.0)
+    assert exact / 2 == 2.0
+    assert isinstance(exact / 2, float)
+
+
+@pytest.mark.parametrize(
+    ("value", "u", "unit", "text"),
+    [
+        (0.7431, 2e-5, "s", "0.743100(20) s"),
+        (12.3, 1.4, "", "12.3(1.4)"),
+        (101325.0, 1500.0, "Pa", "101300(1500) Pa"),
+        (-1.5e-7, 2.0e-9, "m", "-1.500(20)e-07 m"),
+        (13.98, 0.0, "N/m", "13.98 N/m"),
+        (math.nan, 1.0, "s", "nan +- 1 s"),
+    ],
+)
+def test_an_estimate_shows_its_uncertainty_in_brackets(value: float, u: float, unit: str, text: str) -> None:
+    """The short form of a physics text, with two digits of u."""
+    assert repr(Estimate(value, u, unit)) == text
+
+
+def test_correlations_of_joint_parameters() -> None:
+    """Covariance over both uncertainties; what is exact goes with nothing else."""
+    joint = Joint(
+        ("a", "b", "c"), np.ones(3), np.array([[4.0, -3.0, 0.0], [-3.0, 9.0, 0.0], [0.0, 0.0, 0.0]]), ("",) * 3
+    )
+    np.testing.assert_allclose(joint.correlation, [[1.0, -0.5, 0.0], [-0.5, 1.0, 0.0], [0.0, 0.0, 1.0]])

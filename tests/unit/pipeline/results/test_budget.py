@@ -18,7 +18,7 @@ from pipeline.motion.phase import fit_phase
 from pipeline.motion.waveform import fit_rest
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.results.budget import Budget, Inputs
+from pipeline.results.budget import Budget, Inputs, joint_of
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import tabulate
 
@@ -300,3 +300,58 @@ def test_parameters_that_determine_each_other_count_once() -> None:
         assert one.std_dev == pytest.approx(expected, rel=1e-12)
     assert (x / u[0] + y / u[1]).std_dev < 3e-8
     assert (x / u[0] + z / u[2]).std_dev == pytest.approx(2.0, rel=1e-12)
+
+
+def test_degrees_of_freedom_of_the_guides_example() -> None:
+    """JCGM 100, G.4.1: a product of three means of 10, 5 and 15 observations, 0.25, 0.57 and 0.82 %, has 19.0."""
+    inputs = Inputs()
+    share = {"a": (0.0025, 9), "b": (0.0057, 4), "c": (0.0082, 14)}
+    product = math.prod(inputs.add(name, Estimate(1.0, u), "A", dof) for name, (u, dof) in share.items())
+    budget = inputs.budget("product", product, "")
+    assert budget.estimate.u == pytest.approx(0.0103, rel=2e-3)
+    assert budget.dof == pytest.approx(19.0, abs=0.05)
+    assert budget.expanded == budget.coverage_factor * budget.estimate.u
+
+
+@pytest.mark.parametrize(
+    ("dof", "factor"), [(1, 13.97), (5, 2.65), (10, 2.28), (20, 2.13), (50, 2.05), (math.inf, 2.0)]
+)
+def test_coverage_factors_are_those_of_ea_4_02(dof: float, factor: float) -> None:
+    """Student's t for 95.45 %, table E.1 there."""
+    inputs = Inputs()
+    x = inputs.add("x", Estimate(1.0, 0.1), "A", dof)
+    assert inputs.budget("x", x, "").coverage_factor == pytest.approx(factor, abs=0.005)
+
+
+def test_only_what_scatter_told_has_few_degrees_of_freedom(windows: Windows) -> None:
+    """Inputs from the scene count as known; the frequency's windows, less what is correlated, do not."""
+    found, points = derived(windows, SCENE)
+    budgets = found.budgets
+    each = {c.name: c for budget in budgets.values() for c in budget.contributions}
+    assert all(c.dof == math.inf for c in each.values() if c.kind == "B")
+    assert each["angular_frequency"].dof <= points.t.size - 2
+    assert each["damping_law"].dof == pytest.approx(budgets["gamma"].dof, rel=0.2)
+    assert budgets["spring_constant"].coverage_factor == pytest.approx(2.0, abs=1e-3)
+
+
+def test_estimates_carry_their_correlations(windows: Windows) -> None:
+    """Period times frequency is exactly 1, and a product of estimates has the variance that their covariance gives."""
+    found, _ = derived(windows, SCENE)
+    period, frequency = found.estimates["period"], found.estimates["frequency"]
+    assert (period * frequency).std_dev < 1e-12
+    a, b = found.estimates["amplitude"], found.coefficients["beta"]
+    joint = joint_of({"a": a, "b": b})
+    expected = b.value**2 * joint.covariance[0, 0] + a.value**2 * joint.covariance[1, 1]
+    expected += 2.0 * a.value * b.value * joint.covariance[0, 1]
+    assert (a * b).std_dev == pytest.approx(math.sqrt(expected))
+    assert abs(joint.correlation[0, 1]) > 0.1
+    assert set(found.joint.names) == set(found.estimates) | set(found.coefficients)
+
+
+def test_the_start_phase_turns_with_the_frequency(windows: Windows) -> None:
+    """The phase at the start is extrapolated from the record's middle by the frequency, so both err together."""
+    found, points = derived(windows, SCENE, Instrument("device", Estimate(1.0, 0.0), "none"))
+    joint = joint_of({name: found.estimates[name] for name in ("angular_frequency", "phase")})
+    way = 0.5 * (points.t[0] + points.t[-1])
+    u_omega, u_phase = np.sqrt(np.diag(joint.covariance))
+    assert joint.correlation[0, 1] == pytest.approx(-way * u_omega / u_phase, rel=0.02)
