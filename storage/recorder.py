@@ -20,7 +20,7 @@ from typing import Any, Self
 from acquisition.clock import Clock
 from acquisition.readings import Read
 from storage.errors import WriteFailed, one_line
-from storage.log_place import LogPlace
+from storage.log_place import LogPlaces
 from storage.wire_log.appending import Item, LogFile, Roll, WireLogWriter, open_log_file
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, event_payload
 
@@ -121,7 +121,7 @@ class Recorder:
     ) -> None:
         self._log = WireLogWriter(path, header, open_file=open_file, roll=roll)
         self.path = self._log.path
-        self._place = LogPlace(self.path)
+        self._place = LogPlaces(self.path)
         self._clock = clock
         self._sync_every_ns = int(sync_every_s * 1e9)
         self._limit = queue_bytes
@@ -287,6 +287,7 @@ class Recorder:
     def _find_log(self) -> None:
         """Have :attr:`path` say where the log lies, written anew where it was deleted."""
         try:
+            self._place.look(self._log.files)
             self.path = self._place.found()
         finally:
             self._place.close()
@@ -294,7 +295,7 @@ class Recorder:
     def _look_for_log(self) -> None:
         """Notice a log that was deleted, renamed or replaced, once; this thread alone may wait for the disk."""
         before = self._place.astray
-        self._place.look()
+        self._place.look(self._log.files)
         if self._place.astray != before:
             facts = {"what": self._place.astray or "the log is in its place again"}
             self.event(0, self._clock.now_ns(), "astray", facts)

@@ -12,7 +12,7 @@ from pipeline.errors import PipelineError
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder
-from springmass.runs.json_results import REJECTED_WARNINGS, picked
+from springmass.runs.json_results import picked, rejected
 from springmass.runs.loading import load
 from springmass.runs.scenes import read_scenes
 from storage.errors import StorageError
@@ -75,9 +75,7 @@ def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | No
     if not isinstance(analysed.analysis.motion, (Oscillation, Overdamped)):
         complain(f"{path}: no oscillation: {analysed.analysis.motion.why}")
         return UNREADABLE
-    findings = analysed.result["findings"]
-    wrong = [f["code"] for f in findings if f["severity"] == "error" or f["code"] in REJECTED_WARNINGS]
-    if options.strict and wrong:
+    if options.strict and (wrong := rejected(analysed.result["findings"])):
         complain(f"{path}: rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK

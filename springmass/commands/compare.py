@@ -10,7 +10,7 @@ from springmass.commands import completions
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
-from springmass.runs.json_results import picked, provenance_of
+from springmass.runs.json_results import picked, provenance_of, rejected
 from springmass.runs.loading import load
 from springmass.runs.scenes import read_scenes
 
@@ -50,9 +50,8 @@ def run(options: argparse.Namespace) -> int:
 
         tell(f"report: {write_report(out, runs, compared=compared, summary=result)}")
     findings = [*result["findings"], *(f for run in runs for f in run.result["findings"])]
-    wrong = [f["code"] for f in findings if f["severity"] == "error"]
-    if options.strict and wrong:
-        complain(f"rejected under --strict: {', '.join(dict.fromkeys(wrong))}")
+    if options.strict and (wrong := rejected(findings)):
+        complain(f"rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK
 

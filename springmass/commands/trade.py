@@ -113,11 +113,14 @@ def _integrators(options: argparse.Namespace) -> int:
 
 
 def _write(out: Path, name: str, figure: Figure, content: Mapping[str, Any]) -> None:
-    from springmass.report.figures import save
+    from springmass.report.figures import KINDS, save
     from storage.atomic import write_whole
+    from storage.folder import whole_folder
 
-    save(figure, out, name)
-    write_whole(out / f"{name}.json", json.dumps(content, indent=2) + "\n")
+    last = f"{name}.json"
+    with whole_folder(out, {last, *(f"{name}.{kind}" for kind in KINDS)}, last) as folder:
+        save(figure, folder, name)
+        write_whole(folder / last, json.dumps(content, indent=2) + "\n")
 
 
 def _own(options: argparse.Namespace) -> int:

@@ -18,13 +18,13 @@ from springmass import __version__
 from springmass.runs.loading import Loaded
 
 __all__ = [
-    "REJECTED_WARNINGS",
     "SCHEMA",
     "all_findings",
     "input_of",
     "picked",
     "plain",
     "provenance_of",
+    "rejected",
     "result_of",
 ]
 
@@ -50,8 +50,13 @@ _SEVERITY = {
     "other_device": "warning",
 }
 
-REJECTED_WARNINGS = frozenset({"sensor_lost"})
-"""Warnings that ``--strict`` rejects as it does errors: the run is not the one that was to be recorded."""
+_REJECTED_WARNINGS = frozenset({"sensor_lost"})
+
+
+def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
+    """Return the codes that ``--strict`` rejects: errors, and a run that is not the one that was to be recorded."""
+    grave = [f["code"] for f in findings if f["severity"] == "error" or f["code"] in _REJECTED_WARNINGS]
+    return list(dict.fromkeys(grave))
 
 
 def result_of(

@@ -80,9 +80,9 @@ class WireLogWriter:
     between two records, each file beginning with a copy of the header. The old file is on the disk before anything is
     written to the next. Where the next cannot be made, the old one goes on, and an event says so.
 
-    One thread appends; others may call :meth:`sync` at the same time. :attr:`written` and ``synced`` say how far the
-    log has come, in the kernel's hands and on the disk; ``extended`` how many items of the last call are whole in the
-    log.
+    One thread appends; others may call :meth:`sync` at the same time. :attr:`files` are those made so far.
+    :attr:`written` and ``synced`` say how far the log has come, in the kernel's hands and on the disk; ``extended`` how
+    many items of the last call are whole in the log.
 
     Parameters
     ----------
@@ -117,6 +117,7 @@ class WireLogWriter:
         self.path = Path(path)
         self._roll = roll
         self._open_file = open_file
+        self.files = [self.path]
         self._files = 1
         self._roll_at_bytes, self._roll_at_ns = self._next_roll(0, header.mono_ns)
         self.written = self.synced = Written()
@@ -255,8 +256,10 @@ class WireLogWriter:
         """Make the log's next file; a name that is taken, by another recording or whoever, is passed over."""
         for number in range(self._files, self._files + TAKEN_NAMES):
             with contextlib.suppress(FileExistsError):
-                file = self._open_file(part_path(self.path, number))
+                path = part_path(self.path, number)
+                file = self._open_file(path)
                 self._files = number + 1
+                self.files.append(path)
                 return file
         demand = f"{part_path(self.path, self._files).name} and the {TAKEN_NAMES - 1} after it are taken"
         raise RunExists(self.path, demand, "move them away")

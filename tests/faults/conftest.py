@@ -114,8 +114,12 @@ class Recording:
 
     def until_bytes(self, size: int) -> None:
         """Return once the log holds so much."""
+        self.until(lambda: self.log.exists() and self.log.stat().st_size >= size)
+
+    def until(self, holds: Callable[[], bool]) -> None:
+        """Return once something holds of what is recorded."""
         end = time.monotonic() + LIMIT_S
-        while not (self.log.exists() and self.log.stat().st_size >= size):
+        while not holds():
             assert self.process.poll() is None, f"ended with {self.process.returncode}"
             assert time.monotonic() < end, "nothing is recorded"
             threading.Event().wait(0.02)

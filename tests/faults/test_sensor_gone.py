@@ -30,7 +30,9 @@ from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
 
 UNPLUGS = int(os.environ.get("SPRINGMASS_UNPLUGS", "3"))
-ANSWER_S = 30.0
+RUN_S = 6.0  # no recording here is longer
+ANSWER_S = RUN_S + 10.0
+"""Within ten seconds of its end a recording has answered."""
 SECOND = 8000
 
 
@@ -77,6 +79,12 @@ def test_strict_rejects_a_run_whose_sensor_was_lost(tmp_path: Path, capsys: pyte
     write_run(out, [recording.samples], recording.info, traps=[lost])
     assert main(["analyse", str(out), "--json"]) == 0
     assert main(["analyse", str(out), "--json", "--strict"]) == 5
+    assert "rejected under --strict: sensor_lost" in capsys.readouterr().err
+    scene = tmp_path / "scene.toml"
+    scene.write_text("[bob]\nmass_kg = 0.2007\n")
+    both = [str(out), str(sample_data() / "undamped_simulated_position.txt"), "--scene", str(scene), "--json"]
+    assert main(["compare", *both]) == 0
+    assert main(["compare", *both, "--strict"]) == 5
     assert "rejected under --strict: sensor_lost" in capsys.readouterr().err
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from storage.errors import WriteFailed
-from storage.log_place import LogPlace
+from storage.log_place import LogPlace, LogPlaces
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="open files are found by name on Linux")
 
@@ -73,3 +73,53 @@ def test_a_log_deleted_with_its_folder_is_one_line(log: Path) -> None:
     with pytest.raises(WriteFailed, match="cannot be written anew"):
         place.found()
     place.close()
+
+
+@pytest.fixture
+def further(log: Path) -> Path:
+    """Return the log's further file; the name between was taken when it was made."""
+    path = log.with_name("run.002.wire")
+    path.write_bytes(b"its rest")
+    return path
+
+
+def test_further_files_in_their_places_are_left_alone(log: Path, further: Path) -> None:
+    """Nothing is written beside them."""
+    places = LogPlaces(log)
+    places.look([log, further])
+    assert (places.astray, places.found()) == ("", log)
+    assert sorted(path.name for path in log.parent.iterdir()) == ["run.002.wire", "run.wire"]
+    places.close()
+
+
+@pytest.mark.parametrize("loss", ["deleted", "renamed", "replaced"])
+def test_a_further_file_that_is_lost_is_written_anew_where_the_log_is_read_from(
+    log: Path, further: Path, loss: str
+) -> None:
+    """Under its name, or with one digit more where somebody's file has taken that; and it is said which it was."""
+    places = LogPlaces(log)
+    places.look([log, further])
+    if loss == "renamed":
+        further.rename(log.parent.parent / "elsewhere")
+    else:
+        further.unlink()
+    if loss == "replaced":
+        further.write_bytes(b"mine")
+    places.look([log, further])
+    assert "run.002.wire" in places.astray
+    assert places.found() == log
+    written = log.with_name("run.0002.wire") if loss == "replaced" else further
+    assert written.read_bytes() == b"its rest"
+    places.close()
+
+
+def test_further_files_go_with_a_log_that_is_written_anew_by_another_name(log: Path, further: Path) -> None:
+    """Beside it, under its new name, for that is where they are looked for."""
+    places = LogPlaces(log)
+    places.look([log, further])
+    log.unlink()
+    log.write_bytes(b"mine")
+    saved = places.found()
+    assert saved == log.with_name("run.saved1.wire")
+    assert log.with_name("run.saved1.002.wire").read_bytes() == b"its rest"
+    places.close()
