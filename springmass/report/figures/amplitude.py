@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipeline.analyse import Analysis
+from pipeline.errors import AnalysisError
 from springmass.report.figures.canvas import (
     BLUE,
     GREEN,
@@ -25,9 +27,10 @@ from springmass.report.figures.canvas import (
 from springmass.report.tables import law_status
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["amplitude_figure"]
+__all__ = ["amplitude_figure", "amplitude_panel"]
 
 _DASHES = ((0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
 
@@ -44,23 +47,9 @@ def amplitude_figure(analysis: Analysis) -> Figure:
     damping, t, amplitude = motion.damping, motion.demodulated.t, motion.demodulated.amplitude * 1e3
     u, kept = damping.scatter.u * 1e3, damping.scatter.kept
     end = float(np.nanmax(analysis.track.t))
-    grid = np.linspace(damping.t0, end, 160)
     with style():
         figure, (above, below) = panels([(2.7, 0.0), (1.0, 0.08)])
-        error_bars(above, t[kept], amplitude[kept], u[kept], "amplitude of one window")
-        if not kept.all():
-            above.plot(t[~kept], amplitude[~kept], "o", mfc="none", color=ORANGE, ms=4, label="left out of the fits")
-        shown = [float(np.min(amplitude - u)), float(np.max(amplitude + u))]
-        for i, name in enumerate(sorted(damping.fits, key=lambda name: name == damping.selected)):
-            status = law_status(damping, name)
-            chosen, rejected = name == damping.selected, status.startswith("rejected")
-            colour = "#000000" if chosen else GREY if rejected else (GREEN, PURPLE, VERMILLION, ORANGE)[i % 4]
-            dashes = "-" if chosen else _DASHES[i % len(_DASHES)]
-            curve = damping.fits[name].amplitude(grid - damping.t0) * 1e3
-            above.plot(grid, curve, color=colour, ls=dashes, lw=1.0, label=f"{name} ({status})", zorder=3)
-        margin = 0.12 * max(shown[1] - shown[0], 1e-9)
-        above.set_ylim(shown[0] - margin, shown[1] + margin)
-        above.set_ylabel("amplitude / mm")
+        amplitude_panel(above, analysis)
         residual = (amplitude - damping.best.amplitude(t - damping.t0) * 1e3) / np.where(u > 0, u, 1.0)
         below.plot(t[kept], residual[kept], "o", ms=2.6, mew=0, color=BLUE)
         finish_residual(below, residual[kept], "residual / u")
@@ -71,3 +60,43 @@ def amplitude_figure(analysis: Analysis) -> Figure:
         share(above, below, damping.t0, end)
         legend_above(above, handle=2.8)
         return figure
+
+
+def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None = None) -> None:
+    """Draw the amplitudes with laws as curves.
+
+    Parameters
+    ----------
+    panel : Axes
+    analysis : Analysis
+        Of a record that oscillates.
+    laws : sequence of str, optional
+        Names of the laws to draw; left out, all that were fitted.
+
+    Raises
+    ------
+    AnalysisError
+        If a law was not fitted.
+    """
+    motion = moving(analysis)
+    damping, t, amplitude = motion.damping, motion.demodulated.t, motion.demodulated.amplitude * 1e3
+    if missing := [name for name in laws or () if name not in damping.fits]:
+        raise AnalysisError(f"no law {missing[0]!r} was fitted to this run; there are {', '.join(damping.fits)}")
+    u, kept = damping.scatter.u * 1e3, damping.scatter.kept
+    grid = np.linspace(damping.t0, float(np.nanmax(analysis.track.t)), 160)
+    error_bars(panel, t[kept], amplitude[kept], u[kept], "amplitude of one window")
+    if not kept.all():
+        panel.plot(t[~kept], amplitude[~kept], "o", mfc="none", color=ORANGE, ms=4, label="left out of the fits")
+    shown = [float(np.min(amplitude - u)), float(np.max(amplitude + u))]
+    for i, name in enumerate(sorted(damping.fits, key=lambda name: name == damping.selected)):
+        if laws is not None and name not in laws:
+            continue
+        status = law_status(damping, name)
+        chosen, rejected = name == damping.selected, status.startswith("rejected")
+        colour = "#000000" if chosen else GREY if rejected else (GREEN, PURPLE, VERMILLION, ORANGE)[i % 4]
+        dashes = "-" if chosen else _DASHES[i % len(_DASHES)]
+        curve = damping.fits[name].amplitude(grid - damping.t0) * 1e3
+        panel.plot(grid, curve, color=colour, ls=dashes, lw=1.0, label=f"{name} ({status})", zorder=3)
+    margin = 0.12 * max(shown[1] - shown[0], 1e-9)
+    panel.set_ylim(shown[0] - margin, shown[1] + margin)
+    panel.set_ylabel("amplitude / mm")

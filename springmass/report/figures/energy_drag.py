@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["drag_figure", "energy_figure"]
+__all__ = ["drag_figure", "drag_panel", "energy_figure", "energy_panel"]
 
 
 def energy_figure(analysis: Analysis) -> Figure:
@@ -30,14 +30,9 @@ def energy_figure(analysis: Analysis) -> Figure:
     """
     motion = moving(analysis)
     curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
-    low, high = curve.y - curve.u, curve.y_points
     with style():
         figure, (above, below) = panels([(2.3, 0.0), (1.1, 0.08)])
-        _draw(above, curve, 1.0, 1e3, "from single amplitudes", f"from the law {motion.damping.selected}")
-        if 0 < float(np.min(low)) < float(np.max(high)) / 20.0 and float(np.min(high)) > 0:
-            above.set_yscale("log")
-            above.yaxis.set_major_formatter("{x:g}")
-        above.set_ylabel("energy / mJ" if curve.unit == "J" else "energy per mass / (mJ/kg)")
+        energy_panel(above, analysis)
         law = np.interp(curve.x_points, curve.x, curve.y)
         deviation, scatter = 100.0 * (curve.y_points / law - 1.0), 100.0 * curve.u_points / law
         width = 100.0 * curve.u / curve.y
@@ -53,6 +48,18 @@ def energy_figure(analysis: Analysis) -> Figure:
         return figure
 
 
+def energy_panel(panel: Axes, analysis: Analysis) -> None:
+    """Draw the mechanical energy against time with its band, as :func:`energy_figure` does."""
+    motion = moving(analysis)
+    curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
+    low, high = curve.y - curve.u, curve.y_points
+    _draw(panel, curve, 1.0, 1e3, "from single amplitudes", f"from the law {motion.damping.selected}")
+    if 0 < float(np.min(low)) < float(np.max(high)) / 20.0 and float(np.min(high)) > 0:
+        panel.set_yscale("log")
+        panel.yaxis.set_major_formatter("{x:g}")
+    panel.set_ylabel("energy / mJ" if curve.unit == "J" else "energy per mass / (mJ/kg)")
+
+
 def drag_figure(analysis: Analysis) -> Figure | None:
     """Draw the drag coefficient against amplitude with its band; None where scene or record give none.
 
@@ -61,31 +68,45 @@ def drag_figure(analysis: Analysis) -> Figure | None:
     analysis : Analysis
         Of a record that oscillates.
     """
+    with style():
+        # Room above for the second axis.
+        figure, (panel,) = panels([(2.8, 0.0)], top=0.5)
+        if not drag_panel(panel, analysis):
+            return None
+        # The axis begins at 0, the coefficient falls as the amplitude grows: the lower left is free.
+        panel.legend(loc="lower left")
+        return figure
+
+
+def drag_panel(panel: Axes, analysis: Analysis) -> bool:
+    """Draw the drag coefficient against amplitude, and say whether scene and record give one.
+
+    Parameters
+    ----------
+    panel : Axes
+    analysis : Analysis
+        Of a record that oscillates.
+    """
     motion = moving(analysis)
     curve = motion.derived.drag_curve(motion.damping, motion.demodulated)
     diameter = analysis.scene.disc_diameter_m
     if curve is None or diameter is None:
-        return None
-    with style():
-        # Room above for the second axis.
-        figure, (panel,) = panels([(2.8, 0.0)], top=0.5)
-        _draw(panel, curve, 1e3, 1.0, "from a stretch of the record", f"from the law {motion.damping.selected}")
-        points = [curve.y_points + curve.u_points, curve.y_points - curve.u_points]
-        shown = np.concatenate([curve.y + curve.u, curve.y - curve.u, *points])
-        # A stretch with hardly any damping has a bar that would flatten all else.
-        most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
-        low, high = min(0.0, max(float(np.min(shown)), -most)), min(float(np.max(shown)), most)
-        panel.set_ylim(low - 0.05 * (high - low) if low < 0 else 0.0, high + 0.08 * (high - low))
-        panel.set_ylabel("drag coefficient")
-        panel.set_xlabel("amplitude / mm")
-        edge = 0.04e3 * float(np.ptp(curve.x))
-        panel.set_xlim(max(1e3 * float(curve.x[0]) - edge, 0.0), 1e3 * float(curve.x[-1]) + edge)
-        per_mm = 2e-3 * np.pi / diameter.value
-        second = panel.secondary_xaxis("top", functions=(_times(per_mm), _times(1.0 / per_mm)))
-        second.set_xlabel("Keulegan-Carpenter number")
-        # The axis begins at 0, the coefficient falls as the amplitude grows: the lower left is free.
-        panel.legend(loc="lower left")
-        return figure
+        return False
+    _draw(panel, curve, 1e3, 1.0, "from a stretch of the record", f"from the law {motion.damping.selected}")
+    points = [curve.y_points + curve.u_points, curve.y_points - curve.u_points]
+    shown = np.concatenate([curve.y + curve.u, curve.y - curve.u, *points])
+    # A stretch with hardly any damping has a bar that would flatten all else.
+    most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
+    low, high = min(0.0, max(float(np.min(shown)), -most)), min(float(np.max(shown)), most)
+    panel.set_ylim(low - 0.05 * (high - low) if low < 0 else 0.0, high + 0.08 * (high - low))
+    panel.set_ylabel("drag coefficient")
+    panel.set_xlabel("amplitude / mm")
+    edge = 0.04e3 * float(np.ptp(curve.x))
+    panel.set_xlim(max(1e3 * float(curve.x[0]) - edge, 0.0), 1e3 * float(curve.x[-1]) + edge)
+    per_mm = 2e-3 * np.pi / diameter.value
+    second = panel.secondary_xaxis("top", functions=(_times(per_mm), _times(1.0 / per_mm)))
+    second.set_xlabel("Keulegan-Carpenter number")
+    return True
 
 
 def _times(factor: float) -> Callable[[ArrayLike], F8]:

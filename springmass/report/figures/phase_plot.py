@@ -12,9 +12,11 @@ from pipeline.track import F8, UNUSABLE
 from springmass.report.figures.canvas import DENSE_POINTS, legend_above, model_phase, moving, panels, style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
-__all__ = ["measured_phase", "phase_figure", "turn_step"]
+__all__ = ["measured_phase", "phase_figure", "phase_panel", "turn_step"]
 
 LEAST_TURNS, MOST_TURNS = 4, 24  # drawn in a phase plot
 
@@ -36,6 +38,26 @@ def phase_figure(analysis: Analysis) -> Figure:
     analysis : Analysis
         Of a record that oscillates.
     """
+    with style():
+        figure, (panel,) = panels([(4.0, 0.0)], width=5.6, right=1.05)
+        times = phase_panel(panel, analysis)
+        legend_above(panel)
+        beside = panel.get_position()
+        bar = figure.colorbar(times, cax=figure.add_axes((beside.x1 + 0.03, beside.y0, 0.025, beside.height)))
+        bar.set_label("time / s")
+        bar.solids.set_rasterized(True)  # type: ignore[union-attr]  # a bar without lines always has them
+        return figure
+
+
+def phase_panel(panel: Axes, analysis: Analysis) -> ScalarMappable:
+    """Draw the turns of :func:`phase_figure`; return what a bar of their colours, in s, is made of.
+
+    Parameters
+    ----------
+    panel : Axes
+    analysis : Analysis
+        Of a record that oscillates.
+    """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
@@ -43,41 +65,30 @@ def phase_figure(analysis: Analysis) -> Figure:
     motion, track = moving(analysis), analysis.track
     period = 2.0 * np.pi / motion.phase.angular_frequency.value
     first, end = motion.damping.t0, float(np.nanmax(track.t))
-    starts = np.arange(first, end, period * turn_step(motion))
     # The map's pale end would drown in the paper.
     colours = ListedColormap(colormaps["cividis"](np.linspace(0.0, 0.88, 64)))
     scale = Normalize(first, end)
-    with style():
-        figure, (panel,) = panels([(4.0, 0.0)], width=5.6, right=1.05)
-        displacement, velocity, label = measured_phase(analysis, motion)
-        turn = np.floor((track.t - first) / period)
-        drawn = np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, turn_step(motion)) == 0)
-        dots: dict[str, Any] = {
-            "ms": 2.8,
-            "mew": 0,
-            "color": "#a0a0a0",
-            "rasterized": np.count_nonzero(drawn) > DENSE_POINTS // 5,
-        }
-        fastest = 1.3 * float(np.nanmax(np.abs(motion.waveform.velocity)))
-        beyond = int(np.count_nonzero(np.abs(velocity[drawn]) > fastest))
-        label += f" ({beyond} off the axis)" if beyond else ""
-        panel.plot(displacement[drawn] * 1e3, velocity[drawn], ".", label=label, **dots)
-        panel.set_ylim(-fastest, fastest)
-        for i, start in enumerate(starts):
-            t = np.linspace(start, min(start + period, end), 73)
-            x, v = model_phase(motion, t)
-            panel.plot(x * 1e3, v, color=colours(scale(start)), lw=1.0, label=None if i else "fitted motion")
-        panel.set_xlabel("displacement / mm")
-        panel.set_ylabel("velocity / (m/s)")
-        legend_above(panel)
-        beside = panel.get_position()
-        bar = figure.colorbar(
-            ScalarMappable(scale, colours),
-            cax=figure.add_axes((beside.x1 + 0.03, beside.y0, 0.025, beside.height)),
-        )
-        bar.set_label("time / s")
-        bar.solids.set_rasterized(True)  # type: ignore[union-attr]  # a bar without lines always has them
-        return figure
+    displacement, velocity, label = measured_phase(analysis, motion)
+    turn = np.floor((track.t - first) / period)
+    drawn = np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, turn_step(motion)) == 0)
+    dots: dict[str, Any] = {
+        "ms": 2.8,
+        "mew": 0,
+        "color": "#a0a0a0",
+        "rasterized": np.count_nonzero(drawn) > DENSE_POINTS // 5,
+    }
+    fastest = 1.3 * float(np.nanmax(np.abs(motion.waveform.velocity)))
+    beyond = int(np.count_nonzero(np.abs(velocity[drawn]) > fastest))
+    label += f" ({beyond} off the axis)" if beyond else ""
+    panel.plot(displacement[drawn] * 1e3, velocity[drawn], ".", label=label, **dots)
+    panel.set_ylim(-fastest, fastest)
+    for i, start in enumerate(np.arange(first, end, period * turn_step(motion))):
+        t = np.linspace(start, min(start + period, end), 73)
+        x, v = model_phase(motion, t)
+        panel.plot(x * 1e3, v, color=colours(scale(start)), lw=1.0, label=None if i else "fitted motion")
+    panel.set_xlabel("displacement / mm")
+    panel.set_ylabel("velocity / (m/s)")
+    return ScalarMappable(scale, colours)
 
 
 def measured_phase(analysis: Analysis, motion: Oscillation) -> tuple[F8, F8, str]:

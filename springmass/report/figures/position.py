@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["ZOOM_PERIODS", "has_error_bars", "is_long", "position_figure"]
+__all__ = ["ZOOM_PERIODS", "has_error_bars", "is_long", "position_figure", "position_panel"]
 
 # Bits of a sample, the gravest first; what they are called, and marker and colour.
 _FLAGGED: tuple[tuple[int, str, str, str], ...] = (
@@ -71,10 +71,7 @@ def position_figure(analysis: Analysis) -> Figure:
     with style():
         if not isinstance(motion, Oscillation):
             figure, (only,) = panels([(2.6, 0.0)])
-            _draw_distance(only, analysis, start, end)
-            if isinstance(motion, Overdamped):
-                t, y = _relaxing(analysis, motion)
-                only.plot(t, y * 1e3, color="#000000", lw=0.9, label="fit", zorder=2.5)
+            position_panel(only, analysis, start, end)
             legend_above(only)
             only.set_xlabel("time / s")
             return figure
@@ -92,6 +89,34 @@ def position_figure(analysis: Analysis) -> Figure:
             axes[2].set_title(f"the first {ZOOM_PERIODS} periods", loc="left", fontsize=8.5, pad=3)
         axes[-1].set_xlabel("time / s")
         return figure
+
+
+def position_panel(panel: Axes, analysis: Analysis, start: float, end: float) -> None:
+    """Draw the distance between two times, s, with its fit where there is one.
+
+    Parameters
+    ----------
+    panel : Axes
+    analysis : Analysis
+    start, end : float, s
+    """
+    motion = analysis.motion
+    _draw_distance(panel, analysis, start, end)
+    if isinstance(motion, Overdamped):
+        t, y = _relaxing(analysis, motion)
+        panel.plot(t, y * 1e3, color="#000000", lw=0.9, label="fit", zorder=2.5)
+    if not isinstance(motion, Oscillation):
+        return
+    law, rest = motion.damping.best, motion.rest
+    if (end - start) * motion.cycles.frequency_hz > DENSE_PERIODS:
+        grid = np.linspace(start, end, 400)
+        reach = law.amplitude(grid - motion.damping.t0)
+        for sign, label in ((1, "fit: rest ± amplitude"), (-1, None)):
+            panel.plot(grid, (rest.at(grid) + sign * reach) * 1e3, color="#000000", lw=1.0, label=label)
+    else:
+        grid = np.linspace(start, end, int(50 * (end - start) * motion.cycles.frequency_hz) + 2)
+        position = rest.at(grid) + model_phase(motion, grid)[0]
+        panel.plot(grid, position * 1e3, color="#000000", lw=0.8, label="fit", zorder=2.5)
 
 
 def _relaxing(analysis: Analysis, motion: Overdamped) -> tuple[F8, F8]:
@@ -119,17 +144,7 @@ def _draw_pair(axes: Sequence[Axes], analysis: Analysis, motion: Oscillation, st
     """Draw distance and fit above, residual over noise beneath, between two times."""
     above, below = axes
     t = analysis.track.t
-    _draw_distance(above, analysis, start, end)
-    law, rest = motion.damping.best, motion.rest
-    if (end - start) * motion.cycles.frequency_hz > DENSE_PERIODS:
-        grid = np.linspace(start, end, 400)
-        reach = law.amplitude(grid - motion.damping.t0)
-        for sign, label in ((1, "fit: rest ± amplitude"), (-1, None)):
-            above.plot(grid, (rest.at(grid) + sign * reach) * 1e3, color="#000000", lw=1.0, label=label)
-    else:
-        grid = np.linspace(start, end, int(50 * (end - start) * motion.cycles.frequency_hz) + 2)
-        position = rest.at(grid) + model_phase(motion, grid)[0]
-        above.plot(grid, position * 1e3, color="#000000", lw=0.8, label="fit", zorder=2.5)
+    position_panel(above, analysis, start, end)
     noise = analysis.estimates["noise"].value or 1.0
     inside = ((analysis.flags & UNUSABLE) == 0) & (t >= start) & (t <= end)
     residual = motion.waveform.residual[inside] / noise
