@@ -94,10 +94,15 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
     WriteFailed
         If the temporary file cannot be made, synced or put in place. After any error, also one of the body,
         the temporary file is gone and what stood there before stands.
+
+    Notes
+    -----
+    What a killed writer left in the folder goes with the next file that is written there.
     """
     target = Path(path)
     if not overwrite and os.path.lexists(target):
         raise _exists(target)
+    remove_leftovers(target.parent)
     temporary, lock = _reserve(target)
     try:
         yield temporary

@@ -159,3 +159,15 @@ def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
     """Others may read what the umask lets them, not only the owner."""
     (tmp_path / "usual").write_text("x")
     assert write_whole(tmp_path / "a", "x").stat().st_mode == (tmp_path / "usual").stat().st_mode
+
+
+def test_what_a_killed_writer_left_goes_with_the_next_file(tmp_path: Path) -> None:
+    """A temporary file that nobody holds is removed; one that a living writer is at work on stays."""
+    left = tmp_path / ".old.h5.0123abcd.part"
+    left.write_bytes(b"half")
+    with whole_file(tmp_path / "a") as working:
+        assert not left.exists()
+        working.write_text("mine")
+        write_whole(tmp_path / "b", "another")
+        assert working.exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
