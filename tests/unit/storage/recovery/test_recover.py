@@ -252,8 +252,8 @@ def test_what_a_killed_build_left_is_removed_and_named(tmp_path: Path) -> None:
     """A temporary file that nobody holds goes; one that a living writer is at work on stays."""
     log = write(tmp_path / "run.wire", count=10)
     left = tmp_path / ".run.h5.0123abcd.part"
-    left.write_bytes(b"half")
     with whole_file(tmp_path / "other.h5") as living:
+        left.write_bytes(b"half")
         lines = list(recover(log).describe())
         assert living.exists()
     assert not left.exists()
