@@ -123,7 +123,7 @@ def _write(
 ) -> Path:
     """Write run file, figures, tables and JSON into NAME.simulated; return the folder."""
     from springmass.report.figures import save
-    from springmass.report.simulation_figures import against_figure, band_figure, draw_simulation
+    from springmass.report.figures.simulation import against_figure, band_figure, draw_simulation
     from storage.atomic import write_whole
     from storage.folder import whole_folder
 

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from importlib.resources import files
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
-from pipeline.analyse import Analysis, Oscillation
-from pipeline.damping.joint import JointDamping
-from pipeline.damping.select import Damping
-from pipeline.numerics.estimate import Joint
+from pipeline.analyse import Oscillation
 from pipeline.track import Track
+from springmass.report.advice import ADVICE, sorted_out
 from springmass.report.budgets import INPUTS, budgets_of
-from springmass.report.tables import law_status, page_unit, pretty, pretty_number, table_rows
-from springmass.report.words import LETTERS, caption, verdict
+from springmass.report.figures.inline import inline_svg
+from springmass.report.laws import laws_across, laws_of
+from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
+from springmass.report.tables import pretty, pretty_number, table_rows
+from springmass.report.words import caption, typeset, verdict
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
+from springmass.runs.json_results import picked
 
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-__all__ = ["inline_svg", "render_html"]
+__all__ = ["render_html"]
 
-_SEVERITIES = {"error": "Error", "warning": "Warning", "info": "Note"}
 _QUALITY = {
     "used": "used",
     "missing": "without a distance",
@@ -47,6 +46,20 @@ _BIASES = {
     "velocity_rms": "differences of neighbouring distances carry noise, which adds to the mean square",
     "reynolds_number": "as the velocity; air taken at 20 °C without uncertainty",
 }
+
+
+BESIDE = 3  # columns of runs that a sheet of A4 holds
+MOST_NOTES = 50  # of a recording that the page lists
+_SECTIONS = (
+    ("position", "Position"),
+    ("amplitude", "Amplitude and damping law"),
+    ("drag", "Drag coefficient"),
+    ("energy", "Energy"),
+    ("motion", "Velocity and acceleration"),
+    ("phase", "Phase plot"),
+    ("classic", "The lab report's own method"),
+)
+"""Figures in the order of their sections, with the sections' titles."""
 
 
 def render_html(
@@ -72,21 +85,39 @@ def render_html(
 
     Notes
     -----
+    First what holds, Table 1, the main figure and what changes a number, then everything else; each fact once.
     Every text is escaped by the template engine; only the pictures, made here, go in as they are.
     """
-    from jinja2 import Environment, StrictUndefined
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_shown
+        loader=PackageLoader("springmass.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_shown,
     )
-    environment.filters |= {"pretty": pretty, "number": pretty_number, "symbol": _symbol, "input": INPUTS.__getitem__}
-    source = files("springmass.report").joinpath("templates/report.html.j2").read_text(encoding="utf-8")
-    parts = [_part(i, run, drawn) for i, (run, drawn) in enumerate(zip(runs, pictures, strict=True))]
-    return environment.from_string(source).render(
+    environment.filters |= {
+        "pretty": pretty,
+        "number": pretty_number,
+        "symbol": _symbol,
+        "input": INPUTS.__getitem__,
+        "typeset": typeset,
+        "breakable": _breakable,
+    }
+    # One run alone shows its law at the top; where several are compared it is their constants.
+    numbers = itertools.count(2 if compared is not None else 1)
+    parts = [
+        _part(i, run, drawn, numbers, alone=len(runs) == 1)
+        for i, (run, drawn) in enumerate(zip(runs, pictures, strict=True))
+    ]
+    return environment.get_template("report.html.j2").render(
         title=", ".join(run.name for run in runs),
         parts=parts,
-        rows=table_rows([run.analysis for run in runs]),
+        tables=list(_tables(runs)),
         compared=None if compared is None else _compared(compared, overview),
+        contents=list(_contents(parts, compared)),
         provenance=list(_flattened(provenance)),
     )
 
@@ -96,80 +127,99 @@ def _shown(value: object) -> object:
     return visible(value) if type(value) is str else value
 
 
-def _part(index: int, run: Analysed, pictures: Mapping[str, bytes]) -> dict[str, Any]:
+def _tables(runs: Sequence[Analysed]) -> Iterator[dict[str, Any]]:
+    """Yield Table 1 in blocks of as many runs as stand beside each other on paper."""
+    for first in range(0, len(runs), BESIDE):
+        some = runs[first : first + BESIDE]
+        yield {"names": [run.name for run in some], "rows": table_rows([run.analysis for run in some])}
+
+
+def _contents(parts: Sequence[Mapping[str, Any]], compared: Compared | None) -> Iterator[tuple[str, str]]:
+    """Yield (id, title) of every section that the table of contents names."""
+    yield "holds", "What holds"
+    yield "table-1", "Table 1"
+    if compared is not None or parts[0]["main"]:
+        yield "main-figure", "Main figure"
+    yield "heed", "What changes a number"
+    if compared is not None:
+        yield "comparison", "Comparison"
+    if len(parts) == 1:
+        yield from parts[0]["sections"]
+    else:
+        yield from ((f"run{part['index']}", part["name"]) for part in parts)
+    yield "provenance", "Provenance"
+
+
+def _part(
+    index: int, run: Analysed, pictures: Mapping[str, bytes], numbers: Iterator[int], *, alone: bool
+) -> dict[str, Any]:
     """Everything that the template says of one run."""
     analysis, quality, given = run.analysis, run.result["quality"], run.result["input"]
     motion = analysis.motion
     ordered = [*(name for name in _QUALITY if name in quality), *(name for name in quality if name not in _QUALITY)]
-    return {
+    main = next((name for name in ("amplitude", "position") if alone and name in pictures), "")
+    drawn = [name for name in (main, *(name for name, _ in _SECTIONS if name != main)) if name in pictures]
+    findings = [picked(x, ("code", "severity", "message")) for x in analysis.findings]
+    part = {
         "name": run.name,
-        "subtitle": _subtitle(given, analysis.track),
-        "kind": analysis.track.kind,
-        "findings": _findings(analysis),
-        "verdict": verdict(analysis),
-        "figures": [
-            {"name": name, "svg": inline_svg(svg, f"{name}{index}-"), "caption": caption(name, analysis)}
-            for name, svg in pictures.items()
+        "index": index,
+        "head": [
+            _subtitle(given, analysis.track),
+            f"{date_words(run.recorded)[:1].upper()}{date_words(run.recorded)[1:]}.",
+            f"Bench: {bench_words(analysis.scene)}.",
         ],
-        "laws": _laws_of(motion.damping) if isinstance(motion, Oscillation) else None,
+        "kind": analysis.track.kind,
+        "verdict": verdict(analysis),
+        "main": main,
+        "figures": {
+            name: {
+                "svg": inline_svg(pictures[name], f"{name}{index}-"),
+                "caption": caption(name, analysis),
+                "number": next(numbers),
+                "id": f"figure-{name}-{index}",
+            }
+            for name in drawn
+        },
+        "told": sorted_out(run.result.get("findings", findings), drawn),
+        "laws": laws_of(motion.damping) if isinstance(motion, Oscillation) else None,
         "budgets": budgets_of(analysis),
         "effects": analysis.effects,
         "quality": [(_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in ordered],
+        "notes": notes_of(run.recorded),
+        "most_notes": MOST_NOTES,
+        "calibration": calibration_of(run.recorded),
         "classic": _classic_rows(run),
         "chi2": None if run.classic is None else run.classic.chi2,
         "input": list(_flattened(given)),
     }
+    return part | {"sections": list(_sections(part))}
+
+
+def _sections(part: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield (id, title) of the sections of a run that have anything to show."""
+    there = {
+        "amplitude": part["laws"] is not None,
+        "motion": part["laws"] is not None,
+        "classic": part["classic"] is not None,
+        "position": True,
+    }
+    for name, title in _SECTIONS:
+        if there.get(name, name in part["figures"]):
+            yield f"{name}-{part['index']}", title
+    for name, title in (("budgets", "Uncertainty"), ("effects", "Effects")):
+        if part[name]:
+            yield f"{name}-{part['index']}", title
+    yield f"samples-{part['index']}", "Samples and recording"
 
 
 def _subtitle(given: Mapping[str, Any], track: Track) -> str:
     duration_s = float(track.t[-1] - track.t[0])
     parts = [
-        given.get("format"),
         given.get("title"),
         f"{len(track)} samples at {track.rate_hz:g} Hz, {duration_s:.1f} s",
+        f"format {given['format']}" if given.get("format") else None,
     ]
     return " · ".join(str(part) for part in parts if part)
-
-
-def _findings(analysis: Analysis) -> list[dict[str, str]]:
-    """Errors first; among equals what became of the laws before what happened to samples."""
-    severities = list(_SEVERITIES)
-    ordered = sorted(analysis.findings, key=lambda x: (severities.index(x.severity), not x.code.startswith("law")))
-    return [
-        {"severity": x.severity, "word": _SEVERITIES[x.severity], "code": x.code, "message": x.message} for x in ordered
-    ]
-
-
-def _laws_of(damping: Damping) -> dict[str, Any]:
-    fitted = {law: fit.joint for law, fit in damping.fits.items()}
-    return _laws(damping, fitted, lambda law: law_status(damping, law))
-
-
-def _laws_across(joint: JointDamping) -> dict[str, Any]:
-    fitted = {law: fit.coefficients for law, fit in joint.fits.items()}
-    return {"message": joint.message, **_laws(joint, fitted, lambda law: _joint_status(joint, law))}
-
-
-def _laws(found: Damping | JointDamping, fitted: Mapping[str, Joint], status: Callable[[str], str]) -> dict[str, Any]:
-    """Lay out every law tried: what was fitted, how well, and what became of it."""
-    units = {name: unit for joint in fitted.values() for name, unit in zip(joint.names, joint.units, strict=True)}
-    rows = [
-        {
-            "name": law,
-            "cells": [replace(fitted[law][name], unit="") if name in fitted[law].names else None for name in units],
-            "fit": fit,
-            "bic": _difference(fit.bic - found.best.bic),
-            "status": status(law),
-            "look": "selected" if status(law) == "selected" else "rejected" if fit.rejected else "",
-        }
-        for law, fit in found.fits.items()
-    ]
-    heads = [LETTERS.get(name, name) + (f" / {page_unit(unit)}" if unit else "") for name, unit in units.items()]
-    return {"heads": heads, "rows": rows}
-
-
-def _difference(bic: float) -> str:
-    return pretty_number(bic) if abs(bic) >= 1000.0 else f"{bic:.1f}".replace("-", "−")
 
 
 def _classic_rows(run: Analysed) -> list[dict[str, Any]] | None:
@@ -192,19 +242,12 @@ def _compared(compared: Compared, overview: bytes) -> dict[str, Any]:
     found = compared.comparison
     return {
         "found": found,
+        "message": typeset(found.message),
+        "told": [picked(x, ("code", "severity")) | {"advice": ADVICE[x.code]} for x in compared.findings],
         "rows": list(zip(found.names, found.each, found.pulls, strict=True)),
         "figure": inline_svg(overview, "comparison-"),
-        "joint": [_laws_across(joint) for joint in compared.joint],
+        "joint": [laws_across(joint) for joint in compared.joint],
     }
-
-
-def _joint_status(joint: JointDamping, law: str) -> str:
-    rejection = joint.fits[law].rejection
-    if rejection:
-        return {"differ": "coefficients differ"}.get(rejection, rejection)
-    if law == joint.selected:
-        return "selected"
-    return "admissible" if law in joint.admissible else "unlikely"
 
 
 def _flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
@@ -231,55 +274,8 @@ def _symbol(symbol: str) -> Markup:
     )
 
 
-def inline_svg(svg: bytes, prefix: str) -> Markup:
-    """Return an SVG file as an element for a page: names of its own, coordinates to a hundredth of a point.
+def _breakable(law: str) -> Markup:
+    """Let the name of a law break behind a plus."""
+    from markupsafe import Markup, escape
 
-    Parameters
-    ----------
-    svg : bytes
-        As :func:`springmass.report.figures.render` makes it.
-    prefix : str
-        Of every id, so that figures on one page do not take each other's clip paths.
-    """
-    from markupsafe import Markup
-
-    text = svg.decode()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
-    text = re.sub(r' xmlns(:xlink)?="[^"]*"| version="1.1"', "", text).replace("xlink:href", "href")
-    used = dict.fromkeys(re.findall(r'(?:href="|url\()#([^")]+)', text))
-    short = {name: f"{prefix}{i}" for i, name in enumerate(used)}
-
-    def renamed(found: re.Match[str]) -> str:
-        # Groups are named as well, but nobody calls them.
-        return f' id="{short[found[1]]}"' if found[1] in short else ""
-
-    text = re.sub(r' id="([^"]*)"', renamed, text)
-    text = re.sub(r'(href="|url\()#([^")]+)', lambda found: f"{found[1]}#{short[found[2]]}", text)
-    # A style for "*" would reach the whole page from here.
-    text = re.sub(r"<style[^>]*>.*?</style>", "", text, flags=re.DOTALL)
-    text = re.sub(r"<defs>\s*</defs>", "", text)
-    text = re.sub(r"<[^>]+>", _rounded, text)
-    text = _shared_styles(text)
-    return Markup(re.sub(r">\s+<", "><", text).strip())
-
-
-def _rounded(tag: re.Match[str]) -> str:
-    # Text between tags, such as 0.0025 at an axis, is not touched, nor are pixels.
-    if tag[0].startswith("<image"):
-        return tag[0]
-    shorter = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0])
-    return re.sub(r"\s+", " ", shorter)
-
-
-def _shared_styles(text: str) -> str:
-    """Move the style of a run of equal markers to one group around them."""
-    one = r'<use href="[^"]*" x="[^"]*" y="[^"]*" style="[^"]*" ?/>'
-
-    def grouped(found: re.Match[str]) -> str:
-        styles = set(re.findall(r'style="([^"]*)"', found[0]))
-        if len(styles) != 1:
-            return found[0]
-        return f'<g style="{styles.pop()}">' + re.sub(r' style="[^"]*"', "", found[0]) + "</g>"
-
-    return re.sub(rf"{one}(?:\s*{one})+", grouped, text)
+    return Markup("+<wbr>").join(escape(term) for term in law.split("+"))

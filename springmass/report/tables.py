@@ -20,6 +20,7 @@ __all__ = [
     "page_unit",
     "pretty",
     "pretty_number",
+    "raised",
     "results_csv",
     "table_rows",
     "text_table",
@@ -51,7 +52,7 @@ _QUANTITIES = (
 )
 QUANTITIES = {name: quantity for name, quantity, *_ in _QUANTITIES}
 
-_PAGE_UNITS = {"degC": "°C", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
+_PAGE_UNITS = {"degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 NOTHING = "-"
 
@@ -251,4 +252,9 @@ def _ascii(text: str) -> str:
 def _typeset(number: str) -> str:
     mantissa, mark, power = number.replace("+-", "±").partition("e")
     mantissa = mantissa.replace("-", "−")
-    return f"{mantissa} × 10{str(int(power)).translate(_SUPERSCRIPT)}" if mark else mantissa
+    return f"{mantissa} × 10{raised(int(power))}" if mark else mantissa
+
+
+def raised(power: int) -> str:
+    """Return an exponent in raised digits."""
+    return str(power).translate(_SUPERSCRIPT)

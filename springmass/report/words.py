@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from pipeline.analyse import Analysis, Oscillation, Overdamped, Still
+from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
 from springmass.report.figures.phase_plot import turn_step
 from springmass.report.figures.position import ZOOM_PERIODS, has_error_bars, is_long
 from springmass.report.motion_table import row_step
-from springmass.report.tables import pretty
+from springmass.report.tables import page_unit, pretty, raised
 
-__all__ = ["LETTERS", "caption", "kept", "verdict"]
+__all__ = ["LETTERS", "caption", "kept", "typeset", "verdict"]
 
 LETTERS = {"A0": "A₀", "gamma": "γ", "beta": "β", "mu": "μ"}
 
@@ -21,31 +23,70 @@ def kept(estimate: Estimate) -> str:
     return pretty(estimate).replace(" ", "\u00a0")
 
 
-def verdict(analysis: Analysis) -> str:
-    """Return what became of the damping laws, in a sentence or a few."""
+_SUBSTITUTES = (
+    (re.compile(r"(?<=[\d)] )(1/\(m s\)|1/s|m/s\^2|degC)(?!\w)"), lambda found: page_unit(found[1])),
+    (re.compile(r"(?<=[\d)])e([+-]\d+)\b"), lambda found: f" × 10{raised(int(found[1]))}"),
+    (re.compile(r"\+-"), "±"),
+    (re.compile(r"(?<![\w.+-])-(?=\d)"), "−"),
+    (re.compile(r"\b(gamma|beta|mu)(?= = )"), lambda found: LETTERS[found[1]]),
+    (re.compile(r"(?<=\d),(?=\d{3}(?!\d))"), "\u202f"),
+    (re.compile(r"(?<=\d)%"), "\u00a0%"),
+    (re.compile(r"\bchi-square\b"), "χ²"),
+)
+
+
+def typeset(message: str) -> str:
+    """Return a message as the page's tables write numbers and units.
+
+    Examples
+    --------
+    >>> typeset("gamma = (6.50 +- 0.12)e-03 1/s; left in, the amplitude changes by -0.4 mm (2.0%)")
+    'γ = (6.50 ± 0.12) × 10⁻³ s⁻¹; left in, the amplitude changes by −0.4 mm (2.0\xa0%)'
+    """
+    for pattern, by in _SUBSTITUTES:
+        message = pattern.sub(by, message)
+    return message
+
+
+def verdict(analysis: Analysis) -> tuple[str, ...]:
+    """Return what holds of a run, in two sentences at most: what was measured, and how the motion is damped."""
     if isinstance(analysis.motion, Overdamped):
-        return f"{analysis.motion.why[0].upper()}{analysis.motion.why[1:]}.".replace("+-", "±")
+        why = typeset(analysis.motion.why)
+        return (f"{why[0].upper()}{why[1:]}.",)
     if isinstance(analysis.motion, Still):
-        return "Nothing oscillates in this record; rest position and noise are all that it gives."
-    damping = analysis.motion.damping
+        return ("Nothing oscillates in this record; rest position and noise are all that it gives.",)
+    found = analysis.estimates
+    measured = f"The bob swings with the period T\u00a0=\u00a0{kept(found['period'])}"
+    if "spring_constant" in found:
+        measured += f", which makes the spring constant k\u00a0=\u00a0{kept(found['spring_constant'])}"
+    return (f"{measured}.", _damped(analysis.motion.damping))
+
+
+def _damped(damping: Damping) -> str:
+    """Return what became of the damping laws, in a sentence."""
     chosen = damping.best.law.words
     if damping.best.rejected:
-        return f"No damping law holds; the least bad is {chosen}, and its parameters must not be used."
+        return (
+            f"No damping law describes how the amplitude falls; {chosen} comes nearest, and its parameters must not be "
+            "used: quote the amplitude against time."
+        )
+    if damping.selected == "none":
+        text = "The amplitude does not fall by more than this record can tell"
+    else:
+        text = f"Its amplitude falls by {chosen}"
     parameters = [
         f"{LETTERS.get(name, name)}\u00a0=\u00a0{kept(x)}"
         for name, x in damping.best.joint.estimates().items()
         if name != "A0"
     ]
-    text = f"The amplitude is described by {chosen}" + (f": {', '.join(parameters)}." if parameters else ".")
-    if damping.selected == "none":
-        text = "The amplitude does not fall by more than this record can tell."
-    rejected = [fit.law.words for fit in damping.fits.values() if fit.rejected]
-    if rejected:
-        text += f" Rejected: {'; '.join(rejected)}."
+    text += f", {', '.join(parameters)}" if parameters else ""
     others = [damping.fits[name].law.words for name in damping.admissible if name != damping.selected]
     if others:
-        text += f" As good, as far as this record can tell: {'; '.join(others)}."
-    return text
+        return f"{text}; as far as this record can tell, as good: {'; '.join(others)}."
+    tried, rejected = len(damping.fits) - 1, sum(fit.rejected for fit in damping.fits.values())
+    if rejected == tried:
+        return f"{text}; the record rejects every other law tried."
+    return f"{text}; of the {tried} other laws tried the record rejects {rejected}, the rest are unlikely."
 
 
 def caption(name: str, analysis: Analysis) -> str:

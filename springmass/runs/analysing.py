@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -44,12 +44,15 @@ class Analysed:
         first line, if it has one.
     classic : Classic, optional
         The lab report's own method on the same input, to be set beside.
+    recorded : mapping
+        What the recording says of its origin: start time, marks, events, calibration.
     """
 
     name: str
     analysis: Analysis
     result: Mapping[str, Any]
     classic: Classic | None = None
+    recorded: Mapping[str, Any] = field(default_factory=dict)
 
 
 def analyse_loaded(
@@ -95,7 +98,7 @@ def analyse_loaded(
         parameters={**parameters, "scene": scene.to_mapping()},
         classic=by_classic,
     )
-    return Analysed(name or loaded.path.name, analysis, result, by_classic)
+    return Analysed(name or loaded.path.name, analysis, result, by_classic, loaded.provenance)
 
 
 def scene_of(loaded: Loaded, given: Scene | None) -> Scene:

@@ -7,6 +7,7 @@ import dataclasses
 import functools
 import html
 import io
+import itertools
 import json
 import re
 from pathlib import Path
@@ -22,13 +23,15 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import UNUSABLE, Track
+from springmass.report.advice import ADVICE, LAW_CODES
 from springmass.report.budgets import INPUTS, budget_csv, budget_text, budgets_of
 from springmass.report.figures import comparison_figure, draw, motion_figure, render
-from springmass.report.html import inline_svg, render_html
+from springmass.report.figures.inline import inline_svg
+from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.tables import law_status, pretty, pretty_number, results_csv, table_rows, text_table
-from springmass.report.words import caption
+from springmass.report.words import caption, verdict
 from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
@@ -142,21 +145,78 @@ def test_hostile_text_is_escaped_everywhere() -> None:
 
 
 @pytest.mark.parametrize("make", [damped, bare, still])
-def test_every_finding_is_told(make: Any) -> None:
-    """Every message stands on the page word for word, errors before warnings before notes."""
+def test_every_finding_is_told_once(make: Any) -> None:
+    """Each code stands on the page in one place; at the top are three at most, errors before warnings."""
     page = page_of(run_of(make()))
-    assert make().findings
-    for finding in make().findings:
-        assert finding.message in html.unescape(page)
-    order = re.findall(r'<li class="(\w+)">', page)
-    assert order == sorted(order, key=["error", "warning", "info"].index)
+    codes = re.findall(r"<code>([a-z_]+)</code>", page)
+    assert sorted(codes) == sorted({finding.code for finding in make().findings})
+    top = page[page.index('id="heed"') : page.index('id="position-0"')]
+    order = re.findall(r'<li class="(\w+)">', top)
+    assert len(order) <= 3
+    assert order == sorted(order, key=["error", "warning"].index)
+
+
+def test_what_changes_a_number_says_what_to_do() -> None:
+    """Of many warnings the gravest three stand at the top with a remedy, the others beside what shows them."""
+    many = [Finding(code, "warning", f"{code} has gamma = 2.0e-03 +- 1.0e-04 1/s") for code in ("clipped", "quantised")]
+    many += [Finding("stale_header", "warning", "third"), Finding("rest_drift", "warning", "fourth")]
+    page = html.unescape(page_of(run_of(dataclasses.replace(damped(), findings=tuple(many)))))
+    top, rest = page.split('id="position-0"')
+    assert all(f"<code>{x.code}</code>" in top and ADVICE[x.code] in top for x in many[:3])
+    assert "γ = 2.0 × 10⁻³ ± 1.0 × 10⁻⁴ s⁻¹" in top
+    assert "<code>rest_drift</code>" in rest
+    assert "Fourth." in rest
+
+
+def test_every_warning_of_the_reference_has_a_remedy() -> None:
+    """What the page of findings calls a warning or an error has its sentence on what to do."""
+    reference = (Path(__file__).parents[4] / "docs/reference/findings.md").read_text("utf-8")
+    codes = re.findall(r"^\| `(\w+)` \| ([^|]*)\|", reference, re.MULTILINE)
+    grave = {code for code, severity in codes if "warning" in severity or "error" in severity}
+    assert len(grave) > 30
+    assert grave - set(ADVICE) - LAW_CODES == set()
+
+
+def test_the_page_has_landmarks_and_headings_in_order() -> None:
+    """One banner, one navigation to what is there, one main part, and no level of headings is left out."""
+    page = page_of(run_of(damped(), "one"), run_of(still(), "two"))
+    assert [page.count(f"<{name}") for name in ("header", "nav", "main", "h1")] == [1, 1, 1, 1]
+    levels = [int(level) for level in re.findall(r"<h(\d)", page)]
+    assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
+    linked = re.findall(r'<li><a href="#([^"]+)"', page)
+    assert len(linked) > 5
+    assert set(linked) <= set(re.findall(r'\bid="([^"]+)"', page))
+
+
+def test_the_head_says_when_and_at_which_bench() -> None:
+    """Date, samples and conditions stand above everything; marks, events and the calibration are listed."""
+    recorded = {
+        "start_time": "2026-11-22T22:30:35.97+00:00",
+        "marks": [{"t_s": 6.2, "text": "fan on", "channel": 0}],
+        "events": [{"t_s": 0.5, "kind": "trigger", "facts": {"threshold_m": 0.01, "keep_s": 2.0}}],
+        "sensor": {"calibration": {"offset_m": 0.012, "u_offset_m": 0.0005, "scale": 1.0, "u_scale": 0.0}},
+    }
+    page = page_of(dataclasses.replace(run_of(damped()), recorded=recorded))
+    head = page[page.index("<header") : page.index("</header")]
+    assert "Recorded 2026-11-22 22:30:35 UTC." in head
+    assert "bob 0.217600 ± 0.000050 kg" in head
+    listed = page[page.index('id="samples-0"') :]
+    assert all(words in listed for words in ("fan on", "threshold m 0.01", "0.01200 ± 0.00050 m"))
+    assert "Date of the recording not known" in page_of(run_of(damped()))
 
 
 def test_rejected_laws_are_named_in_words() -> None:
-    """The top of the page says which law describes the amplitude and which ones the record rejects."""
-    top = page_of(run_of(damped())).split("Table 1")[0]
-    assert "linear and quadratic drag together" in top
-    assert re.search(r"Rejected: .*a lone exponential", top)
+    """Two sentences say what holds; the table names what became of every law, with all that speaks for and against."""
+    sentences = verdict(damped())
+    assert len(sentences) == 2
+    assert "linear and quadratic drag together" in sentences[1]
+    page = page_of(run_of(damped()))
+    table = page[page.index('<table class="laws"') :].split("</table>")[0]
+    motion = damped().motion
+    assert isinstance(motion, Oscillation)
+    assert table.count("<tbody") == len(motion.damping.fits)
+    assert re.findall(r'<th scope="col">([^<]*)</th>', table) == ["law", "reduced χ²", "Δχ²", "dof", "ΔBIC"]
+    assert re.search(r'linear<br><span class="sub">rejected', table)
 
 
 def test_simulated_data_cannot_pass_for_measured() -> None:
@@ -375,8 +435,8 @@ def test_several_runs_stand_side_by_side(tmp_path: Path) -> None:
     springs = [SpringRun(run.name, run.analysis.estimates["angular_frequency"], mass) for run in runs]
     comparison = compare_springs(springs)
     page = written(tmp_path, *runs, compared=Compared(comparison, (), ()))
-    assert page.count("<th>same</th>") >= 2
-    assert page.count("Phase plot") == 2
+    assert page.count('<th scope="col">same</th>') == 2
+    assert len(re.findall(r"<h3[^>]*>Phase plot</h3>", page)) == 2
     assert html.escape(comparison.message.replace("+-", "±")) in page
     assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 13
 

@@ -1,0 +1,62 @@
+"""The table of damping laws on a page: how well each fits, what became of it, what was fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pipeline.damping.joint import JointDamping
+from pipeline.damping.select import Damping
+from pipeline.numerics.estimate import Joint
+from springmass.report.tables import law_status, pretty, pretty_number
+from springmass.report.words import LETTERS, typeset
+
+__all__ = ["laws_across", "laws_of"]
+
+
+def laws_of(damping: Damping) -> dict[str, Any]:
+    """Return the rows of every law tried on one run, and what kept others from being tried."""
+    fitted = {law: fit.joint for law, fit in damping.fits.items()}
+    laws = _laws(damping, fitted, lambda law: law_status(damping, law))
+    return {**laws, "unfitted": [(law, typeset(why)) for law, why in damping.unfitted.items()]}
+
+
+def laws_across(joint: JointDamping) -> dict[str, Any]:
+    """Return the same for one law with shared coefficients on several runs, with what came of it in words."""
+    fitted = {law: fit.coefficients for law, fit in joint.fits.items()}
+    return {
+        "message": typeset(joint.message),
+        "unfitted": [],
+        **_laws(joint, fitted, lambda law: _joint_status(joint, law)),
+    }
+
+
+def _laws(found: Damping | JointDamping, fitted: Mapping[str, Joint], status: Callable[[str], str]) -> dict[str, Any]:
+    """Lay out every law tried: how well it fits, what became of it, and what was fitted."""
+    chi2 = found.best.reduced_chi2 * found.best.dof
+    rows = [
+        {
+            "name": law,
+            "status": status(law),
+            "look": "selected" if status(law) == "selected" else "rejected" if fit.rejected else "",
+            "fit": fit,
+            "chi2": _difference(fit.reduced_chi2 * fit.dof - chi2),
+            "bic": _difference(fit.bic - found.best.bic),
+            "coefficients": [f"{LETTERS.get(name, name)} = {pretty(x)}" for name, x in fitted[law].estimates().items()],
+        }
+        for law, fit in found.fits.items()
+    ]
+    return {"rows": rows}
+
+
+def _difference(value: float) -> str:
+    return pretty_number(value) if abs(value) >= 1000.0 else f"{value:.1f}".replace("-", "−")
+
+
+def _joint_status(joint: JointDamping, law: str) -> str:
+    rejection = joint.fits[law].rejection
+    if rejection:
+        return {"differ": "coefficients differ"}.get(rejection, rejection)
+    if law == joint.selected:
+        return "selected"
+    return "admissible" if law in joint.admissible else "unlikely"
