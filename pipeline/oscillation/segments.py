@@ -188,6 +188,7 @@ class _Seen:
     logarithm: C16
     u: float
     sound: NDArray[np.bool_]
+    around: F8  # the greatest amplitude among a window and the two on either side, m
 
     @classmethod
     def of(cls, demodulated: Demodulated) -> _Seen:
@@ -202,7 +203,8 @@ class _Seen:
         # A break within a window leaves it more scatter than others, or samples that were taken for false echoes.
         count = demodulated.count
         sound = (demodulated.noise <= 1.3 * median(demodulated.noise)) & (count >= 0.95 * np.median(count))
-        return cls(t, plane, logarithm, u, sound)
+        around = np.max([np.roll(size, shift) for shift in (-2, -1, 0, 1, 2)], axis=0)
+        return cls(t, plane, logarithm, u, sound, around)
 
     @property
     def spacing(self) -> float:
@@ -215,12 +217,6 @@ class _Seen:
         first = int(np.argmax(np.abs(self.plane)))
         steps = -np.diff(self.logarithm.real[first : first + REACH + 2])
         return median(steps) if steps.size else 0.0
-
-    @property
-    def around(self) -> F8:
-        """(w,): the greatest amplitude among a window and the two on either side, m."""
-        size = np.abs(self.plane)
-        return np.asarray(np.max([np.roll(size, shift) for shift in (-2, -1, 0, 1, 2)], axis=0))
 
     def moving(self) -> int:
         """Number of windows up to the last two running that stand out of the noise."""
@@ -243,7 +239,9 @@ class _Seen:
         t, v = self.t[rows] - self.t[k][:, None], values[rows]
         i, j = PAIRS
         lines = v[:, i] - t[:, i] * (v[:, j] - v[:, i]) / (t[:, j] - t[:, i])
-        return np.asarray(np.median(lines.real, axis=1) + 1j * np.median(lines.imag, axis=1))
+        both = np.sort(np.stack([lines.real, lines.imag]), axis=2)  # a fifth of the time of numpy.median
+        real, imaginary = 0.5 * (both[:, :, 4] + both[:, :, 5])
+        return np.asarray(real + 1j * imaginary)
 
     def change(self, values: C16, k: NDArray[np.int64], one: int, other: int) -> C16:
         """Return what the one side of windows k must be changed by to be the other; 0 stands for the windows."""
@@ -283,8 +281,9 @@ def _trimmed(seen: _Seen, start: int, stop: int, bound: float, share: float) -> 
     """Return the windows of a part without those at either end that do not continue what lies within it."""
     least = np.maximum(bound, share * seen.around)
     if stop - start >= REACH + 4:
-        off = [j for j in (start, start + 1) if seen.difference(np.array([j]), 0, 1)[0] > least[j]]
-        late = [j for j in (stop - 1, stop - 2) if seen.difference(np.array([j]), -1, 0)[0] > least[j]]
+        first, final = np.array([start, start + 1]), np.array([stop - 1, stop - 2])
+        off = first[seen.difference(first, 0, 1) > least[first]].tolist()
+        late = final[seen.difference(final, -1, 0) > least[final]].tolist()
         start, stop = max(off, default=start - 1) + 1, min(late, default=stop)
     # Beside a break a window may hold a little of it.
     start += int(start > 0 and not seen.sound[start])
