@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -99,6 +100,15 @@ def _smooth(powers: F8, y: F8) -> F8:
     return np.asarray(powers @ values)
 
 
+@lru_cache(maxsize=16)
+def _powers_of_legendre(degree: int) -> F8:
+    """(degree + 1, degree + 1): power series of the Legendre polynomials, in columns. One takes numpy 0.2 ms."""
+    series = np.zeros((degree + 1, degree + 1))
+    for k, row in enumerate(np.eye(degree + 1)):
+        series[: k + 1, k] = np.polynomial.legendre.leg2poly(row[: k + 1])
+    return series
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Mode:
     """One oscillation beside the main one: :math:`\\mathrm{Re}\\,E(t) w(t)`.
@@ -160,7 +170,7 @@ class Mode:
         """Return E at times t (n,), m."""
         if not self.degree:
             return np.broadcast_to(self.coefficients, t.shape)
-        x, powers = self._x(t), np.polynomial.legendre.leg2poly(self.coefficients)
+        x, powers = self._x(t), _powers_of_legendre(self.degree) @ self.coefficients
         envelope = np.full(t.shape, powers[-1])
         for coefficient in powers[-2::-1]:
             envelope *= x

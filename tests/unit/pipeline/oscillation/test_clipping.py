@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import Analysis, analyse
+from pipeline.oscillation import clipping
 from pipeline.oscillation.condition import Cut
+from pipeline.oscillation.windows import solve
 from pipeline.track import F8, Track
 
 SIGMA_M = 3e-4
@@ -125,6 +127,20 @@ def test_clusters_of_echoes_at_some_turning_points_are_no_cut() -> None:
     assert cuts(found) == ()
     assert found.quality["clipped"] == 0
     assert found.quality["false_echo"] > 50
+
+
+def test_echoes_and_sideways_motion_are_told_from_cuts_by_the_first_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither clusters of echoes nor a sideways motion makes the middle of every swing be fitted."""
+    looked: list[str] = []
+    monkeypatch.setattr(clipping, "solve", lambda basis, weights: looked.append("swing") or solve(basis, weights))
+    rng = np.random.default_rng(8)
+    t, x = swing(rng)
+    struck = (x < -0.042) & np.isin((8.3 * t / (2 * math.pi)).astype(int) % 4, (1,))
+    assert seen(t, np.where(struck, x + 0.006, x), rng).quality["false_echo"] > 25
+    seen(t, x + 0.004 * np.cos(6.1 * t), rng)
+    assert looked == []
+    analyse(report_twin(0))
+    assert looked != []
 
 
 @pytest.mark.parametrize("bend", [0.01, 0.05])
