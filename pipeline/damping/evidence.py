@@ -28,16 +28,16 @@ SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # of the first amplitude, to whi
 NEGATIVE = 3.0  # standard uncertainties below zero at which a coefficient speaks against its law
 
 
-def least_chi2(fits: Mapping[str, Minimum]) -> dict[str, float]:
+def least_chi2(fits: Mapping[str, Minimum], laws: Mapping[str, Law] = LAWS) -> dict[str, float]:
     """Each law's chi-square at its best without negative coefficients, which is a special case's or its own."""
     least: dict[str, float] = {}
-    for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
+    for name in sorted(fits, key=lambda name: len(laws[name].parameters)):
         fit = fits[name]
         least[name] = fit.chi2
         if fit.theta.min() < 0.0:
             with np.errstate(divide="ignore", invalid="ignore"):
                 below = np.minimum(fit.theta, 0.0) ** 2 / np.diag(fit.covariance)
-            cases = [least[case] for case in LAWS[name].cases if case in least]
+            cases = [least[case] for case in laws[name].cases if case in least]
             # Without its special cases at hand: what the worst coefficient costs to be zero.
             least[name] = min(cases) if cases else fit.chi2 + float(np.max(below))
     return least

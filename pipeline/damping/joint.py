@@ -159,11 +159,14 @@ def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params |
     params = params or Params()
     if len(runs) < 2:
         raise AnalysisError(f"a joint fit needs two runs at least, got {len(runs)}")
-    shared = [name for name in params.laws if all(name in damping.fits for _, _, damping in runs)]
+    laws = {name: fit.law for _, _, damping in runs for name, fit in damping.fits.items()}
+    # Laws of one's own are wanted wherever they were fitted.
+    wanted = [name for name in laws if name in params.laws or name not in LAWS]
+    shared = [name for name in wanted if all(name in damping.fits for _, _, damping in runs)]
     if not shared:
         raise AnalysisError("no damping law was fitted to every run; a joint fit has nothing to join")
     points = _points(runs)
-    fits = {name: _fit(LAWS[name], runs, points, params) for name in shared}
+    fits = {name: _fit(laws[name], runs, points, params) for name in shared}
     fits = {name: fit for name, fit in fits.items() if math.isfinite(fit.chi2)}
     if not fits:
         raise AnalysisError("no damping law could be fitted to the runs together; fit them one by one")

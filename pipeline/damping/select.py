@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.damping.evidence import choose, least_chi2, weigh
 from pipeline.damping.law_fit import LawFit, Minimum, mean_squared_rate, minimum_of
-from pipeline.damping.laws import LAWS, Law
+from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Scatter, correlation_length, scatter
@@ -34,10 +34,11 @@ class Params:
         Probability at which chi-square rejects a law that is true.
     evidence : float
         A law whose BIC exceeds the best by more than this is not admissible; 6 is "strong" [1]_.
-    laws : tuple of str
-        Names of the laws to try, from :data:`pipeline.damping.laws.LAWS`.
-    otherwise : tuple of str
-        Names of the laws to try where the record rejects all of ``laws``: where few are tried to save time, a wrong
+    laws : tuple of str or Law
+        The laws to try: names of :data:`pipeline.damping.laws.LAWS`, or laws of one's own, such as
+        :func:`pipeline.damping.laws.of_function.make_law` makes.
+    otherwise : tuple of str or Law
+        The laws to try where the record rejects all of ``laws``: where few are tried to save time, a wrong
         one must not be stated.
 
     References
@@ -48,8 +49,8 @@ class Params:
 
     rejection: float = 1e-3
     evidence: float = 6.0
-    laws: tuple[str, ...] = tuple(LAWS)
-    otherwise: tuple[str, ...] = ()
+    laws: tuple[str | Law, ...] = tuple(LAWS)
+    otherwise: tuple[str | Law, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,10 +190,10 @@ class _Points:
         return self.minima[law.name]
 
 
-def _fit_laws(points: _Points, names: Sequence[str], params: Params) -> Damping:
+def _fit_laws(points: _Points, wanted: Sequence[str | Law], params: Params) -> Damping:
     """Fit some of the laws and choose among them."""
     unfitted: dict[str, str] = {}
-    laws = _affordable(names, int(np.count_nonzero(points.spread.kept)), unfitted)
+    laws = _affordable([find_law(law) for law in wanted], int(np.count_nonzero(points.spread.kept)), unfitted)
     fits = _weigh_all(laws, points, params, unfitted)
     if fits and (closer := _corner(fits, points)) is not None:
         points = replace(points, spread=closer, minima={})
@@ -204,14 +205,14 @@ def _fit_laws(points: _Points, names: Sequence[str], params: Params) -> Damping:
     return Damping(points.t0, fits, selected, admissible, points.spread, unfitted)
 
 
-def _affordable(names: Sequence[str], points: int, unfitted: dict[str, str]) -> list[Law]:
+def _affordable(wanted: Sequence[Law], points: int, unfitted: dict[str, str]) -> list[Law]:
     laws = []
-    for name in names:
-        needed = len(LAWS[name].parameters)
+    for law in wanted:
+        needed = len(law.parameters)
         if points >= needed:
-            laws.append(LAWS[name])
+            laws.append(law)
         else:
-            unfitted[name] = f"{needed} parameters need as many windows, and there are {points}"
+            unfitted[law.name] = f"{needed} parameters need as many windows, and there are {points}"
     return laws
 
 
@@ -226,10 +227,11 @@ def _weigh_all(laws: Sequence[Law], points: _Points, params: Params, unfitted: d
             unfitted.pop(law.name, None)
         else:
             unfitted[law.name] = why
-    least = least_chi2(sound)
+    by_name = {law.name: law for law in laws}
+    least = least_chi2(sound, by_name)
     weighed = {}
     for name, fit in sound.items():
-        weighed[name] = weigh(LAWS[name], fit, least[name], y.size, spread.correlation, params.rejection)
+        weighed[name] = weigh(by_name[name], fit, least[name], y.size, spread.correlation, params.rejection)
         if weighed[name].rejection == "misfit":
             weighed[name] = _widened(weighed[name], (y - weighed[name].amplitude(t)) / u, spread.correlation)
     return weighed

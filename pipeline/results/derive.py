@@ -332,9 +332,10 @@ def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[
     """The selected law's parameters in true seconds and metres."""
     joint = damping.best.joint
     found: dict[str, tuple[Any, str]] = {}
+    dimensions = {**_DIMENSIONS, **getattr(damping.best.law, "dimensions", {})}  # a function's law states its own
     for name, unit, x in zip(joint.names, joint.units, laws.variables, strict=True):
-        if name in _DIMENSIONS and name != "A0":
-            length, per_time = _DIMENSIONS[name]
+        if name in dimensions and name != "A0":
+            length, per_time = dimensions[name]
             found[name] = (x * scale**length * rate**per_time, unit)
     if "n" in joint.names:
         c, n = (laws.variables[joint.names.index(name)] for name in ("c", "n"))

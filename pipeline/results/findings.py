@@ -10,7 +10,6 @@ import numpy as np
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE
 from pipeline.checks.finding import GRAVITY_M_PER_S2, Finding, by_severity
-from pipeline.damping.laws import LAWS
 from pipeline.damping.mixture import MixedDrag, find_mixed
 from pipeline.damping.select import Damping
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit
@@ -141,7 +140,7 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
         yield Finding(
             "no_law_fits",
             "warning",
-            f"no damping law describes the amplitude's fall to within its scatter; {LAWS[damping.selected].words} "
+            f"no damping law describes the amplitude's fall to within its scatter; {damping.best.law.words} "
             f"comes nearest (reduced chi-square {_number(damping.best.reduced_chi2)}): period and amplitudes hold, "
             "quote the amplitude against time rather than the law's coefficients",
         )
@@ -158,7 +157,7 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
 def _words_on_mixed(mixed: MixedDrag, damping: Damping) -> str:
     fit = mixed.fit
     terms = " and ".join(f"{name} = {fit.joint[name]}" for name in fit.law.parameters[1:])
-    alone = ", ".join(f"{LAWS[name].words} by {_number(excess)}" for name, excess in mixed.against.items())
+    alone = ", ".join(f"{damping.fits[name].law.words} by {_number(excess)}" for name, excess in mixed.against.items())
     words = f"{fit.law.words}: {terms}; the BIC of one term alone is higher, of {alone}"
     if not fit.rejected:
         return words

@@ -4,16 +4,36 @@
 :math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)`, :mod:`pipeline.damping.laws.power` that of :math:`-c A^n`. A law is
 one
 small class and one entry of :data:`LAWS`; ``tests/conformance/test_laws.py`` holds each to its differential equation,
-to its Jacobian and to its guess.
+to its Jacobian and to its guess. :mod:`pipeline.damping.laws.of_function` makes one of a function, for one analysis.
 """
 
 from __future__ import annotations
 
 from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.laws.law import Law
+from pipeline.damping.laws.of_function import FunctionLaw, make_law
 from pipeline.damping.laws.power import Power
+from pipeline.errors import AnalysisError
 
-__all__ = ["LAWS", "Drag", "Law", "Power"]
+__all__ = ["LAWS", "Drag", "FunctionLaw", "Law", "Power", "find_law", "make_law"]
 
 _ALL: tuple[Law, ...] = (*DRAGS, Power())
 LAWS: dict[str, Law] = {law.name: law for law in _ALL}
+
+
+def find_law(law: str | Law) -> Law:
+    """Return a law by its name, or the law itself.
+
+    Raises
+    ------
+    AnalysisError
+        If there is none of that name, or one's own has a name that is taken.
+    """
+    name = law if isinstance(law, str) else law.name
+    if isinstance(law, str):
+        if name not in LAWS:
+            raise AnalysisError(f"laws must be of {', '.join(LAWS)}, or laws of your own; got {name!r}")
+        return LAWS[name]
+    if LAWS.get(name, law) is not law:
+        raise AnalysisError(f"a law of your own needs a name of its own, got {name!r}, which is taken")
+    return law

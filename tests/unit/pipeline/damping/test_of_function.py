@@ -1,0 +1,124 @@
+"""Laws made of functions: they fit as the laws with a class do, and what is no law of damping is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.accuracy import params_for
+from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.damping.joint import fit_joint
+from pipeline.damping.laws import LAWS, find_law
+from pipeline.damping.laws.of_function import FunctionLaw, make_law
+from pipeline.damping.select import Params
+from pipeline.errors import AnalysisError
+from pipeline.track import Track
+
+T = np.arange(6000) / 100
+
+
+def fall(t: Any, A0: float, d: float) -> Any:
+    """Return an amplitude that falls as dA/dt = -d A^(3/2)."""
+    return A0 / (1.0 + 0.5 * d * np.sqrt(A0) * t) ** 2
+
+
+def guess(t: Any, amplitude: Any) -> tuple[float, float]:
+    """Return the start of a straight line through the reciprocal roots."""
+    slope, level = np.polyfit(t, 1.0 / np.sqrt(amplitude), 1)
+    return level**-2, 2.0 * slope
+
+
+def three_halves(**options: Any) -> FunctionLaw:
+    """Return the law of these functions."""
+    return make_law("three-halves", fall, {"d": "1/(m^1/2 s)"}, guess, **options)
+
+
+def analysed(amplitude: Any, *laws: Any, accuracy: str = "standard", seed: int = 1) -> tuple[Analysis, Oscillation]:
+    """Return the analysis of a minute with this amplitude, with these laws beside all others."""
+    noise_m = 1e-4 * np.random.default_rng(seed).standard_normal(T.size)
+    params = replace(params_for(accuracy), damping=Params(laws=(*LAWS, *laws)))
+    found = analyse(Track.from_arrays(T, 0.2 + amplitude * np.cos(8.0 * T) + noise_m), params=params)
+    assert isinstance(found.motion, Oscillation)
+    return found, found.motion
+
+
+@pytest.mark.parametrize("accuracy", ["standard", "best"])
+def test_a_law_of_a_function_is_found_where_it_holds(accuracy: str) -> None:
+    """It is selected, and its coefficient is the true one, with the clock in its uncertainty and a budget."""
+    _, motion = analysed(fall(T, 0.05, 0.2), three_halves(words="a law of mine"), accuracy=accuracy)
+    assert motion.damping.selected == "three-halves"
+    d = motion.derived.coefficients["d"]
+    assert d.unit == "1/(m^1/2 s)"
+    assert abs(d.value - 0.2) < 4.0 * d.u < 0.01
+    assert {"clock_rate", "damping_law"} <= {c.name for c in motion.derived.budgets["d"].contributions}
+
+
+@pytest.mark.parametrize("name", ["linear", "quadratic"])
+def test_a_function_fits_as_the_class_of_the_same_law_does(name: str) -> None:
+    """The same values, uncertainties and BIC as the law that ships, though its slopes are differences."""
+    law = LAWS[name]
+    unit = law.units[1]
+
+    def own(t: Any, A0: float, c: float) -> Any:
+        return law.amplitude(np.asarray(t), np.array([A0, c]))
+
+    _, motion = analysed(own(T, 0.05, 0.02), make_law("mine", own, {"c": unit}, law.guess))
+    theirs, mine = motion.damping.fits[name], motion.damping.fits["mine"]
+    np.testing.assert_allclose(mine.joint.values, theirs.joint.values, rtol=1e-6)
+    np.testing.assert_allclose(mine.joint.covariance, theirs.joint.covariance, rtol=1e-4)
+    assert mine.bic == pytest.approx(theirs.bic, rel=1e-6)
+    amplitudes = np.array([0.05, 0.02])
+    np.testing.assert_allclose(mine.rates(amplitudes)[0], theirs.rates(amplitudes)[0], rtol=1e-6)
+
+
+def test_a_law_of_a_function_holds_across_runs() -> None:
+    """Runs that were both analysed with it are fitted together with it too."""
+    runs = []
+    for seed, start in ((1, 0.05), (2, 0.03)):
+        _, motion = analysed(fall(T, start, 0.2), three_halves(), seed=seed)
+        runs.append((str(seed), motion.demodulated, motion.damping))
+    joint = fit_joint(runs)
+    assert joint.selected == "three-halves"
+    assert abs(joint.best.coefficients["d"].value - 0.2) < 4.0 * joint.best.coefficients["d"].u
+
+
+def test_a_law_that_does_not_hold_is_rejected_and_called_by_its_words() -> None:
+    """A record with linear drag contradicts it."""
+    found, motion = analysed(0.05 * np.exp(-0.05 * T), three_halves(words="a law of mine"))
+    assert motion.damping.selected == "linear"
+    assert motion.damping.fits["three-halves"].rejected
+    assert any("a law of mine" in finding.message for finding in found.findings)
+
+
+@pytest.mark.parametrize(
+    ("function", "units", "start", "message"),
+    [
+        (fall, {"d": "1/s"}, guess, "units of length do not fit"),
+        (fall, {"d": "1/(m^1/2 s^2)"}, guess, "units of time do not fit"),
+        (fall, {"d": "1/(ft s)"}, guess, "must be made of m and s, as in \"1/\\(m\\^1/2 s\\)\", got '1/\\(ft s\\)'"),
+        (lambda t, A0, d: 2.0 * fall(t, A0, d), {"d": "1/(m^1/2 s)"}, guess, "A0 must be its amplitude at t = 0"),
+        (lambda t, A0, d: A0 * np.exp(-((d * t) ** 2)), {"d": "1/s"}, lambda *_: (0.05, 0.1), "amplitude alone"),
+        (fall, {"d": "1/(m^1/2 s)"}, lambda *_: (0.05,), "finite numbers for A0, d, got \\[0.05\\]"),
+        (fall, {"d": "1/(m^1/2 s)"}, lambda *_: (0.05, 0.0), "an amplitude that changes"),
+    ],
+)
+def test_what_is_no_law_is_refused(
+    function: Callable[..., Any], units: dict[str, str], start: Callable[..., Any], message: str
+) -> None:
+    """The message names what a law must do, before anything is fitted."""
+    with pytest.raises(AnalysisError, match=message):
+        make_law("mine", function, units, start)
+
+
+def test_laws_are_named_or_given() -> None:
+    """Unknown names list what there is; a law of one's own needs a name of its own."""
+    assert find_law("linear") is LAWS["linear"]
+    assert find_law(LAWS["linear"]) is LAWS["linear"]
+    with pytest.raises(AnalysisError, match=r"laws must be of none, linear, .*; got 'cubic'"):
+        find_law("cubic")
+    with pytest.raises(AnalysisError, match="got 'linear', which is taken"):
+        find_law(replace(three_halves(), name="linear"))
