@@ -53,6 +53,7 @@ def far() -> Iterator[tuple[str, str, str]]:
         ip("-n", name, "link", "set", theirs, "up")
         yield name, "198.18.77.2", theirs
     finally:
+        subprocess.run(["ip", "link", "del", ours], check=False, capture_output=True)  # at once, unlike the namespace
         ip("netns", "del", name)
 
 
