@@ -180,8 +180,6 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     ------
     AnalysisError
         If fewer than eight samples are usable.
-    TrackError
-        If the track is no length.
 
     Examples
     --------
@@ -191,9 +189,8 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     >>> print(analyse(Track.from_arrays(t, y)).estimates["period"])  # 2 pi / 8.3 = 0.757010
     0.757010 +- 0.000022 s
     """
-    track.demand_length()
     scene, params = scene or Scene(), params or STANDARD
-    if track.sigma_m is None and scene.sensor_sigma_m is not None:
+    if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     conditioned = condition(track, params.condition)
     windows = see_windows(
@@ -247,6 +244,7 @@ def _oscillation(
     windows: Windows, fitted: Fitted, solved: EquationFit | EquationMisfit | None, scene: Scene, params: Params
 ) -> Found:
     """What follows from an oscillation, however it was fitted."""
+    fitted = fitted.in_unit(windows.conditioned.track.unit)
     track, cycles = windows.conditioned.track, windows.cycles
     demodulated, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
     disturbances = fitted.disturbances
@@ -296,13 +294,13 @@ def _still(conditioned: Conditioned, why: NoOscillation) -> Found:
     """A record without any motion to fit."""
     findings = _findings(conditioned, Finding(why.code, "error", why.why))
     if (held := holding(conditioned)) > 1:
-        findings = by_severity(findings, (judge_held(held, 1.0 / conditioned.track.rate_hz),))
+        findings = by_severity(findings, (judge_held(held, 1.0 / conditioned.track.rate_hz, conditioned.track.unit),))
     return Still(why.why), (), findings, _at_rest(conditioned)
 
 
 def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:
     """Mean and noise of the samples used."""
-    y, noise_m = conditioned.track.y[conditioned.used], conditioned.noise_m
+    y, noise_m, unit = conditioned.track.y[conditioned.used], conditioned.noise_m, conditioned.track.unit
     if not y.size:
         raise AnalysisError("no usable sample is left; see the counts of flagged samples")
     # Where the distance steps or creeps, neighbours say the same: their number would make the mean look certain.
@@ -312,8 +310,8 @@ def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:
     if (quantum_m := coarsest_step(np.sort(every), conditioned.quantum_m) or 0.0) > STEPS * noise_m:
         u = float(np.hypot(u, quantum_m / np.sqrt(12.0)))  # rounding that noise does not reach over stays
     return {
-        "offset": Estimate(float(np.mean(y)), u, "m"),
-        "noise": Estimate(noise_m, noise_m / np.sqrt(2.0 * y.size), "m"),
+        "offset": Estimate(float(np.mean(y)), u, unit),
+        "noise": Estimate(noise_m, noise_m / np.sqrt(2.0 * y.size), unit),
     }
 
 

@@ -60,6 +60,8 @@ class MotionAccumulator:
     window_s : float
         How many seconds to hold.
     params : pipeline.analyse.Params, optional
+    quantity, unit : str
+        What the samples are of.
 
     Notes
     -----
@@ -67,11 +69,19 @@ class MotionAccumulator:
     once a second it takes less than a hundredth of a core.
     """
 
-    def __init__(self, rate_hz: float, window_s: float = 10.0, params: Params | None = None) -> None:
+    def __init__(
+        self,
+        rate_hz: float,
+        window_s: float = 10.0,
+        params: Params | None = None,
+        *,
+        quantity: str = "length",
+        unit: str = "m",
+    ) -> None:
         if not (rate_hz > 0 and window_s > 0):
             raise ValueError(f"rate_hz and window_s must be positive, got {rate_hz} and {window_s}")
         self._rate_hz = rate_hz
-        self._params = params
+        self._params, self._quantity, self._unit = params, quantity, unit
         self._room = max(int(rate_hz * window_s), 16)
         self.clear()
 
@@ -87,7 +97,7 @@ class MotionAccumulator:
         return min(self._stop, self._room)
 
     def push(self, t: F8, y: F8, flags: U8) -> None:
-        """Take samples: times (n,) in s, distances (n,) in m, flags (n,)."""
+        """Take samples: times (n,) in s, values (n,) in their unit, flags (n,)."""
         t, y, flags = t[-self._room :], y[-self._room :], flags[-self._room :]
         n = t.size
         if self._stop + n > self._t.size:
@@ -103,7 +113,13 @@ class MotionAccumulator:
         """Return the samples held, as a batch analysis would get them."""
         held = slice(max(self._stop - self._room, 0), self._stop)
         return Track(
-            self._t[held].copy(), self._y[held].copy(), self._flags[held].copy(), self._rate_hz, clock="device"
+            self._t[held].copy(),
+            self._y[held].copy(),
+            self._flags[held].copy(),
+            self._rate_hz,
+            clock="device",
+            quantity=self._quantity,
+            unit=self._unit,
         )
 
     def value(self) -> LiveMotion | NotYet:

@@ -48,8 +48,9 @@ class Track:
     ----------
     t : (n,) float64, s
         Time since the start of the run.
-    y : (n,) float64, m
-        Distance from the sensor; NaN where unmeasured.
+    y : (n,) float64
+        Distance from the sensor in m, or another quantity in its ``unit``; NaN where unmeasured. What is called ``_m``
+        here and in the stages is in that unit.
     flags : (n,) uint8
         Sums of :class:`Quality` bits known before any analysis.
     rate_hz : float
@@ -84,7 +85,7 @@ class Track:
     u_offset_m : float
         Standard uncertainty of their zero from a calibration, m; 0 where none was made.
     quantity, unit : str
-        What ``y`` holds, of :data:`UNITS`. Every stage of today takes a length in metres, see :meth:`demand_length`.
+        What ``y`` holds, of :data:`UNITS`. Only what :meth:`demand_length` guards needs a length.
 
     Raises
     ------
@@ -122,15 +123,15 @@ class Track:
     def __len__(self) -> int:
         return int(self.t.size)
 
-    def demand_length(self) -> None:
-        """Refuse what is no length: the stages state metres, N/m and kg, which would be wrong of an angle.
+    def demand_length(self, what: str) -> None:
+        """Refuse what is no length where ``what`` needs one.
 
         Raises
         ------
         TrackError
         """
         if self.quantity != "length":
-            raise TrackError(f"an analysis takes a length in m so far, got {self.quantity} in {self.unit}")
+            raise TrackError(f"{what} needs a length in m, got {self.quantity} in {self.unit}; leave it out")
 
     @classmethod
     def from_arrays(

@@ -1,4 +1,4 @@
-"""Plausibility: whether a bob on a spring, seen by a distance sensor, can do what the record says."""
+"""Plausibility: whether a bob on a spring, seen by a sensor of distance or acceleration, can do what is recorded."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FEWEST = 4.0  # samples a period
 
 
 def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit) -> Iterator[Finding]:
-    """Yield what no bob on a spring does, or no distance sensor sees.
+    """Yield what no bob on a spring does, or no distance sensor sees; of other quantities nothing is known.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
     Notes
     -----
     A bob hangs from a spring that pulls only, so it never falls faster than freely: :math:`A\\omega^2 \\le g`, and
-    not much more while the spring goes slack.
+    not much more while the spring goes slack. Of an acceleration that is the amplitude itself.
     """
     track = conditioned.track
     used = (demodulated.flags & UNUSABLE) == 0
@@ -50,7 +50,9 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
             f"only {rate_hz / f:.2g} samples fall on a period: the bob may move several times as fast as the record "
             "shows, and a wave of the same samples has another period; record at ten samples a period and more",
         )
-    gravities = amplitude * omega**2 / GRAVITY_M_PER_S2
+    if track.unit not in ("m", "m/s^2"):
+        return
+    gravities = amplitude * (omega**2 if track.unit == "m" else 1.0) / GRAVITY_M_PER_S2
     if gravities > MOST_GRAVITIES:
         mains = _mains(f, rate_hz)
         if mains is not None:
@@ -63,12 +65,12 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
         yield Finding(
             "implausible_motion",
             "warning",
-            f"an amplitude of {amplitude:.3g} m at {f:.4g} Hz needs {gravities:.2g} times the acceleration of gravity, "
-            "which no bob hanging from a spring reaches: likely a wrong unit, hum, or a velocity read as distance; "
-            "check unit and column",
+            f"an amplitude of {amplitude:.3g} {track.unit} at {f:.4g} Hz needs {gravities:.2g} times the acceleration "
+            "of gravity, which no bob hanging from a spring reaches: likely a wrong unit, hum, or "
+            f"{'a velocity read as distance' if track.unit == 'm' else 'counts read as m/s^2'}; check unit and column",
         )
     # Where distances are counted from the first sample, as from a velocity, their zero says nothing.
-    if y.size and track.y[0] != 0.0:
+    if track.unit == "m" and y.size and track.y[0] != 0.0:
         low, high = float(np.min(y)), float(np.max(y))
         mean = float(np.mean(demodulated.offset))
         if low <= 0.0 or high > FARTHEST_M or amplitude > abs(mean):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.checks.finding import Finding
+from pipeline.numerics.quantity import amount, noun, plural
 from pipeline.oscillation.condition import Conditioned, Cut
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, U8, UNUSABLE, Quality
@@ -80,9 +81,10 @@ def judge_samples(
     """
     track, plateaus_m, quantum_m = conditioned.track, conditioned.plateaus_m, conditioned.quantum_m
     counts, n = count_quality(flags), len(track)
-    yield from (_on_cut(cut, n) for cut in conditioned.cuts)
+    yield from (_on_cut(cut, n, track.unit) for cut in conditioned.cuts)
     if counts["clipped"] and not any(cut.fixed for cut in conditioned.cuts):
-        levels = " and ".join(f"{level * 1e3:.1f} mm" for level in plateaus_m) or "a level flagged in the record"
+        told = [amount(level, track.unit, ".1f") for level in plateaus_m]
+        levels = " and ".join(told) or "a level flagged in the record"
         yield Finding(
             "clipped",
             "warning",
@@ -95,10 +97,10 @@ def judge_samples(
             "false_echoes",
             "warning" if share > 0.1 else "info",
             f"{counts['false_echo']} of {n} samples ({share:.1%}) are false echoes and were left out of the fit"
-            + _words_on(clusters),
+            + _words_on(clusters, track.unit),
         )
     if counts["missing"]:
-        yield Finding("missing_samples", "info", f"{counts['missing']} of {n} samples carry no distance")
+        yield Finding("missing_samples", "info", f"{counts['missing']} of {n} samples carry no {noun(track.unit)}")
     if counts["duplicate_time"]:
         yield Finding("duplicate_time", "warning", f"{counts['duplicate_time']} samples repeat an earlier time")
     if counts["non_monotonic_time"]:
@@ -113,15 +115,16 @@ def judge_samples(
         yield Finding(
             "stated_error_is_not_noise",
             "info",
-            f"the file states an error of {track.stated_error_m * 1e3:.2f} mm for every distance; "
-            f"the samples scatter by {noise_m * 1e3:.2g} mm, so the stated error was not used as noise",
+            f"the file states an error of {amount(track.stated_error_m, track.unit, '.2f')} for every "
+            f"{noun(track.unit)}; "
+            f"the samples scatter by {amount(noise_m, track.unit)}, so the stated error was not used as noise",
         )
     if quantum_m is not None and quantum_m > STEPS * noise_m:
         yield Finding(
             "quantised",
             "warning",
-            f"distances come in steps of {quantum_m * 1e3:.3g} mm, which outweigh their noise: "
-            "amplitudes may err by several times their stated uncertainty",
+            f"{plural(track.unit)} come in steps of {amount(quantum_m, track.unit, '.3g')}, which outweigh their "
+            "noise: amplitudes may err by several times their stated uncertainty",
         )
 
 
@@ -157,26 +160,27 @@ def find_clusters(demodulated: Demodulated, phase: Callable[[NDArray[np.int64]],
     return Clusters(int(np.count_nonzero(clusters)), int(sizes[clusters].sum()), int(np.count_nonzero(turning)), shift)
 
 
-def _on_cut(cut: Cut, n: int) -> Finding:
+def _on_cut(cut: Cut, n: int, unit: str) -> Finding:
     """What is said of an end at which the motion is cut."""
+    end = cut.end if unit == "m" else {"far": "upper", "near": "lower"}[cut.end]
     where = (
         f"{cut.samples} of {n} samples ({cut.samples / n:.0%}), between {cut.first_s:.2f} and {cut.last_s:.2f} s "
-        f"at the {cut.end} end from {cut.from_m * 1e3:.1f} mm on,"
+        f"at the {end} end from {amount(cut.from_m, unit, '.1f')} on,"
     )
     out = "they were left out by where the fitted motion goes, and the amplitude comes from the rest of each cycle"
     if cut.fixed:
         why = "behind the motion that the rest of each cycle shows: a fixed object or a lost target cuts it there"
-        level = f"lie on a plateau at {cut.level_m * 1e3:.1f} mm,"
+        level = f"lie on a plateau at {amount(cut.level_m, unit, '.1f')},"
         return Finding("clipped", "warning", f"{where} {level} {why}; {out}")
     why = "move with the bob, but not as it does in the rest of each cycle: an echo by way of something beside it"
     return Finding("locked_echoes", "warning", f"{where} {why}; {out}")
 
 
-def _words_on(clusters: Clusters | None) -> str:
+def _words_on(clusters: Clusters | None, unit: str) -> str:
     if clusters is None or not clusters.count:
         return ""
     many = f"{clusters.count} cluster{'s' * (clusters.count > 1)}"
     return (
         f"; {clusters.samples} of them come in {many}, {clusters.turning} of these at turning "
-        f"points; left in, all of them would change the amplitude by {clusters.shift_m * 1e3:+.2g} mm"
+        f"points; left in, all of them would change the amplitude by {amount(clusters.shift_m, unit, '+.2g')}"
     )

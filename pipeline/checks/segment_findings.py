@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.checks.finding import Finding
+from pipeline.numerics.quantity import noun
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.rows import count_lost
 from pipeline.oscillation.segments import Break, Segments, Span
@@ -67,8 +68,9 @@ def judge_rows(conditioned: Conditioned, rms_m: float) -> Iterator[Finding]:
         yield Finding(
             "rows_lost",
             "error",
-            f"about {lost} rows are missing where times go on as if there were none: the distance makes two steps at "
-            "once there; period, frequency, spring constant and damping rate are wrong by as much as the times",
+            f"about {lost} rows are missing where times go on as if there were none: the "
+            f"{noun(conditioned.track.unit)} makes two steps at once there; period, frequency, spring constant and "
+            "damping rate are wrong by as much as the times",
         )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.checks.finding import Finding
 from pipeline.motion.phase import PhaseFit
+from pipeline.numerics.quantity import amount, noun, plural
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
@@ -89,7 +90,7 @@ def check_residuals(
     :math:`e^{-l/\\tau}` behind a first-order lag; the motion loses
     :math:`1 - \\sin(N\\omega h/2)/(N\\sin(\\omega h/2))` or :math:`1 - (1 + \\omega^2\\tau^2)^{-1/2}` of its amplitude.
     """
-    t = conditioned.track.t
+    t, unit = conditioned.track.t, conditioned.track.unit
     used = (demodulated.flags & UNUSABLE) == 0
     used &= np.isfinite(demodulated.residual)
     rows = np.flatnonzero(used)
@@ -109,15 +110,15 @@ def check_residuals(
     # Drag bends a sinusoid by itself, and a computed record is exact to its digits only.
     least = float(np.median(model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)))
     if folded is not None and wave.peak > max(0.5 * quantum_m, least):
-        found.append(_not_sinusoidal(wave, amplitude, seconds))
+        found.append(_not_sinusoidal(wave, amplitude, seconds, unit))
         residual = residual - folded
     held = holding(conditioned)
     if held > 1:
-        found.append(_held(held, step, turn, amplitude))
+        found.append(_held(held, step, turn, amplitude, unit))
     elif demodulated.noise_m > least:
         whole = np.zeros(t.size)
         whole[rows] = residual
-        smoothed = _smoothed(whole, used, rows.size // demodulated.t.size, step, turn, amplitude)
+        smoothed = _smoothed(whole, used, rows.size // demodulated.t.size, step, turn, amplitude, unit)
         if smoothed is not None and smoothed.misfits[0].amplitude_m > 0.5 * u_amplitude:
             found.append(smoothed)
     return Checked(
@@ -172,7 +173,7 @@ def _fold(residual: F8, angle: F8, noise_m: float, turn: float) -> tuple[_Wave, 
     return _Wave(harmonics, folded), folded[bins] if harmonics else None
 
 
-def _not_sinusoidal(wave: _Wave, amplitude: float, seconds: float) -> Checked:
+def _not_sinusoidal(wave: _Wave, amplitude: float, seconds: float, unit: str) -> Checked:
     """What a wave locked to the oscillation does to the estimates, and what it comes from."""
     size = wave.peak
     misfit = Misfit(
@@ -193,8 +194,9 @@ def _not_sinusoidal(wave: _Wave, amplitude: float, seconds: float) -> Checked:
         cause = "a scale that levels off at both ends, stops at both ends, or a bob that bounces: odd harmonics"
     else:
         near = abs(wave.folded[BINS // 2]) > abs(wave.folded[0])
+        end = ("near" if near else "far") if unit == "m" else "lower" if near else "upper"
         cause = (
-            f"it is largest towards the {'near' if near else 'far'} turning point: an echo, a plateau or a stop there, "
+            f"it is largest towards the {end} turning point: an echo, a plateau or a stop there, "
             "or a spring that goes slack"
         )
     return Checked(
@@ -202,7 +204,7 @@ def _not_sinusoidal(wave: _Wave, amplitude: float, seconds: float) -> Checked:
             Finding(
                 "not_sinusoidal",
                 "warning",
-                f"the motion as recorded is no sinusoid: every period differs from one by up to {size * 1e3:.2g} mm "
+                f"the motion as recorded is no sinusoid: every period differs from one by up to {amount(size, unit)} "
                 f"({size / amplitude:.1%} of the amplitude) in the same way. Likely {cause}. Amplitude, rest position "
                 "and damping are uncertain by as much; look at the residuals, and at what stands in the beam",
             ),
@@ -235,26 +237,26 @@ def holding(conditioned: Conditioned) -> int:
     return 1
 
 
-def judge_held(count: int, step: float) -> Finding:
-    """Return what is said of distances that stand over so many samples, ``step`` seconds apart."""
+def judge_held(count: int, step: float, unit: str) -> Finding:
+    """Return what is said of values in ``unit`` that stand over so many samples, ``step`` seconds apart."""
     return Finding(
         "held_samples",
         "warning",
-        f"every distance stands {count} times in a row: the sensor measures every {count * step:.3g} s only, and its "
-        f"last value stands in between, late by {0.5 * (count - 1) * step:.2g} s on average; what that does to "
+        f"every {noun(unit)} stands {count} times in a row: the sensor measures every {count * step:.3g} s only, and "
+        f"its last value stands in between, late by {0.5 * (count - 1) * step:.2g} s on average; what that does to "
         "amplitude and phase is in their uncertainties; record at the sensor's own rate",
     )
 
 
-def _held(count: int, step: float, turn: float, amplitude: float) -> Checked:
+def _held(count: int, step: float, turn: float, amplitude: float, unit: str) -> Checked:
     half = 0.5 * count * turn
     loss = half / math.sin(half) - 1.0 if half < 0.5 * math.pi else 1.0
     misfit = Misfit(name="held_samples", amplitude_m=amplitude * loss, phase_rad=0.5 * (count - 1) * turn)
-    return Checked((judge_held(count, step),), (misfit,))
+    return Checked((judge_held(count, step, unit),), (misfit,))
 
 
 def _smoothed(
-    whole: F8, used: NDArray[np.bool_], length: int, step: float, turn: float, amplitude: float
+    whole: F8, used: NDArray[np.bool_], length: int, step: float, turn: float, amplitude: float, unit: str
 ) -> Checked | None:
     """What a sensor that smooths does to the estimates, if neighbours know of each other as behind one."""
     power = float(whole @ whole)
@@ -285,9 +287,9 @@ def _smoothed(
     finding = Finding(
         "smoothed_sensor",
         "warning",
-        f"neighbouring distances know of each other (correlation {first:.2f}) as behind {what}: a sensor or a program "
-        f"that smooths like that makes the amplitude too small by {1.0 - gain:.1%} and the motion late by {late:.2g} "
-        "s, which the uncertainties hold; switch the smoothing off, and record at the sensor's own rate",
+        f"neighbouring {plural(unit)} know of each other (correlation {first:.2f}) as behind {what}: a sensor or a "
+        f"program that smooths like that makes the amplitude too small by {1.0 - gain:.1%} and the motion late by "
+        f"{late:.2g} s, which the uncertainties hold; switch the smoothing off, and record at the sensor's own rate",
     )
     return Checked((finding,), (misfit,))
 

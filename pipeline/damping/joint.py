@@ -229,6 +229,7 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
         _chi2(fit.reduced_chi2, t.size - len(law.parameters)) / damping.scatter.correlation
         for fit, t, (_, _, damping) in zip(own, points.t, runs, strict=True)
     )
+    units = own[0].joint.units
     excess, saved = max(chi2 - separate, 0.0), float((count - 1) * shared)
     deviation = np.sqrt(np.diag(covariance))
     rejection: Rejection = ""
@@ -241,9 +242,9 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
     elif not end.converged:
         rejection = "not converged"
     amplitudes = tuple(
-        Estimate(float(a), float(u), "m") for a, u in zip(values[:count], deviation[:count], strict=True)
+        Estimate(float(a), float(u), units[0]) for a, u in zip(values[:count], deviation[:count], strict=True)
     )
-    joint = Joint(law.parameters[1:], values[count:], covariance[count:, count:], law.units[1:])
+    joint = Joint(law.parameters[1:], values[count:], covariance[count:, count:], units[1:])
     bic = chi2 + values.size * math.log(max(size, 2.0))
     return JointFit(law, joint, amplitudes, chi2, dof, bic, excess, saved, rejection)
 

@@ -21,6 +21,7 @@ from pipeline.motion.phase import PhaseFit, wrapped
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.quantity import amount
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, U8, Quality
@@ -211,7 +212,7 @@ def fit_equation(
     """
     params, laws = params or Params(), laws or DampingParams()
     ratio = damping.best.rate_at_start() / demodulated.angular_frequency
-    names = _fittable(damping)
+    names, unit = _fittable(damping), conditioned.track.unit
     if not names or not _required(damping, demodulated, ratio, params, stopped=stopped):
         return None
     search = Search.of(conditioned, demodulated, damping, names, _stop_row(conditioned), params.clip_sigmas)
@@ -219,8 +220,8 @@ def fit_equation(
     if not search.noise_m <= params.misfit * search.expected_m:
         return EquationMisfit(
             f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err, and the equation of "
-            f"motion with {LAWS[search.richest].words} leaves {search.noise_m * 1e3:.2g} mm where samples scatter by "
-            f"{search.expected_m * 1e3:.2g} mm: the averaged law stands"
+            f"motion with {LAWS[search.richest].words} leaves {amount(search.noise_m, unit)} where samples scatter by "
+            f"{amount(search.expected_m, unit)}: the averaged law stands"
         )
     chosen = search.choose(laws)
     if chosen is None:
@@ -265,6 +266,7 @@ def _described(search: Search, damping: Damping, fit: least_squares.Fit) -> Equa
     why = (
         f"the damping ratio is {ratio:.2g} at the first sample"
         + (" and friction ends the motion within the record" if stops else "")
-        + f": the equation of motion with {law} was fitted to the samples; it leaves {rms * 1e3:.2g} mm"
+        + f": the equation of motion with {law} was fitted to the samples; it leaves "
+        + amount(rms, search.conditioned.track.unit)
     )
     return EquationFit(why, damping, state, Waveform(position, velocity, residual, rms), flags)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping, fit_damping
 from pipeline.damping.select import Params as DampingParams
 from pipeline.motion.equation_fit import EquationFit, moving_part
@@ -15,6 +16,7 @@ from pipeline.motion.phase import PhaseFit, fit_phase
 from pipeline.motion.waveform import Rest, Waveform, fit_rest, reconstruct
 from pipeline.motion.waveform_fit import FullFit, fit_record
 from pipeline.motion.waveform_fit import Params as WaveformParams
+from pipeline.numerics.quantity import amount, in_unit, noun
 from pipeline.oscillation.clipping import find_cuts
 from pipeline.oscillation.condition import Conditioned, condition
 from pipeline.oscillation.condition import Params as ConditionParams
@@ -86,6 +88,24 @@ class Fitted:
     rest: Rest
     waveform: Waveform
     full: FullFit | None
+
+    def in_unit(self, unit: str) -> Fitted:
+        """Return the same of a record in another unit: the stages know only that values have one, and write m."""
+        if unit == "m":
+            return self
+        fits = {name: _law_in_unit(fit, unit) for name, fit in self.damping.fits.items()}
+        damping, backbone = replace(self.damping, fits=fits), self.phase.backbone
+        bent = None if backbone is None else replace(backbone, unit=in_unit(backbone.unit, unit))
+        return replace(
+            self,
+            damping=damping,
+            phase=replace(self.phase, damping=damping, backbone=bent),
+            rest=replace(self.rest, mean=replace(self.rest.mean, unit=unit)),
+        )
+
+
+def _law_in_unit(fit: LawFit, unit: str) -> LawFit:
+    return replace(fit, joint=replace(fit.joint, units=tuple(in_unit(each, unit) for each in fit.joint.units)))
 
 
 def see_windows(
@@ -164,12 +184,13 @@ def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscill
     """Why the motion is no oscillation although its spectrum has a peak: a step or a ramp has one too."""
     most = demodulated.amplitude.size * 9 // 10
     size = float(np.partition(demodulated.amplitude, most)[most])
-    left = demodulated.noise_m
+    left, unit = demodulated.noise_m, conditioned.track.unit
     if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
-        return NoOscillation("the distance does not follow the period that its spectrum shows")
+        return NoOscillation(f"the {noun(unit)} does not follow the period that its spectrum shows")
     if left > 0.15 * size and left > 4.0 * conditioned.noise_m:
         return NoOscillation(
-            f"the distance moves, but not to and fro: a sinusoid of {size * 1e3:.3g} mm leaves {left * 1e3:.3g} mm"
+            f"the {noun(unit)} moves, but not to and fro: a sinusoid of {amount(size, unit, '.3g')} leaves "
+            f"{amount(left, unit, '.3g')}"
         )
     return None
 

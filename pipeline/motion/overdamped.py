@@ -14,6 +14,7 @@ from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.motion.decay import DecayFit, best_decay, critical_decay, lone_exponential
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.quantity import noun
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import NoOscillation
 from pipeline.track import F8
@@ -137,14 +138,14 @@ def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params
         return None
     if not _beats_other_shapes(tau, y, fit, noise, params.evidence):
         return None
-    choice = _kind(tau, y, fit, 0.5 * conditioned.track.rate_hz)
+    choice = _kind(tau, y, fit, 0.5 * conditioned.track.rate_hz, conditioned.track.unit)
     if choice is None or isinstance(choice, NoOscillation):
         return choice
     kind, fit = choice
     # Uncertainties grow with what the fit leaves beyond the noise.
     fit = replace(fit, covariance=fit.covariance * max(1.0, fit.chi2 / max(t.size - 5, 1)))
     u_clock = params.u_clock if conditioned.track.clock == "nominal" else 0.0
-    found = _described(fit, kind, float(t[0]), t.size, u_clock)
+    found = _described(fit, kind, float(t[0]), t.size, u_clock, conditioned.track.unit)
     return None if kind == "strong" and found.damping_ratio.value < params.least_damping else found
 
 
@@ -202,7 +203,7 @@ def _left(design: F8, y: F8) -> float:
     return float(np.sum(residual**2))
 
 
-def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float) -> tuple[Kind, DecayFit] | NoOscillation | None:
+def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float, unit: str) -> tuple[Kind, DecayFit] | NoOscillation | None:
     """Which kind of damping has the lowest BIC, and its fit, if a lone exponential does not do.
 
     None where the motion ends at a rate beyond the fastest, 1/s: between two samples, where a step looks alike.
@@ -216,7 +217,7 @@ def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float) -> tuple[Kind, DecayFit
         if rate > fastest:
             return None
         return NoOscillation(
-            f"the distance follows one exponential, at {rate:.3g} 1/s: "
+            f"the {noun(unit)} follows one exponential, at {rate:.3g} 1/s: "
             "an overdamped motion whose fast part is over or too small, or a drift"
         )
     if one is not None and critical <= free:
@@ -226,7 +227,7 @@ def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float) -> tuple[Kind, DecayFit
     return ("overdamped" if fit.square > 0.0 else "strong"), fit
 
 
-def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: float) -> Overdamped:
+def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: float, unit: str) -> Overdamped:
     """Return what follows from a fit of so many samples with a clock of this relative standard uncertainty."""
     from uncertainties import correlated_values, ufloat, umath
 
@@ -235,7 +236,7 @@ def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: f
     v, rate = v * clock, umath.exp(logarithms[0]) * clock
     stiffness = rate**2 if fit.critical else umath.exp(logarithms[1]) * clock**2
     spread = math.sqrt(fit.chi2 / max(count - 5, 1)) * fit.noise
-    found = {"offset": _estimate(offset, "m"), "noise": Estimate(spread, spread / math.sqrt(2.0 * count), "m")}
+    found = {"offset": _estimate(offset, unit), "noise": Estimate(spread, spread / math.sqrt(2.0 * count), unit)}
     squared, natural = _estimate(stiffness, "rad^2/s^2"), umath.sqrt(stiffness)
     ratio = Estimate(1.0, 0.0) if kind == "critical" else _estimate(rate / natural, "")
     if kind == "critical":
@@ -259,7 +260,7 @@ def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: f
         found["angular_frequency"] = _estimate(omega, "rad/s")
         found["frequency"] = _estimate(omega / turn, "Hz")
         found["period"] = _estimate(turn / omega, "s")
-        found["amplitude"] = _estimate(umath.sqrt(a**2 + side**2), "m")
+        found["amplitude"] = _estimate(umath.sqrt(a**2 + side**2), unit)
         found["phase"] = _estimate(umath.atan2(-side, a), "rad")
         found["damping_rate"] = _estimate(rate, "1/s")
         found["quality_factor"] = _estimate(0.5 * natural / rate, "")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.quantity import amount, noun
 from pipeline.oscillation.condition import Conditioned
 from pipeline.track import F8
 
@@ -118,7 +119,8 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     resolution = conditioned.quantum_m or 0.0
     if spread <= max(3.0 * resolution, 1e-12 * max(high, -low)):
         return NoOscillation(
-            f"the distance stays within {spread * 1e3:.3g} mm: nothing moves, or the sensor reads one fixed object"
+            f"the {noun(track.unit)} stays within {amount(spread, track.unit, '.3g')}: nothing moves, or the sensor "
+            "reads one fixed object"
         )
     line = _spectral_line(t, y, track.t, track.rate_hz, params.false_alarm)
     if isinstance(line, NoOscillation):

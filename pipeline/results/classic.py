@@ -65,6 +65,8 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
     ------
     AnalysisError
         If fewer than eight sampled maxima are there, or the record is shorter than one window.
+    TrackError
+        If the track is no length.
 
     Notes
     -----
@@ -83,6 +85,7 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
     one point's error becomes the slope's, and an exponential is assumed where drag is mixed. Together the bias is
     -12 % at 2.39 mm noise.
     """
+    track.demand_length("the classic method")
     scene = scene or Scene()
     there = np.isfinite(track.y) & np.isfinite(track.t) & ((track.flags & UNUSABLE) == 0)
     t, y = track.t[there], track.y[there]

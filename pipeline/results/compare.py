@@ -56,10 +56,12 @@ class SpringRun:
         Raises
         ------
         AnalysisError
-            If its scene gave no bob mass.
+            If its scene gave no bob mass, or an angle's no spring.
         """
         if derived.own_mass_kg is None or derived.effective_mass_kg is None:
             raise AnalysisError(f"{name}: a comparison of springs needs [bob] mass_kg in the scene")
+        if "spring_constant" not in derived.estimates:
+            raise AnalysisError(f"{name}: an angle gives a spring constant only with [spring] mass_kg in the scene")
         omega = derived.statistical["angular_frequency"]
         parts = derived.budgets["angular_frequency"].contributions
         u_clock = math.hypot(*(c.u for c in parts if c.name == "clock_rate")) / omega.value

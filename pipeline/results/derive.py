@@ -96,13 +96,21 @@ class Derived:
         return self._part("own_mass")
 
     @cached_property
-    def half_stiffness(self) -> Estimate:
-        """Mechanical energy over the recorded amplitude's square, N/m; per kilogram where the scene gives no mass."""
-        return estimate_of(*self.parts["half_stiffness"])
+    def half_stiffness(self) -> Estimate | None:
+        """Mechanical energy over the recorded amplitude's square, N/m; per kilogram where the scene gives no mass.
+
+        Of accelerations in J/(m/s^2)^2; None where the record tells no displacement.
+        """
+        return self._part("half_stiffness")
+
+    @cached_property
+    def displacement(self) -> Estimate | None:
+        """Displacement over the recorded amplitude: 1 of a length, s^2 of an acceleration; None of anything else."""
+        return self._part("displacement")
 
     @cached_property
     def drag_length(self) -> Estimate | None:
-        """Drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude, m.
+        """Drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude, m; of accelerations m/s^2.
 
         None without disc, mass or air temperature.
         """
@@ -111,8 +119,10 @@ class Derived:
     def _part(self, name: str) -> Estimate | None:
         return estimate_of(*self.parts[name]) if name in self.parts else None
 
-    def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve:
+    def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
         """Return the mechanical energy against time with its band, J; J/kg where no mass is known.
+
+        None where the record tells no displacement.
 
         Parameters
         ----------
@@ -121,6 +131,8 @@ class Derived:
             Of the same run.
         """
         unit = "J/kg" if self.effective_mass_kg is None else "J"
+        if self.half_stiffness is None:
+            return None
         return energy_curve(damping, demodulated, self.half_stiffness, self.law_weights, unit)
 
     def drag_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
@@ -179,6 +191,8 @@ def derive(
     :math:`Q = \\omega/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start,
     :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta`,
     :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
+    Of an acceleration of amplitude a the displacement's is :math:`a/(\\omega^2 + \\lambda^2)`, and with it everything
+    that needs a length; of angles, voltages and forces no such thing is given. The spring constant needs none.
     What depends on the damping law carries the covariance of the selected law's parameters, and beside it what the
     admissible laws differ by: :math:`\\sum_i w_i (x_i - x)^2` with :math:`w_i \\propto e^{-\\mathrm{BIC}_i/2}`.
 
@@ -192,7 +206,8 @@ def derive(
     ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
     laws = _Laws(damping, inputs, demodulated.t - damping.t0)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B")
-    scale = ambient.scale(instrument)
+    unit = rest.mean.unit
+    scale = ambient.scale(instrument) if unit == "m" else 1.0
     windows = phase.residual.size
     # Of one window or two the uncertainty is by the samples.
     free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
@@ -203,40 +218,53 @@ def derive(
     rates = rate * amiss.over("damping_rate", laws.rate)
     start = laws.start() * lengths
     lam = laws.rate_at_start() * rates
-    v_rms = omega * lengths * laws.root_mean_square()
-    zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, "m"), "B")
+    natural = omega**2 + laws.squared_rate * rate**2
+    # How large the displacement is where the recorded value is 1; nobody knows of a voltage or a force.
+    displacement = {"m": 1.0, "m/s^2": 1.0 / natural}.get(unit)
+    zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B")
     offset = inputs.add("rest_position", rest.mean, "A", free) * scale
+    noise = inputs.add("noise", _noise(demodulated, unit), "A", demodulated.residual.size - 3.0 * windows)
     found: dict[str, tuple[Any, str]] = {
         "period": (2 * math.pi / omega, "s"),
         "frequency": (omega / (2 * math.pi), "Hz"),
         "angular_frequency": (omega, "rad/s"),
-        "amplitude": (start, "m"),
-        "offset": (offset + zero + amiss["offset"], "m"),
+        "amplitude": (start, unit),
+        "offset": (offset + zero + amiss["offset"], unit),
         "phase": (_start_phase(phase, slope, inputs, free) + amiss["phase"], "rad"),
-        "noise": (inputs.add("noise", _noise(demodulated), "A", demodulated.residual.size - 3.0 * windows), "m"),
+        "noise": (noise, unit),
         "damping_rate": (lam, "1/s"),
-        "velocity_rms": (v_rms, "m/s"),
     }
+    if unit == "m/s^2":
+        found["displacement_amplitude"] = (start / (omega**2 + lam**2), "m")
+    if (per_value := 1.0 if unit == "rad" else displacement) is not None:
+        v_rms = omega * lengths * laws.root_mean_square() * per_value
+        found["velocity_rms"] = (v_rms, "rad/s" if unit == "rad" else "m/s")
     if laws.rate > 0:
         found["quality_factor"] = (0.5 * omega / lam, "")
     coefficients = _coefficients(damping, laws, rates, lengths)
     diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
-    parts = {"half_stiffness": (0.5 * (omega * scale) ** 2 * (1.0 if mass is None else mass), "N/m")}
+    parts: dict[str, tuple[Any, str]] = {}
+    if displacement is not None:
+        parts["displacement"] = displacement, "" if unit == "m" else "s^2"
+        energy = 0.5 * (omega * scale * displacement) ** 2 * (1.0 if mass is None else mass)
+        parts["half_stiffness"] = energy, "N/m" if unit == "m" else "J s^4/m^2"
     for name, x in (("mass", mass), ("own_mass", own)):
         if x is not None:
             parts[name] = x, "kg"
-    if mass is not None:
-        found["spring_constant"] = ((omega**2 + laws.squared_rate * rate**2) * mass, "N/m")
-    if diameter is not None:
-        found["keulegan_carpenter_number"] = (2 * math.pi * start / diameter, "")
+    # An angle may be a pendulum's, whose bob hangs from no spring unless the scene has one.
+    if mass is not None and (unit != "rad" or scene.spring_mass_kg is not None):
+        found["spring_constant"] = (natural * mass, "N/m")
+    if diameter is not None and displacement is not None:
+        length = found["displacement_amplitude"][0] if unit == "m/s^2" else start
+        found["keulegan_carpenter_number"] = (2 * math.pi * length / diameter, "")
         if ambient.known:
             found["reynolds_number"] = (ambient.density * v_rms * diameter / ambient.viscosity(), "")
         if ambient.known and mass is not None:
             # C over beta; the area, the mass and the density are in it once.
-            over_beta = 6.0 * mass / (omega * ambient.density * diameter**2)
-            parts["drag_length"] = over_beta * rate / scale, "m"
+            over_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
+            parts["drag_length"] = over_beta * rate / scale, unit
             if damping.settled and "beta" in coefficients:
                 found["drag_coefficient"] = (over_beta * coefficients["beta"][0], "")
     budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
@@ -362,8 +390,8 @@ def _masses(
     return own, None
 
 
-def _noise(demodulated: Demodulated) -> Estimate:
-    """Noise of one sample, m, from the residuals' median.
+def _noise(demodulated: Demodulated, unit: str) -> Estimate:
+    """Noise of one sample, from the residuals' median.
 
     Tails heavier than the normal distribution's make "the" standard deviation a matter of definition. The uncertainty
     holds the difference to the root mean square of the samples used, and what a share e of wide draws like those left
@@ -379,4 +407,4 @@ def _noise(demodulated: Demodulated) -> Estimate:
     value = mad_sigma(residual) * math.sqrt(used / dof)
     wide = 0.0 if clean else np.count_nonzero(flags & np.uint8(Quality.FALSE_ECHO)) / flags.size
     parts = (1.17 * value / math.sqrt(2.0 * dof), demodulated.noise_m - value, 1.17 * wide * value)
-    return Estimate(value, math.hypot(*parts), "m")
+    return Estimate(value, math.hypot(*parts), unit)

@@ -18,6 +18,7 @@ from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.waveform import Rest
+from pipeline.numerics.quantity import amount, in_unit
 from pipeline.oscillation.disturbances import Disturbances
 
 __all__ = ["Effect", "tabulate"]
@@ -77,18 +78,17 @@ def tabulate(
     disturbances : Disturbances, optional
         Modes other than the main oscillation; left out, they were not sought.
     """
-    omega = phase.angular_frequency
+    omega, unit = phase.angular_frequency, rest.mean.unit
     u_k = 2.0 * math.hypot(omega.u / omega.value, instrument.clock_rate.u)
     if scene.bob_mass_kg is not None:
         u_k = math.hypot(u_k, scene.bob_mass_kg.u / scene.bob_mass_kg.value)
     return (
         *_masses(scene, u_k),
-        *_drags(scene, damping, omega.value),
+        *_drags(scene, damping, omega.value, unit),
         _backbone(phase, damping),
         _rest_drift(rest, noise_m),
-        *_modes(disturbances),
-        _buoyancy(scene, omega.value),
-        _speed_of_sound(scene, instrument),
+        *_modes(disturbances, unit),
+        *((_buoyancy(scene, omega.value), _speed_of_sound(scene, instrument)) if unit == "m" else ()),
         _clock_rate(instrument),
     )
 
@@ -120,7 +120,7 @@ def _mass_effect(name: str, share: float, u_k: float, what: str) -> Effect:
     return Effect(name, share, None, "1", included, why)
 
 
-def _drags(scene: Scene, damping: Damping, omega: float) -> Iterator[Effect]:
+def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[Effect]:
     names = damping.best.joint.names
     gamma = damping.best.joint["gamma"].value if "gamma" in names else None
     beta = damping.best.joint["beta"].value if "beta" in names else None
@@ -132,13 +132,15 @@ def _drags(scene: Scene, damping: Damping, omega: float) -> Iterator[Effect]:
         celsius, pascal, _ = scene_air(scene)
         predicted_gamma = 8.0 * air_viscosity(celsius.value, pascal.value) * radius / mass
         b = 0.5 * STEADY_DISC_DRAG * scene_air_density(scene) * math.pi * radius**2
-        predicted_beta = 4.0 * b * omega / (3.0 * math.pi * mass)
+        # Of the displacement; an acceleration's is smaller by omega^2, and of nothing else is one known.
+        share = {"m": 1.0, "m/s^2": omega**-2}.get(unit)
+        predicted_beta = None if share is None else 4.0 * b * omega / (3.0 * math.pi * mass) * share
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
-    yield Effect("quadratic_drag", predicted_beta, beta, "1/(m s)", beta is not None, chosen)
+    yield Effect("quadratic_drag", predicted_beta, beta, in_unit("1/(m s)", unit), beta is not None, chosen)
     mu = damping.best.joint["mu"].value if "mu" in names else None
     tried = any("mu" in fit.joint.names for fit in damping.fits.values())
     why = chosen if tried else "no law with friction is among those tried"
-    yield Effect("friction", None, mu, "m/s", mu is not None, why)
+    yield Effect("friction", None, mu, in_unit("m/s", unit), mu is not None, why)
 
 
 def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
@@ -156,17 +158,18 @@ def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
 
 
 def _rest_drift(rest: Rest, noise_m: float) -> Effect:
+    unit = rest.mean.unit
     if not rest.moves:
-        why = f"a constant rest position describes the record (noise of one sample {noise_m * 1e3:.2g} mm)"
-        return Effect("rest_drift", None, rest.drift_m, "m", False, why)
+        why = f"a constant rest position describes the record (noise of one sample {amount(noise_m, unit)})"
+        return Effect("rest_drift", None, rest.drift_m, unit, False, why)
     parts = ["it is followed by a smooth curve"] if rest.drifts else []
     if rest.steps:
         parts.append(f"its steps, {len(rest.steps)} in number, are taken out")
     why = f"the rest position moves more than its scatter allows; {' and '.join(parts)}"
-    return Effect("rest_drift", None, rest.range_m, "m", True, why)
+    return Effect("rest_drift", None, rest.range_m, unit, True, why)
 
 
-def _modes(disturbances: Disturbances | None) -> Iterator[Effect]:
+def _modes(disturbances: Disturbances | None, unit: str) -> Iterator[Effect]:
     """A mode of its own frequency, and what turns with the main oscillation or with both."""
     found = () if disturbances is None else disturbances.sideways.modes
     own = [mode for mode in found if mode.kind == "mode"]
@@ -174,17 +177,17 @@ def _modes(disturbances: Disturbances | None) -> Iterator[Effect]:
     names = (("sideways_mode", own, "mode of a frequency of its own"), ("harmonics", locked, "harmonic or product"))
     for name, members, what in names:
         if disturbances is None or disturbances.sideways.carrier is None:
-            yield Effect(name, None, None, "m", False, "not sought: too few periods, or not at this accuracy")
+            yield Effect(name, None, None, unit, False, "not sought: too few periods, or not at this accuracy")
         elif not members:
-            yield Effect(name, None, None, "m", False, f"no {what} stands out of what the main oscillation leaves")
+            yield Effect(name, None, None, unit, False, f"no {what} stands out of what the main oscillation leaves")
         else:
             size = math.sqrt(sum(mode.amplitude.value**2 for mode in members))
             verdict = "more" if disturbances.modelled else "less"
             why = (
                 f"{_count(len(members), what)}, together of this amplitude; the strongest line found would leave up to "
-                f"{disturbances.leak_m * 1e3:.2g} mm in the main amplitude, {verdict} than a tenth of its uncertainty"
+                f"{amount(disturbances.leak_m, unit)} in the main amplitude, {verdict} than a tenth of its uncertainty"
             )
-            yield Effect(name, None, size, "m", disturbances.modelled, why)
+            yield Effect(name, None, size, unit, disturbances.modelled, why)
 
 
 def _count(number: int, what: str) -> str:

@@ -17,6 +17,7 @@ from pipeline.motion.overdamped import Overdamped
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_fit import FullFit
+from pipeline.numerics.quantity import amount
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
@@ -129,7 +130,7 @@ def judge(
     findings = [
         *_damping_findings(damping),
         *_motion_findings(cycles, demodulated, phase, rest, waveform),
-        *_mode_findings(demodulated, phase, disturbances),
+        *_mode_findings(demodulated, phase, disturbances, rest.mean.unit),
     ]
     return by_severity(findings)
 
@@ -225,7 +226,7 @@ def _motion_findings(
             "amplitude_dependent_frequency",
             "warning",
             f"the frequency depends on amplitude: it is {abs(shift):.2%} {'higher' if shift > 0 else 'lower'} at "
-            f"{start * 1e3:.0f} mm than at rest and shifts with {words_on_exponent(phase.exponent)}; "
+            f"{amount(start, rest.mean.unit, '.0f')} than at rest and shifts with {words_on_exponent(phase.exponent)}; "
             "the period given is the record's mean, its uncertainty covers the bend",
         )
     # What a computed record's rest position does within its digits disturbs no number.
@@ -233,41 +234,43 @@ def _motion_findings(
     if rest.moves and rest.range_m > float(np.max(errors)):
         yield Finding("rest_drift", "warning", _words_on_rest(rest))
     ratio = waveform.rms_m / demodulated.noise_m if demodulated.noise_m > 0 else 1.0
-    excess = phase.damping.scatter.excess
+    excess, unit = phase.damping.scatter.excess, rest.mean.unit
     if ratio > 1.5:
-        extra = f"; amplitudes of single periods scatter by {excess * 1e3:.2g} mm beyond their noise" if excess else ""
+        extra = f"; amplitudes of single periods scatter by {amount(excess, unit)} beyond their noise" if excess else ""
         yield Finding(
             "correlated_residuals",
             "warning",
-            f"the smooth model leaves {waveform.rms_m * 1e3:.2g} mm where samples scatter by "
-            f"{demodulated.noise_m * 1e3:.2g} mm within a period{extra}; uncertainties were widened by what is left",
+            f"the smooth model leaves {amount(waveform.rms_m, unit)} where samples scatter by "
+            f"{amount(demodulated.noise_m, unit)} within a period{extra}; uncertainties were widened by what is left",
         )
 
 
-def _mode_findings(demodulated: Demodulated, phase: PhaseFit, disturbances: Disturbances | None) -> Iterator[Finding]:
+def _mode_findings(
+    demodulated: Demodulated, phase: PhaseFit, disturbances: Disturbances | None, unit: str
+) -> Iterator[Finding]:
     own = [] if disturbances is None else [mode for mode in disturbances.sideways.modes if mode.kind == "mode"]
     if disturbances is None or not own:
         return
     main = phase.angular_frequency.value / (2.0 * math.pi)
     mode = own[0]
     f, share = mode.frequency.value, mode.amplitude.value / float(np.median(demodulated.amplitude))
-    pendulum = (
-        f"; a pendulum {GRAVITY_M_PER_S2 / (2.0 * math.pi * f) ** 2:.2g} m long swings like that" if f < main else ""
-    )
+    long_m = GRAVITY_M_PER_S2 / (2.0 * math.pi * f) ** 2
+    pendulum = f"; a pendulum {long_m:.2g} m long swings like that" if f < main and unit == "m" else ""
     others = f", and {len(own) - 1} more" if len(own) > 1 else ""
     fate = "they were" if others else "it was"
     yield Finding(
         "sideways_mode",
         "warning" if disturbances.modelled and share > 0.01 else "info",
-        f"a second mode of {mode.amplitude.value * 1e3:.2g} mm at {f:.4g} Hz beats with the oscillation every "
+        f"a second mode of {amount(mode.amplitude.value, unit)} at {f:.4g} Hz beats with the oscillation every "
         f"{1.0 / abs(f - main):.2g} s{pendulum}{others}; "
         + (f"{fate} fitted along" if disturbances.modelled else f"{fate} left in, too small to disturb the amplitude"),
     )
 
 
 def _words_on_rest(rest: Rest) -> str:
-    drift = f"drifts by {rest.drift_m * 1e3:.2g} mm during the record" if rest.drifts else ""
-    shown = [f"{step.height.value * 1e3:+.2g} mm at {step.time.value:.4g} s" for step in rest.steps[:5]]
+    unit = rest.mean.unit
+    drift = f"drifts by {amount(rest.drift_m, unit)} during the record" if rest.drifts else ""
+    shown = [f"{amount(step.height.value, unit, '+.2g')} at {step.time.value:.4g} s" for step in rest.steps[:5]]
     more = f" and {len(rest.steps) - 5} more" if len(rest.steps) > 5 else ""
     jumps = f"jumps {len(rest.steps)} time{'s' * (len(rest.steps) > 1)}: {', '.join(shown)}{more}" if shown else ""
     return f"the rest position {' and '.join(part for part in (drift, jumps) if part)}"

@@ -130,6 +130,7 @@ def _own(options: argparse.Namespace) -> int:
     from springmass.trade.summary import own_json, own_text
 
     loaded = load(options.input, **completions(options))
+    loaded.track.demand_length("a comparison of estimators")
     found, absent = methods()
     results = own_record(loaded.track, found, timer=time.perf_counter)
     if options.json:

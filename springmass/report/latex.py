@@ -25,6 +25,9 @@ _SIUNITX = {
     "1/s": r"\per\second",
     "1/(m s)": r"\per\metre\per\second",
     "m^(1-n)/s": r"\metre^{1-n}\per\second",
+    "V": r"\volt",
+    "N": r"\newton",
+    "m/s^2": r"\metre\per\second\squared",
     "degC": r"\degreeCelsius",
     "Pa": r"\pascal",
 }

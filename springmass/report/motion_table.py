@@ -7,9 +7,10 @@ import numpy as np
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.errors import AnalysisError
 from pipeline.motion.smoother import Smoothed
+from pipeline.numerics.quantity import in_unit, noun
 from pipeline.track import UNUSABLE
 
-__all__ = ["COLUMNS", "motion_csv", "row_step", "smoothed_or_why"]
+__all__ = ["COLUMNS", "columns_of", "motion_csv", "row_step", "smoothed_or_why"]
 
 COLUMNS = (
     "time_s",
@@ -22,9 +23,29 @@ COLUMNS = (
     "acceleration_m_per_s2",
     "u_acceleration_m_per_s2",
 )
-"""Of ``motion.csv``; distance and used are the sample's own, the rest is smoothed."""
+"""Of ``motion.csv`` of a length; distance and used are the sample's own, the rest is smoothed."""
 
 MOST_ROWS = 1_000_000
+
+
+def columns_of(unit: str) -> tuple[str, ...]:
+    """Return the columns of ``motion.csv`` of a record in this unit.
+
+    Examples
+    --------
+    >>> columns_of("rad")[3:7]
+    ('smooth_angle_rad', 'u_smooth_angle_rad', 'derivative_rad_per_s', 'u_derivative_rad_per_s')
+    """
+    if unit == "m":
+        return COLUMNS
+    names = {f"smooth_{noun(unit)}": "m", "derivative": "m/s", "second_derivative": "m/s^2"}
+    smooth = [f"{name}_{_spelt(in_unit(form, unit))}" for name, form in names.items()]
+    own = f"{noun(unit)}_{_spelt(unit)}"
+    return ("time_s", own, "used", *(x for each in smooth for x in (each, f"u_{each}")))
+
+
+def _spelt(unit: str) -> str:
+    return unit.replace("/", "_per_").replace("^", "")
 
 
 def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
@@ -53,7 +74,7 @@ def row_step(analysis: Analysis) -> int:
 
 
 def motion_csv(analysis: Analysis, smoothed: Smoothed) -> str:
-    """Return a line a sample, in the record's order, with the columns of :data:`COLUMNS`.
+    """Return a line a sample, in the record's order, with the columns of :func:`columns_of` its unit.
 
     Parameters
     ----------
@@ -81,4 +102,4 @@ def motion_csv(analysis: Analysis, smoothed: Smoothed) -> str:
     # One format for many lines takes a third of numpy's time for them one by one.
     blocks = (table[at : at + 1000] for at in range(0, len(table), 1000))
     text = "".join((line * len(block)) % tuple(block.ravel().tolist()) for block in blocks)
-    return ",".join(COLUMNS) + "\n" + text.replace("nan", "")
+    return ",".join(columns_of(analysis.track.unit)) + "\n" + text.replace("nan", "")

@@ -33,6 +33,7 @@ _QUANTITIES = (
     ("angular_frequency", "angular frequency", "omega", "ω", r"\omega"),
     ("spring_constant", "spring constant", "k", "k", "k"),
     ("amplitude", "amplitude at the start", "A0", "A₀", "A_0"),
+    ("displacement_amplitude", "amplitude of the displacement", "x0", "x₀", "x_0"),
     ("offset", "rest position", "y0", "y₀", "y_0"),
     ("noise", "noise of one sample", "sigma", "σ", r"\sigma"),
     ("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda"),

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pipeline.analyse import Analysis, Oscillation, Overdamped, Still
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.quantity import SHOWN, noun
 from springmass.report.figures.phase_plot import turn_step
 from springmass.report.figures.position import ZOOM_PERIODS, has_error_bars, is_long
 from springmass.report.motion_table import row_step
@@ -99,22 +100,29 @@ def caption(name: str, analysis: Analysis) -> str:
     analysis : Analysis
     """
     if isinstance(analysis.motion, Overdamped):
-        return f"Distance from the sensor with the fitted relaxation. Samples scatter by {_sigma(analysis)}."
+        return f"{_subject(analysis)} with the fitted relaxation. Samples scatter by {_sigma(analysis)}."
     if isinstance(analysis.motion, Still):
-        return f"Distance from the sensor; nothing oscillates. Samples scatter by {_sigma(analysis)}."
+        return f"{_subject(analysis)}; nothing oscillates. Samples scatter by {_sigma(analysis)}."
     return _CAPTIONS[name](analysis, analysis.motion)
 
 
 def _sigma(analysis: Analysis) -> str:
     noise = analysis.estimates["noise"]
-    return kept(Estimate(1e3 * noise.value, 1e3 * noise.u, "mm"))
+    shown = SHOWN[analysis.track.unit]
+    return kept(Estimate(shown.factor * noise.value, shown.factor * noise.u, shown.unit))
+
+
+def _subject(analysis: Analysis) -> str:
+    """What was recorded, at the head of a sentence."""
+    unit = analysis.track.unit
+    return "Distance from the sensor" if unit == "m" else noun(unit).capitalize()
 
 
 def _position(analysis: Analysis, _: Oscillation) -> str:
     bars = "shown as error bars" if has_error_bars(analysis) else "too small for error bars to show"
     detail = f" Above the whole record, below its first {ZOOM_PERIODS} periods (shaded above)."
     return (
-        "Distance from the sensor with the fitted motion; beneath, what the fit leaves, over the noise of "
+        f"{_subject(analysis)} with the fitted motion; beneath, what the fit leaves, over the noise of "
         f"one sample, σ\u00a0=\u00a0{_sigma(analysis)}, {bars}.{detail if is_long(analysis) else ''}"
         " Flagged samples were left out of the fit and of the residuals."
     )
@@ -127,28 +135,36 @@ def _amplitude(_: Analysis, motion: Oscillation) -> str:
     )
 
 
-def _phase(_: Analysis, motion: Oscillation) -> str:
+def _phase(analysis: Analysis, motion: Oscillation) -> str:
     step = turn_step(motion)
     every = f" One turn in {step} is drawn." if step > 1 else ""
-    return f"Velocity against displacement from rest; colour tells the time.{every}"
+    value = noun(analysis.track.unit)
+    what = "Velocity against displacement" if value == "distance" else f"Derivative of the {value} against the {value}"
+    return f"{what} from rest; colour tells the time.{every}"
 
 
-def _energy(_: Analysis, motion: Oscillation) -> str:
+def _energy(analysis: Analysis, motion: Oscillation) -> str:
     mass = motion.derived.effective_mass_kg
     of = f"the mass that oscillates, {kept(mass)}" if mass is not None else "one kilogram, as no mass was given"
     return (
-        f"Energy of the oscillation, m ω² A²/2, for {of}; beneath, what single amplitudes deviate from the law. "
+        f"Energy of the oscillation, m ω² A²/2{_of_displacement(analysis)}, for {of}; beneath, what single amplitudes "
+        "deviate from the law. "
         "Points bear their own scatter. The band is one standard uncertainty of the law, with all that points share: "
         "mass, frequency, the distances' scale and the choice among admissible laws."
     )
 
 
-def _drag(_: Analysis, motion: Oscillation) -> str:
+def _of_displacement(analysis: Analysis) -> str:
+    return " with A the recorded amplitude over ω²" if analysis.track.unit == "m/s^2" else ""
+
+
+def _drag(analysis: Analysis, motion: Oscillation) -> str:
     friction = "; friction is left out" if "mu" in motion.damping.best.joint.names else ""
     return (
         "Drag coefficient against amplitude: what purely quadratic drag on the disc would need to take the energy that "
-        f"the record loses, −dA/dt · 3π m/(2 ω ρ S A²), the spring's own losses included{friction}. Points are slopes "
-        "of the amplitude's logarithm through stretches of the record and bear their own scatter; the band is one "
+        f"the record loses, −dA/dt · 3π m/(2 ω ρ S A²){_of_displacement(analysis)}, the spring's own losses "
+        f"included{friction}. Points are slopes of the amplitude's logarithm through stretches of the record and bear "
+        "their own scatter; the band is one "
         "standard uncertainty of the law with masses, disc, air and scale. A coefficient that falls with the "
         "amplitude is one that a constant C does not describe."
     )
@@ -159,9 +175,13 @@ def _motion(analysis: Analysis, _: Oscillation) -> str:
     step = row_step(analysis)
     rows = "position, velocity and acceleration at every sample" if step == 1 else f"all three at one sample in {step}"
     whole = " over the whole record (the periods above are shaded)" if is_long(analysis) else ""
+    first, rate = "Velocity v and acceleration a", "velocity"
+    if analysis.track.unit != "m":
+        first, rate = f"First and second derivative of the {noun(analysis.track.unit)}", "first derivative"
+        rows = rows.replace("position, velocity and acceleration", "the value and its derivatives")
     return (
-        f"Velocity v and acceleration a over {periods}, from an oscillator smoother: every sample speaks on every "
-        f"other, nothing is differenced. Beneath{whole}, what the velocity differs from the fitted law's, in its band "
+        f"{first} over {periods}, from an oscillator smoother: every sample speaks on every "
+        f"other, nothing is differenced. Beneath{whole}, what the {rate} differs from the fitted law's, in its band "
         "of one standard uncertainty u, and u of both: larger at the edges, where one side is missing. Clock and "
         f"scale, which move all alike, are not in u. motion.csv holds {rows}."
     )

@@ -38,6 +38,8 @@ def completed(scene: Scene, analysis: Analysis) -> tuple[Scene, Joint]:
     ------
     ProgramError
         With exit code 3 if the run does not oscillate.
+    TrackError
+        If it is no length.
 
     Notes
     -----
@@ -47,6 +49,7 @@ def completed(scene: Scene, analysis: Analysis) -> tuple[Scene, Joint]:
     is :math:`-\\tau u_\\omega^2`, where the line's middle is :math:`\\tau` later. Amplitude and coefficients have the
     covariance of the damping law.
     """
+    analysis.track.demand_length("a prediction laid over a run")
     motion = _oscillation(analysis)
     scale = analysis.estimates
     first = int(np.flatnonzero(analysis.conditioned.used)[0])

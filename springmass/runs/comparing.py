@@ -154,10 +154,10 @@ def _moving(run: Analysed) -> Oscillation:
 
 
 def _of_one_bob(motions: list[tuple[str, Oscillation]], scenes: list[Scene]) -> list[list[tuple[str, Oscillation]]]:
-    """Groups of two runs and more with the same bob and disc: the laws' coefficients go as one over the mass."""
-    groups: dict[tuple[Estimate | None, Estimate | None], list[tuple[str, Oscillation]]] = {}
+    """Groups of two runs and more with the same bob, disc and unit: the coefficients go as one over the mass."""
+    groups: dict[tuple[Estimate | None, Estimate | None, str], list[tuple[str, Oscillation]]] = {}
     for one, scene in zip(motions, scenes, strict=True):
-        groups.setdefault((scene.bob_mass_kg, scene.disc_diameter_m), []).append(one)
+        groups.setdefault((scene.bob_mass_kg, scene.disc_diameter_m, one[1].rest.mean.unit), []).append(one)
     return [group for group in groups.values() if len(group) > 1]
 
 

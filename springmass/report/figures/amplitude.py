@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.analyse import Analysis
 from pipeline.errors import AnalysisError
+from pipeline.numerics.quantity import SHOWN
 from springmass.report.figures.canvas import (
     BLUE,
     GREEN,
@@ -23,6 +24,7 @@ from springmass.report.figures.canvas import (
     panels,
     share,
     style,
+    value_label,
 )
 from springmass.report.tables import law_status
 
@@ -43,14 +45,14 @@ def amplitude_figure(analysis: Analysis) -> Figure:
     analysis : Analysis
         Of a record that oscillates.
     """
-    motion = moving(analysis)
-    damping, t, amplitude = motion.damping, motion.demodulated.t, motion.demodulated.amplitude * 1e3
-    u, kept = damping.scatter.u * 1e3, damping.scatter.kept
+    motion, factor = moving(analysis), SHOWN[analysis.track.unit].factor
+    damping, t, amplitude = motion.damping, motion.demodulated.t, motion.demodulated.amplitude * factor
+    u, kept = damping.scatter.u * factor, damping.scatter.kept
     end = float(np.nanmax(analysis.track.t))
     with style():
         figure, (above, below) = panels([(2.7, 0.0), (1.0, 0.08)])
         amplitude_panel(above, analysis)
-        residual = (amplitude - damping.best.amplitude(t - damping.t0) * 1e3) / np.where(u > 0, u, 1.0)
+        residual = (amplitude - damping.best.amplitude(t - damping.t0) * factor) / np.where(u > 0, u, 1.0)
         below.plot(t[kept], residual[kept], "o", ms=2.6, mew=0, color=BLUE)
         finish_residual(below, residual[kept], "residual / u")
         # What was left out lies far off; at the edge it is seen and flattens nothing.
@@ -78,11 +80,11 @@ def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None 
     AnalysisError
         If a law was not fitted.
     """
-    motion = moving(analysis)
-    damping, t, amplitude = motion.damping, motion.demodulated.t, motion.demodulated.amplitude * 1e3
+    motion, factor = moving(analysis), SHOWN[analysis.track.unit].factor
+    damping, t, amplitude = motion.damping, motion.demodulated.t, motion.demodulated.amplitude * factor
     if missing := [name for name in laws or () if name not in damping.fits]:
         raise AnalysisError(f"no law {missing[0]!r} was fitted to this run; there are {', '.join(damping.fits)}")
-    u, kept = damping.scatter.u * 1e3, damping.scatter.kept
+    u, kept = damping.scatter.u * factor, damping.scatter.kept
     grid = np.linspace(damping.t0, float(np.nanmax(analysis.track.t)), 160)
     error_bars(panel, t[kept], amplitude[kept], u[kept], "amplitude of one window")
     if not kept.all():
@@ -95,8 +97,8 @@ def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None 
         chosen, rejected = name == damping.selected, status.startswith("rejected")
         colour = "#000000" if chosen else GREY if rejected else (GREEN, PURPLE, VERMILLION, ORANGE)[i % 4]
         dashes = "-" if chosen else _DASHES[i % len(_DASHES)]
-        curve = damping.fits[name].amplitude(grid - damping.t0) * 1e3
+        curve = damping.fits[name].amplitude(grid - damping.t0) * factor
         panel.plot(grid, curve, color=colour, ls=dashes, lw=1.0, label=f"{name} ({status})", zorder=3)
-    margin = 0.12 * max(shown[1] - shown[0], 1e-9)
+    margin = 0.12 * max(shown[1] - shown[0], 1e-9 * abs(shown[1])) or 1.0
     panel.set_ylim(shown[0] - margin, shown[1] + margin)
-    panel.set_ylabel("amplitude / mm")
+    panel.set_ylabel(value_label("amplitude", analysis.track.unit))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Oscillation
+from pipeline.numerics.quantity import SHOWN, in_unit
 from pipeline.track import F8
 from storage.atomic import write_whole
 
@@ -38,6 +40,7 @@ __all__ = [
     "VERMILLION",
     "WIDTH",
     "blank",
+    "derivative_label",
     "error_bars",
     "finish_residual",
     "legend_above",
@@ -50,6 +53,7 @@ __all__ = [
     "share",
     "style",
     "thinned",
+    "value_label",
 ]
 
 BLUE, SKY, ORANGE, GREEN = "#0072B2", "#56B4E9", "#E69F00", "#009E73"
@@ -216,12 +220,42 @@ def error_bars(panel: Axes, t: F8, y: F8, u: F8, label: str) -> None:
     panel.errorbar(t, y, yerr=u, fmt="o", label=label, **look)
 
 
+def value_label(what: str, unit: str) -> str:
+    """Return the label of an axis in the unit that values of a record are shown in.
+
+    Examples
+    --------
+    >>> value_label("amplitude", "m"), value_label("amplitude", "m/s^2")
+    ('amplitude / mm', 'amplitude / (m/s²)')
+    """
+    return f"{what} / {_in_brackets(SHOWN[unit].unit)}"
+
+
+def derivative_label(what: tuple[str, str], form: str, unit: str) -> str:
+    """Return the label of an axis of a derivative: its name for a length and otherwise, its unit for a length.
+
+    Examples
+    --------
+    >>> derivative_label(("velocity", "rate"), "m/s", "m"), derivative_label(("velocity", "rate"), "m/s", "rad")
+    ('velocity / (m/s)', 'rate / (rad/s)')
+    """
+    return f"{what[unit != 'm']} / {_in_brackets(in_unit(form, unit))}"
+
+
+def _in_brackets(unit: str) -> str:
+    shown = re.sub(r"\^(\d)", lambda power: _POWERS[power[1]], unit)
+    return f"({shown})" if "/" in shown else shown
+
+
+_POWERS = {"2": "²", "3": "³", "4": "⁴"}
+
+
 def model_phase(motion: Oscillation, t: F8) -> tuple[F8, F8]:
-    """Fitted displacement and velocity at times t, m and m/s."""
+    """Fitted displacement and velocity at times t, in the record's unit and in that over s."""
     law, angle = motion.damping.best, motion.phase.total(t)
     amplitude = law.amplitude(t - motion.phase.t0)
     cosine, sine = np.cos(angle), np.sin(angle)
-    velocity = -law.law.rate(amplitude, law.joint.values) * cosine - amplitude * motion.phase.rate(t) * sine
+    velocity = -law.law.rate(amplitude, law.joint.values) * cosine - amplitude * motion.phase.rate(amplitude) * sine
     return amplitude * cosine, velocity
 
 

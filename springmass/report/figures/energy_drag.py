@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.analyse import Analysis
+from pipeline.errors import AnalysisError
+from pipeline.numerics.quantity import SHOWN
 from pipeline.results.curves import Curve
 from pipeline.track import F8
-from springmass.report.figures.canvas import BLUE, SKY, legend_above, moving, panels, share, style
+from springmass.report.figures.canvas import BLUE, SKY, legend_above, moving, panels, share, style, value_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,8 +22,10 @@ if TYPE_CHECKING:
 __all__ = ["drag_figure", "drag_panel", "energy_figure", "energy_panel"]
 
 
-def energy_figure(analysis: Analysis) -> Figure:
+def energy_figure(analysis: Analysis) -> Figure | None:
     """Draw the mechanical energy with its band, and beneath it what single amplitudes deviate from the law.
+
+    None where the record tells no displacement.
 
     Parameters
     ----------
@@ -30,6 +34,8 @@ def energy_figure(analysis: Analysis) -> Figure:
     """
     motion = moving(analysis)
     curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
+    if curve is None:
+        return None
     with style():
         figure, (above, below) = panels([(2.3, 0.0), (1.1, 0.08)])
         energy_panel(above, analysis)
@@ -49,9 +55,17 @@ def energy_figure(analysis: Analysis) -> Figure:
 
 
 def energy_panel(panel: Axes, analysis: Analysis) -> None:
-    """Draw the mechanical energy against time with its band, as :func:`energy_figure` does."""
+    """Draw the mechanical energy against time with its band, as :func:`energy_figure` does.
+
+    Raises
+    ------
+    AnalysisError
+        If the record tells no displacement.
+    """
     motion = moving(analysis)
     curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
+    if curve is None:
+        raise AnalysisError(f"an energy needs a displacement, and a record in {analysis.track.unit} tells none")
     low, high = curve.y - curve.u, curve.y_points
     _draw(panel, curve, 1.0, 1e3, "from single amplitudes", f"from the law {motion.damping.selected}")
     if 0 < float(np.min(low)) < float(np.max(high)) / 20.0 and float(np.min(high)) > 0:
@@ -89,10 +103,12 @@ def drag_panel(panel: Axes, analysis: Analysis) -> bool:
     """
     motion = moving(analysis)
     curve = motion.derived.drag_curve(motion.damping, motion.demodulated)
-    diameter = analysis.scene.disc_diameter_m
-    if curve is None or diameter is None:
+    diameter, displacement = analysis.scene.disc_diameter_m, motion.derived.displacement
+    if curve is None or diameter is None or displacement is None:
         return False
-    _draw(panel, curve, 1e3, 1.0, "from a stretch of the record", f"from the law {motion.damping.selected}")
+    unit = analysis.track.unit
+    factor = SHOWN[unit].factor
+    _draw(panel, curve, factor, 1.0, "from a stretch of the record", f"from the law {motion.damping.selected}")
     points = [curve.y_points + curve.u_points, curve.y_points - curve.u_points]
     shown = np.concatenate([curve.y + curve.u, curve.y - curve.u, *points])
     # A stretch with hardly any damping has a bar that would flatten all else.
@@ -100,11 +116,11 @@ def drag_panel(panel: Axes, analysis: Analysis) -> bool:
     low, high = min(0.0, max(float(np.min(shown)), -most)), min(float(np.max(shown)), most)
     panel.set_ylim(low - 0.05 * (high - low) if low < 0 else 0.0, high + 0.08 * (high - low))
     panel.set_ylabel("drag coefficient")
-    panel.set_xlabel("amplitude / mm")
-    edge = 0.04e3 * float(np.ptp(curve.x))
-    panel.set_xlim(max(1e3 * float(curve.x[0]) - edge, 0.0), 1e3 * float(curve.x[-1]) + edge)
-    per_mm = 2e-3 * np.pi / diameter.value
-    second = panel.secondary_xaxis("top", functions=(_times(per_mm), _times(1.0 / per_mm)))
+    panel.set_xlabel(value_label("amplitude", unit))
+    edge = 0.04 * factor * float(np.ptp(curve.x))
+    panel.set_xlim(max(factor * float(curve.x[0]) - edge, 0.0), factor * float(curve.x[-1]) + edge)
+    per_value = 2.0 * np.pi * displacement.value / (diameter.value * factor)
+    second = panel.secondary_xaxis("top", functions=(_times(per_value), _times(1.0 / per_value)))
     second.set_xlabel("Keulegan-Carpenter number")
     return True
 

@@ -8,8 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Oscillation
+from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.track import F8, UNUSABLE
-from springmass.report.figures.canvas import DENSE_POINTS, legend_above, model_phase, moving, panels, style
+from springmass.report.figures.canvas import (
+    DENSE_POINTS,
+    derivative_label,
+    legend_above,
+    model_phase,
+    moving,
+    panels,
+    style,
+    value_label,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,6 +73,7 @@ def phase_panel(panel: Axes, analysis: Analysis) -> ScalarMappable:
     from matplotlib.colors import ListedColormap, Normalize
 
     motion, track = moving(analysis), analysis.track
+    unit, factor = track.unit, SHOWN[track.unit].factor
     period = 2.0 * np.pi / motion.phase.angular_frequency.value
     first, end = motion.damping.t0, float(np.nanmax(track.t))
     # The map's pale end would drown in the paper.
@@ -80,14 +91,14 @@ def phase_panel(panel: Axes, analysis: Analysis) -> ScalarMappable:
     fastest = 1.3 * float(np.nanmax(np.abs(motion.waveform.velocity)))
     beyond = int(np.count_nonzero(np.abs(velocity[drawn]) > fastest))
     label += f" ({beyond} off the axis)" if beyond else ""
-    panel.plot(displacement[drawn] * 1e3, velocity[drawn], ".", label=label, **dots)
+    panel.plot(displacement[drawn] * factor, velocity[drawn], ".", label=label, **dots)
     panel.set_ylim(-fastest, fastest)
     for i, start in enumerate(np.arange(first, end, period * turn_step(motion))):
         t = np.linspace(start, min(start + period, end), 73)
         x, v = model_phase(motion, t)
-        panel.plot(x * 1e3, v, color=colours(scale(start)), lw=1.0, label=None if i else "fitted motion")
-    panel.set_xlabel("displacement / mm")
-    panel.set_ylabel("velocity / (m/s)")
+        panel.plot(x * factor, v, color=colours(scale(start)), lw=1.0, label=None if i else "fitted motion")
+    panel.set_xlabel(value_label("displacement" if unit == "m" else f"{noun(unit)} from rest", unit))
+    panel.set_ylabel(derivative_label(("velocity", "derivative"), "m/s", unit))
     return ScalarMappable(scale, colours)
 
 

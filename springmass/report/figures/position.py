@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation, Overdamped
+from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.track import F8, UNUSABLE, Quality
 from springmass.report.figures.canvas import (
     BLUE,
@@ -24,6 +25,7 @@ from springmass.report.figures.canvas import (
     share,
     style,
     thinned,
+    value_label,
 )
 
 if TYPE_CHECKING:
@@ -100,11 +102,11 @@ def position_panel(panel: Axes, analysis: Analysis, start: float, end: float) ->
     analysis : Analysis
     start, end : float, s
     """
-    motion = analysis.motion
+    motion, factor = analysis.motion, SHOWN[analysis.track.unit].factor
     _draw_distance(panel, analysis, start, end)
     if isinstance(motion, Overdamped):
         t, y = _relaxing(analysis, motion)
-        panel.plot(t, y * 1e3, color="#000000", lw=0.9, label="fit", zorder=2.5)
+        panel.plot(t, y * factor, color="#000000", lw=0.9, label="fit", zorder=2.5)
     if not isinstance(motion, Oscillation):
         return
     law, rest = motion.damping.best, motion.rest
@@ -112,11 +114,11 @@ def position_panel(panel: Axes, analysis: Analysis, start: float, end: float) ->
         grid = np.linspace(start, end, 400)
         reach = law.amplitude(grid - motion.damping.t0)
         for sign, label in ((1, "fit: rest ± amplitude"), (-1, None)):
-            panel.plot(grid, (rest.at(grid) + sign * reach) * 1e3, color="#000000", lw=1.0, label=label)
+            panel.plot(grid, (rest.at(grid) + sign * reach) * factor, color="#000000", lw=1.0, label=label)
     else:
         grid = np.linspace(start, end, int(50 * (end - start) * motion.cycles.frequency_hz) + 2)
         position = rest.at(grid) + model_phase(motion, grid)[0]
-        panel.plot(grid, position * 1e3, color="#000000", lw=0.8, label="fit", zorder=2.5)
+        panel.plot(grid, position * factor, color="#000000", lw=0.8, label="fit", zorder=2.5)
 
 
 def _relaxing(analysis: Analysis, motion: Overdamped) -> tuple[F8, F8]:
@@ -159,7 +161,8 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
     """Draw the samples between two times, the flagged ones on top with markers of their own."""
     track, flags = analysis.track, analysis.flags
     inside = (track.t >= start) & (track.t <= end)
-    y = track.y * 1e3
+    factor = SHOWN[track.unit].factor
+    y = track.y * factor
     used = inside & ((flags & UNUSABLE) == 0) & np.isfinite(y)
     if np.count_nonzero(used) > DENSE_POINTS:
         ends = thinned(y[used], 900)
@@ -167,13 +170,13 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
     else:
         panel.plot(track.t[used], y[used], ".", ms=4.0, mew=0, color=SKY, label="samples used")
         if has_error_bars(analysis):
-            u = analysis.conditioned.noise_m * 1e3
+            u = analysis.conditioned.noise_m * factor
             panel.vlines(track.t[used], y[used] - u, y[used] + u, color=SKY, lw=0.6, alpha=0.6)
     # What was clipped off is part of the motion: the axis holds the fit as well as the samples.
-    fit = analysis.motion.waveform.position[inside] * 1e3 if isinstance(analysis.motion, Oscillation) else y[used]
+    fit = analysis.motion.waveform.position[inside] * factor if isinstance(analysis.motion, Oscillation) else y[used]
     shown = np.concatenate([y[used], fit[np.isfinite(fit)]])
     low, high = (float(np.min(shown)), float(np.max(shown))) if shown.size else (0.0, 1.0)
-    margin = 0.1 * max(high - low, 6e3 * analysis.conditioned.noise_m, 1e-3)
+    margin = 0.1 * (max(high - low, 6.0 * factor * analysis.conditioned.noise_m) or 1.0)
     low, high = low - margin, high + margin
     rest = inside & ~used
     for bit, name, marker, colour in _FLAGGED:
@@ -189,7 +192,7 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
         _mark(panel, track.t[missing], np.full(count, low), "|", PURPLE, f"missing ({count})")
     panel.set_ylim(low, high)
     panel.set_xlim(start, end)
-    panel.set_ylabel("position / mm")
+    panel.set_ylabel(value_label("position" if track.unit == "m" else noun(track.unit), track.unit))
 
 
 def _mark(panel: Axes, t: F8, y: F8, marker: str, colour: str, label: str) -> None:

@@ -8,12 +8,14 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.motion.smoother import Smoothed
+from pipeline.numerics.quantity import SHOWN
 from pipeline.track import F8
 from springmass.report.figures.canvas import (
     BLUE,
     DENSE_POINTS,
     SKY,
     VERMILLION,
+    derivative_label,
     legend_above,
     model_phase,
     moving,
@@ -46,7 +48,8 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
     smoothed : Smoothed, optional
         Its motion; left out, it is worked out.
     """
-    motion = moving(analysis)
+    motion, unit = moving(analysis), analysis.track.unit
+    factor = SHOWN[unit].factor
     smoothed = analysis.smoothed() if smoothed is None else smoothed
     rows = np.flatnonzero(np.isfinite(smoothed.t))
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
@@ -59,13 +62,13 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
         _draw_samples(axes[0], analysis, motion, start, detail)
         inside = t <= detail
         _draw_value(axes[0], t[inside], velocity[inside], u_velocity[inside], labelled=True)
-        axes[0].set_ylabel("velocity v / (m/s)")
+        axes[0].set_ylabel(derivative_label(("velocity v", "derivative"), "m/s", unit))
         acceleration, u_acceleration = smoothed.acceleration[rows], smoothed.u_acceleration[rows]
         _draw_value(axes[1], t[inside], acceleration[inside], u_acceleration[inside])
-        axes[1].set_ylabel("acceleration a / (m/s²)")
-        _draw_difference(axes[2], t, 1e3 * (velocity - model_phase(motion, t)[1]), 1e3 * u_velocity)
-        axes[2].set_ylabel("v − law / (mm/s)")
-        _draw_uncertainties(axes[3], t, 1e3 * u_velocity, 1e3 * u_acceleration)
+        axes[1].set_ylabel(derivative_label(("acceleration a", "2nd derivative"), "m/s^2", unit))
+        _draw_difference(axes[2], t, factor * (velocity - model_phase(motion, t)[1]), factor * u_velocity)
+        axes[2].set_ylabel("v − law / (mm/s)" if unit == "m" else derivative_label(("", "− law"), "m/s", unit))
+        _draw_uncertainties(axes[3], t, factor * u_velocity, factor * u_acceleration, unit)
         axes[3].set_xlabel("time / s")
         share(axes[0], axes[1], start, detail)
         share(axes[2], axes[3], start, end)
@@ -107,13 +110,16 @@ def _draw_difference(panel: Axes, t: F8, difference: F8, u: F8) -> None:
     panel.set_ylim(-reach, reach)
 
 
-def _draw_uncertainties(panel: Axes, t: F8, u_velocity: F8, u_acceleration: F8) -> None:
+def _draw_uncertainties(panel: Axes, t: F8, u_velocity: F8, u_acceleration: F8, unit: str) -> None:
     """Draw both standard uncertainties, the acceleration's on an axis of its own at the right."""
     beside = panel.twinx()
     beside.grid(visible=False)
+    labels = ("u(v) / (mm/s)", "u(a) / (mm/s²)")
+    if unit != "m":
+        labels = derivative_label(("", "its u"), "m/s", unit), derivative_label(("", "its u"), "m/s^2", unit)
     for axes, u, colour, dashes, label in (
-        (panel, u_velocity, BLUE, "-", "u(v) / (mm/s)"),
-        (beside, u_acceleration, VERMILLION, (0, (3, 1.5)), "u(a) / (mm/s²)"),
+        (panel, u_velocity, BLUE, "-", labels[0]),
+        (beside, u_acceleration, VERMILLION, (0, (3, 1.5)), labels[1]),
     ):
         keep = thinned(u, BINS)
         axes.plot(t[keep], u[keep], color=colour, ls=dashes, lw=0.9)

@@ -130,5 +130,5 @@ def test_a_track_of_a_quantity_keeps_it() -> None:
     """A known quantity travels with the arrays, and says so where a length is needed."""
     track = Track.from_arrays([0.0, 1.0], [0.0, 1.0], quantity="voltage", unit="V")
     assert (track.quantity, track.unit) == ("voltage", "V")
-    with pytest.raises(TrackError, match="got voltage in V"):
-        track.demand_length()
+    with pytest.raises(TrackError, match=r"^a spring needs a length in m, got voltage in V"):
+        track.demand_length("a spring")

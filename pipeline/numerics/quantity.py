@@ -1,0 +1,96 @@
+"""Words and units of what a record holds: stages count in its unit, sentences and figures say which."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+__all__ = ["SHOWN", "Shown", "amount", "in_unit", "noun", "plural"]
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """How values of one unit are called and written.
+
+    Parameters
+    ----------
+    noun : str
+        Of one value.
+    unit : str
+        In which sentences and figures write it.
+    factor : float
+        From the record's unit to that one.
+    """
+
+    noun: str
+    unit: str
+    factor: float
+
+
+SHOWN = {
+    "m": Shown("distance", "mm", 1e3),
+    "rad": Shown("angle", "rad", 1.0),
+    "V": Shown("voltage", "V", 1.0),
+    "m/s^2": Shown("acceleration", "m/s^2", 1.0),
+    "N": Shown("force", "N", 1.0),
+}
+"""By the one unit that each of :data:`pipeline.track.UNITS` has."""
+
+_OF_ACCELERATION = {
+    "m/s": "m/s^3",
+    "m/s^2": "m/s^4",
+    "1/(m s)": "s/m",
+    "m^(1-n)/s": "(m/s^2)^(1-n)/s",
+}
+
+
+def amount(value: float, unit: str, form: str = ".2g") -> str:
+    """Write a value of a record with its unit.
+
+    Parameters
+    ----------
+    value : float
+        In ``unit``.
+    unit : str
+        Of the record.
+    form : str
+        Of the number in mm; a number of fixed decimals has four digits in other units, whose size nobody knows.
+
+    Examples
+    --------
+    >>> amount(0.00234, "m"), amount(0.0234, "rad"), amount(1.2345678, "V", ".1f")
+    ('2.3 mm', '0.023 rad', '1.235 V')
+    """
+    shown = SHOWN[unit]
+    if unit != "m" and form.endswith("f"):
+        form = ".4g"
+    return f"{value * shown.factor:{form}} {shown.unit}"
+
+
+def noun(unit: str) -> str:
+    """Return what a value of a record in this unit is called."""
+    return SHOWN[unit].noun
+
+
+def plural(unit: str) -> str:
+    """Return what values of a record in this unit are called.
+
+    Examples
+    --------
+    >>> plural("m"), plural("V")
+    ('distances', 'voltages')
+    """
+    return SHOWN[unit].noun + "s"
+
+
+def in_unit(form: str, unit: str) -> str:
+    """Return a unit that was written for a length in metres for a record in another unit.
+
+    Examples
+    --------
+    >>> in_unit("1/(m s)", "V"), in_unit("m/s", "rad"), in_unit("1/(m s)", "m/s^2"), in_unit("1/s", "N")
+    ('1/(V s)', 'rad/s', 's/m', '1/s')
+    """
+    if unit == "m/s^2" and form in _OF_ACCELERATION:
+        return _OF_ACCELERATION[form]
+    return re.sub(r"\bm\b", unit, form)

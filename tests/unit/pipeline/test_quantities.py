@@ -1,0 +1,209 @@
+"""Angles, voltages, accelerations and forces through the whole analysis: their own units, and what needs a length."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.analyse import Analysis, Oscillation, Overdamped, Still, analyse
+from pipeline.bench.scene import Scene
+from pipeline.errors import AnalysisError, TrackError
+from pipeline.numerics.estimate import Estimate
+from pipeline.results.classic import classic
+from pipeline.results.compare import SpringRun
+from pipeline.streaming import LiveMotion, MotionAccumulator
+from pipeline.track import UNITS, Track
+from tests.synthetic import Truth, noisy, times
+
+TRUTH = Truth(gamma=0.0073, beta=0.235)
+SIGMA = 3e-4
+SCENE = Scene.from_mapping(
+    {
+        "bob": {"mass_kg": {"value": 0.2, "u": 1e-4}},
+        "disc": {"diameter_m": {"value": 0.1, "u": 1e-3}},
+        "air": {"temperature_c": 20.0},
+    }
+)
+OTHERS = {quantity: unit for quantity, unit in UNITS.items() if quantity != "length"}
+every = pytest.mark.parametrize(("quantity", "unit"), OTHERS.items())
+
+
+def track(quantity: str = "length", unit: str = "m", *, seconds: float = 60.0, seed: int = 1) -> Track:
+    """Return the same numbers as a record of one quantity."""
+    t = times(seconds)
+    return Track.from_arrays(t, noisy(TRUTH, t, SIGMA, seed), quantity=quantity, unit=unit)
+
+
+def oscillation(found: Analysis) -> Oscillation:
+    """Return its motion, which oscillates."""
+    assert isinstance(found.motion, Oscillation)
+    return found.motion
+
+
+@every
+def test_the_same_numbers_give_the_same_results_in_their_own_unit(quantity: str, unit: str) -> None:
+    """Whatever a record is of, period, damping and amplitudes are those of a length, and only the units differ."""
+    length, other = analyse(track()), analyse(track(quantity, unit))
+    for name in ("period", "frequency", "damping_rate", "quality_factor", "phase"):
+        assert other.estimates[name] == length.estimates[name], name
+    for name in ("amplitude", "offset", "noise"):
+        mine, its = other.estimates[name], length.estimates[name]
+        assert (mine.value, mine.u) == (its.value, its.u)
+        assert (mine.unit, its.unit) == (unit, "m")
+    assert oscillation(other).damping.selected == oscillation(length).damping.selected == "linear+quadratic"
+    units = dict(
+        zip(*(getattr(oscillation(other).damping.best.joint, each) for each in ("names", "units")), strict=True)
+    )
+    per = {"rad": "1/(rad s)", "V": "1/(V s)", "m/s^2": "s/m", "N": "1/(N s)"}[unit]
+    assert units == {"A0": unit, "gamma": "1/s", "beta": per}
+    assert oscillation(other).derived.coefficients["beta"].unit == per
+
+
+@every
+def test_no_number_is_in_metres_where_nothing_was_measured_in_them(quantity: str, unit: str) -> None:
+    """Units of estimates, budgets, laws and effects, with a bench that knows everything."""
+    found = analyse(track(quantity, unit), SCENE)
+    motion = oscillation(found)
+    told = {name: each.unit for name, each in found.estimates.items()}
+    told |= {f"budget {name}": each.estimate.unit for name, each in motion.derived.budgets.items()}
+    told |= {f"effect {each.name}": each.unit for each in found.effects}
+    for name, fit in motion.damping.fits.items():
+        told |= {f"{name} {x}": own for x, own in zip(fit.joint.names, fit.joint.units, strict=True)}
+    needless = {name for name, own in told.items() if re.search(r"\bm\b", own.replace(unit, ""))}
+    # A mass and a period give N/m whatever was recorded; an acceleration gives lengths by omega^2.
+    allowed = {"spring_constant", "budget spring_constant"}
+    if unit == "m/s^2":
+        derived = ("displacement_amplitude", "velocity_rms")
+        allowed |= {*derived, *(f"budget {name}" for name in derived)}
+        needless = {name for name in needless if told[name] not in ("m/s^3", "s/m", "(m/s^2)^(1-n)/s")}
+    assert needless <= allowed
+
+
+def test_an_acceleration_gives_the_displacement_and_what_follows_from_it() -> None:
+    """Amplitude, velocity, Reynolds number, drag and energy are those of the bob, by omega^2, within two u."""
+    t = times(60.0)
+    start, lam = TRUTH.amplitude, TRUTH.gamma + TRUTH.beta * TRUTH.amplitude
+    exact = 9.81 + TRUTH.omega**2 * (TRUTH.position(t) - TRUTH.offset)
+    y = exact + 0.02 * np.random.default_rng(4).standard_normal(t.size)
+    by_acceleration = analyse(Track.from_arrays(t, y, quantity="acceleration", unit="m/s^2"), SCENE)
+    by_length = analyse(track(), SCENE)
+    amplitude = by_acceleration.estimates["displacement_amplitude"]
+    assert amplitude.unit == "m"
+    assert abs(amplitude.value - start) < 2.5 * amplitude.u < 0.01 * start
+    assert (
+        abs(by_acceleration.estimates["damping_rate"].value - lam) < 3.0 * by_acceleration.estimates["damping_rate"].u
+    )
+    names = ("velocity_rms", "reynolds_number", "keulegan_carpenter_number", "spring_constant")
+    for name in (*names, "drag_coefficient") if "drag_coefficient" in by_acceleration.estimates else names:
+        mine, its = by_acceleration.estimates[name], by_length.estimates[name]
+        assert mine.unit == its.unit
+        assert abs(mine.value - its.value) < 3.0 * np.hypot(mine.u, its.u), name
+    curves = [
+        motion.derived.energy_curve(motion.damping, motion.demodulated)
+        for motion in map(oscillation, (by_acceleration, by_length))
+    ]
+    assert curves[0] is not None
+    assert curves[1] is not None
+    assert curves[0].unit == curves[1].unit == "J"
+    assert curves[0].y[0] == pytest.approx(curves[1].y[0], rel=0.01)
+    drags = [
+        motion.derived.drag_curve(motion.damping, motion.demodulated)
+        for motion in map(oscillation, (by_acceleration, by_length))
+    ]
+    assert drags[0] is not None
+    assert drags[1] is not None
+    assert drags[0].y[-1] == pytest.approx(drags[1].y[-1], rel=0.05)
+
+
+def test_what_a_scene_allows_of_an_angle_a_voltage_and_a_force() -> None:
+    """A spring constant needs mass and period, of an angle also a spring; Re, energy and drag need a displacement."""
+    spring = replace(SCENE, spring_mass_kg=Estimate(0.01, 1e-4, "kg"))
+    for quantity, scene, known in (
+        ("angle", SCENE, False),
+        ("angle", spring, True),
+        ("voltage", SCENE, True),
+        ("force", SCENE, True),
+    ):
+        found = analyse(track(quantity, UNITS[quantity]), scene)
+        assert ("spring_constant" in found.estimates) == known
+        if known:
+            assert (
+                found.estimates["spring_constant"].value == analyse(track(), scene).estimates["spring_constant"].value
+            )
+        for name in ("reynolds_number", "keulegan_carpenter_number", "drag_coefficient", "displacement_amplitude"):
+            assert name not in found.estimates
+        assert ("velocity_rms" in found.estimates) == (quantity == "angle")
+        derived = oscillation(found).derived
+        assert derived.energy_curve(oscillation(found).damping, oscillation(found).demodulated) is None
+        assert derived.drag_curve(oscillation(found).damping, oscillation(found).demodulated) is None
+
+
+def hostile(seed: int) -> np.ndarray:
+    """Return a record with echoes, a plateau, a step, a drift and coarse steps of its values."""
+    rng = np.random.default_rng(seed)
+    t = times(60.0)
+    y = noisy(replace(TRUTH, kappa=-40.0), t, SIGMA, seed) + 0.004 * (t > 31.0) + 0.01 * (t / 60.0) ** 2
+    y[rng.integers(0, t.size, 200)] += 0.3
+    if seed % 2:
+        y = np.minimum(y, 0.25)
+    return np.asarray(np.round(y, 3) if seed % 3 == 0 else y)
+
+
+@every
+def test_words_are_of_the_records_own_quantity(quantity: str, unit: str) -> None:
+    """No finding, effect or reason of a troubled record, an overdamped one or one at rest speaks of mm or distances."""
+    t = times(60.0)
+    rng = np.random.default_rng(9)
+    records = [
+        *(hostile(seed) for seed in range(4)),
+        0.2 + 0.05 * np.exp(-t / 3.0) + 1e-4 * rng.standard_normal(t.size),
+        0.2 + 0.05 * np.exp(-0.9 * t) * np.cos(8.3 * t) + 1e-4 * rng.standard_normal(t.size),
+        0.2 + 0.05 * np.abs(t / 30.0 - 1.0) + 1e-4 * rng.standard_normal(t.size),
+        np.full(t.size, 0.2),
+        np.repeat(noisy(TRUTH, t[::5], SIGMA, 3), 5),
+        0.2 + 0.05 * np.tanh(2.0 * np.cos(8.3 * t)),
+    ]
+    kinds, words = set(), []
+    for y in records:
+        found = analyse(Track.from_arrays(t, y, quantity=quantity, unit=unit), SCENE)
+        kinds.add(type(found.motion))
+        words += [finding.message for finding in found.findings] + [effect.why for effect in found.effects]
+        words += [] if isinstance(found.motion, Oscillation) else [found.motion.why]
+    assert kinds == {Oscillation, Overdamped, Still}
+    assert not [each for each in words if re.search(r"\bmm\b|\bdistances?\b(?!' scale)|\d m\b(?!/s)", each)]
+    assert any(unit in each for each in words)
+
+
+def test_a_shake_beyond_gravity_is_implausible_and_an_angle_never() -> None:
+    """An acceleration of 30 m/s^2 is none of a hanging bob; 30 rad or 30 V are nobody's business."""
+    t = times(20.0)
+    y = 30.0 * np.cos(8.3 * t) + 0.01 * np.random.default_rng(1).standard_normal(t.size)
+    for quantity, unit in UNITS.items():
+        found = analyse(Track.from_arrays(t, y, quantity=quantity, unit=unit))
+        codes = {finding.code for finding in found.findings}
+        assert ("implausible_motion" in codes) == (quantity in ("length", "acceleration")), quantity
+        assert ("implausible_distance" in codes) == (quantity == "length"), quantity
+
+
+def test_what_needs_a_length_says_so_in_one_line() -> None:
+    """The report's own method, and springs compared by a pendulum's angle."""
+    with pytest.raises(TrackError, match=r"^the classic method needs a length in m, got voltage in V"):
+        classic(track("voltage", "V"))
+    found = analyse(track("angle", "rad"), SCENE)
+    with pytest.raises(AnalysisError, match=r"^swing: an angle gives a spring constant only with \[spring\] mass_kg"):
+        SpringRun.of("swing", oscillation(found).derived)
+    assert SpringRun.of("coil", oscillation(analyse(track("voltage", "V"), SCENE)).derived).clock == ""
+
+
+def test_a_live_angle_has_its_unit() -> None:
+    """Period as of a length, amplitude in rad."""
+    motion = MotionAccumulator(100.0, quantity="angle", unit="rad")
+    samples = track("angle", "rad", seconds=10.0)
+    motion.push(samples.t, samples.y, samples.flags)
+    found = motion.value()
+    assert isinstance(found, LiveMotion)
+    assert (found.amplitude.unit, found.offset.unit, found.period.unit) == ("rad", "rad", "s")
+    assert found.period.value == pytest.approx(TRUTH.period, rel=1e-3)
