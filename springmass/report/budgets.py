@@ -11,7 +11,7 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.budget import Budget, Contribution
 from springmass.report.tables import QUANTITIES, cell
 
-__all__ = ["INPUTS", "BudgetRow", "budget_csv", "budget_text", "budgets_of"]
+__all__ = ["INPUTS", "BudgetRow", "budget_csv", "budget_text", "budgets_of", "correlations_of"]
 
 INPUTS = {
     "angular_frequency": "scatter of the phases",
@@ -40,6 +40,8 @@ INPUTS = {
 }
 """Every input of :mod:`pipeline.results.derive` in words."""
 SAME = ("frequency", "angular_frequency")  # one number with the period
+CORRELATED = frozenset({"period", "spring_constant", "amplitude", "damping_rate", "gamma", "beta", "mu", "c", "n"})
+"""Results whose correlations the page tells: as many as a phone is wide."""
 LEAST_SHARE = 1e-3  # of the variance; what is less does not reach a printed digit of u
 
 
@@ -84,6 +86,30 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
             told = tuple(c for c in every if c.share >= LEAST_SHARE)
             rows.append(BudgetRow(name, quantity, budgets[name], told, sum(c.share for c in every[len(told) :])))
     return tuple(rows)
+
+
+def correlations_of(analysis: Analysis) -> tuple[tuple[str, ...], list[list[float]]]:
+    """Return the correlations between the results that others are calculated from; empty where nothing oscillates.
+
+    ``results.json`` holds those between all results.
+
+    Parameters
+    ----------
+    analysis : Analysis
+
+    Returns
+    -------
+    names : tuple of str
+        Of the results, in the order of Table 1.
+    matrix : list of list of float
+        Between -1 and 1.
+    """
+    if not isinstance(analysis.motion, Oscillation):
+        return (), []
+    joint = analysis.motion.derived.joint
+    names = tuple(name for name in QUANTITIES if name in CORRELATED and name in joint.names)
+    rows = [joint.names.index(name) for name in names]
+    return names, [[float(joint.correlation[i, j]) for j in rows] for i in rows]
 
 
 def budget_text(analysis: Analysis) -> str:

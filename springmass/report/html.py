@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
-from pipeline.analyse import Oscillation
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.track import Track
 from springmass.report.advice import ADVICE, sorted_out
-from springmass.report.budgets import INPUTS, budgets_of
+from springmass.report.budgets import INPUTS, budgets_of, correlations_of
 from springmass.report.figures.inline import inline_svg
 from springmass.report.laws import laws_across, laws_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
-from springmass.report.tables import pretty, pretty_number, table_rows
+from springmass.report.tables import page_unit, pretty, pretty_number, table_rows
 from springmass.report.words import caption, typeset, verdict
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
@@ -103,6 +103,7 @@ def render_html(
         "number": pretty_number,
         "symbol": _symbol,
         "input": INPUTS.__getitem__,
+        "unit": page_unit,
         "typeset": typeset,
         "breakable": _breakable,
     }
@@ -183,6 +184,7 @@ def _part(
         "told": sorted_out(run.result.get("findings", findings), drawn),
         "laws": laws_of(motion.damping) if isinstance(motion, Oscillation) else None,
         "budgets": budgets_of(analysis),
+        "correlations": _correlations(analysis),
         "effects": analysis.effects,
         "quality": [(_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in ordered],
         "notes": notes_of(run.recorded),
@@ -193,6 +195,16 @@ def _part(
         "input": list(_flattened(given)),
     }
     return part | {"sections": list(_sections(part))}
+
+
+def _correlations(analysis: Analysis) -> list[tuple[str, list[str]]]:
+    """Return a row a result: its symbol, and its correlations to itself and those before it."""
+    names, matrix = correlations_of(analysis)
+    symbols = {row.name: row.page_symbol for row in table_rows([analysis])}
+    return [
+        (symbols[name], [f"{round(value, 2) + 0.0:.2f}".replace("-", "−") for value in row[: i + 1]])
+        for i, (name, row) in enumerate(zip(names, matrix, strict=True))
+    ]
 
 
 def _sections(part: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -31,6 +32,8 @@ _SIUNITX = {
     "degC": r"\degreeCelsius",
     "Pa": r"\pascal",
 }
+INPUT_WIDTH = 0.42
+"""Of a budget's lines for the input's name, which breaks there: what is left holds its value on A4."""
 _WRITTEN = re.compile(r"\(?(?P<value>-?[\d.]+) \+- (?P<u>[\d.]+)\)?(?:e(?P<power>[+-]\d+))?")
 _TEX_SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -62,7 +65,7 @@ def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
 
 
 def budget_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return the uncertainty budgets as one LaTeX table a run; they need booktabs and siunitx, version 3.
+    """Return the uncertainty budgets as one LaTeX table a run; they need booktabs, longtable and siunitx, version 3.
 
     Parameters
     ----------
@@ -73,20 +76,46 @@ def budget_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
 
 
 def _budget_table(name: str, analysis: Analysis) -> str:
+    """A block a quantity, its result above its inputs: beside them it would not fit a page of A4."""
     lines = []
     for row in budgets_of(analysis):
-        heads = [row.quantity[:1].upper() + row.quantity[1:], _tex_quantity(row.budget.estimate)]
+        result = f"{row.quantity[:1].upper()}{row.quantity[1:]} {_tex_quantity(row.budget.estimate)}"
+        freedom = r"\infty" if math.isinf(row.budget.dof) else f"{row.budget.dof:.0f}"
+        expanded = rf"$U = {row.budget.expanded:.2g}$, $k = {row.budget.coverage_factor:.2f}$, $\nu = {freedom}$"
+        lines.append(rf"\multicolumn{{4}}{{l}}{{{result}; {_tex_power(expanded)}}} \\")
         for c in row.contributions:
             given = "--" if c.input is None else _tex_quantity(c.input)
-            cells = [*heads, _tex_text(INPUTS[c.name]), c.kind, given, rf"\qty{{{100 * c.share:.1f}}}{{\percent}}"]
+            cells = [rf"\quad {_tex_text(INPUTS[c.name])}", c.kind, given, rf"\qty{{{100 * c.share:.1f}}}{{\percent}}"]
             lines.append(" & ".join(cells) + r" \\")
-            heads = ["", ""]
         lines.append(r"\addlinespace")
     caption = (
         f"Uncertainty budget of {_tex_text(name)}: share of each input in the variance, "
-        "from the record's own scatter (A) or from elsewhere (B)."
+        "from the record's own scatter (A) or from elsewhere (B), and the expanded uncertainty $U = ku$ that covers "
+        r"\qty{95.45}{\percent}, in the result's unit."
     )
-    return _framed(caption, ["Quantity", "Result", "Input", "Type", "Value", "Share"], lines[:-1])
+    return "\n".join(
+        [
+            r"% needs \usepackage{booktabs}, \usepackage{longtable} and \usepackage{siunitx}, version 3",
+            r"{\footnotesize",
+            rf"\begin{{longtable}}{{p{{{INPUT_WIDTH}\linewidth}}llr}}",
+            rf"  \caption{{{caption}}} \\",
+            r"  \toprule",
+            r"  Input & Type & Value & Share \\",
+            r"  \midrule",
+            r"  \endhead",
+            r"  \bottomrule",
+            r"  \endfoot",
+            *(f"  {line}" for line in lines[:-1]),
+            r"\end{longtable}",
+            "}",
+            "",
+        ]
+    )
+
+
+def _tex_power(text: str) -> str:
+    """Set a power of ten as one."""
+    return re.sub(r"e([+-])0*(\d+)", lambda found: rf" \times 10^{{{found[1].replace('+', '')}{found[2]}}}", text)
 
 
 def _framed(caption: str, heads: Sequence[str], body: Sequence[str], label: Sequence[str] = ()) -> str:

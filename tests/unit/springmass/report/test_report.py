@@ -24,7 +24,7 @@ from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import UNUSABLE, Track
 from springmass.report.advice import ADVICE, LAW_CODES
-from springmass.report.budgets import INPUTS, budget_csv, budget_text, budgets_of
+from springmass.report.budgets import INPUTS, budget_csv, budget_text, budgets_of, correlations_of
 from springmass.report.figures import comparison_figure, draw, motion_figure, render
 from springmass.report.figures.inline import inline_svg
 from springmass.report.html import render_html
@@ -329,9 +329,39 @@ def test_budget_tables_hold_every_input() -> None:
         assert all(INPUTS[c.name] in page and INPUTS[c.name] in tex for c in row.contributions)
     plain = re.sub(r"\\[\\{}%_#&$]", "", tex)
     assert plain.count("{") == plain.count("}")
-    assert {line.count(" & ") for line in tex.splitlines() if line.endswith(r"\\")} == {5}
+    lines = [line for line in tex.splitlines() if line.endswith(r"\\") and r"\caption" not in line]
+    assert {line.count(" & ") for line in lines} == {0, 3}
+    # At 8 pt a letter is 3.9 pt wide on average, and an article's lines on A4 are 345 pt.
+    for line in lines:
+        told = re.sub(
+            r"\\multicolumn\{4\}\{l\}|\\(qty|num|text)|\\times|[{}$]|\\\\$", "", re.sub(r"\\(per|nu|infty)", "1", line)
+        )
+        told = re.sub(r"\\(\w{1,3})\w*", r"\1", told)
+        cells = [cell.strip() for cell in told.split(" & ")]
+        assert len(cells[0]) <= 88 if len(cells) == 1 else 18 + 3.9 * sum(map(len, cells[1:])) <= 0.58 * 345 - 36
     assert budget_csv(["b"], [still()]).count("\n") == 1
     assert budgets_of(still()) == ()
+
+
+def test_expanded_uncertainties_and_correlations_stand_on_the_page() -> None:
+    """Each result has its U with coverage factor and degrees of freedom, and the main ones their correlations."""
+    motion = damped().motion
+    assert isinstance(motion, Oscillation)
+    section = page_of(run_of(damped())).split('id="budgets-0"')[1].split("<h2")[0]
+    budget = motion.derived.budgets["gamma"]
+    row = re.search(r">linear damping</th>((?:<td[^>]*>[^<]*</td>)+)", section)
+    assert row is not None
+    cells = re.findall(r">([^<]*)</td>", row[1])
+    assert cells[0] == f"{budget.dof:.0f}"
+    assert float(cells[1]) == pytest.approx(budget.coverage_factor, abs=0.005)
+    assert cells[2] == f"{pretty_number(budget.expanded)} s⁻¹"
+    names, matrix = correlations_of(damped())
+    joint = motion.derived.joint
+    assert matrix[names.index("gamma")][names.index("beta")] == pytest.approx(
+        joint.correlation[joint.names.index("gamma"), joint.names.index("beta")]
+    )
+    assert f"{matrix[names.index('gamma')][names.index('beta')]:.2f}".replace("-", "−") in section
+    assert correlations_of(still()) == ((), [])
 
 
 def test_budget_in_brief_names_the_greatest_inputs() -> None:
