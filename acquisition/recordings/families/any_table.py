@@ -59,8 +59,8 @@ def _contents(path: str, data: bytes) -> Contents:
         times = [guess]
         message = f'"{_name(headings[guess], guess)}" was taken for the times: no other column runs forward alike'
         traps.append(Trap("time_assumed", message))
-    sheet = Sheet(text, found.line.start, text.stop, found.line.number, found.mark)
     names = numbered_apart([_name(each, column) for column, each in enumerate(headings)])
+    sheet = Sheet(text, found.line.start, text.stop, found.line.number, found.mark, names=tuple(names))
     channels = []
     for column, each in enumerate(headings):
         if column in times or column in clocks or (formula is not None and column == 0):
@@ -85,7 +85,7 @@ def _contents(path: str, data: bytes) -> Contents:
     if all(each.aside for each in channels):
         channels = [replace(each, aside=False) for each in channels]
     title = found.preamble[0] if found.preamble else ""
-    return Contents(tuple(channels), title=title, traps=tuple(traps), zeros=text.zeros, names=tuple(names))
+    return Contents(tuple(channels), title=title, traps=tuple(traps), zeros=text.zeros)
 
 
 def _name(heading: Heading, column: int) -> str:

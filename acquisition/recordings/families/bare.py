@@ -59,9 +59,9 @@ def _contents(path: str, data: bytes) -> Contents:
     rows, mark = _rows([line.text for line in head])
     if not rows:
         raise FormatError(path, "expected rows of numbers", "check the file", line=1)
-    sheet = Sheet(text, text.start, text.stop, 1, mark)
     numbers = [np.array(column) for column in zip(*rows, strict=True)]
     names = tuple(f"column {column + 1}" for column in range(len(numbers)))
+    sheet = Sheet(text, text.start, text.stop, 1, mark, names=names)
     time = times_by_steps([Heading("", "")] * len(names), numbers) if len(names) > 1 else None
     counts = len(names) > 1 and are_row_numbers(numbers[0])
     channels = (
@@ -72,7 +72,7 @@ def _contents(path: str, data: bytes) -> Contents:
     traps = (
         [] if not time else [Trap("time_assumed", f'"{names[time]}" was taken for the times: it alone runs forward')]
     )
-    return Contents(tuple(channels), traps=tuple(traps), zeros=text.zeros, names=names)
+    return Contents(tuple(channels), traps=tuple(traps), zeros=text.zeros)
 
 
 FORMAT = ColumnFormat("bare", "bare numbers: nothing but rows; units are asked for", _evidence, _contents)

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError
-from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Sheet, is_time, numbered_apart
-from acquisition.recordings.tables.markup import read_markup
+from acquisition.recordings.tables.contents import Channel, Contents, Sheet, is_time, numbered_apart
+from acquisition.recordings.tables.markup import read_markup, side_by_side
 from acquisition.recordings.tables.sheet import ColumnFormat
 from acquisition.recordings.tables.text import Text, decode, head_lines, parse_number, text_of
-from acquisition.recordings.units import time_power
 
 __all__ = ["FORMAT"]
 
@@ -51,23 +51,15 @@ def _of_markup(path: str, data: bytes) -> Contents:
         if cells:
             name, symbol, unit = ((each.findtext(tag) or "").strip() for tag in ("quantity", "symbol", "unit"))
             columns.append((name, symbol, unit, np.array([np.nan if x is None else x for x in cells])))
-    times = [values / 10.0 ** -(time_power(unit) or 0) for name, _, unit, values in columns if is_time(name)]
-    time = times[0] if times else None
     names = numbered_apart([f"{name} {symbol}".strip() for name, symbol, _, _ in columns])
-    channels = []
-    for label, (name, _, unit, values) in zip(names, columns, strict=True):
-        if is_time(name):
-            continue
-        size = max(values.size, 0 if time is None else time.size)
-        own = None if time is None else _longer(time, size)
-        channels.append(Channel(label, unit, Arrays(own, _longer(values, size)), time_unit="s", aside=name == "Index"))
+    channels = side_by_side(
+        [(label, unit, values) for label, (_, _, unit, values) in zip(names, columns, strict=True)],
+        [column for column, each in enumerate(columns) if is_time(each[0])],
+    )
+    channels = [replace(each, aside=each.name.startswith("Index")) for each in channels]
     if not channels:
         raise FormatError(path, "expected channels with values, got none", _REMEDY)
     return Contents(tuple(channels))
-
-
-def _longer(values: F8, size: int) -> F8:
-    return np.concatenate((values, np.full(size - values.size, np.nan)))
 
 
 def _of_text(path: str, text: Text) -> Contents:
@@ -96,9 +88,9 @@ def _of_rows(path: str, text: Text, above: Sequence[str], first: int, width: int
     tab = text.data.rfind(b"\t", lines[first].start, text.stop)
     end = next((line.next for line in text.lines(tab)), text.stop)
     stop = end if b"\n" in text.data[end : text.stop] else text.stop
-    sheet = Sheet(text, lines[first].start, stop, first + 1, "\t")
     times = [column for column, (name, _, _) in enumerate(told) if is_time(name)]
     names = numbered_apart([f"{name} {symbol}".strip() for name, symbol, _ in told])
+    sheet = Sheet(text, lines[first].start, stop, first + 1, "\t", names=tuple(names))
     time = times[0] if times else None
     time_unit = told[time][2] if time is not None else ""
     channels = [
@@ -106,7 +98,7 @@ def _of_rows(path: str, text: Text, above: Sequence[str], first: int, width: int
         for column, (name, _, unit) in enumerate(told)
         if column not in times
     ]
-    return Contents(tuple(channels), zeros=text.zeros, names=tuple(names))
+    return Contents(tuple(channels), zeros=text.zeros)
 
 
 FORMAT = ColumnFormat("cassy", "CASSY Lab: saved as labx (XML) or lab (text)", _evidence, _contents)

@@ -151,7 +151,7 @@ def _channels(text: Text, top: _Header, segment: _Header, stop: int, mark: str, 
         cells.pop()
     mode = (top.first_of("X_Columns") or "One").lower()
     columns = range(1, len(cells), 2) if mode == "multi" else range(1, len(cells))
-    sheet = Sheet(text, names.next, stop, names.number + 1, mark)
+    sheet = Sheet(text, names.next, stop, names.number + 1, mark, names=tuple(cells))
     labels = [_name_and_unit(cells[column], segment.of_column("Y_Unit_Label", column), column) for column in columns]
     apart = numbered_apart([name for name, _ in labels])
     for name, (_, unit), column in zip(apart, labels, columns, strict=True):

@@ -16,7 +16,6 @@ import numpy as np
 from acquisition.block import F8
 from acquisition.errors import FormatError
 from acquisition.recordings.tables.contents import (
-    Arrays,
     Channel,
     Contents,
     Heading,
@@ -24,7 +23,7 @@ from acquisition.recordings.tables.contents import (
     name_and_unit,
     split_heading,
 )
-from acquisition.recordings.tables.markup import read_markup
+from acquisition.recordings.tables.markup import read_markup, side_by_side
 from acquisition.recordings.tables.sheet import ColumnFormat, headed_format
 from acquisition.recordings.tables.text import decode, head_lines, parse_number, text_of
 
@@ -90,22 +89,13 @@ def _channels(root: Element, buffers: Mapping[str, F8]) -> Iterator[Channel]:
     sets = list(root.iter("set"))
     for each in sets:
         run = each.get("name", "") if len(sets) > 1 else ""
-        time: F8 | None = None
+        columns = []
         for data in each.iter("data"):
             name, unit = name_and_unit(data.get("name", ""))
             values = buffers.get((data.text or "").strip())
-            if values is None:
-                continue
-            if is_time(name):
-                time = values
-                continue
-            size = max(values.size, 0 if time is None else time.size)
-            own_time = None if time is None else _longer(time, size)
-            yield Channel(name, unit, Arrays(own_time, _longer(values, size)), run)
-
-
-def _longer(values: F8, size: int) -> F8:
-    return np.concatenate((values, np.full(size - values.size, np.nan)))
+            if values is not None:
+                columns.append((name, unit, values))
+        yield from side_by_side(columns, [at for at, (name, _, _) in enumerate(columns) if is_time(name)], run)
 
 
 _TITLE = "phyphox export as CSV, or saved state as XML"

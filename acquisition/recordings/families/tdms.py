@@ -70,7 +70,7 @@ def _channels(path: str, group: Any, several: bool, size: int) -> Iterator[Chann
         yield Channel(
             name=each.name,
             unit=next((str(each.properties[key]) for key in _UNITS if each.properties.get(key)), ""),
-            source=Arrays(time, values),
+            source=Arrays(time, values, "" if own_time is None else own_time.name),
             run=group.name if several else "",
             formula=_formula(each.properties) if step is not None else None,
             time_unit="s",

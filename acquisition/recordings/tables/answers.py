@@ -12,7 +12,16 @@ import numpy as np
 from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Sheet, candidates, named, of_run
+from acquisition.recordings.tables.contents import (
+    Arrays,
+    Channel,
+    Contents,
+    Sheet,
+    candidates,
+    name_and_unit,
+    named,
+    of_run,
+)
 from acquisition.recordings.tables.text import parse_number
 from acquisition.recordings.units import TIMES, Measure, known_units, measure_of, time_power, unit_words
 
@@ -67,7 +76,7 @@ def settle(path: str, contents: Contents, said: Answers) -> Channel:
             names = ", ".join(f'"{each.label}"' for each in fit)
             questions.append((f"which channel of {names}", f"--channel {_quoted(chosen.name)}"))
     if said.time is not None:
-        chosen = _timed_by(path, contents, channels, chosen, said.time)
+        chosen = _timed_by(path, channels, chosen, said.time)
     if isinstance(chosen.source, Sheet) and chosen.time is not None and _begins_anew(chosen.source, chosen.time):
         chosen = replace(chosen, time=None, formula=None)  # chunks: what lies between them is told nowhere
     chosen = _with_time_unit(path, chosen, said.time_unit)
@@ -78,7 +87,7 @@ def settle(path: str, contents: Contents, said: Answers) -> Channel:
         )
         questions.append((what, f"--unit {_likely_unit(chosen.name)}"))
     if questions:
-        demand = f"{_columns(contents, channels, chosen)}: {', and '.join(each for each, _ in questions)}?"
+        demand = f"{_columns(channels, chosen)}: {', and '.join(each for each, _ in questions)}?"
         given = _given(said)
         raise NeedsAnswer(
             path, demand, " ".join([f"springmass analyse {_quoted(path)}", *given, *(q for _, q in questions)])
@@ -115,46 +124,58 @@ def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tup
     return given, (Trap("unit_assumed", message),)
 
 
-def _timed_by(path: str, contents: Contents, channels: Sequence[Channel], chosen: Channel, time: str) -> Channel:
+def _timed_by(path: str, channels: Sequence[Channel], chosen: Channel, time: str) -> Channel:
     """Return the channel with the times of the column that the user names."""
     source = chosen.source
-    if isinstance(source, Sheet) and time in (names := [*contents.names]):
-        column = names.index(time)
-        if column == chosen.time:
-            return chosen
-        unit = next((each.unit for each in channels if each.name == time), "")
-    else:
-        number = re.fullmatch(r"column (\d+)", time.strip().lower())
-        if isinstance(source, Sheet) and number and time not in {each.name for each in channels}:
-            column, unit = int(number[1]) - 1, ""
-            if column == chosen.time or column < 0:
-                return chosen
-        else:
-            found = named(path, [each for each in channels if each.name != chosen.name] or channels, time, "time")
-            if isinstance(source, Arrays) or isinstance(found.source, Arrays):
-                return _timed_by_values(path, chosen, found)
-            column, unit = found.column, found.unit
+    if isinstance(source, Arrays):
+        return _timed_by_values(path, channels, chosen, source, time)
+    column = _column(source, time)
+    if column is None:
+        others = [each for each in channels if each.name != chosen.name and each.source is source]
+        column = named(path, others or channels, time, "time").column
+    if column == chosen.time:
+        return chosen
     if column == chosen.column:
         raise FormatError(path, f'"{time}" cannot be both channel and time', "name another with --channel")
+    units = {each.time: each.time_unit for each in channels} | {each.column: each.unit for each in channels}
+    unit = units.get(column, "")
     return replace(chosen, time=column, time_unit=unit if time_power(unit) is not None else "", formula=None)
 
 
-def _timed_by_values(path: str, chosen: Channel, times: Channel) -> Channel:
-    if not (isinstance(chosen.source, Arrays) and isinstance(times.source, Arrays)):
-        raise FormatError(path, f'"{times.name}" is no time of "{chosen.name}"', "name another with --time")
-    values = times.source.values / 10.0 ** -(time_power(times.unit) or 0)
-    if values.size != chosen.source.values.size:
-        raise FormatError(path, f'"{times.name}" and "{chosen.name}" differ in length', "name another with --time")
-    return replace(chosen, source=Arrays(values, chosen.source.values), formula=None)
+def _column(sheet: Sheet, name: str) -> int | None:
+    """Return the column of a name, with or without its unit, or of a number, "column 2"; None where there is none."""
+    bare = " ".join(name_and_unit(name)[0].lower().split())
+    for wanted in (" ".join(name.lower().split()), bare):
+        for column, each in enumerate(sheet.names):
+            if each and " ".join(each.lower().split()) == wanted:
+                return column
+    number = re.fullmatch(r"column (\d{1,4})", bare)
+    return int(number[1]) - 1 if number and 0 < int(number[1]) <= (len(sheet.names) or 1 << 12) else None
+
+
+def _timed_by_values(path: str, channels: Sequence[Channel], chosen: Channel, source: Arrays, time: str) -> Channel:
+    """Return the channel with other numbers, read already, as its times."""
+    for each in channels:
+        told = each.source.time_name if isinstance(each.source, Arrays) else ""
+        if told and time.strip().lower() in (told.lower(), f"{told} ({each.time_unit})".lower()):
+            times, unit = each.source, each.time_unit
+            t = times.t if isinstance(times, Arrays) else None
+            break
+    else:
+        found = named(path, [each for each in channels if each.name != chosen.name] or channels, time, "time")
+        t, unit = (found.source.values if isinstance(found.source, Arrays) else None), found.unit
+    if t is None or t.size != source.values.size:
+        raise FormatError(path, f'"{time}" and "{chosen.name}" differ in length', "name another with --time")
+    unit = unit if time_power(unit) is not None else ""
+    return replace(chosen, source=Arrays(t, source.values, time), time_unit=unit, formula=None)
 
 
 def _with_time_unit(path: str, chosen: Channel, unit: str | None) -> Channel:
     if unit is None:
         return chosen
-    power = time_power(unit)
-    if power is None:
+    if time_power(unit) is None:
         raise FormatError(path, f'time unit must be one of {", ".join(TIMES)}, got "{unit}"', "name one of these")
-    if isinstance(chosen.source, Arrays) or chosen.time is None:
+    if chosen.source.t is None if isinstance(chosen.source, Arrays) else chosen.time is None:
         raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
     if chosen.time_unit and unit_words(chosen.time_unit) != unit_words(unit):
         said = unit_words(chosen.time_unit)
@@ -174,12 +195,11 @@ def _of_times(contents: Contents, chosen: Channel, said: Answers) -> list[tuple[
         others = [each for each in contents.channels if each.name != chosen.name and each.run == chosen.run]
         or_time = ", or which column is the time (--time NAME)" if others else ""
         return [(f"what is the rate{or_time}", "--rate-hz R")]
-    if not isinstance(source, Sheet) or chosen.time_unit or chosen.time is None or chosen.formula is not None:
+    if chosen.time_unit or chosen.formula is not None:
         return []
-    steps = np.diff(_first_times(source, chosen.time))
+    steps = np.diff(_times_at_first(chosen))
     if steps.size and float(np.median(steps)) >= _SLOW_S:
-        name = contents.names[chosen.time] if chosen.time < len(contents.names) else "the time"
-        return [(f"what is {name}'s unit", "--time-unit ms")]
+        return [(f"what is {_time_name(chosen) or 'the time'}'s unit", "--time-unit ms")]
     return []
 
 
@@ -189,42 +209,62 @@ def _begins_anew(sheet: Sheet, column: int) -> bool:
     return bool(steps.size >= 4 and np.mean(steps < 0) >= _ANEW)
 
 
-def _first_times(sheet: Sheet, column: int) -> F8:
+def _first_times(sheet: Sheet, column: int, most: int = _FIRST_ROWS) -> F8:
     read = []
     for line in sheet.text.lines(sheet.start):
         cells = line.text.split(sheet.delimiter or None)
         value = parse_number(cells[column].strip(' "')) if column < len(cells) else None
         if value is not None:
             read.append(value)
-        if len(read) == _FIRST_ROWS or line.start > sheet.start + 65536:
+        if len(read) == most or line.start > sheet.start + 65536:
             break
     return np.array(read)
 
 
-def _columns(contents: Contents, channels: Sequence[Channel], chosen: Channel) -> str:
+def _times_at_first(chosen: Channel) -> F8:
+    """Return the first times of a channel that has some, in its unit."""
+    source = chosen.source
+    if isinstance(source, Sheet):
+        return np.empty(0) if chosen.time is None else _first_times(source, chosen.time)
+    return np.empty(0) if source.t is None else source.t[:_FIRST_ROWS]
+
+
+def _time_name(chosen: Channel) -> str:
+    source = chosen.source
+    if isinstance(source, Arrays):
+        return source.time_name
+    return source.names[chosen.time] if chosen.time is not None and chosen.time < len(source.names) else ""
+
+
+def _columns(channels: Sequence[Channel], chosen: Channel) -> str:
     """Name the columns; of the times also where they run."""
     labels = [f'"{each.label}"' for each in channels]
     source = chosen.source
-    if isinstance(source, Sheet) and chosen.time is not None:
-        told = contents.names[chosen.time] if chosen.time < len(contents.names) else "time"
-        labels.insert(0, f'"{told}"{_span(source, chosen.time)}')
+    timed = chosen.time is not None if isinstance(source, Sheet) else source.t is not None
+    if timed and (_time_name(chosen) or isinstance(source, Sheet)):
+        labels.insert(0, f'"{_time_name(chosen) or "time"}"{_span(chosen)}')
     many = len(labels) > 1
     return f"column{'s' if many else ''} {', '.join(labels[:-1])}{' and ' if many else ''}{labels[-1]}"
 
 
-def _span(sheet: Sheet, column: int) -> str:
-    first = _first_times(sheet, column)
-    tail = max(sheet.start, sheet.stop - _LAST_BYTES)
-    ends = _first_times(replace(sheet, start=tail), column) if tail == sheet.start else _last_times(sheet, tail, column)
-    steps = np.diff(first[np.isfinite(first)])
+def _span(chosen: Channel) -> str:
+    first, source = _times_at_first(chosen), chosen.source
+    if isinstance(source, Arrays):
+        ends = np.empty(0) if source.t is None else source.t
+    else:
+        tail = max(source.start, source.stop - _LAST_BYTES)
+        ends = _last_times(source, tail, chosen.time or 0)
+    first, ends = first[np.isfinite(first)], ends[np.isfinite(ends)]
+    steps = np.diff(first)
     if not steps.size or not ends.size:
         return ""
     return f" ({first[0]:.6g} to {ends[-1]:.6g}, {float(np.median(steps)):.3g} apart)"
 
 
 def _last_times(sheet: Sheet, tail: int, column: int) -> F8:
-    line = sheet.text.data.find(b"\n", tail, sheet.stop) + 1 or tail
-    return _first_times(replace(sheet, start=line), column)
+    """Return the last times, from a byte on: what stands before the first line end is half a line."""
+    line = tail if tail == sheet.start else sheet.text.data.find(b"\n", tail, sheet.stop) + 1 or tail
+    return _first_times(replace(sheet, start=line), column, _LAST_BYTES)
 
 
 def _given(said: Answers) -> list[str]:

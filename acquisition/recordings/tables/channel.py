@@ -80,13 +80,15 @@ def pull(path: str, channel: Channel, power: int) -> Rows:
         If there are no numbers, or times in a unit that is not known.
     """
     if isinstance(channel.source, Arrays):
-        return _from_arrays(channel.source, power)
+        return _from_arrays(path, channel, channel.source, power)
     return _from_sheet(path, channel, channel.source, power)
 
 
-def _from_arrays(arrays: Arrays, power: int) -> Rows:
+def _from_arrays(path: str, channel: Channel, arrays: Arrays, power: int) -> Rows:
     value = arrays.values / 10.0**-power if power else arrays.values.copy()
-    t = None if arrays.t is None else arrays.t.copy()  # channels may share it, and it will be written to
+    minutes = 60.0 if unit_words(channel.time_unit) == "min" else 1.0
+    # A copy: channels may share the times, and they will be written to.
+    t = None if arrays.t is None else arrays.t * minutes / 10.0 ** -_time_power(path, channel)
     bad = np.zeros(value.size, bool) if t is None else ~np.isfinite(t)
     if bad.any():
         value[bad] = np.nan
@@ -181,7 +183,8 @@ def _no_rows(path: str, channel: Channel, sheet: Sheet, lines: int, line: int) -
 
 
 def _time_power(path: str, channel: Channel) -> int:
-    if channel.time is None or not channel.time_unit:
+    timed = channel.source.t is not None if isinstance(channel.source, Arrays) else channel.time is not None
+    if not timed or not channel.time_unit:
         return 0
     power = time_power(channel.time_unit)
     if power is None:

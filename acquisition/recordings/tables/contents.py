@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from acquisition.block import F8
 from acquisition.errors import NeedsAnswer
@@ -76,6 +76,8 @@ class Sheet:
     delimiter : str
     width : int or None
         Cells that a row must have, all of them numbers; None where rows may be ragged.
+    names : tuple of str
+        What each column is called, times among them, where the family tells; so that ``--time`` may name one.
     """
 
     text: Text
@@ -84,14 +86,25 @@ class Sheet:
     first_line: int
     delimiter: str
     width: int | None = None
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrays:
-    """Numbers that a file holds in binary, or that were read already: times (s) or None, and values."""
+    """Numbers that a file holds in binary, or that were read already.
+
+    Parameters
+    ----------
+    t : (n,) float64 or None
+        Times in the channel's unit of time.
+    values : (n,) float64
+    time_name : str
+        What the times are called; empty where the file does not say.
+    """
 
     t: F8 | None
     values: F8
+    time_name: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,15 +186,12 @@ class Contents:
         What was seen in the file as a whole.
     zeros : int
         Zero bytes at the end, left out.
-    names : tuple of str
-        What each column is called, times among them, where the family tells; so that ``--time`` may name one.
     """
 
     channels: tuple[Channel, ...]
     title: str = ""
     traps: tuple[Trap, ...] = ()
     zeros: int = field(default=0)
-    names: tuple[str, ...] = ()
 
     @property
     def runs(self) -> tuple[str, ...]:
@@ -333,6 +343,7 @@ def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind =
     """
     times = [column for column, each in enumerate(headings) if is_time(each.name)]
     found = []
+    sheet = replace(sheet, names=tuple(each.name for each in headings))
     runs = any(each.run for each in headings)
     named = [column for column, each in enumerate(headings) if each.name or each.run or not runs]
     values = [column for column in named if column not in times]

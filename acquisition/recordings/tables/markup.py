@@ -1,15 +1,20 @@
-"""XML that holds a recording: read without document types, entities or references to anything outside."""
+"""XML that holds a recording: read without document types, entities or references to anything outside; its columns."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from acquisition.block import F8
 from acquisition.errors import FormatError
+from acquisition.recordings.tables.contents import Arrays, Channel
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-__all__ = ["MOST_BYTES", "read_markup"]
+__all__ = ["MOST_BYTES", "read_markup", "side_by_side"]
 
 MOST_BYTES = 1 << 26
 """More than any recording of a school's program; a tree takes some twenty times as much memory."""
@@ -33,3 +38,30 @@ def read_markup(path: str, data: bytes, remedy: str) -> Element:
         return ElementTree.fromstring(data)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise FormatError(path, f"expected XML, got {error}", remedy) from error
+
+
+def side_by_side(columns: Sequence[tuple[str, str, F8]], times: Sequence[int], run: str = "") -> list[Channel]:
+    """Return the channels of columns that were read already: each has the times to its left, or the first.
+
+    Parameters
+    ----------
+    columns : sequence of (str, str, (n,) float64)
+        Name, unit and numbers of each; they may differ in length, and NaN fills the shorter.
+    times : sequence of int
+        Which of them are times.
+    run : str
+    """
+    found = []
+    for column, (name, unit, values) in enumerate(columns):
+        if column in times:
+            continue
+        time = max((each for each in times if each < column), default=times[0] if times else None)
+        time_name, time_unit, t = ("", "", None) if time is None else columns[time]
+        size = max(values.size, 0 if t is None else t.size)
+        source = Arrays(None if t is None else _longer(t, size), _longer(values, size), time_name)
+        found.append(Channel(name, unit, source, run, time_unit=time_unit))
+    return found
+
+
+def _longer(values: F8, size: int) -> F8:
+    return np.concatenate((values, np.full(size - values.size, np.nan)))

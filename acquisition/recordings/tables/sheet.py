@@ -141,6 +141,6 @@ def headed_format(
         channels = () if first is None else channels_of(Sheet(text, first.next, text.stop, 2, mark), headings)
         if not channels:
             raise FormatError(path, f"expected headings like {example}", "export the run again", line=1)
-        return Contents(channels, zeros=text.zeros, names=tuple(each.name for each in headings))
+        return Contents(channels, zeros=text.zeros)
 
     return ColumnFormat(name, title, evidence, contents)
