@@ -3,36 +3,73 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import PurePath
 
 from acquisition.errors import FormatError, UnknownFormat
 from acquisition.recordings.tables.text import head_lines
 
-__all__ = ["refuse"]
+__all__ = ["named", "refuse"]
 
 _TEXT = 'export time and position as text, tab separated, under a line "Time (s)<TAB>Distance (m)"'
-_AS_CSV = 'export the data as text: in phyphox "Export data", then "CSV (Comma, decimal point)"; in a spreadsheet "CSV"'
-_ZIP = b"PK\x03\x04"
+_AS_CSV = "save the sheet as xlsx or CSV"
 
 
 def _is_hdf5(head: bytes) -> bool:
     return any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048, 4096))
 
 
-def _is_xlsx(head: bytes) -> bool:
-    return head.startswith(_ZIP) and (b"[Content_Types].xml" in head or b"xl/" in head)
-
-
 def _begins(with_bytes: bytes) -> Callable[[bytes], bool]:
     return lambda head: head.startswith(with_bytes)
 
 
-_FAMILIES = (
+_CONTENTS = (
+    ("a MATLAB file", _begins(b"MATLAB 5.0 MAT"), 'in MATLAB writematrix([t x], "run.csv")'),
     ("an HDF5 file", _is_hdf5, "if it is a run file, open it as a run; it is not an old recording"),
-    ("an Excel workbook (xlsx)", _is_xlsx, _AS_CSV),
-    ("an Excel workbook (xls)", _begins(bytes.fromhex("d0cf11e0a1b11ae1")), _AS_CSV),
-    ("a zip archive", _begins(_ZIP), "unpack it and name a file inside, a CSV of phyphox say"),
+    ("an OpenDocument file", lambda head: b"application/vnd.oasis.opendocument" in head[:200], _AS_CSV),
     ("a TDMS index", _begins(b"TDSh"), "name the .tdms file beside it"),
+    ("a numpy file", _begins(b"\x93NUMPY"), 'in Python numpy.savetxt("run.csv", array, delimiter=",")'),
+    ("a page (PDF)", _begins(b"%PDF"), _TEXT),
+    ("a picture", lambda head: head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"GIF8")), _TEXT),
+    (
+        "a video",
+        lambda head: head[4:8] == b"ftyp" or head[8:12] == b"AVI ",
+        "follow the mass in Tracker, and save there",
+    ),
 )
+_PROGRAMS = {
+    ".cap": ("a Capstone workbook", 'in Capstone "File", "Export Data", "CSV"'),
+    ".spk": ("a SPARKvue lab", 'in SPARKvue "Export Data", "CSV"'),
+    ".spklab": ("a SPARKvue lab", 'in SPARKvue "Export Data", "CSV"'),
+    ".pasco": ("a workbook of PASCO", 'in Capstone or SPARKvue "Export Data", "CSV"'),
+    ".ds": ("a DataStudio activity", 'in DataStudio "File", "Export Data"'),
+    ".qmbl": ("a LabQuest file", 'open it in Logger Pro or Graphical Analysis, and "Export", "CSV"'),
+    ".psdata": ("a PicoScope file", 'in PicoScope "File", "Save As", "CSV"'),
+    ".dwf3work": ("a WaveForms workspace", 'in WaveForms "File", "Export", "CSV"'),
+    ".wfm": ("an oscilloscope's waveform", "save it as CSV at the oscilloscope"),
+    ".isf": ("an oscilloscope's waveform", "save it as CSV at the oscilloscope"),
+    ".opj": ("an Origin project", 'in Origin "File", "Export", "ASCII"'),
+    ".opju": ("an Origin project", 'in Origin "File", "Export", "ASCII"'),
+    ".numbers": ("a Numbers sheet", 'in Numbers "File", "Export To", "CSV"'),
+    ".mat": ("a MATLAB file", 'in MATLAB writematrix([t x], "run.csv")'),
+    ".pkl": ("a pickle of Python", "save the numbers as CSV where they were made"),
+}
+"""Files of programs that say too little of themselves in their first bytes, by suffix."""
+
+
+def named(path: str, head: bytes) -> UnknownFormat | None:
+    """Return the error for a file that is known and not read; None where it is not known.
+
+    Parameters
+    ----------
+    path : str
+    head : bytes
+        The start of the file.
+    """
+    for title, matches, remedy in _CONTENTS:
+        if matches(head):
+            return UnknownFormat(path, f"expected a recording, got {title}", remedy)
+    title, remedy = _PROGRAMS.get(PurePath(path).suffix.lower(), ("", ""))
+    return UnknownFormat(path, f"expected a recording, got {title}", remedy) if title else None
 
 
 def refuse(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
@@ -51,9 +88,8 @@ def refuse(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
     UnknownFormat
         Naming what the file is where that is known.
     """
-    for title, matches, remedy in _FAMILIES:
-        if matches(head):
-            return UnknownFormat(path, f"expected a recording, got {title}", remedy)
+    if (known := named(path, head)) is not None:
+        return known
     if not "".join(head_lines(head)).strip("\0 \t"):
         return UnknownFormat(path, "expected a recording, got binary data or nothing", _TEXT)
     if head.count(b"\n") + head.count(b"\r") == 0 and len(head) > 4096:

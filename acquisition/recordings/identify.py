@@ -30,6 +30,8 @@ _TABLE = {
     "motion-sensor": "motion_sensor",
     "lvm": "lvm",
     "tdms": "tdms",
+    "workbook": "workbook",
+    "zip": "archive",
     "capstone": "capstone",
     "datastudio": "datastudio",
     "vernier": "vernier",

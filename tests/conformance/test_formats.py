@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import tarfile
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -228,6 +230,140 @@ def lab(t: Any, x: Any) -> bytes:
     return "\r\n".join(["CL4", "265 0.1", *head, "4 0 0 3", f"3 {len(t)}", *body]).encode()
 
 
+def xlsx(t: Any, x: Any) -> bytes:
+    """Write a workbook of two sheets, one of them words; numbers as a spreadsheet keeps them."""
+    body = "".join(
+        f'<row r="{i}"><c r="A{i}"><v>{a!r}</v></c>'
+        + ("" if np.isnan(b) else f'<c r="B{i}"><v>{b!r}</v></c>')
+        + "</row>"
+        for i, (a, b) in enumerate(zip(map(float, t), map(float, x), strict=True), 2)
+    )
+    return workbook({"Raw": cells("Time (s)", "Distance (m)") + body, "Meta": cells("device", "phone")})
+
+
+def cells(*words: str) -> str:
+    """Write the first row of a sheet, of words."""
+    inner = (f'<c r="{chr(65 + i)}1" t="inlineStr"><is><t>{each}</t></is></c>' for i, each in enumerate(words))
+    return f'<row r="1">{"".join(inner)}</row>'
+
+
+def workbook(sheets: dict[str, str]) -> bytes:
+    """Write an xlsx of sheets by name, each as the XML of its rows; style 1 is a time of the day."""
+    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+    package = "http://schemas.openxmlformats.org/package/2006"
+    kinds = "application/vnd.openxmlformats-"
+    links = [(f"r{i}", "worksheet", f"worksheets/sheet{i}.xml") for i in range(1, len(sheets) + 1)]
+    links.append(("styles", "styles", "styles.xml"))
+
+    def relationships(told: list[tuple[str, str, str]]) -> str:
+        inner = (f'<Relationship Id="{a}" Type="{office}/{b}" Target="{c}"/>' for a, b, c in told)
+        return f'<Relationships xmlns="{package}/relationships">{"".join(inner)}</Relationships>'
+
+    named = (f'<sheet name="{name}" sheetId="{i}" r:id="r{i}"/>' for i, name in enumerate(sheets, 1))
+    parts = {
+        "[Content_Types].xml": f'<Types xmlns="{package}/content-types">'
+        f'<Default Extension="xml" ContentType="application/xml"/>'
+        f'<Default Extension="rels" ContentType="{kinds}package.relationships+xml"/>'
+        f'<Override PartName="/xl/workbook.xml" ContentType="{kinds}officedocument.spreadsheetml.sheet.main+xml"/>'
+        "</Types>",
+        "_rels/.rels": relationships([("r", "officeDocument", "xl/workbook.xml")]),
+        "xl/workbook.xml": f'<workbook xmlns="{main}" xmlns:r="{office}"><sheets>{"".join(named)}</sheets></workbook>',
+        "xl/_rels/workbook.xml.rels": relationships(links),
+        "xl/styles.xml": f'<styleSheet xmlns="{main}"><cellXfs count="2"><xf numFmtId="0"/>'
+        '<xf numFmtId="21" applyNumberFormat="1"/></cellXfs></styleSheet>',
+    }
+    for i, rows_of in enumerate(sheets.values(), 1):
+        parts[f"xl/worksheets/sheet{i}.xml"] = f'<worksheet xmlns="{main}"><sheetData>{rows_of}</sheetData></worksheet>'
+    return packed({name: f'<?xml version="1.0" encoding="UTF-8"?>{text}'.encode() for name, text in parts.items()})
+
+
+def packed(files: dict[str, bytes]) -> bytes:
+    """Write a zip archive, the same bytes each time."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files.items():
+            archive.writestr(zipfile.ZipInfo(name, (2024, 1, 1, 0, 0, 0)), data, zipfile.ZIP_DEFLATED)
+    return file.getvalue()
+
+
+def phyphox_zip(t: Any, x: Any) -> bytes:
+    """Write phyphox's archive: the data, and two files on the phone."""
+    device = b'"property","value"\n"version","1.1.12"\n"accelerometer MaxRange","78.4"\n'
+    time = b'"event","experiment time"\n"START",0.0\n"PAUSE",3.0\n'
+    return packed({"Raw Data.csv": phyphox(t, x), "meta/device.csv": device, "meta/time.csv": time})
+
+
+def cmbl(t: Any, x: Any) -> bytes:
+    """Write what Logger Pro saves: two data sets of one column of times each."""
+
+    def column(name: str, unit: str, values: Any) -> str:
+        cells = "\n".join("" if np.isnan(each) else f"{each:.9g}" for each in values)
+        return (
+            f"<DataColumn><DataObjectName>{name}</DataObjectName><ColumnUnits>{unit}</ColumnUnits>"
+            f"<ColumnCells>\n{cells}\n</ColumnCells></DataColumn>"
+        )
+
+    sets = "".join(
+        f"<DataSet><DataSetName>{name}</DataSetName>{column('Time', 's', t)}{column('Position', 'm', x + more)}"
+        "</DataSet>"
+        for name, more in (("Latest", 1.0), ("Run 1", 0.0))
+    )
+    return f"<Document><Copyright>Vernier Software &#38; Technology</Copyright>{sets}</Document>".encode()
+
+
+def gambl(t: Any, x: Any) -> bytes:
+    """Write what Graphical Analysis saves: the same in a tar archive."""
+    data, file = cmbl(t, x), io.BytesIO()
+    with tarfile.open(fileobj=file, mode="w", format=tarfile.USTAR_FORMAT) as archive:
+        info = tarfile.TarInfo("vstudm/data.udm")
+        info.size = len(data)
+        archive.addfile(info, io.BytesIO(data))
+    return file.getvalue()
+
+
+def trk(t: Any, x: Any) -> bytes:
+    """Write what Tracker saves: pixels of a mass by frame, a stick of 400 pixels a metre, axes turned by 30 degrees."""
+    turn, scale = np.deg2rad(30.0), 400.0
+
+    def given(name: str, value: object) -> str:
+        return f'<property name="{name}" type="double">{value}</property>'
+
+    def thing(kind: str, inner: str) -> str:
+        return f'<object class="org.opensourcephysics.{kind}">{inner}</object>'
+
+    frames = "".join(
+        f'<property name="[{i}]" type="object">'
+        + thing(
+            "cabrillo.tracker.PointMass$FrameData",
+            given("x", 500.0 - y * scale * np.sin(turn)) + given("y", 300.0 - y * scale * np.cos(turn)),
+        )
+        + "</property>"
+        for i, y in enumerate(map(float, x))
+        if not np.isnan(y)
+    )
+    axes = "".join(
+        given(*each)
+        for each in (("xorigin", 500.0), ("yorigin", 300.0), ("angle", 30.0), ("xscale", scale), ("yscale", scale))
+    )
+    system = thing("media.core.ImageCoordSystem$FrameData", axes)
+    mass = '<property name="name" type="string">mass A</property><property name="framedata" type="array">' + frames
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        + thing(
+            "cabrillo.tracker.TrackerPanel",
+            thing("media.core.VideoClip", given("startframe", 0) + given("starttime", 0.0))
+            + thing("media.core.StepperClipControl", given("delta_t", 10.0))
+            + thing(
+                "media.core.ImageCoordSystem",
+                f'<property name="framedata" type="array"><property name="[0]">{system}</property></property>',
+            )
+            + given("length_unit", "m")
+            + thing("cabrillo.tracker.PointMass", mass + "</property>"),
+        )
+    ).encode()
+
+
 def height_log(t: Any, x: Any) -> bytes:
     """Write the invented log of the template."""
     body = (f"{i};{row}" for i, row in enumerate(rows(t, x * 1000, "{x:.2f}")))
@@ -255,6 +391,11 @@ CASES = [
     Case("phyphox", "tab-CRLF", lambda t, x: phyphox(t, x, "\t", "\r\n")),
     Case("phyphox", "XML", phyphox_xml, None, text=False),
     Case("tracker", "masa", tracker, options={"channel": "y", "unit": "m"}),
+    Case("workbook", "xlsx", xlsx, text=False),
+    Case("zip", "phyphox", phyphox_zip, text=False),
+    Case("logger-pro", "cmbl", cmbl, None, options={"run": "run 1"}, text=False),
+    Case("logger-pro", "gambl", gambl, None, options={"run": "run 1"}, text=False),
+    Case("tracker", "trk", trk, None, options={"channel": "y"}, times=False, text=False),
     Case("csv", "semicolon-comma", columns_with_units),
     Case("example", "template", height_log, times=False),
     Case("cassy", "labx", labx, None, text=False),
@@ -516,7 +657,7 @@ def test_positions_rounded_to_a_centimetre_are_known_as_such(case: Case) -> None
 @with_times
 def test_measured_times_stand_and_are_told_from_nominal_ones(case: Case) -> None:
     """Times that jitter by a few microseconds are kept as they are, and the clock is the device's."""
-    if case.format in (
+    if case.text and case.format in (
         "motion-sensor",
         "vernier",
         "logger-pro",
@@ -538,5 +679,7 @@ def test_measured_times_stand_and_are_told_from_nominal_ones(case: Case) -> None
         assert recording.info.clock in ("device", "nominal")
         return
     t = t - t[0] if case.label == "clock" else t  # which counts from its first
-    np.testing.assert_allclose(recording.samples.t, t, atol=6e-3 if case.format in ("vernier", "logger-pro") else 6e-7)
+    np.testing.assert_allclose(
+        recording.samples.t, t, atol=6e-3 if case.text and case.format in ("vernier", "logger-pro") else 6e-7
+    )
     assert recording.info.rate_hz == pytest.approx(299 / (t[-1] - t[0]), rel=2e-3)

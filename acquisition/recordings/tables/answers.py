@@ -33,7 +33,7 @@ _FIRST_ROWS = 50
 _ANEW = 0.2
 _LAST_BYTES = 4096
 _LIKELY = (
-    (re.compile(r"theta|θ|phi|φ|ang|winkel|rad", re.IGNORECASE), "rad"),
+    (re.compile(r"theta|θ|phi|φ|ang|winkel|rad|rotat|gyr|omega|ω", re.IGNORECASE), "rad"),
     (re.compile(r"volt|spannung|^ch|signal|tens", re.IGNORECASE), "V"),
     (re.compile(r"acc|beschl|versn", re.IGNORECASE), "m/s2"),
     (re.compile(r"force|kraft|forza|fuerza", re.IGNORECASE), "N"),

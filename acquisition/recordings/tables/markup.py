@@ -10,6 +10,7 @@ import numpy as np
 from acquisition.block import F8
 from acquisition.errors import FormatError
 from acquisition.recordings.tables.contents import Arrays, Channel
+from acquisition.recordings.tables.text import decode
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -29,6 +30,9 @@ def read_markup(path: str, data: bytes, remedy: str) -> Element:
         If it is none, too long, or has a document type: that may name other files, or grow without bound.
     """
     from xml.etree import ElementTree
+
+    if not data.lstrip(b"\xef\xbb\xbf \r\n").startswith(b"<?xml"):
+        data = decode(data).encode()  # without a declaration it must be UTF-8, and old programs do not know
 
     if len(data) > MOST_BYTES:
         raise FormatError(path, f"expected at most {MOST_BYTES} bytes of XML, got {len(data)}", remedy)

@@ -15,6 +15,7 @@ from acquisition.recordings.units import time_power
 __all__ = ["are_row_numbers", "columns_of", "is_aside", "runs_forward", "times_by_name", "times_by_steps"]
 
 _INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
+_FIRST_NUMBERS = 10  # rows that are not like the others may stand before the first that is read
 _NEUTRAL = re.compile(r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|column \d+", re.IGNORECASE)
 """Names that say nothing against a column of times."""
 _SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10", re.IGNORECASE)
@@ -33,8 +34,8 @@ def columns_of(rows: Sequence[Sequence[str]]) -> list[F8]:
 
 
 def are_row_numbers(column: F8) -> bool:
-    """Tell whole numbers one by one from 0 or 1."""
-    return bool(column.size > 1 and column[0] in (0.0, 1.0) and (np.diff(column) == 1.0).all())
+    """Tell whole numbers one by one, from one of the first."""
+    return bool(column.size > 1 and column[0] in range(_FIRST_NUMBERS) and (np.diff(column) == 1.0).all())
 
 
 def runs_forward(column: F8) -> bool:

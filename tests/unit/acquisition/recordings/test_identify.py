@@ -100,15 +100,36 @@ def test_every_family_is_told_by_content(tmp_path: Path, head: bytes, family: st
     ("head", "words"),
     [
         (b"\x89HDF\r\n\x1a\n" + bytes(99), "got an HDF5 file; if it is a run file, open it as a run"),
-        (b"PK\x03\x04" + bytes(26) + b"[Content_Types].xml", "workbook (xlsx); export the data as text: in phyphox"),
-        (bytes.fromhex("d0cf11e0a1b11ae1") + bytes(99), "workbook (xls); export the data as text: in phyphox"),
-        (b"PK\x03\x04" + bytes(26) + b"Raw Data.csv", "got a zip archive; unpack it"),
+        (
+            b"PK\x03\x04" + bytes(26) + b"mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
+            "save the sheet as xlsx",
+        ),
+        (b"MATLAB 5.0 MAT-file, Platform" + bytes(99), "got a MATLAB file; in MATLAB writematrix"),
+        (b"\0\0\0\x20ftypisom" + bytes(99), "got a video; follow the mass in Tracker"),
         (b"TDSh" + bytes(99), "name the .tdms file beside it"),
     ],
 )
 def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, head: bytes, words: str) -> None:
-    """Workbooks above all: phyphox offers them beside CSV."""
+    """By content, whatever it is called."""
     path = tmp_path / "run.csv"
+    path.write_bytes(head)
+    with pytest.raises(UnknownFormat) as caught:
+        open_recording(path)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "words"),
+    [
+        ("run.cap", b"PK\x03\x04" + bytes(99), 'got a Capstone workbook; in Capstone "File", "Export Data", "CSV"'),
+        ("run.spklab", bytes(range(256)) * 9, 'got a SPARKvue lab; in SPARKvue "Export Data", "CSV"'),
+        ("run.opj", bytes.fromhex("d0cf11e0a1b11ae1") + bytes(999), "got an Origin project; in Origin"),
+    ],
+)
+def test_a_program_s_file_is_named_with_how_to_export_it(tmp_path: Path, name: str, head: bytes, words: str) -> None:
+    """Where the first bytes say too little, the suffix tells; also of a zip or an OLE file without sheets."""
+    path = tmp_path / name
     path.write_bytes(head)
     with pytest.raises(UnknownFormat) as caught:
         open_recording(path)
