@@ -34,7 +34,7 @@ _KEPT_BYTES = 1 << 22
 _MIXED_ROWS = 512  # more rows that are not all of fixed point are halved: most of them may be
 _SINGLE_ROWS = 32  # so few are read one by one
 _UNIFORM = 0.9  # a column that prints the same number of decimals in this share of its rows always does
-_MANY, _STRIPPED = 40, 0.03
+_SHORTER = 2
 _LINE_END = re.compile(rb"\r\n?|\n")
 _LF, _CR, _ZERO = (np.uint8(ord(c)) for c in "\n\r0")
 
@@ -275,9 +275,9 @@ class _Rows:
         counts = self.counts[k]
         numbers = int(counts[: 2 * EXPONENT if exponent else EXPONENT].sum())
         others = numbers - int(counts[usual])
-        # Where zeros at the end are not printed, a tenth of the numbers is shorter and none ends in zero.
+        # Where zeros at the end are not printed, none ends in zero and some are shorter: more than one, for one is cut.
         padded = usual % EXPONENT and self.padded[k, usual]
-        stripped = others >= _STRIPPED * numbers and numbers >= _MANY and not padded
+        stripped = others >= _SHORTER and not padded
         return others <= (1 - _UNIFORM) * numbers and not stripped
 
     def _cut(self, k: int, form: I1, usual: int, exponent: bool) -> B1 | None:
