@@ -110,6 +110,6 @@ def _channels(data_set: Element, run: str) -> Iterator[Channel]:
     yield from side_by_side(named, [at for at, (name, _, _) in enumerate(columns) if is_time(name)], run)
 
 
-_TITLE = "Logger Pro and Graphical Analysis: CSV with runs side by side, or saved as cmbl or gambl"
+_TITLE = "Logger Pro, Graphical Analysis: CSV, or saved as cmbl or gambl"
 _CSV = headed_format("logger-pro", _TITLE, _headings, _why, '"Latest: Position (m)"')
 FORMAT = ColumnFormat("logger-pro", _TITLE, _evidence, _contents)
