@@ -44,6 +44,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ratios.py
 	$(BIN)/python benchmarks/dynamics.py
 	$(BIN)/python benchmarks/formats.py
+	$(BIN)/python benchmarks/many.py
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -40,7 +40,7 @@ def _add_unverified(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_analyse(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("input", nargs="+", metavar="INPUT", help="recordings and run files")
+    parser.add_argument("input", nargs="+", metavar="INPUT", help="recordings, run files, and folders of them")
     parser.add_argument(
         "--scene",
         action="append",
@@ -54,10 +54,17 @@ def _add_analyse(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", dest="from_s", type=_finite, metavar="S", help="use samples from this second on")
     parser.add_argument("--to", dest="to_s", type=_finite, metavar="S", help="use samples up to this second")
     _add_clock(parser)
-    parser.add_argument("--out", metavar="DIR", help="folder for NAME.results (default: here; with --json: none)")
-    parser.add_argument("--no-report", action="store_true", help="print, but write no files")
+    parser.add_argument("--out", metavar="DIR", help="folder for what is written (default: here; with --json: none)")
+    written = parser.add_mutually_exclusive_group()
+    written.add_argument("--report", action="store_true", help="write a report of each of several inputs too")
+    written.add_argument("--no-report", action="store_true", help="print, but write no files")
+    _add_si(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object per input on stdout")
     parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
+
+
+def _add_si(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--si", action="store_true", help="SI units without prefixes on a terminal, as elsewhere")
 
 
 def _add_clock(parser: argparse.ArgumentParser) -> None:

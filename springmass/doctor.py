@@ -17,7 +17,7 @@ import springmass
 __all__ = ["Check", "examine", "foreign_packages"]
 
 PACKAGES = ("acquisition", "pipeline", "storage")
-LIBRARIES = ("numpy", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2")
+LIBRARIES = ("numpy", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2", "rich")
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,12 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
 
-__all__ = ["classic_text", "comparison_text", "findings_text", "wrapped"]
+__all__ = ["classic_text", "comparison_text", "findings_text", "fitted", "shared_findings_text", "wrapped"]
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
 STANDING = ("nominal_clock", "stated_error_is_not_noise", "jittered_time", "offset_unknown", "velocity_missing")
 """Notes that a format makes on every file of its own: they drown what this record says."""
+NAMED = 5  # runs that a line names
 FIRST = 3  # that change a number stand by themselves
 
 
@@ -40,6 +41,32 @@ def findings_text(findings: Sequence[Mapping[str, Any]]) -> str:
     if standing:
         words = f"{_MARKS['info']} of the format, as of every file of its kind: {', '.join(standing)} (findings.md)"
         lines.append(wrapped(words, " " * 8))
+    return "\n".join(lines)
+
+
+def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+    """Return the findings of several runs that change a number, a paragraph a code, and how many notes there are.
+
+    Parameters
+    ----------
+    runs : mapping
+        By name of the run, its findings as in the result's JSON.
+    """
+    grave: dict[str, dict[str, Mapping[str, Any]]] = {}
+    notes = 0
+    for name, findings in runs.items():
+        notes += sum(f["severity"] == "info" for f in findings)
+        for f in findings:
+            if f["severity"] != "info":
+                grave.setdefault(f["code"], {})[name] = f
+    lines = []
+    for code, by_run in sorted(grave.items(), key=lambda item: min(f["severity"] for f in item[1].values())):
+        names = [visible(name) for name in by_run]
+        told = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+        first = next(iter(by_run.values()))
+        head = f"{_MARKS[first['severity']]} {code}, {len(names)} of {len(runs)} runs ({told}): "
+        lines.append(wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{first['message']}", " " * 8))
+    lines.append(f"{notes} notes, which change no number: --json has them.")
     return "\n".join(lines)
 
 
@@ -78,3 +105,8 @@ def wrapped(text: str, indent: str = "") -> str:
     width = min(shutil.get_terminal_size((100, 24)).columns, 100)
     shown = visible(" ".join(text.splitlines()))
     return textwrap.fill(shown, width, subsequent_indent=indent, break_on_hyphens=False)
+
+
+def fitted(text: str, width: int) -> str:
+    """Return lines broken between words where they are wider than a terminal."""
+    return "\n".join(textwrap.fill(line, width, subsequent_indent="    ") for line in text.splitlines())

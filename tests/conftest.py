@@ -53,6 +53,12 @@ def hunt() -> ModuleType:
 
 
 @pytest.fixture(scope="session")
+def screen() -> ModuleType:
+    """Return pseudo-terminals and their screens, ``tests/screen.py``."""
+    return _load("screen")
+
+
+@pytest.fixture(scope="session")
 def synthetic() -> ModuleType:
     """Return the generator of synthetic runs, ``tests/synthetic.py``."""
     return _load("synthetic")

@@ -1,101 +1,245 @@
-"""``springmass analyse``: recordings to Table 1, findings and a report."""
+"""``springmass analyse``: recordings to Table 1, findings and a report.
+
+Several inputs are analysed one after the other: twenty records of two minutes take 1.4 s, and a second process would
+take longer to begin (``benchmarks/many.py``). Their reports, a second each and more, are made by a process a core.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from acquisition.errors import AcquisitionError
 from pipeline.analyse import Oscillation, Overdamped
+from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
+from pipeline.numerics.estimate import Estimate
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder
+from springmass.runs.inputs import Found, files_of
 from springmass.runs.json_results import picked, rejected
 from springmass.runs.loading import load
 from springmass.runs.scenes import read_scenes
-from storage.errors import StorageError
+from storage.errors import StorageError, WriteFailed
 
 __all__ = ["run"]
 
 PARAMETERS = ("accuracy", "method", "velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "clock_ppm", "strict")
+TOGETHER = "together.results"
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """One input, and what is to be made of it."""
+
+    found: Found
+    name: str
+    scene: Scene | None
+    options: argparse.Namespace
+    report: Path | None = None  # the folder for it
+
+
+@dataclass(frozen=True, slots=True)
+class _Done:
+    """What became of one of several inputs: small enough to come from another process."""
+
+    name: str
+    code: int
+    complaints: tuple[str, ...] = ()
+    result: Mapping[str, Any] = field(default_factory=dict)
+    table: Mapping[str, Estimate] = field(default_factory=dict)
+    numbers: Mapping[str, Estimate] = field(default_factory=dict)
+    page: Path | None = None
 
 
 def run(options: argparse.Namespace) -> int:
     """Analyse every input; one that fails does not keep the others from their results."""
-    if options.velocity is not None and len(options.input) > 1:
-        raise ProgramError(
-            f"--velocity completes one position file, got {len(options.input)} inputs; analyse the pair by itself",
-            USAGE,
-        )
+    if options.velocity is not None and (len(options.input) > 1 or Path(options.input[0]).is_dir()):
+        got = f"{len(options.input)} inputs" if len(options.input) > 1 else "a folder"
+        raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself", USAGE)
     scenes = read_scenes(options.scene, len(options.input))
-    out = make_folder(options.out or ".") if _wants_report(options) else None
-    codes: list[int] = []
-    for path, name, scene in zip(options.input, distinct_names(options.input), scenes, strict=True):
-        try:
-            loaded = load(
-                path, **completions(options), from_s=options.from_s, to_s=options.to_s, clock_ppm=options.clock_ppm
-            )
-            analysed = analyse_loaded(
-                loaded,
-                scene,
-                parameters=picked(options, PARAMETERS),
-                accuracy=options.accuracy,
-                with_classic=options.method == "classic",
-            )
-        except ProgramError as error:
-            complain(error)
-            codes.append(error.exit_code)
-        except (AcquisitionError, StorageError) as error:
-            complain(error)
-            codes.append(UNREADABLE)
-        except PipelineError as error:
-            complain(f"{path}: {error}")
-            codes.append(UNREADABLE)
-        else:
-            codes.append(_deliver(analysed, options, None if out is None else out / in_a_name(name, ".results")))
+    found, said = files_of(options.input)
+    out = make_folder(options.out or ".") if _writes(options) else None
+    for line in said:
+        tell(line)
+    every = len(found) == 1 or options.report
+    tasks = [
+        _Task(
+            one,
+            name,
+            scenes[one.of],
+            options,
+            out / in_a_name(name, ".results") if out is not None and every else None,
+        )
+        for one, name in zip(found, distinct_names([one.path for one in found]), strict=True)
+    ]
+    return _one(tasks[0]) if len(tasks) == 1 else _several(tasks, options, out)
+
+
+def _writes(options: argparse.Namespace) -> bool:
+    return not options.no_report and (options.report or options.out is not None or not options.json)
+
+
+def _one(task: _Task) -> int:
+    analysed = _attempt(task)
+    if isinstance(analysed, _Done):
+        complain(*analysed.complaints)
+        return analysed.code
+    if task.options.json:
+        print(json.dumps(analysed.result, allow_nan=False), flush=True)
+    else:
+        _print_text(analysed, si=task.options.si)
+    if task.report is not None:
+        tell(f"report: {_write(analysed, task.report)}")
+    code, complaints = _judged(analysed, task)
+    for line in complaints:
+        complain(line)
+    return code
+
+
+def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | None) -> int:
+    """Analyse many inputs: one Table 1, one file of numbers."""
+    from springmass.terminal.progress import counted
+
+    everything: list[_Done] = []
+    for done in counted(_worked(tasks), len(tasks), "reports" if options.report else "runs"):
+        everything.append(done)
+        if options.json and done.result:
+            print(json.dumps(done.result, allow_nan=False), flush=True)
+        if done.page is not None:
+            tell(f"report: {done.page}")
+        for line in done.complaints:
+            complain(line)
+    analysed = [done for done in everything if done.result]
+    if analysed and not options.json:
+        _print_together(analysed, options)
+    if analysed and out is not None:
+        tell(f"written: {_write_together(analysed, out / TOGETHER)}")
+    codes = [done.code for done in everything]
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(codes)
 
 
-def _wants_report(options: argparse.Namespace) -> bool:
-    return not options.no_report and (options.out is not None or not options.json)
+def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
+    """Yield what became of each task, in their order; with reports a process a core works on them."""
+    workers = min(_cores(), len(tasks))
+    if tasks[0].report is None or workers == 1:
+        yield from map(_work, tasks)
+        return
+    import signal
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    # Fresh processes: a fork of one that has threads of linear algebra may hang. Ctrl-C is this process's.
+    with ProcessPoolExecutor(workers, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        try:
+            yield from pool.map(_work, tasks)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
-def _deliver(analysed: Analysed, options: argparse.Namespace, results: Path | None) -> int:
-    path = analysed.result["input"]["path"]
-    if options.json:
-        print(json.dumps(analysed.result, allow_nan=False), flush=True)
-    else:
-        _print_text(analysed)
-    if results is not None:
-        _write(analysed, results)
-    if not isinstance(analysed.analysis.motion, (Oscillation, Overdamped)):
-        complain(f"{path}: no oscillation: {analysed.analysis.motion.why}")
-        return UNREADABLE
-    if options.strict and (wrong := rejected(analysed.result["findings"])):
-        complain(f"{path}: rejected under --strict: {', '.join(wrong)}")
-        return REJECTED
-    return OK
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _print_text(analysed: Analysed) -> None:
-    from springmass.printing import classic_text, findings_text
+def _work(task: _Task) -> _Done:
+    """Analyse one of several inputs, and write its report where one is asked for."""
+    from springmass.report.tables import every_number, table_estimates
+
+    analysed = _attempt(task)
+    if isinstance(analysed, _Done):
+        return analysed
+    code, complaints = _judged(analysed, task)
+    page = None
+    if task.report is not None:
+        try:
+            page = _write(analysed, task.report)
+        except WriteFailed as error:
+            code, complaints = USAGE, (*complaints, str(error))
+    analysis = analysed.analysis
+    return _Done(task.name, code, complaints, analysed.result, table_estimates(analysis), every_number(analysis), page)
+
+
+def _attempt(task: _Task) -> Analysed | _Done:
+    options = task.options
+    asked = {**completions(options), "velocity": options.velocity or task.found.velocity}
+    try:
+        loaded = load(task.found.path, **asked, from_s=options.from_s, to_s=options.to_s, clock_ppm=options.clock_ppm)
+        return analyse_loaded(
+            loaded,
+            task.scene,
+            parameters={**picked(options, PARAMETERS), "velocity": asked["velocity"]},
+            accuracy=options.accuracy,
+            with_classic=options.method == "classic",
+        )
+    except ProgramError as error:
+        return _Done(task.name, error.exit_code, (str(error),))
+    except (AcquisitionError, StorageError) as error:
+        return _Done(task.name, UNREADABLE, (str(error),))
+    except PipelineError as error:
+        return _Done(task.name, UNREADABLE, (f"{task.found.path}: {error}",))
+
+
+def _judged(analysed: Analysed, task: _Task) -> tuple[int, tuple[str, ...]]:
+    """Return the exit code of an analysis, and what is to be said of it."""
+    path, motion = analysed.result["input"]["path"], analysed.analysis.motion
+    if not isinstance(motion, (Oscillation, Overdamped)):
+        return UNREADABLE, (f"{path}: no oscillation: {motion.why}",)
+    if task.options.strict and (wrong := rejected(analysed.result["findings"])):
+        return REJECTED, (f"{path}: rejected under --strict: {', '.join(wrong)}",)
+    return OK, ()
+
+
+def _print_text(analysed: Analysed, *, si: bool) -> None:
+    from springmass.printing import classic_text, findings_text, fitted
     from springmass.report.budgets import budget_text
-    from springmass.report.tables import text_table
+    from springmass.terminal.look import look_of
+    from springmass.terminal.tables import text_table
 
-    print(text_table([analysed.name], [analysed.analysis]))
+    look = look_of(sys.stdout, si=si)
+    print(text_table([analysed.name], [analysed.analysis], look))
     if analysed.classic is not None:
         print(f"\n{classic_text(analysed.classic)}")
     elif told := budget_text(analysed.analysis):
-        print(told)
+        print(fitted(told, look.width) if look.terminal else told)
     print()
     print(findings_text(analysed.result["findings"]))
 
 
-def _write(analysed: Analysed, results: Path) -> None:
+def _print_together(analysed: Sequence[_Done], options: argparse.Namespace) -> None:
+    from springmass.printing import shared_findings_text
+    from springmass.terminal.look import look_of
+    from springmass.terminal.tables import text_table
+
+    names = [done.name for done in analysed]
+    print(text_table(names, [done.table for done in analysed], look_of(sys.stdout, si=options.si)))
+    print(shared_findings_text({done.name: done.result["findings"] for done in analysed}))
+
+
+def _write(analysed: Analysed, results: Path) -> Path:
     from springmass.report.write import write_report
 
-    tell(f"report: {write_report(results, [analysed])}")
+    return write_report(results, [analysed])
+
+
+def _write_together(analysed: Sequence[_Done], folder: Path) -> Path:
+    """Write the numbers of all runs: results.csv for a table, results.json for programs."""
+    from springmass.report.tables import results_csv
+    from storage.atomic import write_whole
+    from storage.folder import whole_folder
+
+    names = [done.name for done in analysed]
+    with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:
+        told = json.dumps([done.result for done in analysed], indent=2, allow_nan=False, ensure_ascii=False)
+        write_whole(part / "results.json", f"{told}\n".encode("utf-8", "backslashreplace"))
+        write_whole(part / "results.csv", results_csv(names, [done.numbers for done in analysed]))
+    return folder / "results.csv"

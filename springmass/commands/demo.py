@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from acquisition.clock import VirtualClock
@@ -10,12 +11,13 @@ from acquisition.replay import Replay
 from springmass.commands.convert import write_loaded
 from springmass.errors import OK
 from springmass.printing import findings_text
-from springmass.report.tables import text_table
 from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed, analyse_loaded, make_folder
 from springmass.runs.comparing import compare_analysed
 from springmass.runs.loading import load, sample_data
 from springmass.runs.scenes import read_scene
+from springmass.terminal.look import look_of
+from springmass.terminal.tables import text_table
 
 __all__ = ["run"]
 
@@ -28,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     analysed = [_one(name, out) for name in RUNS]
     compared = compare_analysed(analysed)
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")
-    print(text_table(RUNS, [a.analysis for a in analysed]))
+    print(text_table(RUNS, [a.analysis for a in analysed], look_of(sys.stdout)))
     for one in analysed:
         print(f"\n{one.name.capitalize()}:")
         print(findings_text(one.result["findings"]))

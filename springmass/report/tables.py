@@ -1,10 +1,10 @@
-"""Tables of a report: Table 1 for the terminal and the page, and every number as CSV."""
+"""Tables of a report: Table 1, and every number as CSV."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from acquisition.errors import visible
@@ -16,14 +16,15 @@ __all__ = [
     "QUANTITIES",
     "TableRow",
     "cell",
+    "every_number",
     "law_status",
     "page_unit",
     "pretty",
     "pretty_number",
     "raised",
     "results_csv",
+    "table_estimates",
     "table_rows",
-    "text_table",
 ]
 
 # name, quantity in words, symbol in ASCII, on the page, in LaTeX
@@ -87,78 +88,53 @@ class TableRow:
         return tuple(NOTHING if x is None else format_value(x.value, x.u, x.unit) for x in self.estimates)
 
 
-def table_rows(analyses: Sequence[Analysis]) -> tuple[TableRow, ...]:
+def table_estimates(analysis: Analysis) -> dict[str, Estimate]:
+    """Return what Table 1 says of a run: its estimates, and the selected law's coefficients, by name."""
+    found = {name: _estimate(analysis, name) for name in QUANTITIES}
+    return {name: estimate for name, estimate in found.items() if estimate is not None}
+
+
+def table_rows(runs: Sequence[Analysis | Mapping[str, Estimate]]) -> tuple[TableRow, ...]:
     """Return Table 1: every quantity that at least one run gives, one column a run.
 
     Parameters
     ----------
-    analyses : sequence of Analysis
+    runs : sequence of Analysis, or of what :func:`table_estimates` kept of one
     """
+    told = [table_estimates(run) if isinstance(run, Analysis) else run for run in runs]
     rows = []
     for name, quantity, symbol, page_symbol, tex_symbol in _QUANTITIES:
-        estimates = tuple(_estimate(analysis, name) for analysis in analyses)
+        estimates = tuple(run.get(name) for run in told)
         if any(estimate is not None for estimate in estimates):
             rows.append(TableRow(name, quantity, symbol, page_symbol, tex_symbol, estimates))
     return tuple(rows)
 
 
-def text_table(names: Sequence[str], analyses: Sequence[Analysis], *, width: int = 100) -> str:
-    """Return Table 1 in plain ASCII, aligned; runs that do not fit side by side follow in a further block.
+def every_number(analysis: Analysis) -> dict[str, Estimate]:
+    """Return every estimate of a run and every law's parameters, these named ``LAW.PARAMETER``."""
+    everything = dict(analysis.estimates)
+    if isinstance(analysis.motion, Oscillation):
+        for law, fit in analysis.motion.damping.fits.items():
+            everything |= {f"{law}.{name}": x for name, x in fit.joint.estimates().items()}
+    return everything
+
+
+def results_csv(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Estimate]]) -> str:
+    """Return every number of every run as CSV with the columns run, name, value, u, unit.
+
+    Numbers keep all their digits: the file is for programs.
 
     Parameters
     ----------
     names : sequence of str
-        Of the runs; shortened where they are wider than their column.
-    analyses : sequence of Analysis
-    width : int
-        Columns of the terminal.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from pipeline.analyse import analyse
-    >>> from pipeline.track import Track
-    >>> t = np.arange(1000) / 100
-    >>> y = 0.2 + 0.05 * np.cos(8.3 * t) + 1e-4 * np.random.default_rng(1).standard_normal(1000)
-    >>> text_table(["bob"], [analyse(Track.from_arrays(t, y))]).splitlines()[2].split()[::4]
-    ['period', '0.000022']
-    """
-    rows = table_rows(analyses)
-    left = max([len("quantity"), *(len(row.quantity) for row in rows)]) + 2
-    middle = max([len("symbol"), *(len(row.symbol) for row in rows)]) + 2
-    widest = max([8, *(len(cell) for row in rows for cell in row.cells)])
-    together = max(1, (width - left - middle + 3) // (widest + 3))
-    blocks = []
-    for first in range(0, len(names), together):
-        chosen = slice(first, first + together)
-        heads = [_shortened(_ascii(name), widest) for name in names[chosen]]
-        lines = [_line("quantity", "symbol", heads, left, middle, widest)]
-        lines.append("-" * max(len(lines[0]), left + middle + len(heads) * (widest + 3) - 3))
-        lines += [_line(row.quantity, row.symbol, row.cells[chosen], left, middle, widest) for row in rows]
-        blocks.append("\n".join(line.rstrip() for line in lines))
-    return "\n\n".join(blocks) + "\n"
-
-
-def results_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return every estimate and every law's parameters as CSV with the columns run, name, value, u, unit.
-
-    Numbers keep all their digits: the file is for programs. A law's parameter is named ``LAW.PARAMETER``.
-
-    Parameters
-    ----------
-    names : sequence of str
-    analyses : sequence of Analysis
+    runs : sequence of Analysis, or of what :func:`every_number` kept of one
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(["run", "name", "value", "u", "unit"])
-    for run, analysis in zip(names, analyses, strict=True):
-        everything = dict(analysis.estimates)
-        if isinstance(analysis.motion, Oscillation):
-            for law, fit in analysis.motion.damping.fits.items():
-                everything |= {f"{law}.{name}": x for name, x in fit.joint.estimates().items()}
-        for name, x in everything.items():
-            writer.writerow([cell(run), name, repr(float(x.value)), repr(float(x.u)), x.unit])
+    for name, run in zip(names, runs, strict=True):
+        for quantity, x in (every_number(run) if isinstance(run, Analysis) else run).items():
+            writer.writerow([cell(name), quantity, repr(float(x.value)), repr(float(x.u)), x.unit])
     return out.getvalue()
 
 
@@ -235,19 +211,6 @@ def _estimate(analysis: Analysis, name: str) -> Estimate | None:
     if name in analysis.estimates or not isinstance(analysis.motion, Oscillation):
         return analysis.estimates.get(name)
     return analysis.motion.derived.coefficients.get(name)
-
-
-def _line(quantity: str, symbol: str, cells: Sequence[str], left: int, middle: int, widest: int) -> str:
-    return quantity.ljust(left) + symbol.ljust(middle) + "   ".join(cell.ljust(widest) for cell in cells)
-
-
-def _shortened(name: str, width: int) -> str:
-    # Names of one experiment differ at their ends as often as at their beginnings: keep both.
-    return name if len(name) <= width else f"{name[: width // 2 - 1]}..{name[len(name) - (width - width // 2 - 1) :]}"
-
-
-def _ascii(text: str) -> str:
-    return visible(text).encode("ascii", "replace").decode()
 
 
 def _typeset(number: str) -> str:

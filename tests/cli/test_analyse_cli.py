@@ -379,27 +379,22 @@ def test_json_writes_no_files(cli: Cli, recording: Path, tmp_path: Path, monkeyp
     assert list(here.iterdir()) == []
 
 
-def test_files_of_one_name_get_results_of_their_own(
-    cli: Cli, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_of_one_name_get_results_of_their_own(cli: Cli, recording: Path, tmp_path: Path) -> None:
     """Recordings are called data.txt in one folder after the other; none overwrites another's results."""
-    written: list[Path] = []
-
-    def note(folder: Path, *_: object, **__: object) -> Path:
-        written.append(folder)
-        return folder / "report.html"
-
-    monkeypatch.setattr("springmass.report.write.write_report", note)
     paths = []
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
         paths.append(tmp_path / folder / "data.txt")
         paths[-1].write_bytes(recording.read_bytes())
     out = tmp_path / "deep" / "out"
-    done = cli("analyse", "--json", "--out", out, *paths)
+    done = cli("analyse", "--json", "--report", "--out", out, *paths)
     assert done.code == 0
-    assert written == [out / "data.results", out / "data-2.results"]
-    assert done.err.splitlines() == [f"report: {folder / 'report.html'}" for folder in written]
+    pages = [out / name / "report.html" for name in ("data.results", "data-2.results")]
+    assert done.err.splitlines() == [
+        *(f"report: {page}" for page in pages),
+        f"written: {out / 'together.results' / 'results.csv'}",
+    ]
+    assert all(page.is_file() for page in pages)
     assert len(done.results) == 2
 
 

@@ -62,7 +62,8 @@ def test_an_analysis_imports_no_slow_library(data: Path, accuracy: str, name: st
     done = subprocess.run([sys.executable, "-c", CODE, *command], capture_output=True, text=True, check=True)
     imported = set(done.stderr.split())
     assert (
-        imported & {"pandas", "scipy.signal", "scipy.stats", "matplotlib", "jinja2", "h5py", "xarray", "lmfit"} == set()
+        imported & {"pandas", "scipy.signal", "scipy.stats", "matplotlib", "jinja2", "h5py", "xarray", "lmfit", "rich"}
+        == set()
     )
     assert "pipeline.analyse" in imported
 

@@ -30,7 +30,7 @@ from springmass.report.figures.inline import inline_svg
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
-from springmass.report.tables import law_status, pretty, pretty_number, results_csv, table_rows, text_table
+from springmass.report.tables import law_status, pretty, pretty_number, results_csv
 from springmass.report.words import caption, verdict
 from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed
@@ -494,17 +494,6 @@ def test_the_classic_method_is_set_beside_with_its_biases() -> None:
     page = page_of(run)
     assert "two sampled maxima decide" in page
     assert "false echoes enter" in page
-
-
-def test_text_table_is_ascii_and_fits_the_terminal() -> None:
-    """Columns that do not fit follow in another block, names of runs are cut, not numbers."""
-    names = ["a run with quite a long name é.txt", "b", "c"]
-    table = text_table(names, [damped(), bare(), still()], width=80)
-    assert table.isascii()
-    assert max(map(len, table.splitlines())) <= 80
-    assert table.count("quantity") > 1
-    for row in table_rows([damped()]):
-        assert row.cells[0] in table
 
 
 def test_a_law_that_fails_is_never_called_selected_alone() -> None:

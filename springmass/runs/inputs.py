@@ -1,0 +1,123 @@
+"""Which files an input names: itself, or what lies in a folder."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition.errors import AcquisitionError, UnknownFormat
+from acquisition.recordings.identify import sniff
+from springmass.errors import UNREADABLE, ProgramError
+from springmass.runs.loading import kind_of
+
+__all__ = ["Found", "files_of"]
+
+NAMED = 5  # files that a message names
+_LATER_LOG = re.compile(r"\.\d{3,}\.wire$")
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One file to analyse.
+
+    Parameters
+    ----------
+    path : str
+    velocity : str or None
+        The velocity file that lies beside it in its folder.
+    of : int
+        Number of the input that named it.
+    """
+
+    path: str
+    velocity: str | None = None
+    of: int = 0
+
+
+def files_of(inputs: Sequence[str]) -> tuple[list[Found], list[str]]:
+    """Return the files that inputs name, and what to say of folders: what in them is no recording.
+
+    Parameters
+    ----------
+    inputs : sequence of str
+        Files, and folders, of which every recording is taken, by name; folders in them are not looked into.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 3 if a folder holds no recording or cannot be read.
+
+    Notes
+    -----
+    In a folder ``X_velocity.txt`` belongs to ``X_position.txt``, and logs to the run file or the log of their name.
+    """
+    found: list[Found] = []
+    said: list[str] = []
+    for number, text in enumerate(inputs):
+        if not Path(text).is_dir():
+            found.append(Found(text, None, number))
+            continue
+        taken, others = _in_folder(Path(text), number)
+        if not taken:
+            raise ProgramError(
+                f"{text}: a folder with recordings was demanded, got none in it{_named(others)}", UNREADABLE
+            )
+        files = "file" if len(others) == 1 else "files"
+        said.append(f"{text}: {len(taken)} recordings; {len(others)} other {files}{_named(others)}")
+        found += taken
+    return found, said
+
+
+def _named(others: Sequence[str]) -> str:
+    if not others:
+        return ""
+    more = f" and {len(others) - NAMED} more" if len(others) > NAMED else ""
+    return f": {', '.join(others[:NAMED])}{more}"
+
+
+def _in_folder(folder: Path, number: int) -> tuple[list[Found], list[str]]:
+    try:
+        files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+    except OSError as error:
+        raise ProgramError(
+            f"{folder}: a folder to read was demanded, {error.strerror}; name another", UNREADABLE
+        ) from error
+    names = {path.name for path in files}
+    pairs = {path.name: name for path in files if (name := _velocity_of(path)) in names}
+    parts = set(_parts(files)) | set(pairs.values())
+    taken = [path for path in files if path.name not in parts and _is_recording(path)]
+    kept = {path.name for path in taken} | parts
+    return (
+        [Found(str(path), str(folder / pairs[path.name]) if path.name in pairs else None, number) for path in taken],
+        [path.name for path in files if path.name not in kept],
+    )
+
+
+def _velocity_of(path: Path) -> str | None:
+    stem = path.stem.removesuffix("_position")
+    return None if stem == path.stem else f"{stem}_velocity{path.suffix}"
+
+
+def _parts(files: Sequence[Path]) -> Iterator[str]:
+    """Logs that a run file was made of, and those that a long log goes on in."""
+    names = {path.name for path in files}
+    for path in files:
+        later = _LATER_LOG.search(path.name)
+        first = f"{path.name[: later.start()]}.wire" if later else ""
+        if first in names or (path.suffix == ".wire" and f"{path.stem}.h5" in names):
+            yield path.name
+
+
+def _is_recording(path: Path) -> bool:
+    """Tell what some family recognises, or a run file or log; one that cannot be opened says so when it is read."""
+    if kind_of(path) != "recording":
+        return True
+    try:
+        sniff(path)
+    except UnknownFormat:
+        return False
+    except AcquisitionError:
+        return True
+    return True

@@ -1,0 +1,102 @@
+"""Table 1 for a terminal or a pipe."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+
+from acquisition.errors import visible
+from pipeline.analyse import Analysis
+from pipeline.numerics.estimate import Estimate
+from springmass.report.tables import TableRow, table_rows
+from springmass.terminal.look import PLAIN, Look
+from springmass.terminal.quantities import concise, shown
+
+__all__ = ["text_table"]
+
+
+def text_table(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Estimate]], look: Look = PLAIN) -> str:
+    """Return Table 1, aligned; runs that do not fit side by side follow in a further block.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the runs; shortened where they are wider than their column.
+    runs : sequence of Analysis, or of what :func:`springmass.report.tables.table_estimates` kept of one
+    look : Look
+        Of the stream. For a pipe it is ASCII in SI units; on a terminal it has rules, ± and prefixes. Runs that do not
+        fit side by side have the digits of u in parentheses.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pipeline.analyse import analyse
+    >>> from pipeline.track import Track
+    >>> t = np.arange(1000) / 100
+    >>> y = 0.2 + 0.05 * np.cos(8.3 * t) + 1e-4 * np.random.default_rng(1).standard_normal(1000)
+    >>> text_table(["bob"], [analyse(Track.from_arrays(t, y))]).splitlines()[2].split()[::4]
+    ['period', '0.000022']
+    """
+    rows = table_rows(runs)
+    left = max([len("quantity"), *(len(row.quantity) for row in rows)]) + 2
+    middle = max([len("symbol"), *(len(row.symbol) for row in rows)]) + 2
+    for form in (shown, concise):
+        cells = [tuple(form(x, look) for x in row.estimates) for row in rows]
+        widest = max([8, *(len(cell) for row in cells for cell in row)])
+        together = max(1, (look.width - left - middle + 3) // (widest + 3))
+        if together >= len(names):
+            break
+    blocks = []
+    for first in range(0, len(names), together):
+        chosen = slice(first, first + together)
+        heads = [_shortened(_readable(name, look), widest) for name in names[chosen]]
+        part = [row[chosen] for row in cells]
+        blocks.append(
+            _drawn(rows, heads, part, look) if look.terminal else _plain(rows, heads, part, left, middle, widest)
+        )
+    return "\n\n".join(blocks) + "\n"
+
+
+def _plain(
+    rows: Sequence[TableRow], heads: Sequence[str], cells: Sequence[Sequence[str]], left: int, middle: int, widest: int
+) -> str:
+    lines = [_line("quantity", "symbol", heads, left, middle, widest)]
+    lines.append("-" * max(len(lines[0]), left + middle + len(heads) * (widest + 3) - 3))
+    lines += [_line(row.quantity, row.symbol, cells[i], left, middle, widest) for i, row in enumerate(rows)]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _drawn(rows: Sequence[TableRow], heads: Sequence[str], cells: Sequence[Sequence[str]], look: Look) -> str:
+    """Draw it by rich, in colour unless NO_COLOR says otherwise."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(
+        box=box.SIMPLE_HEAD if look.unicode else box.ASCII2, pad_edge=False, show_edge=False, header_style="bold"
+    )
+    table.add_column("quantity", no_wrap=True)
+    table.add_column("", style="dim", no_wrap=True)
+    for head in heads:
+        table.add_column(Text(head), no_wrap=True)
+    for row, values in zip(rows, cells, strict=True):
+        symbol = row.page_symbol.replace(" ", "") if look.unicode else row.symbol
+        table.add_row(row.quantity, symbol, *(Text(value) for value in values))
+    console = Console(file=io.StringIO(), force_terminal=True, width=look.width, highlight=False)
+    console.print(table)
+    assert isinstance(console.file, io.StringIO)
+    return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines())
+
+
+def _line(quantity: str, symbol: str, cells: Sequence[str], left: int, middle: int, widest: int) -> str:
+    return quantity.ljust(left) + symbol.ljust(middle) + "   ".join(cell.ljust(widest) for cell in cells)
+
+
+def _shortened(name: str, width: int) -> str:
+    # Names of one experiment differ at their ends as often as at their beginnings: keep both.
+    return name if len(name) <= width else f"{name[: width // 2 - 1]}..{name[len(name) - (width - width // 2 - 1) :]}"
+
+
+def _readable(text: str, look: Look) -> str:
+    return visible(text) if look.unicode else visible(text).encode("ascii", "replace").decode()

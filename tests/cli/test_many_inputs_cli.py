@@ -1,0 +1,106 @@
+"""Several inputs: one Table 1, one file of numbers, reports on request; folders of recordings."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Cli = Callable[..., Any]
+
+
+@pytest.fixture
+def bench(tmp_path: Path, data: Path) -> Path:
+    """Return a folder as a bench leaves it: two pairs of files, notes, a scene, and a sub-folder."""
+    folder = tmp_path / "bench"
+    (folder / "old").mkdir(parents=True)
+    for name in ("undamped", "damped"):
+        for kind in ("position", "velocity"):
+            file = f"{name}_simulated_{kind}.txt"
+            (folder / file).write_bytes((data / file).read_bytes())
+    (folder / "notes.md").write_text("Two runs, the disc on the second.\n")
+    (folder / "bench.toml").write_text("[bob]\nmass_kg = 0.2\n")
+    return folder
+
+
+def test_several_inputs_share_one_table_and_one_file_of_numbers(cli: Cli, bench: Path, tmp_path: Path) -> None:
+    """A column a run, a row a run and quantity, and no report unasked."""
+    runs = [bench / f"{name}_simulated_position.txt" for name in ("undamped", "damped")]
+    done = cli("analyse", *runs, "--out", tmp_path / "out")
+    assert done.code == 0
+    _, _, *body = done.out.splitlines()
+    assert done.out.count("quantity  ") == 1
+    (period,) = (line for line in body if line.startswith("period"))
+    assert "0.7585" in period
+    assert "0.7900" in period
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["together.results"]
+    with (tmp_path / "out" / "together.results" / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    results = json.loads((tmp_path / "out" / "together.results" / "results.json").read_text())
+    told = {(row["run"], row["name"]): float(row["value"]) for row in rows}
+    for run, result in zip(runs, results, strict=True):
+        for name, estimate in result["estimates"].items():
+            assert told[run.stem, name] == estimate["value"]
+    assert ("damped_simulated_position", "linear+quadratic.beta") in told
+
+
+def test_a_folder_gives_its_recordings_and_names_what_is_none(cli: Cli, bench: Path) -> None:
+    """The velocity files join their positions; what no family knows is counted and named, folders are left alone."""
+    done = cli("analyse", bench, "--json")
+    assert done.code == 0
+    assert [Path(result["input"]["path"]).name for result in done.results] == [
+        "damped_simulated_position.txt",
+        "undamped_simulated_position.txt",
+    ]
+    velocities = [result["provenance"]["parameters"]["velocity"] for result in done.results]
+    assert velocities == [str(bench / f"{name}_simulated_velocity.txt") for name in ("damped", "undamped")]
+    assert done.complaint == f"{bench}: 2 recordings; 2 other files: bench.toml, notes.md"
+
+
+def test_a_folder_without_a_recording_is_refused(cli: Cli, bench: Path) -> None:
+    """Exit code 3, and what is there."""
+    (bench / "old" / "readme.md").write_text("nothing")
+    done = cli("analyse", bench / "old", "--json")
+    assert (done.code, done.out) == (3, "")
+    assert "a folder with recordings was demanded, got none in it: readme.md" in done.complaint
+
+
+def test_a_folder_has_one_scene_for_all_of_it(cli: Cli, bench: Path, data: Path) -> None:
+    """A scene for each input counts inputs, not the files in a folder."""
+    scenes = [data / f"{name}.scene.toml" for name in ("undamped", "damped")]
+    done = cli(
+        "analyse", bench, data / "damped_simulated_position.txt", "--json", "--scene", scenes[0], "--scene", scenes[1]
+    )
+    masses = [result["provenance"]["parameters"]["scene"]["bob"]["mass_kg"]["value"] for result in done.results]
+    assert masses == [0.2007, 0.2007, 0.2176]
+
+
+def test_a_log_beside_its_run_file_is_no_second_run(cli: Cli, bench: Path, data: Path) -> None:
+    """What a run file was made of lies beside it at times; a folder gives the run once."""
+    assert cli("convert", bench / "damped_simulated_position.txt", bench / "run.h5").code == 0
+    (bench / "run.wire").write_bytes(b"whatever")
+    done = cli("analyse", bench, "--json")
+    assert [Path(result["input"]["path"]).name for result in done.results][1] == "run.h5"
+    assert len(done.results) == 3
+
+
+def test_findings_of_several_runs_stand_once(cli: Cli, bench: Path) -> None:
+    """A finding that many runs have is one paragraph that counts them."""
+    (bench / "bare.toml").write_text("[bob]\nmass_kg = 0.2\n[spring]\nmass_kg = 0.01\n")
+    done = cli("analyse", bench, "--no-report", "--scene", bench / "bare.toml")
+    assert done.out.count("uncertainty_missing") == 1
+    assert "uncertainty_missing, 2 of 2 runs (damped_simulated_position, undamped_simulated_position): the first:" in (
+        " ".join(done.out.split())
+    )
+
+
+def test_velocity_and_report_options_that_contradict_are_refused(cli: Cli, bench: Path) -> None:
+    """One velocity file does not complete a folder, and no report is not a report."""
+    done = cli("analyse", bench, "--velocity", bench / "damped_simulated_velocity.txt", "--json")
+    assert done.code == 2
+    assert "got a folder" in done.complaint
+    assert cli("analyse", bench, "--report", "--no-report").code == 2

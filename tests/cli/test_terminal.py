@@ -1,0 +1,53 @@
+"""The program on a pseudo-terminal of 80 columns, as a person sees it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are POSIX's")
+
+
+def test_a_terminal_gets_one_page_that_fits(screen: ModuleType, data: Path, tmp_path: Path) -> None:
+    """Table 1, budget and findings of a run: ±, millimetres, and no line broken by the terminal."""
+    arguments = ["analyse", str(data / "damped_simulated_position.txt"), "--no-report"]
+    arguments += ["--scene", str(data / "damped.scene.toml")]
+    with screen.OnTerminal(arguments, tmp_path) as terminal:
+        assert terminal.end() == 0
+    assert terminal.screen.wrapped == 0
+    assert "52.006 ± 0.0" in terminal.screen.text
+    assert "s⁻¹" in terminal.screen.text
+
+
+def test_several_runs_on_a_terminal_share_a_table_and_leave_no_bar_behind(
+    screen: ModuleType, data: Path, tmp_path: Path
+) -> None:
+    """The bar shows how many of how many, and is gone at the end; digits of u stand in parentheses."""
+    runs = [str(data / f"{name}_simulated_position.txt") for name in ("undamped", "damped", "clipped")]
+    with screen.OnTerminal(["analyse", *runs, "--no-report"], tmp_path) as terminal:
+        assert terminal.end() == 0
+    assert "/3" in terminal.screen.raw
+    assert "/3" not in terminal.screen.text
+    assert "0.790066(23) s" in terminal.screen.text
+    assert terminal.screen.wrapped == 0
+
+
+@pytest.mark.parametrize("environment", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "ascii"}])
+def test_a_poor_terminal_gets_ascii(
+    screen: ModuleType, data: Path, tmp_path: Path, environment: dict[str, str]
+) -> None:
+    """Without a cursor it is what a pipe gets; without superscripts it is ASCII."""
+    arguments = ["analyse", str(data / "undamped_simulated_position.txt"), "--no-report"]
+    with screen.OnTerminal(arguments, tmp_path, environment=environment) as terminal:
+        assert terminal.end() == 0
+    assert terminal.screen.text.isascii()
+    piped = subprocess.run(
+        [sys.executable, "-m", "springmass", *arguments], capture_output=True, text=True, check=True
+    ).stdout
+    assert piped.isascii()
+    assert ("0.05101 +- 0.00028 m" in terminal.screen.text) == ("TERM" in environment)
