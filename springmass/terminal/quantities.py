@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
-
-from pipeline.numerics.estimate import Estimate, format_value
+from pipeline.numerics.estimate import Estimate, format_value, in_brackets
 from springmass.report.tables import page_unit, pretty
+from springmass.report.words import typeset
 from springmass.terminal.look import Look
 
 __all__ = ["concise", "prefixed", "shown"]
@@ -17,7 +16,6 @@ _PREFIXES = {
     "s": ((1e-3, 1e6, "µs"), (0.1, 1e3, "ms")),
     "m/s": ((1e-4, 1e6, "µm/s"), (0.1, 1e3, "mm/s")),
 }
-_WRITTEN = re.compile(r"\(?(?P<value>-?[\d.]+) \+- (?P<u>[\d.]+)\)?(?:e(?P<power>[+-]\d+))?")
 
 
 def prefixed(estimate: Estimate) -> Estimate:
@@ -26,7 +24,7 @@ def prefixed(estimate: Estimate) -> Estimate:
     Examples
     --------
     >>> prefixed(Estimate(0.05145, 2e-5, "m"))
-    Estimate(value=51.45, u=0.02, unit='mm')
+    51.450(20) mm
     """
     for below, factor, unit in _PREFIXES.get(estimate.unit, ()):
         if 0.0 < abs(estimate.value) < below:
@@ -55,12 +53,7 @@ def concise(estimate: Estimate | None, look: Look) -> str:
     if estimate is None:
         return "-"
     chosen = estimate if look.si else prefixed(estimate)
-    written = format_value(chosen.value, chosen.u)
-    if (found := _WRITTEN.fullmatch(written)) is None:
-        return shown(estimate, look)
-    number = f"{found['value']}({int(found['u'].replace('.', ''))})"
+    written = in_brackets(format_value(chosen.value, chosen.u))
     if not look.unicode:
-        power = f"e{found['power']}" if found["power"] else ""
-        return f"{number}{power} {chosen.unit.replace('µ', 'u')}".rstrip()
-    tail = pretty(chosen).rpartition(")")[2] if found["power"] else f" {page_unit(chosen.unit)}"
-    return f"{number.replace('-', '−')}{tail}".rstrip()
+        return f"{written} {chosen.unit.replace('µ', 'u')}".rstrip()
+    return f"{typeset(written)} {page_unit(chosen.unit)}".rstrip()
