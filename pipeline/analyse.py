@@ -10,11 +10,11 @@ import numpy as np
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.checks.clock_findings import judge_clock
-from pipeline.checks.finding import Finding, by_severity
+from pipeline.checks.finding import Checked, Finding, by_severity
 from pipeline.checks.plausibility import judge_plausibility
 from pipeline.checks.sample_findings import STEPS, count_quality, find_clusters, judge_samples
 from pipeline.checks.segment_findings import judge_rows, judge_segments
-from pipeline.checks.self_check import Checked, check_residuals, holding, judge_held
+from pipeline.checks.self_check import check_residuals, holding, judge_held
 from pipeline.damping import select as dampings
 from pipeline.errors import AnalysisError
 from pipeline.motion import equation_fit as equations
@@ -256,7 +256,11 @@ def _oscillation(
     u_amplitude = damping.best.joint["A0"].u
     # Strong damping bends every period: its own solution holds what would look like harmonics.
     bent = isinstance(solved, EquationFit)
-    checked = Checked() if bent else check_residuals(windows.conditioned, demodulated, disturbances, phase, u_amplitude)
+    checked = Checked.together(
+        judge_rows(windows.conditioned, waveform.rms_m),
+        Checked() if bent else check_residuals(windows.conditioned, demodulated, disturbances, phase, u_amplitude),
+        judge_plausibility(windows.conditioned, demodulated, phase),
+    )
     derived = derive(
         demodulated,
         damping,
@@ -271,10 +275,8 @@ def _oscillation(
     clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]))
     findings = by_severity(
         judge_segments(windows.segments),
-        judge_rows(windows.conditioned, waveform.rms_m),
         judge(cycles, demodulated, damping, phase, rest, waveform, disturbances),
         checked.findings,
-        judge_plausibility(windows.conditioned, demodulated, phase),
         judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters),
         judge_scene(scene, effects),
         judge_fits(fitted.full, solved),

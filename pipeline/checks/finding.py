@@ -1,4 +1,4 @@
-"""One sentence about a run: what every check and every judgement gives."""
+"""What every check gives: sentences about a run, and what they add to its uncertainties."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["GRAVITY_M_PER_S2", "Finding", "Severity", "by_severity"]
+__all__ = ["GRAVITY_M_PER_S2", "Checked", "Finding", "Misfit", "Severity", "by_severity"]
 
 GRAVITY_M_PER_S2 = 9.81
 
@@ -29,6 +29,48 @@ class Finding:
     code: str
     severity: Severity
     message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misfit:
+    """What the estimates may be off by, because the model does not hold as the fit takes for granted.
+
+    Parameters
+    ----------
+    name : str
+        Of the input in every budget.
+    amplitude_m, offset_m, phase_rad, damping_rate : float
+        Standard uncertainties that it adds to the estimates of these names, m, m, rad, 1/s.
+    clock : float
+        Relative standard uncertainty that it adds to all that is measured by the record's times.
+    """
+
+    name: str
+    amplitude_m: float = 0.0
+    offset_m: float = 0.0
+    phase_rad: float = 0.0
+    damping_rate: float = 0.0
+    clock: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What a record says against its own model.
+
+    Parameters
+    ----------
+    findings : tuple of Finding
+    misfits : tuple of Misfit
+        What enters the uncertainties.
+    """
+
+    findings: tuple[Finding, ...] = ()
+    misfits: tuple[Misfit, ...] = ()
+
+    @classmethod
+    def together(cls, *each: Checked) -> Checked:
+        """Return what several checks say, in their order."""
+        return cls(tuple(f for one in each for f in one.findings), tuple(m for one in each for m in one.misfits))
 
 
 def by_severity(*groups: Iterable[Finding]) -> tuple[Finding, ...]:

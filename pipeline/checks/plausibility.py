@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.checks.finding import GRAVITY_M_PER_S2, Finding
+from pipeline.checks.finding import GRAVITY_M_PER_S2, Checked, Finding, Misfit
 from pipeline.motion.phase import PhaseFit
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
@@ -21,8 +20,8 @@ MOST_GRAVITIES = 1.2
 FEWEST = 4.0  # samples a period
 
 
-def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit) -> Iterator[Finding]:
-    """Yield what no bob on a spring does, or no distance sensor sees; of other quantities nothing is known.
+def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit) -> Checked:
+    """Return what no bob on a spring does, or no distance sensor sees, and how little of the numbers that leaves.
 
     Parameters
     ----------
@@ -34,7 +33,9 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
     Notes
     -----
     A bob hangs from a spring that pulls only, so it never falls faster than freely: :math:`A\\omega^2 \\le g`, and
-    not much more while the spring goes slack. Of an acceleration that is the amplitude itself.
+    not much more while the spring goes slack; of an acceleration that is the amplitude itself. What goes beyond enters
+    the uncertainties: of an amplitude n times as large as gravity lets it be, the share :math:`1 - 1/n`; of a distance
+    that cannot be, all; of the mains, all.
     """
     track = conditioned.track
     used = (demodulated.flags & UNUSABLE) == 0
@@ -43,44 +44,60 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
     f = omega / (2.0 * math.pi)
     amplitude = float(np.max(np.abs(demodulated.amplitude)))
     rate_hz = 1.0 / float(np.median(np.diff(t))) if t.size > 1 else math.nan
+    found, misfits = [], []
     if rate_hz < FEWEST * f:
-        yield Finding(
-            "undersampled",
-            "warning",
-            f"only {rate_hz / f:.2g} samples fall on a period: the bob may move several times as fast as the record "
-            "shows, and a wave of the same samples has another period; record at ten samples a period and more",
+        found.append(
+            Finding(
+                "undersampled",
+                "warning",
+                f"only {rate_hz / f:.2g} samples fall on a period: the bob may move several times as fast as the "
+                "record shows, and a wave of the same samples has another period; record at ten samples a period and "
+                "more",
+            )
         )
     if track.unit not in ("m", "m/s^2"):
-        return
+        return Checked(tuple(found))
     gravities = amplitude * (omega**2 if track.unit == "m" else 1.0) / GRAVITY_M_PER_S2
     if gravities > MOST_GRAVITIES:
+        misfits.append(Misfit(name="implausible_motion", amplitude_m=amplitude * (1.0 - 1.0 / gravities)))
         mains = _mains(f, rate_hz)
         if mains is not None:
-            yield Finding(
-                "mains_hum",
-                "warning",
-                f"what oscillates at {f:.4g} Hz is the mains, {mains:.0f} Hz{_alias(f, mains)}, and no bob: "
-                "none of the numbers is of a motion; see to the sensor's supply and earth, and record a bob that moves",
+            misfits.append(Misfit(name="mains_hum", amplitude_m=amplitude, clock=1.0))
+            found.append(
+                Finding(
+                    "mains_hum",
+                    "warning",
+                    f"what oscillates at {f:.4g} Hz is the mains, {mains:.0f} Hz{_alias(f, mains)}, and no bob: none "
+                    "of the numbers is of a motion, and their uncertainties are as large as they; see to the sensor's "
+                    "supply and earth, and record a bob that moves",
+                )
             )
-        yield Finding(
-            "implausible_motion",
-            "warning",
-            f"an amplitude of {amplitude:.3g} {track.unit} at {f:.4g} Hz needs {gravities:.2g} times the acceleration "
-            "of gravity, which no bob hanging from a spring reaches: likely a wrong unit, hum, or "
-            f"{'a velocity read as distance' if track.unit == 'm' else 'counts read as m/s^2'}; check unit and column",
+        found.append(
+            Finding(
+                "implausible_motion",
+                "warning",
+                f"an amplitude of {amplitude:.3g} {track.unit} at {f:.4g} Hz needs {gravities:.2g} times the "
+                "acceleration of gravity, which no bob hanging from a spring reaches: likely a wrong unit, hum, or "
+                f"{'a velocity read as distance' if track.unit == 'm' else 'counts read as m/s^2'}; check unit and "
+                "column",
+            )
         )
     # Where distances are counted from the first sample, as from a velocity, their zero says nothing.
     if track.unit == "m" and y.size and track.y[0] != 0.0:
         low, high = float(np.min(y)), float(np.max(y))
         mean = float(np.mean(demodulated.offset))
         if low <= 0.0 or high > FARTHEST_M or amplitude > abs(mean):
-            yield Finding(
-                "implausible_distance",
-                "warning",
-                f"distances from {low:.4g} to {high:.4g} m: no sensor of the bench measures that (0.02 to "
-                f"{FARTHEST_M:g} m). Likely a wrong unit, a velocity read as distance, or displacements, whose offset "
-                "is no distance; check unit and column",
+            misfits.append(Misfit(name="implausible_distance", offset_m=max(amplitude, abs(mean))))
+            found.append(
+                Finding(
+                    "implausible_distance",
+                    "warning",
+                    f"distances from {low:.4g} to {high:.4g} m: no sensor of the bench measures that (0.02 to "
+                    f"{FARTHEST_M:g} m). Likely a wrong unit, a velocity read as distance, or displacements, whose "
+                    "offset is no distance; check unit and column",
+                )
             )
+    return Checked(tuple(found), tuple(misfits))
 
 
 def _mains(f: float, rate_hz: float) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pipeline.checks.finding import Finding
+from pipeline.checks.finding import Checked, Finding, Misfit
 from pipeline.numerics.quantity import noun
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.rows import count_lost
@@ -55,23 +55,33 @@ def judge_segments(segments: Segments | None) -> Iterator[Finding]:
         yield Finding("at_rest", "info", f"nothing but noise moves in {_spans(still)}: left out")
 
 
-def judge_rows(conditioned: Conditioned, rms_m: float) -> Iterator[Finding]:
-    """Yield whether rows were lost all over the record while their times were counted on.
+def judge_rows(conditioned: Conditioned, rms_m: float) -> Checked:
+    """Return whether rows were lost all over the record while their times were counted on.
 
     Parameters
     ----------
     conditioned : Conditioned
     rms_m : float
         What the fit of the motion leaves, m.
+
+    Notes
+    -----
+    All times are too short by the share of the rows that is gone: that is what they are uncertain by.
     """
-    if rms_m > LEFT * conditioned.noise_m and (lost := count_lost(conditioned)):
-        yield Finding(
-            "rows_lost",
-            "error",
-            f"about {lost} rows are missing where times go on as if there were none: the "
-            f"{noun(conditioned.track.unit)} makes two steps at once there; period, frequency, spring constant and "
-            "damping rate are wrong by as much as the times",
-        )
+    if rms_m <= LEFT * conditioned.noise_m or not (lost := count_lost(conditioned)):
+        return Checked()
+    return Checked(
+        (
+            Finding(
+                "rows_lost",
+                "error",
+                f"about {lost} rows are missing where times go on as if there were none: the "
+                f"{noun(conditioned.track.unit)} makes two steps at once there; period, frequency, spring constant and "
+                "damping rate are wrong by as much as the times, which their uncertainties hold",
+            ),
+        ),
+        (Misfit(name="rows_lost", clock=lost / len(conditioned.track)),),
+    )
 
 
 def _words_on(one: Break) -> str:

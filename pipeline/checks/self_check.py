@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checks.finding import Finding
+from pipeline.checks.finding import Checked, Finding, Misfit
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.quantity import amount, noun, plural
 from pipeline.oscillation.condition import Conditioned
@@ -17,7 +17,7 @@ from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
 from pipeline.track import F8, UNUSABLE
 
-__all__ = ["Checked", "Misfit", "check_residuals", "holding", "judge_held"]
+__all__ = ["check_residuals", "holding", "judge_held"]
 
 BINS = 64  # of the phase; the eighth harmonic keeps 0.97 of itself
 BLOCKS = 16  # parts of the record that have to agree on a harmonic
@@ -27,40 +27,6 @@ FALL = 1.3  # ratio of the first correlations' distances from 1
 UNLIKE = 0.08  # root mean square by which correlations may differ from a filter's
 TOLD = 0.002  # of the amplitude: what is smaller enters the uncertainties without a word
 REACH = 0.4  # correlation of neighbours from which on they were smoothed, or noise remembers
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Misfit:
-    """What the estimates may be off by, because the model does not hold as the fit takes for granted.
-
-    Parameters
-    ----------
-    name : str
-        Of the input in every budget.
-    amplitude_m, offset_m, phase_rad, damping_rate : float
-        Standard uncertainties that it adds to the estimates of these names, m, m, rad, 1/s.
-    """
-
-    name: str
-    amplitude_m: float = 0.0
-    offset_m: float = 0.0
-    phase_rad: float = 0.0
-    damping_rate: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Checked:
-    """What a record says against its own model.
-
-    Parameters
-    ----------
-    findings : tuple of Finding
-    misfits : tuple of Misfit
-        What enters the uncertainties.
-    """
-
-    findings: tuple[Finding, ...] = ()
-    misfits: tuple[Misfit, ...] = ()
 
 
 def check_residuals(
@@ -121,9 +87,7 @@ def check_residuals(
         smoothed = _smoothed(whole, used, rows.size // demodulated.t.size, step, turn, amplitude, unit)
         if smoothed is not None and smoothed.misfits[0].amplitude_m > 0.5 * u_amplitude:
             found.append(smoothed)
-    return Checked(
-        tuple(one for each in found for one in each.findings), tuple(one for each in found for one in each.misfits)
-    )
+    return Checked.together(*found)
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,8 +46,11 @@ class Params:
         Greatest root mean square of what the richest law leaves, in units of the record's noise.
     clip_sigmas : float
         Residuals beyond this many standard deviations are false echoes and leave the fit.
+    most_periods : int
+        Over more of them it is not fitted where damping is weak, though the bob stops.
     """
 
+    most_periods: int = 250
     least_damping: float = 0.01
     always: float = 0.05
     misfit: float = 1.25
@@ -215,6 +218,13 @@ def fit_equation(
     names, unit = _fittable(damping), conditioned.track.unit
     if not names or not _required(damping, demodulated, ratio, params, stopped=stopped):
         return None
+    periods = demodulated.angular_frequency / (2.0 * math.pi) * float(np.ptp(demodulated.t))
+    if ratio <= params.least_damping and periods > params.most_periods:
+        return EquationMisfit(
+            f"the bob stops within the record, and whether friction stopped it was not settled: over {periods:.0f} "
+            f"periods the equation of motion takes too long to solve (at most {params.most_periods}); the averaged "
+            "law stands"
+        )
     search = Search.of(conditioned, demodulated, damping, names, _stop_row(conditioned), params.clip_sigmas)
     search.clean()
     if not search.noise_m <= params.misfit * search.expected_m:

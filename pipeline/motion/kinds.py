@@ -29,9 +29,13 @@ from pipeline.oscillation.disturbances import Params as DisturbancesParams
 from pipeline.oscillation.rows import are_interleaved
 from pipeline.oscillation.segments import Params as SegmentsParams
 from pipeline.oscillation.segments import Segments, Span, find_segments
+from pipeline.track import UNUSABLE
 
 __all__ = ["Fitted", "Windows", "by_equation", "by_windows", "see_windows"]
 
+MOST_BENT = 0.25  # of the amplitude: parabolas leave 0.19, a motion of which little but plateaus is seen 0.35
+FOLDED = 32  # parts of a period
+ALIKE = 0.25  # of the residual's variance: what periods that are alike may differ by
 ROUNDS = 4  # most times that a part is looked for within the part that was found
 
 
@@ -187,12 +191,24 @@ def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscill
     left, unit = demodulated.noise_m, conditioned.track.unit
     if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
         return NoOscillation(f"the {noun(unit)} does not follow the period that its spectrum shows")
-    if left > 0.15 * size and left > 4.0 * conditioned.noise_m:
+    if left <= max(0.15 * size, 4.0 * conditioned.noise_m):
+        return None
+    if left > MOST_BENT * size or not _repeats(conditioned, demodulated):
         return NoOscillation(
             f"the {noun(unit)} moves, but not to and fro: a sinusoid of {amount(size, unit, '.3g')} leaves "
             f"{amount(left, unit, '.3g')}"
         )
     return None
+
+
+def _repeats(conditioned: Conditioned, demodulated: Demodulated) -> bool:
+    """Whether what a sinusoid leaves is alike in every period: a bob that bounces swings all the same."""
+    rows = np.flatnonzero(((demodulated.flags & UNUSABLE) == 0) & np.isfinite(demodulated.residual))
+    left = demodulated.residual[rows]
+    turns = np.interp(conditioned.track.t[rows], demodulated.t, demodulated.phase) / (2.0 * math.pi)
+    bins = ((turns - np.floor(turns)) * FOLDED).astype(np.int64) % FOLDED
+    means = np.bincount(bins, left, FOLDED) / np.maximum(np.bincount(bins, minlength=FOLDED), 1)
+    return demodulated.t.size >= 4 and float(np.var(left - means[bins])) < ALIKE * float(np.var(left))
 
 
 def by_windows(windows: Windows, phases: PhaseParams, waveforms: WaveformParams | None) -> Fitted:

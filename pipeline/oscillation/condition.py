@@ -20,6 +20,7 @@ FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
 QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
 TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
 CREST_SIGMAS = 3.5
+BLOCK = 256  # samples that tell the curvature where they are
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -265,16 +266,42 @@ def _least_noise(second: F8) -> tuple[float, bool]:
 
 def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
     """Return which samples stand off the median of five around them by more than noise and curvature do."""
-    spikes = np.zeros(y.size, np.bool_)
     if y.size < 8:
-        return spikes
+        return np.zeros(y.size, np.bool_)
     second = np.diff(y, 2)
     noise_m, flooded = _least_noise(second)
+    if noise_m == 0.0:  # most samples say what their neighbours say: single ones a step beside are no spikes
+        half_step = 0.5 * (coarsest_step(np.sort(y), 2.0 * half_step) or 0.0)
     # What curvature alone does: a quantile of the second differences that spikes on a fifth of the samples spare; of
     # a cosine's second differences 0.15 lie within 0.40 of what 0.4 of them do.
     share, gain = (0.15, 2.5) if flooded else (0.4, 1.0)
     rank = int(share * second.size)
-    bound = sigmas * max(noise_m, half_step) + 5.0 * gain * float(np.partition(np.abs(second), rank)[rank])
+    least = sigmas * max(noise_m, half_step)
+    spikes = _beyond(y, least + 5.0 * gain * float(np.partition(np.abs(second), rank)[rank]))
+    if np.count_nonzero(spikes) > 0.05 * y.size:
+        # A bob that has nearly come to rest does not tell the curvature at the start: each part tells its own.
+        blocks = second[: second.size // BLOCK * BLOCK].reshape(-1, BLOCK)
+        if blocks.size and np.count_nonzero(
+            local := _beyond(y, least + 5.0 * gain * _curvature(blocks, share, y.size))
+        ) < 0.5 * np.count_nonzero(spikes):
+            return local
+        # So many come in runs too, which a median of five believes; but hardly any lie within the motion.
+        middle = float(np.median(y[~spikes]))
+        reach = 3.0 * mad_sigma(y[~spikes] - middle)
+        spikes |= np.abs(y - middle) > reach
+    return spikes
+
+
+def _curvature(blocks: F8, share: float, size: int) -> F8:
+    """(size,): for each sample that quantile of the second differences (b, k) of the block that it lies in."""
+    rank = int(share * blocks.shape[1])
+    each = np.partition(np.abs(blocks), rank, axis=1)[:, rank]
+    return np.asarray(each[np.minimum(np.arange(size) // blocks.shape[1], each.size - 1)])
+
+
+def _beyond(y: F8, bound: float | F8) -> NDArray[np.bool_]:
+    """Return which samples stand off the median of five around them by more than a bound."""
+    spikes = np.zeros(y.size, np.bool_)
     smooth = y
     for _ in range(4):
         away = _off_median(smooth)
@@ -290,11 +317,6 @@ def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
             break
         smooth = y.copy()
         smooth[spikes] = np.interp(np.flatnonzero(spikes), kept, y[kept])
-    if np.count_nonzero(spikes) > 0.05 * y.size:
-        # So many come in runs too, which a median of five believes; but hardly any lie within the motion.
-        middle = float(np.median(y[~spikes]))
-        reach = 3.0 * mad_sigma(y[~spikes] - middle)
-        spikes |= np.abs(y - middle) > reach
     return spikes
 
 

@@ -14,6 +14,7 @@ from pipeline.track import F8
 
 FEW_PERIODS = 4.5  # below which the spectrum's peak is displaced by the line's own image
 HOLE = 8.0  # sample intervals without a sample that make a hole
+LONG = 0.05  # of the record without a usable sample: a hole too
 MOSTLY_HOLES = 0.2  # share of the record beyond which straight lines over holes would be seen for a motion
 SHORTFALL = 0.05  # periods by which a record of one and a half may be misjudged
 
@@ -169,10 +170,13 @@ def _bridged(grid: F8, t: F8, y: F8, recorded: F8, hole_s: float) -> F8:
     """Return samples at the times of a grid: by straight lines, by their mean where mostly nothing was recorded."""
     values = np.asarray(np.interp(grid, t, y))
     latest = np.maximum.accumulate(recorded[np.isfinite(recorded)])
-    step = np.diff(latest)
-    if float(step[step > hole_s].sum()) > MOSTLY_HOLES * float(latest[-1] - latest[0]):
-        before = np.searchsorted(latest, grid, side="right") - 1
-        values[np.append(step > hole_s, False)[before]] = y.mean()
+    seconds = float(latest[-1] - latest[0])
+    # Rows without a sample make a hole only where it is no part of every period.
+    for times, longest in ((latest, hole_s), (np.maximum.accumulate(t), max(hole_s, LONG * seconds))):
+        step = np.diff(times)
+        if float(step[step > longest].sum()) > MOSTLY_HOLES * seconds:
+            before = np.searchsorted(times, grid, side="right") - 1
+            values[np.append(step > longest, False)[before]] = y.mean()
     return values
 
 

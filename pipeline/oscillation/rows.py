@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.oscillation.condition import Conditioned
+from pipeline.numerics.robust import mad_sigma
+from pipeline.oscillation.condition import FOURTH_DIFFERENCE_GAIN, Conditioned
 from pipeline.track import F8, Track
 
 __all__ = ["are_interleaved", "count_lost"]
@@ -13,6 +14,8 @@ SIGMAS = 8.0  # of the noise that a step between rows must have to be told from 
 ALIKE = 0.7  # correlation of what alternates, from row to row
 LEAST = 64  # rows
 LEAST_SHARE = 0.015  # of the rows
+SLOW = 0.25  # of the fastest steps: below, near a turning point, a lost row is no more than noise
+MOST = 5.0  # steps at once: more are no rows lost but something else
 
 
 def are_interleaved(track: Track) -> bool:
@@ -37,22 +40,29 @@ def count_lost(conditioned: Conditioned) -> int:
 
     Notes
     -----
-    Where a row is missing the distance makes two steps at once: twice the median of the two before and the two after.
-    Where times jitter, or values are held, as many steps are too short.
+    Where a row is missing the distance makes two steps at once: twice the lesser of the middle two of the steps
+    around, which is a single one unless three of the four are not. Where times jitter, or values are held, as many
+    steps are too short. The noise is that near the turning points, where a lost row moves little.
     """
     track, used = conditioned.track, conditioned.used
     step: F8 = np.diff(track.y)
     sound = used[1:] & used[:-1] & (np.abs(np.diff(track.t) * track.rate_hz - 1.0) < 0.2)
     if step.size < LEAST:
         return 0
-    around = np.median([step[:-4], step[1:-3], step[3:-1], step[4:]], axis=0)
+    four = np.sort([step[:-4], step[1:-3], step[3:-1], step[4:]], axis=0)
+    around = np.where(four.sum(axis=0) > 0.0, four[1], four[2])
     whole = np.logical_and.reduce([sound[k : sound.size - 4 + k] for k in range(5)])
-    clear = whole & (np.abs(around) > SIGMAS * conditioned.noise_m)
+    if not whole.any():
+        return 0
+    size = np.abs(around)
+    fast = float(np.quantile(size[whole], 0.9))
+    slow = np.diff(step, 3)[:-1][whole & (size < SLOW * fast)]
+    noise_m = float(mad_sigma(slow) / FOURTH_DIFFERENCE_GAIN) if slow.size >= LEAST else conditioned.noise_m
+    clear = whole & (size > np.maximum(SIGMAS * noise_m, 0.5 * fast))
     ratio = step[2:-2][clear] / around[clear]
-    lost, short = np.count_nonzero((ratio > 1.6) & (ratio < 3.4)), np.count_nonzero(ratio < 0.4)
+    many = np.where(ratio < MOST, np.rint(np.maximum(ratio - 0.1, 1.0)) - 1.0, 0.0)
+    lost, short = np.count_nonzero(many), np.count_nonzero(ratio < 0.4)
     # Only in the fast part of a period are two steps told from one.
-    return (
-        round(lost * whole.sum() / max(ratio.size, 1))
-        if lost >= max(5, LEAST_SHARE * ratio.size) and lost > 5 * short
-        else 0
-    )
+    if lost >= max(8, LEAST_SHARE * ratio.size) and lost > 3 * short:
+        return round(float(many.mean()) * track.y.size)
+    return 0

@@ -14,7 +14,7 @@ from pipeline.bench.added_mass import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
-from pipeline.checks.self_check import Misfit
+from pipeline.checks.finding import Misfit
 from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
@@ -205,7 +205,8 @@ def derive(
     inputs = Inputs()
     ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
     laws = _Laws(damping, inputs, demodulated.t - damping.t0)
-    rate = inputs.add("clock_rate", instrument.clock_rate, "B")
+    amiss = _Amiss(misfits, inputs)
+    rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
     unit = rest.mean.unit
     scale = ambient.scale(instrument) if unit == "m" else 1.0
     windows = phase.residual.size
@@ -213,7 +214,6 @@ def derive(
     free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
     omega = slope * rate
-    amiss = _Amiss(misfits, inputs)
     lengths = scale * amiss.over("amplitude", laws.best.joint.values[0])
     rates = rate * amiss.over("damping_rate", laws.rate)
     start = laws.start() * lengths
@@ -288,6 +288,7 @@ class _Amiss:
                 "offset": misfit.offset_m,
                 "phase": misfit.phase_rad,
                 "damping_rate": misfit.damping_rate,
+                "clock": misfit.clock,
             }
             variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()}, "B")
             for name, variable in variables.items():

@@ -234,14 +234,18 @@ def test_scale_of_length_does_not_matter(synthetic: ModuleType, scale: float) ->
         factor = scale if name in LENGTHS else 1.0
         found = there.estimates[name]
         assert found.value == pytest.approx(factor * expected.value, abs=1e-3 * factor * expected.u), name
-        assert found.u == pytest.approx(factor * expected.u, rel=1e-3), name
+        own = (here.motion.derived.statistical[name].u, there.motion.derived.statistical[name].u)
+        assert own[1] == pytest.approx(factor * own[0], rel=1e-3), name
+        # No bob swings a metre at 1.3 Hz: what its length was measured by is in doubt.
+        assert scale > 1.0 or found.u == pytest.approx(factor * expected.u, rel=1e-3), name
+    assert (there.estimates["amplitude"].u > 0.5 * there.estimates["amplitude"].value) == (scale > 1.0)
 
 
 @pytest.mark.parametrize("scale", [0.5, 4.0])
 def test_scale_of_time_does_not_matter(synthetic: ModuleType, scale: float) -> None:
     """Twice as fast and four times as slow the relative errors are the same."""
     t = synthetic.times(20)
-    y = synthetic.noisy(synthetic.Truth(gamma=0.01463), t, 3e-4, 6)
+    y = synthetic.noisy(synthetic.Truth(amplitude=0.02, gamma=0.01463), t, 3e-4, 6)
     here, there = analyse(Track.from_arrays(t, y)), analyse(Track.from_arrays(scale * t, y))
     for name, power in (("period", 1), ("frequency", -1), ("damping_rate", -1), ("amplitude", 0), ("velocity_rms", -1)):
         found, expected = there.estimates[name], here.estimates[name]

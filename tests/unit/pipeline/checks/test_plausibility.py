@@ -34,6 +34,19 @@ def test_velocity_read_as_distance() -> None:
     assert "implausible_distance" in codes(0.4, 1.32, rest=0.0)
 
 
+def test_what_cannot_be_is_uncertain_by_as_much() -> None:
+    """Millimetres read as centimetres, and the mains, leave lengths and period that are no better than a guess."""
+    t = np.arange(2000) / 100.0
+    noise = np.random.default_rng(3).standard_normal(t.size)
+    unit = analyse(Track.from_arrays(t, 10.0 * (0.3 + 0.05 * np.cos(8.3 * t) + 3e-4 * noise))).estimates
+    assert unit["amplitude"].u > 0.5 * unit["amplitude"].value
+    assert unit["period"].u < 1e-3 * unit["period"].value
+    t = np.arange(10_000) / 500.0
+    noise = np.random.default_rng(3).standard_normal(t.size)
+    hum = analyse(Track.from_arrays(t, 0.3 + 5e-4 * np.cos(100.0 * math.pi * t) + 1e-5 * noise)).estimates
+    assert hum["period"].u > 0.9 * hum["period"].value
+
+
 def test_counted_from_the_first_sample_is_no_complaint() -> None:
     """Distances counted from the first one, as those summed up from a velocity, may be negative."""
     t = np.arange(2000) / 100.0

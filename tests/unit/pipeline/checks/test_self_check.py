@@ -62,6 +62,14 @@ def test_waves_locked_to_the_oscillation_are_named(bend: object, words: str) -> 
     assert abs(result.estimates["offset"].value - REST) < 4.0 * result.estimates["offset"].u
 
 
+def test_bouncing_is_an_oscillation_that_is_no_sinusoid() -> None:
+    """Parabolas one after another leave a seventh of the amplitude, the same in every period: that is said."""
+    share_of_period = (OMEGA * T / (2.0 * math.pi)) % 1.0
+    result = analysed(REST + AMPLITUDE * (8.0 * share_of_period * (1.0 - share_of_period) - 1.0) + noise(7))
+    assert "not_sinusoidal" in told(result)
+    assert result.estimates["period"].value == pytest.approx(2.0 * math.pi / OMEGA, rel=1e-3)
+
+
 @pytest.mark.parametrize("end", [1.0, -1.0])
 def test_an_echo_that_moves_slower_near_one_end_is_left_out(end: float) -> None:
     """Half the bob's speed beyond half the swing is no motion: it is named, and amplitude and rest are the bob's."""

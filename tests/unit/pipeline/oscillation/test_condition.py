@@ -200,3 +200,10 @@ def test_same_record_same_flags(synthetic: ModuleType) -> None:
     first, second = condition(track), condition(track)
     np.testing.assert_array_equal(first.flags, second.flags)
     np.testing.assert_array_equal(track.y, y)
+
+
+def test_rest_does_not_tell_the_curvature_of_the_start() -> None:
+    """At ten samples a second a bob that comes to rest between two steps of its sensor keeps its first crests."""
+    t = np.arange(12_000) / 10.0
+    y = 0.3 + 0.05 * np.exp(-0.012 * t) * np.cos(4.2 * t) + 3e-6 * np.random.default_rng(2).standard_normal(t.size)
+    assert not rows(condition(Track.from_arrays(t, np.round(y / 43e-6) * 43e-6)).flags, Quality.FALSE_ECHO)

@@ -115,3 +115,13 @@ def test_thin_records_are_refused_in_words() -> None:
     found = find_cycles(condition(Track.from_arrays(t, np.sin(np.arange(10.0)))))
     assert isinstance(found, NoOscillation)
     assert "too thin" in found.why
+
+
+def test_rows_without_a_distance_are_no_slow_motion(synthetic: ModuleType) -> None:
+    """A third of the record without distances, bridged by a straight line, does not hide the oscillation."""
+    t = synthetic.times(30.0)
+    y = synthetic.noisy(synthetic.Truth(gamma=0.02), t, 3e-4, 1)
+    for first in np.arange(8.9, 9.7, 0.1):
+        found = find_cycles(condition(Track.from_arrays(t, np.where((t > first) & (t < first + 9.0), np.nan, y))))
+        assert isinstance(found, Cycles)
+        assert found.frequency_hz == pytest.approx(8.3 / (2 * np.pi), abs=0.02)

@@ -27,12 +27,16 @@ def test_a_plain_record_has_all_its_rows(sigma: float) -> None:
     assert not are_interleaved(track)
 
 
-def test_lost_rows_are_counted() -> None:
-    """Of a twentieth of the rows lost while times were counted, most are counted, and the finding says so."""
-    kept = np.random.default_rng(5).random(T.size) >= 0.05
+@pytest.mark.parametrize("share", [0.05, 0.3])
+def test_lost_rows_are_counted(share: float) -> None:
+    """Of rows lost while times were counted, most are counted, the finding says so, and the period's u covers."""
+    kept = np.random.default_rng(5).random(T.size) >= share
     track = noisy(PLAIN[kept])
-    assert count_lost(condition(track)) == pytest.approx(np.count_nonzero(~kept), rel=0.3)
-    assert "rows_lost" in {finding.code for finding in analyse(track).findings if finding.severity == "error"}
+    assert count_lost(condition(track)) == pytest.approx(np.count_nonzero(~kept), rel=0.4)
+    found = analyse(track)
+    assert "rows_lost" in {finding.code for finding in found.findings if finding.severity == "error"}
+    period = found.estimates["period"]
+    assert abs(period.value - 2.0 * np.pi / 8.3) < 3.0 * period.u
 
 
 def test_two_records_in_turn_are_refused() -> None:
