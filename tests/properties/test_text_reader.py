@@ -340,3 +340,11 @@ def test_fixed_point_is_read_bit_for_bit(column: tuple[list[str], str], beside: 
     for cell, value in zip(cells, np.asarray(table.values[0]).tolist(), strict=True):
         exact = float(Decimal(cell).scaleb(shift))
         assert (value, math.copysign(1.0, value)) == (exact, math.copysign(1.0, exact))
+
+
+@pytest.mark.parametrize("odd", ["1-2\t\t3", "1\t-\t3", "1\t+-2\t3", "1 2\t3", "1\t2-\t3", "1\t\t3"])
+def test_as_many_numbers_as_cells_are_not_taken_for_one_in_each(odd: str) -> None:
+    """A row whose numbers do not stand one in each cell is marked, and its neighbours are read."""
+    table = read_table(Text.of(f"1\t2\t3\n{odd}\n-4\t5\t+6\n".encode()), (0, 1, 2), "\t", width=3)
+    assert table.bad.tolist() == [False, True, False]
+    assert [column[2] for column in table.values] == [-4.0, 5.0, 6.0]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
 
 from acquisition.recordings.tables.contents import Heading, is_time, name_and_unit, split_heading
 from acquisition.recordings.tables.text import Line, parse_number, split_cells
@@ -79,16 +81,21 @@ def find_table(lines: Sequence[Line]) -> Found | None:
     >>> [each.name for each in found.headings], found.line.number, found.preamble
     (['Tempo', 'Pos'], 3, ('A title',))
     """
-    best: tuple[tuple[int, int, int], Found] | None = None
+    return _find_table(tuple(lines))
+
+
+@lru_cache(maxsize=1)  # whoever recognises a file by its table has found what is read then
+def _find_table(lines: tuple[Line, ...]) -> Found | None:
+    best: tuple[tuple[int, bool, int], _Split, _Rows, Found] | None = None
     for order, mark in enumerate(_MARKS):
-        ends = [each.text.rstrip().endswith(";") for each in lines]
-        brackets = mark == "" and sum(ends) > len(ends) / 2  # as each row of a matrix does
-        start, rows = _rows(lines, mark, brackets)
-        if rows:
-            found = _with_names(lines, start, mark, brackets, rows)
-            rank = (start, not found.named, order)
-            best = min(best, (rank, found), key=lambda each: each[0]) if best else (rank, found)
-    return best[1] if best else None
+        if order and mark and not any(mark in each.text for each in lines):
+            continue  # lines of one cell each, as the first mark has had them
+        split = _Split(lines, mark)
+        if (rows := split.first_rows()) is not None:
+            found = _with_names(lines, rows.start, mark, split.brackets, rows.width)
+            trial = (rows.start, not found.named, order), split, rows, found
+            best = trial if best is None else min(best, trial, key=lambda each: each[0])
+    return None if best is None else replace(best[3], rows=best[1].all_rows(best[2]))
 
 
 def _cells(line: str, mark: str, brackets: bool) -> list[str]:
@@ -108,23 +115,51 @@ def _kind(cell: str) -> str:
     return "mixed" if _NUMBERS.fullmatch(cell) else "text"
 
 
-def _rows(lines: Sequence[Line], mark: str, brackets: bool) -> tuple[int, tuple[tuple[str, ...], ...]]:
-    """Return where the first rows begin among the lines, and the cells of all that are like it; none where none are."""
-    cells = [_cells(each.text, mark, brackets) for each in lines]
-    kinds = [[_kind(cell) for cell in row] for row in cells]
-    filled = [at for at, row in enumerate(kinds) if row]
-    for position, start in enumerate(filled):
-        first = kinds[start]
-        if not _is_row(first) or any("=" in cell for cell in cells[start]):
-            continue
-        probe = filled[position : position + _PROBE]
-        width = max((len(kinds[at]) for at in probe if _is_row(kinds[at])), default=0) if mark else len(first)
-        like = [at for at in probe if _alike(kinds[at], first, width, mark)]
-        near = [at for at in probe[:_FEWEST] if at in like]
-        if len(near) == _FEWEST and len(like) >= _SOUND * len(probe):
-            rows = [cells[at] for at in filled[position:] if _alike(kinds[at], first, width, mark)]
-            return start, tuple(tuple(row + [""] * (width - len(row))) for row in rows)
-    return -1, ()
+class _Rows(NamedTuple):
+    """Where rows begin: the line, the kinds of its cells, the most cells of a row, and the lines from there on."""
+
+    start: int
+    first: list[str]
+    width: int
+    filled: list[int]
+
+
+class _Split:
+    """Lines as one mark separates them into cells, each split when it is looked at."""
+
+    def __init__(self, lines: Sequence[Line], mark: str) -> None:
+        self.lines, self.mark = lines, mark
+        ends = 0 if mark else sum(each.text.rstrip().endswith(";") for each in lines)
+        self.brackets = ends > len(lines) / 2  # as each row of a matrix does
+        self._split: dict[int, tuple[list[str], list[str]]] = {}
+
+    def at(self, line: int) -> tuple[list[str], list[str]]:
+        """Return the cells of a line and their kinds."""
+        if line not in self._split:
+            cells = _cells(self.lines[line].text, self.mark, self.brackets)
+            self._split[line] = cells, [_kind(cell) for cell in cells]
+        return self._split[line]
+
+    def first_rows(self) -> _Rows | None:
+        """Return where the first rows begin; None where there are none."""
+        blanks = self.mark + " " if self.mark else "\t [];" if self.brackets else "\t "
+        filled = [at for at, each in enumerate(self.lines) if each.text.strip(blanks)]
+        for position, start in enumerate(filled):
+            cells, first = self.at(start)
+            if not _is_row(first) or any("=" in cell for cell in cells):
+                continue
+            probe = [self.at(at)[1] for at in filled[position : position + _PROBE]]
+            width = max((len(kinds) for kinds in probe if _is_row(kinds)), default=0) if self.mark else len(first)
+            like = [_alike(kinds, first, width, self.mark) for kinds in probe]
+            if sum(like[:_FEWEST]) == _FEWEST and sum(like) >= _SOUND * len(like):
+                return _Rows(start, first, width, filled[position:])
+        return None
+
+    def all_rows(self, rows: _Rows) -> tuple[tuple[str, ...], ...]:
+        """Return the cells of every line that is like the first row."""
+        split = (self.at(at) for at in rows.filled)
+        like = [cells for cells, kinds in split if _alike(kinds, rows.first, rows.width, self.mark)]
+        return tuple(tuple(cells + [""] * (rows.width - len(cells))) for cells in like)
 
 
 def _is_row(kinds: Sequence[str]) -> bool:
@@ -139,10 +174,8 @@ def _alike(kinds: Sequence[str], first: Sequence[str], width: int, mark: str) ->
     return all(a == b or "" in (a, b) for a, b in zip(kinds, first, strict=False))
 
 
-def _with_names(
-    lines: Sequence[Line], start: int, mark: str, brackets: bool, rows: tuple[tuple[str, ...], ...]
-) -> Found:
-    width = len(rows[0])
+def _with_names(lines: Sequence[Line], start: int, mark: str, brackets: bool, width: int) -> Found:
+    """Return what names the columns of a table whose first row is known; its rows are still to be taken."""
     above = [at for at in range(start - 1, -1, -1) if lines[at].text.strip(_COMMENT)][:_ABOVE]
     names, units, at_names = [""] * width, [""] * width, start
     spare: tuple[tuple[str, str], ...] = ()
@@ -165,7 +198,7 @@ def _with_names(
         plain, own = heading_of(name)
         headings.append(Heading(plain, own or unit.strip(" ()[]")))
     preamble = tuple(text for each in lines[:at_names] if (text := each.text.strip(_COMMENT + "\t")))
-    return Found(preamble, tuple(headings), spare, lines[start], mark, brackets, rows)
+    return Found(preamble, tuple(headings), spare, lines[start], mark, brackets, ())
 
 
 def _names(line: str, mark: str, width: int) -> list[str]:
