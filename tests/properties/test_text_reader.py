@@ -348,3 +348,13 @@ def test_as_many_numbers_as_cells_are_not_taken_for_one_in_each(odd: str) -> Non
     table = read_table(Text.of(f"1\t2\t3\n{odd}\n-4\t5\t+6\n".encode()), (0, 1, 2), "\t", width=3)
     assert table.bad.tolist() == [False, True, False]
     assert [column[2] for column in table.values] == [-4.0, 5.0, 6.0]
+
+
+def test_engineering_notation_has_fewer_decimals_where_its_exponent_is_smaller() -> None:
+    """Numbers that end at the place of all others are whole; one that lost a digit of its mantissa is marked."""
+    cells = [f"{k / 40:.5f}E-03" if abs(k) >= 40 else f"{k * 25:.2f}E-06" for k in range(-500, 500)]
+    cells = [cell.replace("0.00E-06", "0.0E+00") if float(cell) == 0 else cell for cell in cells]
+    assert not read_table(Text.of("\n".join([*cells, ""]).encode()), (0,), ",").bad.any()
+    cells[505], cells[700] = "125.0E-06", "5.0000E-03"
+    bad = read_table(Text.of("\n".join([*cells, ""]).encode()), (0,), ",").bad
+    assert np.flatnonzero(bad).tolist() == [505, 700]

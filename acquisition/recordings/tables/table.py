@@ -288,7 +288,25 @@ class _Rows:
         differs: B1 = (form >= 0) & (form != usual) & (exponent | (form < EXPONENT))
         # What begins at 0 says so without decimals where zeros at the end are not printed.
         differs[:1] &= (form[:1] != 0) | (self.values[k][:1] != 0)
+        if exponent and differs.any():
+            differs &= ~self._ends_alike(k, form, usual)
         return differs if differs.any() else None
+
+    def _ends_alike(self, k: int, form: I1, usual: int) -> B1:
+        """Tell numbers of engineering notation, whose mantissas have the fewer decimals the smaller their exponents.
+
+        ``-1.00000E-03`` and ``-975.00E-06`` end at the same place, and so do all numbers beside them.
+        """
+        size = np.abs(self.values[k][: self.rows])
+        with np.errstate(divide="ignore"):
+            exponent = 3.0 * np.floor((np.log10(size) - self.shifts[k]) / 3.0 + 1e-9)
+        places = np.where((size > 0) & (form >= EXPONENT), form - EXPONENT - exponent, np.nan)
+        told = places[(form == usual) & np.isfinite(places)]
+        if not told.size or told.min() != told.max():
+            return np.zeros(self.rows, bool)
+        alike = places == told[0]
+        # A zero prints whatever decimals it likes where others print fewer.
+        return np.asarray(alike | ((size == 0) & (alike & (form != usual)).any()))
 
     def _is_cut_last(self, k: int, form: I1, usual: int) -> bool:
         """Tell whether a last row without line end may have stopped within the cell of a column.
