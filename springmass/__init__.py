@@ -5,11 +5,10 @@ The program puts acquisition, pipeline and storage together: `cli` takes a line 
 
 Examples
 --------
->>> import springmass
->>> loaded = springmass.load(springmass.sample_data() / "undamped_simulated_position.txt")
->>> analysis = springmass.analyse(loaded.track)
->>> print(analysis.estimates["period"])
-0.758516 +- 0.000022 s
+>>> import springmass as sm
+>>> a = sm.analyse(sm.sample_data() / "undamped_simulated_position.txt")
+>>> a["period"]
+0.758516(22) s
 """
 
 from __future__ import annotations
@@ -20,32 +19,42 @@ if TYPE_CHECKING:
     from typing import Any
 
     from acquisition.replay import Replay
-    from pipeline.analyse import Analysis, analyse
+    from pipeline.analyse import Params
     from pipeline.bench.scene import Scene
+    from pipeline.damping.laws import LAWS
+    from pipeline.damping.laws.of_function import make_law
     from pipeline.numerics.estimate import Estimate
     from pipeline.results.classic import classic
     from pipeline.results.compare import SpringRun, compare_springs
     from pipeline.track import Track
+    from springmass.api.analysis import Analysis
+    from springmass.api.opening import Run, open_run
+    from springmass.api.sources import Comparison, analyse, compare
     from springmass.runs.loading import Loaded, load, sample_data
     from springmass.runs.scenes import read_scene
-    from storage.run_file.reading import open_run
     from storage.run_file.writing import write_run
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "LAWS",
     "Analysis",
+    "Comparison",
     "Estimate",
     "Loaded",
+    "Params",
     "Replay",
+    "Run",
     "Scene",
     "SpringRun",
     "Track",
     "__version__",
     "analyse",
     "classic",
+    "compare",
     "compare_springs",
     "load",
+    "make_law",
     "open_run",
     "read_scene",
     "sample_data",
@@ -54,18 +63,24 @@ __all__ = [
 
 # Name to module: loaded on first use, so that `springmass --help` waits for none of them.
 _WHERE = {
-    "Analysis": "pipeline.analyse",
+    "Analysis": "springmass.api.analysis",
+    "Comparison": "springmass.api.sources",
     "Estimate": "pipeline.numerics.estimate",
+    "LAWS": "pipeline.damping.laws",
     "Loaded": "springmass.runs.loading",
+    "Params": "pipeline.analyse",
     "Replay": "acquisition.replay",
+    "Run": "springmass.api.opening",
     "Scene": "pipeline.bench.scene",
     "SpringRun": "pipeline.results.compare",
     "Track": "pipeline.track",
-    "analyse": "pipeline.analyse",
+    "analyse": "springmass.api.sources",
     "classic": "pipeline.results.classic",
+    "compare": "springmass.api.sources",
     "compare_springs": "pipeline.results.compare",
     "load": "springmass.runs.loading",
-    "open_run": "storage.run_file.reading",
+    "make_law": "pipeline.damping.laws.of_function",
+    "open_run": "springmass.api.opening",
     "read_scene": "springmass.runs.scenes",
     "sample_data": "springmass.runs.loading",
     "write_run": "storage.run_file.writing",

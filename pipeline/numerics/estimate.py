@@ -139,9 +139,10 @@ class Joint:
     def correlation(self) -> F8:
         """(p, p) float64: coefficients of correlation, 1 on the diagonal; 0 beside a parameter that is exact."""
         u = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        found = self.covariance / np.where(u > 0, u, 1.0) / np.where(u > 0, u, 1.0)[:, None]
+        scale = np.where(u > 0, u, 1.0)
+        found = self.covariance / np.outer(scale, scale)
         np.fill_diagonal(found, 1.0)
-        return np.clip(found, -1.0, 1.0)
+        return np.asarray(np.clip(found, -1.0, 1.0))
 
 
 def format_value(value: float, u: float, unit: str = "") -> str:

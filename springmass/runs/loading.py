@@ -27,7 +27,7 @@ from storage.run_file.layout import MAGIC
 from storage.run_file.reading import CHECKED, open_run
 from storage.wire_log.records import MAGIC as WIRE_MAGIC
 
-__all__ = ["Loaded", "kind_of", "load", "sample_data"]
+__all__ = ["Loaded", "cut", "kind_of", "load", "sample_data"]
 
 UNVERIFIED = "unverified"
 NAMED = 5  # differences that a message names
@@ -175,9 +175,7 @@ def load(
             complain(f"{where}: {trap.message}")
     if clock_ppm is not None:
         loaded = replace(loaded, track=replace(loaded.track, clock_limit=clock_ppm * 1e-6))
-    if from_s is None and to_s is None:
-        return loaded
-    return replace(loaded, track=_between(loaded, from_s, to_s))
+    return replace(loaded, track=cut(loaded.track, from_s, to_s, where=where))
 
 
 def sample_data() -> Path:
@@ -330,15 +328,31 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
     )
 
 
-def _between(loaded: Loaded, from_s: float | None, to_s: float | None) -> Track:
-    t = loaded.track.t
+def cut(track: Track, from_s: float | None, to_s: float | None, *, where: object) -> Track:
+    """Return the samples of some seconds.
+
+    Parameters
+    ----------
+    track : Track
+    from_s, to_s : float or None
+        Both included; None: from the first, to the last.
+    where : object
+        Named in errors, usually the file.
+
+    Raises
+    ------
+    ProgramError
+        If no sample lies there.
+    """
+    if from_s is None and to_s is None:
+        return track
+    t = track.t
     low = -np.inf if from_s is None else from_s
     high = np.inf if to_s is None else to_s
     keep = (t >= low) & (t <= high)
     if not keep.any():
         told = t[np.isfinite(t)]
         span = f"spans {told.min():g} to {told.max():g} s" if told.size else "holds no sample"
-        raise ProgramError(f"{loaded.path}: no sample lies between {low:g} and {high:g} s; the record {span}", USAGE)
-    track = loaded.track
+        raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s; the record {span}", USAGE)
     velocity = None if track.velocity is None else track.velocity[keep]
     return replace(track, t=t[keep], y=track.y[keep], flags=track.flags[keep], velocity=velocity)

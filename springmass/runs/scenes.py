@@ -5,13 +5,14 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from acquisition.regular import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import USAGE, ProgramError, complain
 
-__all__ = ["ask_about", "read_scene", "read_scenes"]
+__all__ = ["ask_about", "read_scene", "read_scenes", "scene_beside"]
 
 LONGEST_SCENE = 1 << 14  # bytes; of longer ones some take seconds to parse
 
@@ -34,6 +35,26 @@ def read_scenes(paths: Sequence[str], count: int) -> list[Scene | None]:
     return scenes * count if len(scenes) == 1 else scenes
 
 
+def scene_beside(path: Path) -> Scene | None:
+    """Return the scene that was noted beside a recording after it was made, if there is one.
+
+    Parameters
+    ----------
+    path : Path
+        Of ``NAME.h5``, say: the table ``[scene]`` of ``NAME.about.toml`` holds what a scene file does.
+
+    Raises
+    ------
+    ProgramError
+        As :func:`read_scene`.
+    """
+    about = path.with_suffix(".about.toml")
+    if not about.exists():
+        return None
+    tables = _read_tables(about)
+    return _scene_of(tables["scene"], f"{about} [scene]") if "scene" in tables else None
+
+
 def read_scene(path: str | Path) -> Scene:
     """Read a scene file (TOML).
 
@@ -42,6 +63,10 @@ def read_scene(path: str | Path) -> Scene:
     ProgramError
         With exit code 2 if it is absent, no TOML, or says something impossible; the line names file, key and value.
     """
+    return _scene_of(_read_tables(path), str(path))
+
+
+def _read_tables(path: str | Path) -> dict[str, Any]:
     try:
         with open_regular(path) as file:
             content = file.read(LONGEST_SCENE + 1) or b""
@@ -51,7 +76,7 @@ def read_scene(path: str | Path) -> Scene:
                 "name the scene, not the recording",
                 USAGE,
             )
-        return Scene.from_mapping(tomllib.loads(content.decode()), where=str(path))
+        return tomllib.loads(content.decode())
     except OSError as error:
         raise ProgramError(
             f"{path}: a scene file was demanded, got none ({error.strerror}); check the name", USAGE
@@ -61,6 +86,11 @@ def read_scene(path: str | Path) -> Scene:
         reason = " ".join(str(error).split())
         demand = f"not a TOML file ({reason}); see the scene file in the reference"
         raise ProgramError(f"{path}: {demand}", USAGE) from error
+
+
+def _scene_of(tables: Any, where: str) -> Scene:
+    try:
+        return Scene.from_mapping(tables, where=where)
     except SceneError as error:
         raise ProgramError(str(error), USAGE) from error
 

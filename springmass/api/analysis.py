@@ -1,0 +1,148 @@
+"""One run, analysed, as a notebook wants it: estimates by name, a page-wide summary, figures, frames and datasets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pipeline.analyse import Analysis as Found
+from pipeline.analyse import Oscillation
+from pipeline.numerics.estimate import Estimate
+from springmass.api.frames import estimates_frame, run_dataset
+from springmass.api.plotting import Plot
+from springmass.api.showing import html_summary, text_summary
+from springmass.report.tables import table_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+__all__ = ["Analysis"]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Analysis(Found):
+    """One run, analysed: what :func:`springmass.analyse` returns.
+
+    Parameters
+    ----------
+    name : str
+        Of the run; its file's, where it came from one.
+
+    Notes
+    -----
+    ``a["period"]`` is an :class:`~pipeline.numerics.estimate.Estimate`; names are those of
+    ``docs/reference/estimates.md``, their symbols (``a["k"]``, ``a["T"]``), the coefficients of the selected law
+    (``a["gamma"]``) and ``LAW.PARAMETER`` of any law (``a["quadratic.beta"]``). Estimates of one analysis are
+    correlated, and calculate so; estimates of two analyses are taken as independent: :func:`springmass.compare` knows
+    what two runs share.
+
+    Examples
+    --------
+    >>> import springmass as sm
+    >>> a = sm.analyse(sm.sample_data() / "undamped_simulated_position.txt")
+    >>> a["period"]
+    0.758516(22) s
+    >>> print(2 * a["T"])
+    1.51703+/-0.00004
+    """
+
+    name: str = ""
+
+    @property
+    def everything(self) -> Mapping[str, Estimate]:
+        """All estimates and the coefficients of the selected law, by name."""
+        law = self.motion.derived.coefficients if isinstance(self.motion, Oscillation) else {}
+        return {**self.estimates, **law}
+
+    def __getitem__(self, name: str) -> Estimate:
+        everything = self.everything
+        if name in everything:
+            return everything[name]
+        for row in table_rows([self]):
+            if name in (row.symbol, row.page_symbol.replace(" ", "_")):
+                return everything[row.name]
+        law, _, parameter = name.partition(".")
+        fits = self.motion.damping.fits if isinstance(self.motion, Oscillation) else {}
+        if law in fits and parameter in fits[law].joint.names:
+            return fits[law].joint[parameter]
+        raise _NoEstimate(
+            f"no estimate {name!r} of this run; there are {', '.join(everything)}: see docs/reference/estimates.md for "
+            "what others need of record and scene"
+        )
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.everything
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.everything)
+
+    def keys(self) -> list[str]:
+        """Return the names of the estimates."""
+        return list(self.everything)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return self.keys()
+
+    def ufloat(self, name: str) -> Any:
+        """Return an estimate as an ``uncertainties.UFloat``; a plain number where it is exact.
+
+        Parameters
+        ----------
+        name : str
+            As for ``a[name]``.
+
+        Raises
+        ------
+        KeyError
+            If there is none of that name.
+        """
+        return self[name].ufloat
+
+    @property
+    def plot(self) -> Plot:
+        """Figures: ``a.plot()``, ``a.plot.amplitude(ax=ax)`` and others, see :class:`springmass.api.plotting.Plot`."""
+        return Plot(self)
+
+    def to_dataframe(self, *, correlations: bool = False) -> pd.DataFrame:
+        """Return a row an estimate, by name.
+
+        Parameters
+        ----------
+        correlations : bool
+            Whether columns ``r(NAME)`` with the coefficients of correlation follow.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns quantity, symbol, value, u, unit, dof, coverage_factor and expanded; the last three, as in
+            the budget of the JSON, are NaN where there is none.
+        """
+        return estimates_frame(self, correlations=correlations)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return every sample with its fit, every window with its amplitude, and every estimate.
+
+        Returns
+        -------
+        xarray.Dataset
+            On ``time``: distance, quality, and of an oscillation fit, residual and the smoothed motion with its
+            uncertainties; on ``window``: amplitude_of_window, u_amplitude_of_window, kept and phase_of_window; on
+            ``law`` and ``window``: law_amplitude. Estimates are without a dimension, each with its ``u`` and
+            ``units`` as attributes.
+        """
+        return run_dataset(self)
+
+    def __repr__(self) -> str:
+        return text_summary(self)
+
+    def _repr_html_(self) -> str:
+        return html_summary(self)
+
+
+class _NoEstimate(KeyError):
+    """A name that no estimate has; shown as a sentence, not as the repr of one."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])

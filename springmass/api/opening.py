@@ -1,0 +1,90 @@
+"""Run files opened for scripts: parts of them by time, and their analyses."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from springmass.api.analysis import Analysis
+from springmass.api.sources import analyse
+from storage.run_file.reading import Run as Stored
+from storage.run_file.reading import open_run as open_stored
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Part", "Run", "open_run"]
+
+
+class Run(Stored):
+    """An open run file, with what can be done to it by name: :meth:`sel` and :meth:`analyse`.
+
+    All else as in :class:`storage.run_file.reading.Run`.
+    """
+
+    __slots__ = ()
+
+    def sel(self, *, time: slice) -> Part:
+        """Return the samples between two times, as xarray's ``sel`` does.
+
+        Parameters
+        ----------
+        time : slice
+            In s, both ends included: ``slice(5, 60)``, ``slice(5, None)``.
+
+        Raises
+        ------
+        ValueError
+            If the slice has a step.
+        """
+        if not isinstance(time, slice) or time.step is not None:
+            raise ValueError(f"time must be a slice of two times in s without a step, got {time!r}")
+        return Part(self, time.start, time.stop)
+
+    def analyse(self, scene: Any = None, **how: Any) -> Analysis:
+        """Analyse the run; see :func:`springmass.analyse`."""
+        return analyse(self, scene, **how)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """The samples of a run between two times.
+
+    Parameters
+    ----------
+    run : Run
+    from_s, to_s : float or None
+        Both included; None: from the first, to the last.
+    """
+
+    run: Run
+    from_s: float | None
+    to_s: float | None
+
+    def analyse(self, scene: Any = None, **how: Any) -> Analysis:
+        """Analyse these samples; see :func:`springmass.analyse`."""
+        return analyse(self.run, scene, from_s=self.from_s, to_s=self.to_s, **how)
+
+    def dataset(self) -> xr.Dataset:
+        """Return these samples as a dataset that reads them when they are asked for."""
+        return self.run.dataset().sel(time=slice(self.from_s, self.to_s))
+
+
+def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
+    """Open a run file for reading; to be used in a ``with``, or closed.
+
+    Parameters
+    ----------
+    path : str or PathLike
+    unverified : bool
+        Whether to give what does not fit its digest, to look at it.
+
+    Raises
+    ------
+    storage.errors.NotARun, storage.errors.RunDamaged
+        As :func:`storage.run_file.reading.open_run`.
+    """
+    found = open_stored(Path(path), unverified=unverified)
+    return Run(found.path, found.handle, found.header, found.sha256, found.unverified)

@@ -1,0 +1,130 @@
+"""An analysis shown: 15 lines in a terminal, a page-wide summary in a notebook."""
+
+from __future__ import annotations
+
+import textwrap
+from collections import Counter
+from html import escape
+
+import numpy as np
+
+from acquisition.errors import visible
+from pipeline.analyse import Analysis, Oscillation
+from springmass.report.laws import laws_of
+from springmass.report.tables import pretty, table_rows
+
+__all__ = ["html_summary", "text_summary"]
+
+WIDTH = 79
+MOST_ROWS = 10
+# The quantities shown first where not all have room.
+FIRST = (
+    "period",
+    "spring_constant",
+    "amplitude",
+    "damping_rate",
+    "relaxation_rate",
+    "relaxation_rate_slow",
+    "relaxation_rate_fast",
+    "gamma",
+    "beta",
+    "mu",
+    "c",
+    "n",
+    "offset",
+    "noise",
+    "quality_factor",
+    "drag_coefficient",
+)
+
+
+def text_summary(analysis: Analysis) -> str:
+    """Return an analysis in at most 15 lines of at most 79 characters.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Its ``name`` stands first where it has one.
+    """
+    rows = {row.name: row for row in table_rows([analysis])}
+    shown = [name for name in FIRST if name in rows][:MOST_ROWS]
+    lines = [_cut(visible(_head(analysis)))]
+    lines += [f"  {rows[name].quantity:26}{rows[name].symbol:8}{rows[name].estimates[0]!r}" for name in shown]
+    if isinstance(analysis.motion, Oscillation):
+        lines.append(_cut(f"damping: {_law(analysis.motion)}"))
+    lines.append(_cut(_findings(analysis)))
+    hidden = len(rows) - len(shown)
+    lines.append("to_dataframe() has all estimates" + (f" ({hidden} more)" if hidden else "") + ", plot() the run")
+    return "\n".join(lines)
+
+
+def html_summary(analysis: Analysis) -> str:
+    """Return an analysis as a piece of HTML without scripts: its estimates, its laws, its findings.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    """
+    rows = [
+        f"<tr><td>{escape(row.quantity)}</td><td><i>{_subscript(row.page_symbol)}</i></td>"
+        f"<td>{escape(pretty(row.estimates[0]))}</td></tr>"
+        for row in table_rows([analysis])
+    ]
+    parts = [
+        f"<p><b>{escape(visible(_head(analysis)))}</b></p>",
+        "<table><thead><tr><th>quantity</th><th>symbol</th><th>estimate</th></tr></thead>"
+        f"<tbody>{''.join(rows)}</tbody></table>",
+    ]
+    if isinstance(analysis.motion, Oscillation):
+        damping = analysis.motion.damping
+        fits = [
+            f"<tr><td>{escape(row['name'])}</td><td>{escape(row['status'])}</td>"
+            f"<td>{row['fit'].reduced_chi2:.3g}</td><td>{escape(row['bic'])}</td>"
+            f"<td>{escape(', '.join(row['coefficients'][1:]))}</td></tr>"
+            for row in laws_of(damping)["rows"]
+        ]
+        heads = "<th>law</th><th>status</th><th>reduced χ²</th><th>ΔBIC</th><th>coefficients</th>"
+        parts.append(
+            f"<details><summary>Damping: {escape(_law(analysis.motion))}</summary>"
+            f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(fits)}</tbody></table></details>"
+        )
+    told = "".join(
+        f"<li><b>{escape(f.severity)}</b> <code>{escape(f.code)}</code>: {escape(visible(f.message))}</li>"
+        for f in analysis.findings
+    )
+    opened = " open" if any(f.severity != "info" for f in analysis.findings) else ""
+    parts.append(f"<details{opened}><summary>{escape(_findings(analysis))}</summary><ul>{told}</ul></details>")
+    return f'<div class="springmass-analysis">{"".join(parts)}</div>'
+
+
+def _head(analysis: Analysis) -> str:
+    track = analysis.track
+    name = getattr(analysis, "name", "") or "run"
+    span = float(np.nanmax(track.t) - np.nanmin(track.t))
+    words = f"{name}: {track.kind}, {len(track)} samples in {span:.4g} s, {analysis.quality['used']} used"
+    return words if isinstance(analysis.motion, Oscillation) else f"{words}; {analysis.motion.why}"
+
+
+def _law(motion: Oscillation) -> str:
+    damping = motion.damping
+    others = [name for name in damping.admissible if name != damping.selected]
+    state = "rejected, yet the least bad" if damping.best.rejected else "selected"
+    tail = f"; {', '.join(others)} cannot be told from it" if others else ""
+    return f"{damping.selected} ({state} of {len(damping.fits)} laws){tail}"
+
+
+def _findings(analysis: Analysis) -> str:
+    counts: Counter[str] = Counter(finding.severity for finding in analysis.findings)
+    told = [f"{counts[name]} {name}{'s' * (counts[name] > 1)}" for name in ("error", "warning") if counts[name]]
+    told += [f"{counts['info']} for information"] if counts["info"] else []
+    grave = [f.code for f in analysis.findings if f.severity != "info"]
+    return f"findings: {', '.join(told) or 'none'}" + (f": {', '.join(grave)}" if grave else "")
+
+
+def _cut(line: str) -> str:
+    return textwrap.shorten(line, WIDTH, placeholder=" ...")
+
+
+def _subscript(symbol: str) -> str:
+    letter, _, index = symbol.partition(" ")
+    return escape(letter) + (f"<sub>{escape(index)}</sub>" if index else "")

@@ -1,0 +1,294 @@
+"""Whatever a user has in hand, analysed: paths, open runs, datasets, frames, arrays."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from types import EllipsisType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline.accuracy import params_for
+from pipeline.analyse import Analysis as Found
+from pipeline.analyse import Params
+from pipeline.analyse import analyse as analyse_track
+from pipeline.bench.scene import Scene
+from pipeline.damping.laws import LAWS, Law, find_law
+from pipeline.errors import AnalysisError, TrackError
+from pipeline.motion.waveform_fit import Params as WaveformParams
+from pipeline.track import F8, Track
+from springmass.api.analysis import Analysis
+from springmass.api.frames import comparison_frame
+from springmass.runs.analysing import Analysed, distinct_names
+from springmass.runs.comparing import Compared, compare_analysed, demand_one_spring
+from springmass.runs.json_results import all_findings
+from springmass.runs.loading import Loaded, cut, load
+from springmass.runs.scenes import read_scene, scene_beside
+from storage.run_file.reading import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Comparison", "analyse", "compare"]
+
+
+def analyse(
+    source: Any,
+    scene: Scene | str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    params: Params | None = None,
+    *,
+    accuracy: str | None = None,
+    laws: Sequence[str | Law | EllipsisType] | None = None,
+    options: Mapping[str, Mapping[str, Any]] | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    **completions: Any,
+) -> Analysis:
+    """Analyse a run.
+
+    Parameters
+    ----------
+    source : path, Run, Loaded, Track, Dataset, DataArray, DataFrame, Series, mapping or pair of arrays
+        A recording, run file or wire log by its path, or what :func:`springmass.open_run` and
+        :func:`springmass.load` give: these know clock, calibration and scene. Of a dataset, a frame or a mapping
+        ``"time"`` (s) and ``"distance"`` (m) are taken, and ``"quality"`` where there is one; of a data array or a
+        series its values against ``time`` or its index; of a pair ``(t, y)`` both. Values that are NaN are missing.
+    scene : Scene, path or mapping, optional
+        What is known of the bench. Left out: of ``NAME.h5`` the ``[scene]`` of ``NAME.about.toml`` beside it, else the
+        scene inside the run file, else nothing.
+    params : Params, optional
+        Options of every stage, in place of a tier's.
+    accuracy : {"fast", "standard", "best"}, optional
+        Tier, "standard" where it is left out; not together with ``params``.
+    laws : sequence of str or Law, optional
+        The damping laws to try: names of :data:`springmass.LAWS`, laws of :func:`springmass.make_law`, and ``...`` for
+        all that ship.
+    options : mapping, optional
+        Single options of stages by the names of :class:`springmass.Params`: ``{"damping": {"evidence": 10.0}}``.
+    from_s, to_s : float, optional
+        Use samples of these seconds only.
+    **completions
+        What a recording leaves open, as :func:`springmass.load` takes it: velocity, channel, rate_hz, unit, run, time,
+        time_unit, clock_ppm, unverified.
+
+    Returns
+    -------
+    Analysis
+
+    Raises
+    ------
+    AnalysisError
+        If fewer than eight samples are usable, or a law or an option is not known.
+    TrackError
+        If the arrays are no track.
+    acquisition.errors.FormatError, storage.errors.StorageError, springmass.errors.ProgramError
+        If a file or a scene cannot be read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(1000) / 100
+    >>> y = 0.2 + 0.05 * np.cos(8.3 * t) + 1e-4 * np.random.default_rng(1).standard_normal(1000)
+    >>> analyse((t, y), laws=["none", "linear"])["period"]
+    0.757010(22) s
+    """
+    if params is not None and accuracy is not None:
+        raise AnalysisError("params are the options of an accuracy in full: give one of the two")
+    chosen = with_options(params or params_for(accuracy or "standard"), options or {})
+    if laws is not None:
+        chosen = replace(chosen, damping=replace(chosen.damping, laws=_laws(laws), otherwise=()))
+    if isinstance(source, Run):
+        source = source.path
+    if isinstance(source, str | os.PathLike):
+        source = load(Path(source), **completions)
+    elif completions:
+        raise TrackError(f"{', '.join(completions)} complete recordings named by a path, got a {type(source).__name__}")
+    if isinstance(source, Loaded):
+        found = analyse_track(cut(source.track, from_s, to_s, where=source.path), _scene(scene, source), chosen)
+        found = replace(found, findings=all_findings(source, found))
+    else:
+        found = analyse_track(cut(track_of(source), from_s, to_s, where="the record"), _scene(scene, None), chosen)
+    name = source.path.name if isinstance(source, Loaded) else ""
+    return Analysis(**{each.name: getattr(found, each.name) for each in fields(Found)}, name=name)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Comparison(Compared):
+    """What several runs of one spring say together: what :func:`springmass.compare` returns.
+
+    Parameters
+    ----------
+    runs : mapping of str to Analysis
+    """
+
+    runs: Mapping[str, Analysis]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row a run and one, "together", for their mean.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns period and u_period (s), spring_constant, u and u_own (N/m), pull and agree; the mean is
+            NaN where the runs disagree.
+        """
+        return comparison_frame(self.comparison, {name: run["period"] for name, run in self.runs.items()})
+
+    def __repr__(self) -> str:
+        return "\n".join([self.comparison.message, *(one.message for one in self.joint)])
+
+
+def compare(
+    sources: Sequence[Any],
+    scene: Any = None,
+    *,
+    mass_correlation: float = 0.0,
+    **how: Any,
+) -> Comparison:
+    """Say whether runs agree on one spring, and whether one damping law holds across those of one bob.
+
+    Parameters
+    ----------
+    sources : sequence
+        Two at least: analyses, or whatever :func:`analyse` takes.
+    scene : optional
+        As for :func:`analyse`: one for all runs, or a list with one for each; left out, that of each run.
+    mass_correlation : float
+        Of the errors of two bobs' masses, 0 to 1.
+    **how
+        As for :func:`analyse`.
+
+    Raises
+    ------
+    AnalysisError
+        If fewer than two runs are given, or one does not oscillate.
+    springmass.errors.ProgramError
+        If a scene gives no bob mass, or the scenes state different springs.
+    """
+    if len(sources) < 2:
+        raise AnalysisError(f"compare needs two runs at least, got {len(sources)}")
+    scenes = list(scene) if isinstance(scene, list | tuple) else [scene] * len(sources)
+    if len(scenes) != len(sources):
+        raise AnalysisError(
+            f"one scene for all runs or one for each was demanded, got {len(scenes)} for {len(sources)}"
+        )
+    each = [
+        one if isinstance(one, Analysis) else analyse(one, its, **how) for one, its in zip(sources, scenes, strict=True)
+    ]
+    runs = dict(zip(distinct_names([one.name or "run" for one in each]), each, strict=True))
+    demand_one_spring([(name, run.scene) for name, run in runs.items()])
+    found = compare_analysed([Analysed(name, run, {}) for name, run in runs.items()], mass_correlation=mass_correlation)
+    return Comparison(found.comparison, found.joint, found.findings, runs)
+
+
+def with_options(params: Params, options: Mapping[str, Mapping[str, Any]]) -> Params:
+    """Return options with single ones changed.
+
+    Parameters
+    ----------
+    params : Params
+    options : mapping
+        By stage, then by name.
+
+    Raises
+    ------
+    AnalysisError
+        If a stage or an option is not known.
+    """
+    for stage, changed in options.items():
+        stages = [each.name for each in fields(Params)]
+        if stage not in stages:
+            raise AnalysisError(f"options are of the stages {', '.join(stages)}; got {stage!r}")
+        now: Any = getattr(params, stage)
+        now = WaveformParams() if now is None else now
+        known = [each.name for each in fields(now)]
+        if unknown := [name for name in changed if name not in known]:
+            raise AnalysisError(f"{stage} has the options {', '.join(known)}; got {unknown[0]!r}")
+        with_them: Any = {stage: replace(now, **changed)}
+        params = replace(params, **with_them)
+    return params
+
+
+def track_of(source: Any) -> Track:
+    """Return the track of arrays, however they are held; see :func:`analyse`.
+
+    Parameters
+    ----------
+    source : Track, Dataset, DataArray, DataFrame, Series, mapping or pair
+
+    Raises
+    ------
+    TrackError
+        If it holds no times and distances.
+    """
+    if isinstance(source, Track):
+        return source
+    about: Mapping[str, Any] = getattr(source, "attrs", {})
+    flags = None
+    if hasattr(source, "keys") and "distance" in source:
+        y = source["distance"]
+        t = source["time"] if "time" in source else getattr(source, "index", None)
+        flags = source["quality"] if "quality" in source else None  # noqa: SIM401 - a frame's and a dataset's "in" are of columns
+    elif getattr(source, "ndim", None) == 1 and hasattr(source, "coords") and "time" in source.coords:
+        t, y = source.coords["time"], source
+    elif getattr(source, "ndim", None) == 1 and hasattr(source, "index"):
+        t, y = source.index, source
+    elif isinstance(source, list | tuple) and len(source) == 2:
+        t, y = source
+    else:
+        t = y = None
+    if t is None or y is None:
+        raise TrackError(
+            "a path, a run, a track, a pair (t, y), or a dataset, frame or mapping with time and distance was "
+            f"demanded, got a {type(source).__name__}"
+        )
+    of_y: Mapping[str, Any] = getattr(y, "attrs", {})
+    track = Track.from_arrays(
+        _seconds(t),
+        y,
+        flags=flags,
+        **{name: about[name] for name in ("rate_hz", "sigma_m", "quantum_m", "kind") if name in about},
+        quantity=of_y.get("quantity", "length"),
+        unit=of_y.get("units", "m"),
+    )
+    return replace(track, clock=getattr(t, "attrs", {}).get("clock", track.clock))
+
+
+def _seconds(t: Any) -> F8:
+    """Return times in s; of durations and dates those since the first."""
+    times = np.asarray(t)
+    if times.dtype.kind == "M":
+        times = times - times[0]
+    if times.dtype.kind == "m":
+        return np.asarray(times / np.timedelta64(1, "s"), np.float64)
+    return np.asarray(times, np.float64)
+
+
+def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:
+    """Return the laws asked for, ``...`` replaced by all that ship and are not named."""
+    if isinstance(wanted, str):
+        raise AnalysisError(f"laws must be a list of names and laws, got the text {wanted!r}")
+    named = [law for law in wanted if not isinstance(law, EllipsisType)]
+    for law in named:
+        find_law(law)
+    others = [name for name in LAWS if name not in named]
+    found: list[Any] = []
+    for each in wanted:
+        found += others if isinstance(each, EllipsisType) else [each]
+    return tuple(found)
+
+
+def _scene(given: Any, loaded: Loaded | None) -> Scene:
+    """Return the scene given, else the one beside a file, else the one inside it."""
+    if isinstance(given, Scene):
+        return given
+    if isinstance(given, Mapping):
+        return Scene.from_mapping(given)
+    if given is not None:
+        return read_scene(given)
+    if loaded is None:
+        return Scene()
+    return scene_beside(loaded.path) or Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")

@@ -1,0 +1,174 @@
+"""``springmass.analyse`` takes what a user has in hand, with scene, laws, range and options by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import springmass as sm
+from pipeline.analyse import Analysis as Found
+from pipeline.errors import AnalysisError, TrackError
+from springmass.errors import ProgramError
+
+
+def record(gamma: float = 0.05) -> tuple[Any, Any]:
+    """Return times and distances of a damped swing of 15 s."""
+    t = np.arange(1500) / 100
+    rng = np.random.default_rng(3)
+    return t, 0.2 + 0.05 * np.exp(-gamma * t) * np.cos(8.3 * t) + 1e-4 * rng.standard_normal(t.size)
+
+
+@pytest.fixture(scope="module")
+def damped_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a run file of the damped recording with its scene inside."""
+    data = sm.sample_data()
+    loaded = sm.load(data / "damped_simulated_position.txt")
+    scene = sm.read_scene(data / "damped.scene.toml").to_mapping()
+    path = tmp_path_factory.mktemp("runs") / "damped.h5"
+    return sm.write_run(path, [loaded.samples], loaded.info, scene=scene)
+
+
+def test_every_way_to_hand_over_arrays_gives_the_same_numbers() -> None:
+    """A pair, a track, a dataset, a data array, a frame, a series and a mapping, by name or by index."""
+    t, y = record()
+    expected = sm.analyse(sm.Track.from_arrays(t, y)).estimates
+    frame = pd.DataFrame({"time": t, "distance": y})
+    array = xr.DataArray(y, {"time": t}, ["time"], attrs={"units": "m"})
+    elapsed = pd.to_timedelta(t, unit="s")
+    for source in (
+        (t, y),
+        [t.tolist(), y.tolist()],
+        {"time": t, "distance": y},
+        frame,
+        frame.set_index("time"),
+        frame.set_index("time")["distance"],
+        array,
+        xr.Dataset({"distance": array}),
+    ):
+        assert sm.analyse(source).estimates == expected
+    for source in (pd.Series(y, elapsed), pd.Series(y, pd.Timestamp("2026-11-22") + elapsed)):
+        found = sm.analyse(source)["period"]
+        assert abs(found.value - expected["period"].value) < 1e-6 * found.value
+
+
+@pytest.mark.parametrize("source", [3.0, None, {"t": [0.0]}, np.zeros(5), ([0.0, 1.0],), pd.DataFrame({"x": [1.0]})])
+def test_what_holds_no_run_is_refused(source: Any) -> None:
+    """The error lists what is taken."""
+    with pytest.raises(TrackError, match=r"a path, a run, a track, a pair .* was demanded, got a"):
+        sm.analyse(source)
+
+
+def test_units_that_are_not_si_are_refused() -> None:
+    """A data array in centimetres is not taken for metres."""
+    t, y = record()
+    with pytest.raises(TrackError, match="got length in cm; convert to SI first"):
+        sm.analyse(xr.DataArray(100.0 * y, {"time": t}, ["time"], attrs={"units": "cm"}))
+
+
+def test_a_path_brings_what_its_reader_saw() -> None:
+    """Findings of reading stand among the analysis's, also where the file was loaded before."""
+    data = sm.sample_data()
+    path = data / "damped_simulated_position.txt"
+    found = sm.analyse(path, scene=data / "damped.scene.toml")
+    assert "stated_error_is_not_noise" in {finding.code for finding in found.findings}
+    assert found.name == path.name
+    again = sm.analyse(sm.load(path), sm.read_scene(data / "damped.scene.toml"))
+    assert again.estimates == found.estimates
+    assert isinstance(again, Found)
+
+
+def test_the_scene_is_given_or_beside_the_file_or_in_it(damped_run: Path, tmp_path: Path) -> None:
+    """In this order; a mapping is a scene too."""
+    inside = sm.analyse(damped_run)
+    assert inside["k"].value == pytest.approx(14.0, abs=0.05)
+    copy = tmp_path / "copy.h5"
+    copy.write_bytes(damped_run.read_bytes())
+    (tmp_path / "copy.about.toml").write_text("[scene.bob]\nmass_kg = 0.1\n")
+    assert sm.analyse(copy)["k"].value == pytest.approx(14.0 * 0.1 / 0.2213, rel=0.03)
+    assert sm.analyse(copy, {"bob": {"mass_kg": 0.4}})["k"].value > 20.0
+    (tmp_path / "copy.about.toml").write_text("[scene.bob]\nmass = 0.1\n")
+    with pytest.raises(ProgramError, match=r"copy\.about\.toml \[scene\].*mass"):
+        sm.analyse(copy)
+
+
+def test_laws_are_chosen_by_name_or_given() -> None:
+    """Of ``...`` all that ship are tried, each once; a law of one's own stands beside them."""
+    t, y = record()
+
+    def mine(t: Any, A0: float, c: float) -> Any:
+        return A0 * np.exp(-c * t)
+
+    law = sm.make_law("mine", mine, {"c": "1/s"}, sm.LAWS["linear"].guess)
+    assert list(sm.analyse((t, y), laws=["linear", "none"]).motion.damping.fits) == ["linear", "none"]
+    found = sm.analyse((t, y), laws=["linear", ..., law])
+    assert set(found.motion.damping.fits) == {*sm.LAWS, "mine"}
+    assert found["mine.c"].value == pytest.approx(found["linear.gamma"].value, rel=1e-5)
+    with pytest.raises(AnalysisError, match="got 'cubic'"):
+        sm.analyse((t, y), laws=["cubic"])
+    with pytest.raises(AnalysisError, match="a list of names and laws"):
+        sm.analyse((t, y), laws="linear")
+
+
+def test_range_accuracy_and_options_go_by_name() -> None:
+    """Seconds, tiers and single options of stages, and what is unknown lists what there is."""
+    t, y = record()
+    part = sm.analyse((t, y), from_s=5.0, to_s=12.0)
+    assert (part.track.t[0], part.track.t[-1]) == (5.0, 12.0)
+    assert sm.analyse((t, y), accuracy="best").params.full is not None
+    found = sm.analyse((t, y), options={"damping": {"evidence": 3.0}, "full": {}})
+    assert (found.params.damping.evidence, found.params.full is None) == (3.0, False)
+    with pytest.raises(ProgramError, match="the record: no sample lies between 50 and inf s; the record spans 0 to 14"):
+        sm.analyse((t, y), from_s=50.0)
+    with pytest.raises(AnalysisError, match=r"options are of the stages condition, .*; got 'damp'"):
+        sm.analyse((t, y), options={"damp": {}})
+    with pytest.raises(AnalysisError, match=r"damping has the options rejection, evidence, .*; got 'proof'"):
+        sm.analyse((t, y), options={"damping": {"proof": 1.0}})
+    with pytest.raises(AnalysisError, match="give one of the two"):
+        sm.analyse((t, y), params=sm.Params(), accuracy="fast")
+    with pytest.raises(TrackError, match="channel complete recordings named by a path, got a tuple"):
+        sm.analyse((t, y), channel="x")
+
+
+def test_a_run_is_opened_cut_and_analysed(damped_run: Path) -> None:
+    """By ``sel`` in time, as a dataset, and analysed with the scene of the file."""
+    with sm.open_run(damped_run) as run:
+        whole = run.analyse()
+        part = run.sel(time=slice(5, 60))
+        found = part.analyse(laws=["linear", "quadratic", "linear+quadratic"])
+        dataset = part.dataset().load()
+        assert sm.analyse(run).estimates == whole.estimates
+        assert sm.analyse(run.load_dataset(), scene=run.scene)["period"].value == pytest.approx(whole["T"].value)
+        with pytest.raises(ValueError, match="without a step"):
+            run.sel(time=slice(0, 1, 2))
+    assert (float(dataset.time[0]), float(dataset.time[-1])) == (5.0, 60.0)
+    assert (found.track.t[0], found.track.t[-1]) == (5.0, 60.0)
+    assert found["amplitude"].value < whole["amplitude"].value
+    assert found["k"].value == pytest.approx(whole["k"].value, rel=1e-3)
+
+
+def test_runs_are_compared(damped_run: Path) -> None:
+    """Paths and analyses together, with a scene for each or their own."""
+    data = sm.sample_data()
+    scene = sm.read_scene(data / "undamped.scene.toml")
+    undamped = sm.analyse(data / "undamped_simulated_position.txt", scene)
+    found = sm.compare([undamped, damped_run])
+    frame = found.to_dataframe()
+    assert list(frame.index) == ["undamped_simulated_position", "damped", "together"]
+    assert found.comparison.agree
+    assert frame.loc["together", "spring_constant"] == found.comparison.spring_constant.value
+    assert frame.loc["damped", "period"] == found.runs["damped"]["period"].value
+    assert "agree on k = 14.00" in repr(found)
+    heavier = {"bob": {"mass_kg": 0.3}, "spring": {"mass_kg": {"value": 0.01, "u": 0.0005}}}
+    other = sm.compare([undamped, undamped.track], [None, heavier])
+    assert list(other.runs) == ["undamped_simulated_position", "run"]
+    assert not other.comparison.agree
+    assert np.isnan(other.to_dataframe().loc["together", "spring_constant"])
+    with pytest.raises(AnalysisError, match="two runs at least, got 1"):
+        sm.compare([undamped])
+    with pytest.raises(AnalysisError, match="one for each was demanded, got 3 for 2"):
+        sm.compare([undamped, undamped], [scene] * 3)
