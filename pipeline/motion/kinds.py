@@ -26,6 +26,7 @@ from pipeline.oscillation.demodulate import Demodulated, demodulate
 from pipeline.oscillation.demodulate import Params as DemodulateParams
 from pipeline.oscillation.disturbances import Disturbances, separate
 from pipeline.oscillation.disturbances import Params as DisturbancesParams
+from pipeline.oscillation.kinks import find_kink
 from pipeline.oscillation.rows import are_interleaved
 from pipeline.oscillation.segments import Params as SegmentsParams
 from pipeline.oscillation.segments import Segments, Span, find_segments
@@ -142,7 +143,7 @@ def see_windows(
         return seen
     demodulated = demodulate(conditioned, seen, demodulation)
     for _ in range(ROUNDS):
-        found = find_segments(conditioned, seen, demodulated, segmentation)
+        found = find_segments(conditioned, seen, demodulated, segmentation) or find_kink(demodulated)
         if found is None:
             break
         # Once more without the rest, which may have hidden the period, the plateaus and the noise of this part.

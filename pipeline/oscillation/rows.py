@@ -14,6 +14,7 @@ SIGMAS = 8.0  # of the noise that a step between rows must have to be told from 
 ALIKE = 0.7  # correlation of what alternates, from row to row
 LEAST = 64  # rows
 LEAST_SHARE = 0.015  # of the rows
+MANY = 0.1  # of the rows: so many that the steps around are often two at once themselves
 SLOW = 0.25  # of the fastest steps: below, near a turning point, a lost row is no more than noise
 MOST = 5.0  # steps at once: more are no rows lost but something else
 
@@ -40,9 +41,10 @@ def count_lost(conditioned: Conditioned) -> int:
 
     Notes
     -----
-    Where a row is missing the distance makes two steps at once: twice the lesser of the middle two of the steps
-    around, which is a single one unless three of the four are not. Where times jitter, or values are held, as many
-    steps are too short. The noise is that near the turning points, where a lost row moves little.
+    Where a row is missing the distance makes two steps at once: twice the median of the two before and the two after.
+    Where every fifth row and more is missing, that median is often of two steps itself, and the lesser of the middle
+    two of the four is taken. Where times jitter, or values are held, as many steps are too short. The noise is that
+    near the turning points, where a lost row moves little.
     """
     track, used = conditioned.track, conditioned.used
     step: F8 = np.diff(track.y)
@@ -50,19 +52,19 @@ def count_lost(conditioned: Conditioned) -> int:
     if step.size < LEAST:
         return 0
     four = np.sort([step[:-4], step[1:-3], step[3:-1], step[4:]], axis=0)
-    around = np.where(four.sum(axis=0) > 0.0, four[1], four[2])
     whole = np.logical_and.reduce([sound[k : sound.size - 4 + k] for k in range(5)])
     if not whole.any():
         return 0
-    size = np.abs(around)
-    fast = float(np.quantile(size[whole], 0.9))
-    slow = np.diff(step, 3)[:-1][whole & (size < SLOW * fast)]
+    median, lesser = 0.5 * (four[1] + four[2]), np.where(four.sum(axis=0) > 0.0, four[1], four[2])
+    fast = float(np.quantile(np.abs(median[whole]), 0.9))
+    slow = np.diff(step, 3)[:-1][whole & (np.abs(median) < SLOW * fast)]
     noise_m = float(mad_sigma(slow) / FOURTH_DIFFERENCE_GAIN) if slow.size >= LEAST else conditioned.noise_m
-    clear = whole & (size > np.maximum(SIGMAS * noise_m, 0.5 * fast))
-    ratio = step[2:-2][clear] / around[clear]
-    many = np.where(ratio < MOST, np.rint(np.maximum(ratio - 0.1, 1.0)) - 1.0, 0.0)
-    lost, short = np.count_nonzero(many), np.count_nonzero(ratio < 0.4)
-    # Only in the fast part of a period are two steps told from one.
-    if lost >= max(8, LEAST_SHARE * ratio.size) and lost > 3 * short:
-        return round(float(many.mean()) * track.y.size)
+    for around, least, times in ((lesser, MANY, 3), (median, LEAST_SHARE, 5)):
+        clear = whole & (np.abs(around) > np.maximum(SIGMAS * noise_m, 0.5 * fast))
+        ratio = step[2:-2][clear] / around[clear]
+        # Only in the fast part of a period are two steps told from one.
+        many = np.where(ratio < MOST, np.rint(np.maximum(ratio - 0.1, 1.0)) - 1.0, 0.0)
+        lost, short = np.count_nonzero(many), np.count_nonzero(ratio < 0.4)
+        if lost >= max(5, least * ratio.size) and lost > times * short:
+            return round(float(many.mean()) * track.y.size)
     return 0
