@@ -12,7 +12,6 @@ from pipeline.damping.evidence import choose, least_chi2, weigh
 from pipeline.damping.law_fit import LawFit, Minimum, mean_squared_rate, minimum_of
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError
-from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Scatter, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
@@ -104,25 +103,6 @@ class Damping:
         drag, to second order in the damping for the others.
         """
         return mean_squared_rate(self.best, self.best.amplitude(t - self.t0))
-
-    def averaged(self, values: Mapping[str, Estimate]) -> Estimate:
-        """Return the selected law's value of a quantity, its uncertainty widened by what admissible laws differ.
-
-        Parameters
-        ----------
-        values : mapping of law name to Estimate
-            Of the laws :attr:`considered` at least.
-
-        Notes
-        -----
-        :math:`u^2 = u_s^2 + \\sum_i w_i (x_i - x_s)^2` with weights :math:`w_i \\propto e^{-\\Delta\\mathrm{BIC}_i/2}`.
-        """
-        chosen = values[self.selected]
-        names = self.admissible or (self.selected,)
-        weights = np.exp([-0.5 * (self.fits[name].bic - self.best.bic) for name in names])
-        spread = np.array([(values[name].value - chosen.value) ** 2 for name in names])
-        variance = chosen.u**2 + float(np.sum(weights * spread) / np.sum(weights))
-        return Estimate(chosen.value, math.sqrt(variance), chosen.unit)
 
 
 def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = None) -> Damping:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.damping.average import Weighted
 from pipeline.damping.select import Damping, LawFit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import solve_weighted
@@ -45,7 +47,7 @@ class Curve:
 
 
 def energy_curve(
-    damping: Damping, demodulated: Demodulated, factor: Estimate, weights: Mapping[str, float], unit: str
+    damping: Damping, demodulated: Demodulated, factor: Estimate, laws: Sequence[Weighted], unit: str
 ) -> Curve:
     """Return the mechanical energy :math:`E = \\frac12 m\\omega^2 A^2` against time.
 
@@ -55,25 +57,26 @@ def energy_curve(
     demodulated : Demodulated
     factor : Estimate
         :math:`\\frac12 m\\omega^2`, the scale's square included.
-    weights : mapping of str to float
-        Of the other admissible laws.
+    laws : sequence of Weighted
+        What the band is made of.
     unit : str
         "J", or "J/kg" where no mass is known.
 
     Notes
     -----
-    :math:`u^2(E) = (2 E\\,u(A)/A)^2 + (E\\,u_F/F)^2`, with the covariance of the law's parameters in u(A) and what the
-    admissible laws differ by.
+    :math:`u^2(E) = \\sum_i w_i[(2 E_i\\,u(A_i)/A_i)^2 + (E_i - E)^2] + (E\\,u_F/F)^2` over the laws of which the
+    amplitude is stated; E itself is the selected one's.
     """
     t = demodulated.t
     x = np.linspace(damping.t0, float(t[-1]), POINTS)
     best = damping.best
     amplitude = best.amplitude(x - damping.t0)
     energy = factor.value * amplitude**2
-    variance = (2.0 * factor.value * amplitude * best.u_amplitude(x - damping.t0)) ** 2
-    variance += (energy * factor.u / factor.value) ** 2
-    for name, weight in weights.items():
-        variance += weight * (factor.value * damping.fits[name].amplitude(x - damping.t0) ** 2 - energy) ** 2
+    variance = (energy * factor.u / factor.value) ** 2
+    for one in laws:
+        other = one.fit.amplitude(x - damping.t0)
+        own = 2.0 * factor.value * other * one.fit.u_amplitude(x - damping.t0)
+        variance += one.weight * (own**2 + (factor.value * other**2 - energy) ** 2)
     points = factor.value * demodulated.amplitude**2
     return Curve(
         x,
@@ -86,9 +89,7 @@ def energy_curve(
     )
 
 
-def drag_curve(
-    damping: Damping, demodulated: Demodulated, factor: Estimate, weights: Mapping[str, float]
-) -> Curve | None:
+def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, laws: Sequence[Weighted]) -> Curve | None:
     """Return the drag coefficient against amplitude; None where the amplitude does not fall.
 
     Parameters
@@ -97,8 +98,8 @@ def drag_curve(
     demodulated : Demodulated
     factor : Estimate
         :math:`F = 3\\pi m/(2\\omega\\rho S)`, m.
-    weights : mapping of str to float
-        Of the other admissible laws.
+    laws : sequence of Weighted
+        What the band is made of.
 
     Notes
     -----
@@ -119,12 +120,11 @@ def drag_curve(
         return factor.value * (fit.law.rate(x, theta) - _friction(fit, theta)) / x**2
 
     y = coefficient(best, best.joint.values)
-    gradient = best.by_parameters(lambda theta: coefficient(best, theta))
-    variance = np.einsum("in,ij,jn->n", gradient, best.joint.covariance, gradient)
-    variance = np.maximum(variance, 0.0) + (y * factor.u / factor.value) ** 2
-    for name, weight in weights.items():
-        other = damping.fits[name]
-        variance += weight * (coefficient(other, other.joint.values) - y) ** 2
+    variance = (y * factor.u / factor.value) ** 2
+    for fit, weight in ((one.fit, one.weight) for one in laws):
+        gradient = fit.by_parameters(functools.partial(coefficient, fit))
+        own = np.einsum("in,ij,jn->n", gradient, fit.joint.covariance, gradient)
+        variance += weight * (np.maximum(own, 0.0) + (coefficient(fit, fit.joint.values) - y) ** 2)
     return Curve(x, y, np.sqrt(variance), "", *_local_drag(damping, demodulated, factor.value))
 
 

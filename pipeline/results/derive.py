@@ -15,7 +15,8 @@ from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.checks.finding import Misfit
-from pipeline.damping.law_fit import mean_squared_rate
+from pipeline.damping.average import Weighted, average_over_laws
+from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.waveform import Rest
@@ -60,11 +61,12 @@ class Derived:
     estimates : mapping of str to Estimate
         With every known contribution to the uncertainty, the clock's and the scale's among them.
     coefficients : mapping of str to Estimate
-        The selected law's parameters with every known contribution.
+        Of linear and quadratic drag, whichever of its terms show, where the record allows it; else of the selected
+        law. With every known contribution.
     budgets : mapping of str to Budget
         Of every estimate and coefficient: which input contributes what.
-    law_weights : mapping of str to float
-        Of the admissible laws other than the selected one; with that one's they add up to 1.
+    laws : tuple of Weighted
+        The laws by which amplitude and damping rate are stated; the coefficients are the first one's.
     parts : mapping of str to (variable, str)
         What the properties below are read from, with units; absent where the scene does not give it.
     """
@@ -72,7 +74,7 @@ class Derived:
     estimates: Mapping[str, Estimate]
     coefficients: Mapping[str, Estimate]
     budgets: Mapping[str, Budget]
-    law_weights: Mapping[str, float]
+    laws: tuple[Weighted, ...]
     parts: Mapping[str, tuple[Any, str]]
 
     @cached_property
@@ -133,7 +135,7 @@ class Derived:
         unit = "J/kg" if self.effective_mass_kg is None else "J"
         if self.half_stiffness is None:
             return None
-        return energy_curve(damping, demodulated, self.half_stiffness, self.law_weights, unit)
+        return energy_curve(damping, demodulated, self.half_stiffness, self.laws, unit)
 
     def drag_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
         """Return the drag coefficient against amplitude with its band; None where the scene or the record gives none.
@@ -146,7 +148,7 @@ class Derived:
         """
         if self.drag_length is None:
             return None
-        return drag_curve(damping, demodulated, self.drag_length, self.law_weights)
+        return drag_curve(damping, demodulated, self.drag_length, self.laws)
 
 
 def derive(
@@ -193,8 +195,8 @@ def derive(
     :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
     Of an acceleration of amplitude a the displacement's is :math:`a/(\\omega^2 + \\lambda^2)`, and with it everything
     that needs a length; of angles, voltages and forces no such thing is given. The spring constant needs none.
-    What depends on the damping law carries the covariance of the selected law's parameters, and beside it what the
-    admissible laws differ by: :math:`\\sum_i w_i (x_i - x)^2` with :math:`w_i \\propto e^{-\\mathrm{BIC}_i/2}`.
+    What depends on the damping law is an average over laws (:func:`pipeline.damping.average.average_over_laws`):
+    :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
 
     References
     ----------
@@ -204,7 +206,7 @@ def derive(
     params = params or Params()
     inputs = Inputs()
     ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
-    laws = _Laws(damping, inputs, demodulated.t - damping.t0)
+    laws = _Laws(damping, inputs, demodulated)
     amiss = _Amiss(misfits, inputs)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
     unit = rest.mean.unit
@@ -214,10 +216,10 @@ def derive(
     free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
     omega = slope * rate
-    lengths = scale * amiss.over("amplitude", laws.best.joint.values[0])
-    rates = rate * amiss.over("damping_rate", laws.rate)
-    start = laws.start() * lengths
-    lam = laws.rate_at_start() * rates
+    lengths = scale * amiss.over("amplitude", laws.values[0])
+    rates = rate * amiss.over("damping_rate", laws.values[1])
+    start = laws.start * lengths
+    lam = laws.rate_at_start * rates
     natural = omega**2 + laws.squared_rate * rate**2
     # How large the displacement is where the recorded value is 1; nobody knows of a voltage or a force.
     displacement = {"m": 1.0, "m/s^2": 1.0 / natural}.get(unit)
@@ -237,11 +239,11 @@ def derive(
     if unit == "m/s^2":
         found["displacement_amplitude"] = (start / (omega**2 + lam**2), "m")
     if (per_value := 1.0 if unit == "rad" else displacement) is not None:
-        v_rms = omega * lengths * laws.root_mean_square() * per_value
+        v_rms = omega * lengths * laws.root_mean_square * per_value
         found["velocity_rms"] = (v_rms, "rad/s" if unit == "rad" else "m/s")
-    if laws.rate > 0:
+    if laws.values[1] > 0:
         found["quality_factor"] = (0.5 * omega / lam, "")
-    coefficients = _coefficients(damping, laws, rates, lengths)
+    coefficients = _coefficients(laws, rates, lengths)
     diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
@@ -265,14 +267,14 @@ def derive(
             # C over beta; the area, the mass and the density are in it once.
             over_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
             parts["drag_length"] = over_beta * rate / scale, unit
-            if damping.settled and "beta" in coefficients:
+            if damping.settled and "beta" in damping.best.joint.names:
                 found["drag_coefficient"] = (over_beta * coefficients["beta"][0], "")
     budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
     return Derived(
         estimates={name: budgets[name].estimate for name in found},
         coefficients={name: budgets[name].estimate for name in coefficients},
         budgets=budgets,
-        law_weights=laws.weights,
+        laws=laws.weighted,
         parts=parts,
     )
 
@@ -303,48 +305,39 @@ class _Amiss:
 
 
 class _Laws:
-    """The damping laws as inputs: the selected one's parameters, and what the other admissible ones say instead."""
+    """What depends on the damping law, as inputs: amplitude and rate at the start, displacement, coefficients."""
 
-    def __init__(self, damping: Damping, inputs: Inputs, elapsed: F8) -> None:
-        self.best = damping.best
-        self.variables = inputs.add_joint("damping_law", self.best.joint, "A", self.best.dof)
-        names = damping.admissible or (damping.selected,)
-        odds = {name: math.exp(-0.5 * (damping.fits[name].bic - self.best.bic)) for name in names}
-        total = sum(odds.values())
-        self.weights = {name: x / total for name, x in odds.items() if name != damping.selected}
-        alternatives = inputs.add_alternatives("choice_of_law", self.weights, "A")
-        self.choices = list(alternatives.values())
-        self.fits = (self.best, *(damping.fits[name] for name in alternatives))
-        self.rate = self.best.rate_at_start()
-        self.amplitude, self.jacobian = self.best.law.both(elapsed, self.best.joint.values)
-        each = (self.amplitude, *(fit.amplitude(elapsed) for fit in self.fits[1:]))
-        self.sizes = [math.sqrt(float(amplitude @ amplitude) / (2.0 * elapsed.size)) for amplitude in each]
+    def __init__(self, damping: Damping, inputs: Inputs, demodulated: Demodulated) -> None:
+        elapsed, best = demodulated.t - damping.t0, damping.best
+        self.weighted = average_over_laws(damping, math.sqrt(float(np.mean(demodulated.amplitude**2))))
+        self.stated = self.weighted[0].fit
+        self.squared_rate = mean_squared_rate(best, best.amplitude(elapsed))
+        each = [_of_law(one.fit, elapsed) for one in self.weighted]
+        weights = np.array([one.weight for one in self.weighted])
+        self.values: F8 = weights @ np.array([values for values, _ in each])
+        self.variables = inputs.add_joint("damping_law", self.stated.joint, "A", self.stated.dof)
+        departures = [x - value for x, value in zip(self.variables, self.stated.joint.values.tolist(), strict=True)]
+        slopes = math.sqrt(weights[0]) * each[0][1]
+        quantities = self.values + slopes @ np.array(departures)
+        if weights.size > 1:
+            covariance = np.zeros((3, 3))
+            for (values, by_parameters), one in zip(each, self.weighted, strict=True):
+                covariance += one.weight * np.outer(values - self.values, values - self.values)
+                if one.fit is not self.stated:
+                    covariance += one.weight * by_parameters @ one.fit.joint.covariance @ by_parameters.T
+            joint = Joint(("amplitude", "damping_rate", "displacement"), np.zeros(3), covariance, ("m", "1/s", "m"))
+            quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))
+        self.start, self.rate_at_start, self.root_mean_square = quantities.tolist()
 
-    def start(self) -> Any:
-        """Return the amplitude at the first sample as a variable, m."""
-        slopes = [1.0] + [0.0] * (self.best.joint.values.size - 1)
-        return self._quantity(slopes, [float(fit.joint.values[0]) for fit in self.fits])
 
-    def rate_at_start(self) -> Any:
-        """Return the logarithmic rate of the amplitude there as a variable, 1/s."""
-        others = [fit.rate_at_start() for fit in self.fits[1:]]
-        return self._quantity(self.best.slopes_of_rate().tolist(), [self.rate, *others])
-
-    def root_mean_square(self) -> Any:
-        """Return that of the displacement over the windows as a variable, m."""
-        power = 2.0 * self.amplitude.size * self.sizes[0]
-        return self._quantity((self.amplitude @ self.jacobian / max(power, 1e-300)).tolist(), self.sizes)
-
-    @property
-    def squared_rate(self) -> float:
-        """As :meth:`pipeline.damping.select.Damping.squared_rate` over the windows, 1/s^2."""
-        return mean_squared_rate(self.best, self.amplitude)
-
-    def _quantity(self, slopes: list[float], values: list[float]) -> Any:
-        """A quantity's value under each law as one variable: linear in the selected law's parameters."""
-        departures = [x - value for x, value in zip(self.variables, self.best.joint.values.tolist(), strict=True)]
-        moved = sum(slope * x for slope, x in zip(slopes, departures, strict=True))
-        return values[0] + moved + sum((x - values[0]) * z for x, z in zip(values[1:], self.choices, strict=True))
+def _of_law(fit: LawFit, elapsed: F8) -> tuple[F8, F8]:
+    """Amplitude and its rate at the start and the rms displacement over the windows, (3,), and their slopes (3, p)."""
+    amplitude, jacobian = fit.law.both(elapsed, fit.joint.values)
+    size = math.sqrt(float(amplitude @ amplitude) / (2.0 * elapsed.size))
+    by_size = amplitude @ jacobian / max(2.0 * elapsed.size * size, 1e-300)
+    by_start = np.eye(1, fit.joint.values.size)[0]
+    values = np.array([fit.joint.values[0], fit.rate_at_start(), size])
+    return values, np.stack([by_start, fit.slopes_of_rate(), by_size])
 
 
 def _start_phase(phase: PhaseFit, slope: Any, inputs: Inputs, dof: float) -> Any:
@@ -357,11 +350,11 @@ def _start_phase(phase: PhaseFit, slope: Any, inputs: Inputs, dof: float) -> Any
     return inputs.add("phase", Estimate(at_start.value, own, at_start.unit), "A", dof) + way * (slope - omega.value)
 
 
-def _coefficients(damping: Damping, laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
-    """The selected law's parameters in true seconds and metres."""
-    joint = damping.best.joint
+def _coefficients(laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
+    """The stated law's parameters in true seconds and metres."""
+    joint = laws.stated.joint
     found: dict[str, tuple[Any, str]] = {}
-    dimensions = {**_DIMENSIONS, **getattr(damping.best.law, "dimensions", {})}  # a function's law states its own
+    dimensions = {**_DIMENSIONS, **getattr(laws.stated.law, "dimensions", {})}  # a function's law states its own
     for name, unit, x in zip(joint.names, joint.units, laws.variables, strict=True):
         if name in dimensions and name != "A0":
             length, per_time = dimensions[name]

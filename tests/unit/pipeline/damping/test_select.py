@@ -10,7 +10,6 @@ import pytest
 
 from pipeline.damping.laws import LAWS
 from pipeline.damping.select import Damping, Params, fit_damping
-from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
@@ -176,18 +175,6 @@ def test_uncertainty_of_the_curve(synthetic: ModuleType, windows: Windows) -> No
     fits = [fitted(windows, noisy(clean, 1e-4, s), 1e-4).fits["linear+quadratic"] for s in range(200)]
     spread = np.std([f.amplitude(at) for f in fits], axis=0)
     np.testing.assert_allclose(fits[0].u_amplitude(at), spread, rtol=0.2)
-
-
-def test_laws_that_differ_widen_the_average(synthetic: ModuleType, windows: Windows) -> None:
-    """Between admissible laws the selected one's value stands and its uncertainty covers the others'."""
-    t = T[:13]
-    found = fitted(windows, noisy(synthetic.Truth(gamma=0.003).amplitude_at(t), 5e-5, 1), 5e-5, t)
-    values = {n: Estimate(1.0 if n == found.selected else 2.0, 0.1, "m") for n in found.fits}
-    averaged = found.averaged(values)
-    assert (averaged.value, averaged.unit) == (1.0, "m")
-    assert 0.1 < averaged.u <= 1.005
-    same = found.averaged({n: Estimate(1.0, 0.1, "m") for n in found.fits})
-    assert same.u == pytest.approx(0.1)
 
 
 def test_perfect_points_are_no_division_by_nothing(synthetic: ModuleType, windows: Windows) -> None:

@@ -173,9 +173,9 @@ def humid_air(celsius: np.ndarray, pascal: np.ndarray, humidity: np.ndarray) -> 
 def test_propagation_against_monte_carlo(windows: Windows) -> None:
     """200,000 draws of all inputs through the model give the same u of every result, to 1.5 %, and the same value."""
     result, points = derived(windows, SCENE)
-    assert not result.law_weights  # one admissible law: nothing but a normal distribution is drawn
     damping = fit_damping(points, 0.0)
-    joint, rng, n = damping.best.joint, np.random.default_rng(20240401), 200_000
+    (stated,) = result.laws  # one admissible law: nothing but a normal distribution is drawn
+    joint, rng, n = stated.fit.joint, np.random.default_rng(20240401), 200_000
     assert joint.names == ("A0", "gamma", "beta")
     start, gamma, beta = rng.multivariate_normal(joint.values, joint.covariance, n).T
     omega = fit_phase(points, damping).angular_frequency
@@ -213,17 +213,38 @@ def test_propagation_against_monte_carlo(windows: Windows) -> None:
         assert abs(found.value - float(np.mean(sample))) < 0.02 * found.u, name
 
 
-def test_choice_of_law_widens_by_what_admissible_laws_say(windows: Windows) -> None:
-    """Ten periods admit several laws: u^2 of the damping rate exceeds the covariance's by sum w (x_i - x)^2."""
-    result, points = derived(windows, {}, periods=10)
+def test_rate_is_the_average_over_laws(windows: Windows) -> None:
+    """x = sum w_i x_i, u^2 = sum w_i (u_i^2 + (x_i - x)^2): of the stated law one line, of the others another."""
+    result, points = derived(windows, {}, periods=40)
     damping = fit_damping(points, 0.0)
     assert len(damping.admissible) > 1
+    weights, rates = zip(*((one.weight, one.fit.damping_rate()) for one in result.laws), strict=True)
+    mean = sum(w * rate.value for w, rate in zip(weights, rates, strict=True))
+    whole = sum(w * (rate.u**2 + (rate.value - mean) ** 2) for w, rate in zip(weights, rates, strict=True))
     budget = result.budgets["damping_rate"]
-    rates = {name: damping.fits[name].damping_rate().value for name in damping.admissible}
-    odds = {name: math.exp(-0.5 * (damping.fits[name].bic - damping.best.bic)) for name in damping.admissible}
-    spread = sum(odds[name] * (rates[name] - rates[damping.selected]) ** 2 for name in odds) / sum(odds.values())
-    assert part(budget, "choice_of_law") == pytest.approx(math.sqrt(spread), rel=1e-6)
-    assert part(budget, "damping_law") == pytest.approx(damping.best.damping_rate().u, rel=1e-4)
+    assert budget.estimate.value == pytest.approx(mean, rel=1e-9)
+    assert part(budget, "damping_law") == pytest.approx(math.sqrt(weights[0]) * rates[0].u, rel=1e-4)
+    assert math.hypot(part(budget, "damping_law"), part(budget, "choice_of_law")) == pytest.approx(
+        math.sqrt(whole), rel=1e-4
+    )
+
+
+def test_coefficients_are_those_of_both_drags_where_one_alone_is_selected(windows: Windows) -> None:
+    """Of a lone exponential that is selected the other term stands beside gamma, and gamma's u holds it."""
+    t = 0.4 + 0.785 * np.arange(60)
+    noise = np.random.default_rng(6).normal(0.0, 2e-5, t.size)
+    points = windows(t, START * np.exp(-0.01 * t) + noise, omega=OMEGA, phase=OMEGA * t, u=(2e-5, 4e-4, 2e-5))
+    damping = fit_damping(points, 0.0)
+    assert damping.selected == "linear"
+    phase, rest = fit_phase(points, damping), fit_rest(points)
+    result = derive(points, damping, phase, rest, Scene.from_mapping(SCENE), (), instrument=NOMINAL)
+    gamma, beta = result.coefficients["gamma"], result.coefficients["beta"]
+    assert abs(beta.value) < 3.0 * beta.u
+    assert gamma.u > 3.0 * damping.best.joint["gamma"].u
+    # What users calculate from them knows how they hang together.
+    together = gamma.ufloat + beta.ufloat * result.estimates["amplitude"].ufloat
+    assert together.std_dev < 0.5 * gamma.u
+    assert "drag_coefficient" not in result.estimates
 
 
 def test_a_power_law_has_its_budget_too(windows: Windows) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 
+from pipeline.damping.average import Weighted
 from pipeline.damping.select import fit_damping
 from pipeline.numerics.estimate import Estimate
 from pipeline.oscillation.demodulate import Demodulated
@@ -30,7 +31,7 @@ def test_drag_falls_with_amplitude_as_mixed_drag_does(windows: Windows) -> None:
     """C(A) = F (gamma/A + beta) lies in the band nearly everywhere, and so do the stretches about their own scatter."""
     points = mixed(windows)
     damping = fit_damping(points, 0.0)
-    curve = drag_curve(damping, points, Estimate(13.0, 0.05), {})
+    curve = drag_curve(damping, points, Estimate(13.0, 0.05), (Weighted(damping.best, 1.0),))
     assert curve is not None
     truth = 13.0 * (GAMMA / curve.x + BETA)
     assert np.all(np.abs(curve.y - truth) < 3.0 * curve.u)
@@ -45,7 +46,7 @@ def test_drag_band_by_hand(windows: Windows) -> None:
     """u^2(C) = F^2 (u^2(gamma)/A^2 + u^2(beta) + 2 cov/A) + (C u(F)/F)^2."""
     points = mixed(windows)
     damping = fit_damping(points, 0.0)
-    curve = drag_curve(damping, points, Estimate(13.0, 0.05), {})
+    curve = drag_curve(damping, points, Estimate(13.0, 0.05), (Weighted(damping.best, 1.0),))
     assert curve is not None
     v = damping.best.joint.covariance
     expected = 169.0 * (v[1, 1] / curve.x**2 + v[2, 2] + 2 * v[1, 2] / curve.x) + (curve.y * 0.05 / 13.0) ** 2
@@ -53,26 +54,29 @@ def test_drag_band_by_hand(windows: Windows) -> None:
 
 
 def test_other_admissible_laws_widen_the_bands(windows: Windows) -> None:
-    """With a weight of a quarter on the exponential the band holds a quarter of the squared difference more."""
+    """With a weight of a quarter on another law the band holds a quarter of its variance and squared difference."""
     points = mixed(windows, periods=40)
     damping = fit_damping(points, 0.0)
     other = next(name for name in ("linear", "quadratic") if name != damping.selected)
-    for make in (
-        lambda weights: energy_curve(damping, points, Estimate(7.0, 0.0), weights, "J"),
-        lambda weights: drag_curve(damping, points, Estimate(13.0, 0.0), weights),
-    ):
-        alone, with_other = make({}), make({other: 0.25})
-        assert alone is not None
-        assert with_other is not None
-        added = with_other.u**2 - alone.u**2
-        assert np.all(added >= -1e-18)
-        assert np.max(added) > 0
-    fit, best = damping.fits[other], damping.best
+    best, fit = damping.best, damping.fits[other]
+    shared = (Weighted(best, 0.75), Weighted(fit, 0.25))
+
+    def drag(laws: Sequence[Weighted]) -> np.ndarray:
+        curve = drag_curve(damping, points, Estimate(13.0, 0.0), laws)
+        assert curve is not None
+        return curve.u
+
+    # A band about the selected law's curve holds the other's own variance and the difference.
+    x = np.geomspace(*np.sort(best.amplitude(points.t))[[0, -1]], 200)
+    (rate, _), (other_rate, u) = best.rates(x), fit.rates(x)
+    expected = 0.75 * drag([Weighted(best, 1.0)]) ** 2 + 0.25 * (13.0 / x**2) ** 2 * (u**2 + (other_rate - rate) ** 2)
+    np.testing.assert_allclose(drag(shared) ** 2, expected, rtol=1e-4)
     times = alone_energy(damping, points)
-    difference = 7.0 * (fit.amplitude(times) ** 2 - best.amplitude(times) ** 2)
-    wide = energy_curve(damping, points, Estimate(7.0, 0.0), {other: 0.25}, "J")
-    narrow = energy_curve(damping, points, Estimate(7.0, 0.0), {}, "J")
-    np.testing.assert_allclose(wide.u**2 - narrow.u**2, 0.25 * difference**2, atol=1e-18)
+    one, two = (7.0 * law.amplitude(times) ** 2 for law in (best, fit))
+    own = [(14.0 * law.amplitude(times) * law.u_amplitude(times)) ** 2 for law in (best, fit)]
+    curve = energy_curve(damping, points, Estimate(7.0, 0.0), shared, "J")
+    np.testing.assert_allclose(curve.u**2, 0.75 * own[0] + 0.25 * (own[1] + (two - one) ** 2), rtol=1e-9)
+    np.testing.assert_array_equal(curve.y, one)
 
 
 def alone_energy(damping: object, points: Demodulated) -> np.ndarray:
@@ -84,7 +88,7 @@ def test_energy_and_its_band_by_hand(windows: Windows) -> None:
     """E = F A^2 and u^2 = (2 F A u(A))^2 + (A^2 u(F))^2; a mass wrong by 1 % moves the whole curve by 1 %."""
     points = mixed(windows)
     damping = fit_damping(points, 0.0)
-    curve = energy_curve(damping, points, Estimate(7.0, 0.07), {}, "J")
+    curve = energy_curve(damping, points, Estimate(7.0, 0.07), (Weighted(damping.best, 1.0),), "J")
     amplitude, u = damping.best.amplitude(curve.x), damping.best.u_amplitude(curve.x)
     np.testing.assert_allclose(curve.y, 7.0 * amplitude**2, rtol=1e-12)
     np.testing.assert_allclose(curve.u**2, (14.0 * amplitude * u) ** 2 + (0.07 * amplitude**2) ** 2, rtol=1e-9)
@@ -104,7 +108,7 @@ def test_bands_hold_the_truth_as_often_as_they_say(windows: Windows) -> None:
         damping = fit_damping(points, 0.0)
         if damping.selected != "linear+quadratic":
             continue
-        curve = drag_curve(damping, points, Estimate(13.0, 0.0), {})
+        curve = drag_curve(damping, points, Estimate(13.0, 0.0), (Weighted(damping.best, 1.0),))
         assert curve is not None
         inside.append(np.abs(curve.y - 13.0 * (GAMMA / curve.x + BETA))[[20, 100, 180]] < curve.u[[20, 100, 180]])
     assert len(inside) > 190
@@ -118,4 +122,4 @@ def test_no_damping_gives_no_drag(windows: Windows) -> None:
     points = windows(t, START, omega=OMEGA, phase=OMEGA * t, u=(2e-5, 4e-4, 2e-5))
     damping = fit_damping(points, 0.0)
     assert damping.selected == "none"
-    assert drag_curve(damping, points, Estimate(13.0, 0.05), {}) is None
+    assert drag_curve(damping, points, Estimate(13.0, 0.05), (Weighted(damping.best, 1.0),)) is None

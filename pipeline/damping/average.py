@@ -1,0 +1,109 @@
+"""Averages over laws: amplitude and damping rate where a record cannot tell which law it follows.
+
+Kept by hand: averages by an information criterion alone take a lone term where the other one is there and merely too
+small to show, and state an interval that misses it. Here drag between friction and quadratic is one family, its
+curvature known beforehand to within what any drag shows, and what the record knows of it takes over as it grows
+(``tests/trials/test_law_coverage.py``).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.damping.law_fit import LawFit
+from pipeline.damping.laws import LAWS
+from pipeline.damping.select import Damping
+from pipeline.track import F8
+
+__all__ = ["Weighted", "average_over_laws"]
+
+MIXED = "linear+quadratic"
+FAMILY = (*LAWS[MIXED].cases, MIXED)
+SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0 and quadratic drag's 2 are well inside
+OTHER_LAW = 0.15  # prior odds of each of the five laws beyond linear and quadratic drag, against these two
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Weighted:
+    """A law that takes part in an average.
+
+    Parameters
+    ----------
+    fit : LawFit
+        Parameters and covariance are those to be used.
+    weight : float
+        All weights add up to 1.
+    """
+
+    fit: LawFit
+    weight: float
+
+
+def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, ...]:
+    """Return the laws by which quantities are stated, the one whose coefficients are stated first.
+
+    Parameters
+    ----------
+    damping : Damping
+    amplitude_m : float
+        Mean amplitude of the record, m.
+
+    Notes
+    -----
+    Linear and quadratic drag together hold "none", "linear" and "quadratic"; which of the four is selected says that a
+    term does not show, not that it is zero. So unless the record speaks against it, what is stated is this law's,
+    with what is known beforehand: the power :math:`1 + \\beta A/(\\gamma + \\beta A)` by which drag grows is
+    :math:`1 \\pm 1.4`, which makes :math:`\\beta = 0 \\pm \\tau` with :math:`\\tau = 1.4\\,\\gamma_l/\\bar A` from the
+    lone exponential's rate. The fit alone knows :math:`\\beta` to u; together parameters and covariance are
+
+    .. math:: \\theta = \\theta_l + w\\,(\\theta_{lq} - \\theta_l), \\quad
+              C = C_l + w\\,(C_{lq} - C_l), \\quad w = \\frac{\\tau^2}{\\tau^2 + u^2}:
+
+    the exponential's where the record knows no curvature, and with an uncertainty that covers every drag from
+    friction to quadratic; those of the fit where it does. The other admissible laws weigh
+    :math:`0.15\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it. Where linear and quadratic drag is out of reach, the
+    admissible laws are weighed by their BIC.
+    """
+    names = damping.admissible or (damping.selected,)
+    mixed = damping.fits.get(MIXED)
+    reach = mixed is not None and not mixed.rejected and (damping.selected in FAMILY or MIXED in names)
+    if mixed is None or not reach:
+        odds = {name: math.exp(-0.5 * (damping.fits[name].bic - damping.best.bic)) for name in names}
+        weighted = [(damping.fits[name], x) for name, x in odds.items()]
+    else:
+        share, fit = _with_prior(mixed, damping.fits.get("linear"), amplitude_m)
+        weighted = [(fit, 1.0)]
+        for name in names:
+            if name not in FAMILY:
+                other = damping.fits[name]
+                weighted.append((other, OTHER_LAW * share * math.exp(-0.5 * (other.bic - mixed.bic))))
+    # A power's own coefficients are stated where it is selected; else linear and quadratic drag's, within reach.
+    first = MIXED if reach and damping.selected != "power" else damping.selected
+    weighted.sort(key=lambda one: one[0].name != first)
+    total = sum(odd for _, odd in weighted)
+    return tuple(Weighted(fit, odd / total) for fit, odd in weighted)
+
+
+def _with_prior(mixed: LawFit, linear: LawFit | None, amplitude_m: float) -> tuple[float, LawFit]:
+    """The share that the record has in the curvature, and linear and quadratic drag with what is known beforehand."""
+    if linear is None:
+        return 1.0, mixed
+    gamma = linear.joint["gamma"]
+    tau = SPREAD_OF_POWER * math.hypot(gamma.value, gamma.u) / amplitude_m
+    share = 1.0 / (1.0 + (mixed.joint["beta"].u / tau) ** 2) if tau > 0.0 else 0.0
+    values, covariance = np.zeros(3), np.zeros((3, 3))
+    # Where chi-square rejects the exponential its covariance was widened: here it is a part of what fits.
+    values[:2], covariance[:2, :2] = linear.joint.values, linear.joint.covariance / linear.widening
+    joint = replace(
+        mixed.joint,
+        values=_between(values, mixed.joint.values, share),
+        covariance=_between(covariance, mixed.joint.covariance, share),
+    )
+    return share, replace(mixed, joint=joint)
+
+
+def _between(one: F8, other: F8, share: float) -> F8:
+    return np.asarray(one + share * (other - one))

@@ -1,0 +1,114 @@
+"""Averages over laws: what the record knows takes over from what is known of drag beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from pipeline.damping.average import OTHER_LAW, SPREAD_OF_POWER, Weighted, average_over_laws
+from pipeline.damping.select import Damping, Params, fit_damping
+from pipeline.oscillation.demodulate import Demodulated
+
+Windows = Callable[..., Demodulated]
+START = 0.05
+
+
+def fitted(windows: Windows, amplitude: np.ndarray, t: np.ndarray, noise_m: float, params: Params) -> Damping:
+    """Return the damping of windows at t with that amplitude and noise."""
+    noisy = amplitude + noise_m * np.random.default_rng(3).standard_normal(t.size)
+    return fit_damping(windows(t, noisy, u=(noise_m, 1e-3, 1e-4)), 0.0, params)
+
+
+def of_truth(
+    synthetic: ModuleType, windows: Windows, name: str, periods: int, noise_m: float, params: Params | None = None
+) -> tuple[Damping, tuple[Weighted, ...], float]:
+    """Return the damping of a law's windows, the average over laws and the mean amplitude."""
+    t = 0.4 + 0.757 * np.arange(periods)
+    amplitude = synthetic.Truth(**synthetic.LAW_TRUTHS[name]).amplitude_at(t)
+    damping = fitted(windows, amplitude, t, noise_m, params or Params())
+    size = float(np.mean(amplitude))
+    return damping, average_over_laws(damping, size), size
+
+
+def test_a_record_that_knows_no_curvature_has_the_exponential_and_a_range(
+    synthetic: ModuleType, windows: Windows
+) -> None:
+    """Of ten noisy periods gamma and A0 are the exponential's, and beta is nothing by 1.4 gamma over the amplitude."""
+    damping, weighted, size = of_truth(synthetic, windows, "linear", 10, 5e-4)
+    linear, stated = damping.fits["linear"].joint, weighted[0].fit
+    gamma = linear["gamma"]
+    tau = SPREAD_OF_POWER * np.hypot(gamma.value, gamma.u) / size
+    assert stated.name == "linear+quadratic"
+    assert damping.fits["linear+quadratic"].joint["beta"].u > 4.0 * tau
+    assert stated.joint["beta"].u == pytest.approx(tau, rel=0.05)
+    assert abs(stated.joint["beta"].value) < tau
+    assert stated.joint["A0"].value == pytest.approx(linear["A0"].value, abs=0.2 * linear["A0"].u)
+    assert stated.damping_rate().u < 0.5 * damping.fits["linear+quadratic"].damping_rate().u
+    assert weighted[0].weight > 0.95  # which other law it is, nothing tells
+
+
+def test_a_record_that_knows_its_curvature_has_the_fit(synthetic: ModuleType, windows: Windows) -> None:
+    """Of 160 quiet periods parameters and covariance are those of linear and quadratic drag to a hundredth of u."""
+    damping, weighted, _ = of_truth(synthetic, windows, "quadratic", 160, 2e-5)
+    free, stated = damping.fits["linear+quadratic"].joint, weighted[0].fit.joint
+    assert damping.selected == "quadratic"
+    u = np.sqrt(np.diag(free.covariance))
+    assert np.all(np.abs(stated.values - free.values) < 0.01 * u)
+    np.testing.assert_allclose(stated.covariance, free.covariance, rtol=0.01)
+
+
+def test_the_prior_is_that_of_one_more_measurement(synthetic: ModuleType, windows: Windows) -> None:
+    """To first order the result is the weighted mean of the free fit and of beta = 0 +- tau."""
+    damping, weighted, size = of_truth(synthetic, windows, "linear+quadratic", 25, 3e-4)
+    free, gamma = damping.fits["linear+quadratic"].joint, damping.fits["linear"].joint["gamma"]
+    tau = SPREAD_OF_POWER * np.hypot(gamma.value, gamma.u) / size
+    gain = free.covariance[:, 2] / (free.covariance[2, 2] + tau**2)
+    stated = weighted[0].fit.joint
+    u = np.sqrt(np.diag(stated.covariance))
+    assert np.all(np.abs(stated.values - (free.values - gain * free.values[2])) < 0.05 * u)
+    np.testing.assert_allclose(
+        stated.covariance, free.covariance - np.outer(gain, free.covariance[2]), rtol=0.05, atol=0.0
+    )
+
+
+def test_other_laws_weigh_by_their_evidence_and_by_what_the_record_knows(
+    synthetic: ModuleType, windows: Windows
+) -> None:
+    """A power beside linear and quadratic drag has 0.15 w exp(-dBIC/2) of its weight; all add up to one."""
+    damping, weighted, _ = of_truth(synthetic, windows, "linear+quadratic", 40, 1e-4)
+    assert {"power", "linear+quadratic"} <= set(damping.admissible)
+    by_name = {one.fit.name: one.weight for one in weighted}
+    assert sum(by_name.values()) == pytest.approx(1.0)
+    assert not {"none", "linear", "quadratic"} & set(by_name)
+    evidence = np.exp(-0.5 * (damping.fits["power"].bic - damping.fits["linear+quadratic"].bic))
+    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(OTHER_LAW * evidence, rel=0.1)
+
+
+@pytest.mark.parametrize("name", ["friction", "power", "linear+friction"])
+def test_a_law_out_of_reach_of_both_drags_speaks_for_itself(synthetic: ModuleType, windows: Windows, name: str) -> None:
+    """Where linear and quadratic drag does not fit the selected law comes first with the parameters of its own fit."""
+    damping, weighted, _ = of_truth(synthetic, windows, name, 160, 2e-5)
+    assert damping.selected == name
+    assert weighted[0].fit is damping.best
+    assert "linear+quadratic" not in {one.fit.name for one in weighted}
+
+
+def test_few_laws_leave_what_they_are(synthetic: ModuleType, windows: Windows) -> None:
+    """Without linear and quadratic drag among the laws tried the admissible ones are weighed by their BIC alone."""
+    laws = Params(laws=("linear", "quadratic"))
+    damping, weighted, _ = of_truth(synthetic, windows, "linear", 10, 1e-3, laws)
+    assert len(damping.admissible) == 2
+    assert [one.fit for one in weighted] == [damping.fits[name] for name in damping.admissible]
+    best, other = (damping.fits[name].bic for name in damping.admissible)
+    assert weighted[1].weight / weighted[0].weight == pytest.approx(np.exp(0.5 * (best - other)))
+
+
+def test_mixed_drag_without_the_exponential_is_its_own_fit(synthetic: ModuleType, windows: Windows) -> None:
+    """Where no exponential was fitted nothing is known beforehand."""
+    damping, weighted, _ = of_truth(
+        synthetic, windows, "linear+quadratic", 100, 1e-4, Params(laws=("linear+quadratic",))
+    )
+    assert [one.fit for one in weighted] == [damping.best]
