@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.damping.law_fit import LawFit
-from pipeline.damping.laws import LAWS
+from pipeline.damping.laws import LAWS, Drag
 from pipeline.damping.select import Damping
 from pipeline.track import F8
 
@@ -23,7 +23,7 @@ __all__ = ["Weighted", "average_over_laws"]
 MIXED = "linear+quadratic"
 FAMILY = (*LAWS[MIXED].cases, MIXED)
 SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0 and quadratic drag's 2 are well inside
-OTHER_LAW = 0.15  # prior odds of each of the five laws beyond linear and quadratic drag, against these two
+OTHER_LAW = 0.12  # prior odds of each law beyond linear and quadratic drag, five of them, against these two
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +64,7 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
 
     the exponential's where the record knows no curvature, and with an uncertainty that covers every drag from
     friction to quadratic; those of the fit where it does. The other admissible laws weigh
-    :math:`0.15\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it. Where linear and quadratic drag is out of reach, the
+    :math:`0.12\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it. Where linear and quadratic drag is out of reach, the
     admissible laws are weighed by their BIC.
     """
     names = damping.admissible or (damping.selected,)
@@ -80,8 +80,8 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
             if name not in FAMILY:
                 other = damping.fits[name]
                 weighted.append((other, OTHER_LAW * share * math.exp(-0.5 * (other.bic - mixed.bic))))
-    # A power's own coefficients are stated where it is selected; else linear and quadratic drag's, within reach.
-    first = MIXED if reach and damping.selected != "power" else damping.selected
+    # The coefficients of a power or of a function are stated where it is selected; else both drags', within reach.
+    first = MIXED if reach and isinstance(damping.best.law, Drag) else damping.selected
     weighted.sort(key=lambda one: one[0].name != first)
     total = sum(odd for _, odd in weighted)
     return tuple(Weighted(fit, odd / total) for fit, odd in weighted)

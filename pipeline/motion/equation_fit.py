@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.damping.laws import LAWS, Drag
 from pipeline.damping.select import Damping
 from pipeline.damping.select import Params as DampingParams
-from pipeline.motion.equation_model import STATE
+from pipeline.motion.equation_model import COEFFICIENTS, STATE, envelope
 from pipeline.motion.equation_search import Search
 from pipeline.motion.phase import PhaseFit, wrapped
 from pipeline.motion.waveform import Rest, Waveform
@@ -78,7 +78,8 @@ class EquationFit:
     why : str
         One sentence: how strong the damping is, and what was fitted.
     damping : Damping
-        Every law's coefficients from the samples; A0 is :math:`\\sqrt{y_0^2 + v_0^2/\\omega_0^2}` at the first of them.
+        Every law's coefficients from the samples; A0 is the amplitude at the first of them
+        (:func:`pipeline.motion.equation_model.envelope`).
     state : Joint
         Rest position, displacement and velocity at the first sample, and the undamped angular frequency, as the
         selected law has them.
@@ -104,7 +105,9 @@ class EquationFit:
         omega = math.sqrt(natural**2 - self.damping.squared_rate(t))
         slope = np.array([0.0, v * natural, -y * natural, y * v]) / (v**2 + (y * natural) ** 2)
         u_phase = math.sqrt(float(slope @ self.state.covariance @ slope))
-        start = math.atan2(-v / natural, y)
+        coefficients = self.damping.best.joint.estimates()
+        mu, gamma, beta = (coefficients[n].value if n in coefficients else 0.0 for n in COEFFICIENTS)
+        _, start, _ = envelope(y, v, natural, mu, gamma, beta)
         middle = float(np.mean(t))
         # The total phase goes on from the windows' own count of turns.
         turns = round((float(demodulated.phase[0]) - start - omega * float(t[0] - self.damping.t0)) / (2.0 * math.pi))

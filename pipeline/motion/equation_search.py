@@ -14,7 +14,7 @@ from pipeline.damping.law_fit import Minimum
 from pipeline.damping.laws import LAWS
 from pipeline.damping.select import Damping, LawFit
 from pipeline.damping.select import Params as DampingParams
-from pipeline.motion.equation_model import COEFFICIENTS, STATE, STEP, FreeMotion
+from pipeline.motion.equation_model import COEFFICIENTS, STATE, STEP, FreeMotion, envelope
 from pipeline.numerics import least_squares
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import mad_sigma
@@ -270,16 +270,21 @@ class Search:
         return self.full(self.richest, values), float(whole.values[absent] @ pull)
 
     def weigh(self, fits: Mapping[str, least_squares.Fit], laws: DampingParams) -> dict[str, LawFit]:
-        """Hold each law to the noise, with A0 in place of displacement and velocity."""
+        """Hold each law to the noise, with the amplitude at the start in place of displacement and velocity."""
         found = {}
         for name, fit in fits.items():
-            y, v, omega = fit.values[1:4].tolist()
-            first = math.hypot(y, v / omega)
+
+            def start(values: F8, name: str = name) -> F8:
+                return np.array([envelope(*self.full(name, values)[1:].tolist())[0]])
+
+            *_, u_envelope = envelope(*self.full(name, fit.values)[1:].tolist())
             turn = np.zeros((len(LAWS[name].parameters), fit.values.size))
-            turn[0, 1:4] = np.array([y, v / omega**2, -(v**2) / omega**3]) / first
+            turn[0] = least_squares.central_differences(start, fit.values)[0]
             turn[1:, len(STATE) :] = np.eye(len(LAWS[name].parameters) - 1)
-            theta = np.concatenate([[first], fit.values[len(STATE) :]])
-            found[name] = Minimum(theta, turn @ fit.covariance @ turn.T, fit.cost, fit.converged, fit.tried)
+            covariance = turn @ fit.covariance @ turn.T
+            covariance[0, 0] += u_envelope**2
+            theta = np.concatenate([start(fit.values), fit.values[len(STATE) :]])
+            found[name] = Minimum(theta, covariance, fit.cost, fit.converged, fit.tried)
         least = least_chi2(found)
         points = int(np.count_nonzero(self.used)) - len(STATE) + 1
         return {n: weigh(LAWS[n], fit, least[n], points, self.correlation, laws.rejection) for n, fit in found.items()}

@@ -30,7 +30,7 @@ from pipeline.oscillation.kinks import find_kink
 from pipeline.oscillation.rows import are_interleaved
 from pipeline.oscillation.segments import Params as SegmentsParams
 from pipeline.oscillation.segments import Segments, Span, find_segments
-from pipeline.track import UNUSABLE
+from pipeline.track import UNUSABLE, Quality
 
 __all__ = ["Fitted", "Windows", "by_equation", "by_windows", "see_windows"]
 
@@ -158,9 +158,22 @@ def see_windows(
     if (why := _no_sinusoid(conditioned, demodulated)) is not None:
         return why
     demodulated, disturbances = separate(conditioned, seen, demodulated, separation, demodulation)
-    start = float(conditioned.track.t[np.argmax(conditioned.used)])
-    law = fit_damping(demodulated, start, damping)
+    law = fit_damping(demodulated, _start_s(conditioned, demodulated.angular_frequency), damping)
     return Windows(conditioned, segments, seen, demodulated, disturbances, law, stopped)
+
+
+def _start_s(conditioned: Conditioned, omega: float) -> float:
+    """Time of the part's first row, s, though an echo may stand there; where over a period is lost, of the first used.
+
+    A single false echo must not move the moment that amplitude and phase are stated for.
+    """
+    track = conditioned.track
+    first = float(track.t[np.argmax(conditioned.used)])
+    # What has no place in the order of times begins nothing.
+    out = Quality.OUTSIDE | Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME | Quality.MALFORMED
+    rows = ((conditioned.flags & np.uint8(out)) == 0) & (track.t <= first)
+    begin = float(np.min(track.t[rows], initial=first))
+    return begin if first - begin < 2.0 * math.pi / omega else first
 
 
 def _at_rest(conditioned: Conditioned) -> Segments | None:

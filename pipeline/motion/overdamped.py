@@ -263,7 +263,7 @@ def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: f
         found["amplitude"] = _estimate(umath.sqrt(a**2 + side**2), unit)
         found["phase"] = _estimate(umath.atan2(-side, a), "rad")
         found["damping_rate"] = _estimate(rate, "1/s")
-        found["quality_factor"] = _estimate(0.5 * natural / rate, "")
+        found["quality_factor"] = _estimate(0.5 * omega / rate, "")
         why = f"the oscillation is strongly damped: its damping ratio is {ratio}"
     return Overdamped(why, kind, ratio, squared, found, start_s)
 

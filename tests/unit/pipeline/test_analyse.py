@@ -395,3 +395,26 @@ def test_any_oscillation_is_analysed_or_refused(
     y[rng.random(t.size) < holes] = np.nan
     with contextlib.suppress(PipelineError):
         sane(analyse(replace(Track.from_arrays(t, y), quantum_m=step_m or None)))
+
+
+@pytest.mark.parametrize("lost", [1, 5])
+def test_amplitude_and_phase_are_of_the_first_row_though_an_echo_stands_there(synthetic: ModuleType, lost: int) -> None:
+    """False echoes at the beginning move neither the moment that numbers are stated for nor what they say of it."""
+    truth, t = synthetic.Truth(gamma=0.05), synthetic.times(20.0)
+    y = synthetic.noisy(truth, t, 3e-4, 3)
+    clean = motion_of(analyse(Track.from_arrays(t + 7.0, y)))
+    y[:lost] = 1.3
+    found = motion_of(analyse(Track.from_arrays(t + 7.0, y)))
+    assert found.phase.t0 == clean.phase.t0 == 7.0
+    assert found.damping.t0 == 7.0
+    for name in ("amplitude", "phase"):
+        one, other = found.derived.estimates[name], clean.derived.estimates[name]
+        assert abs(one.value - other.value) < 0.5 * other.u, name
+
+
+def test_a_start_of_more_than_a_period_lost_is_not_stated_for(synthetic: ModuleType) -> None:
+    """Where the first second and a half was not measured numbers are of the first sample that was."""
+    t = synthetic.times(20.0)
+    y = synthetic.noisy(synthetic.Truth(gamma=0.05), t, 3e-4, 3)
+    y[:150] = np.nan
+    assert motion_of(analyse(Track.from_arrays(t, y))).damping.t0 == 1.5

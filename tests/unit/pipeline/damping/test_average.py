@@ -77,7 +77,7 @@ def test_the_prior_is_that_of_one_more_measurement(synthetic: ModuleType, window
 def test_other_laws_weigh_by_their_evidence_and_by_what_the_record_knows(
     synthetic: ModuleType, windows: Windows
 ) -> None:
-    """A power beside linear and quadratic drag has 0.15 w exp(-dBIC/2) of its weight; all add up to one."""
+    """A power beside linear and quadratic drag has 0.12 w exp(-dBIC/2) of its weight; all add up to one."""
     damping, weighted, _ = of_truth(synthetic, windows, "linear+quadratic", 40, 1e-4)
     assert {"power", "linear+quadratic"} <= set(damping.admissible)
     by_name = {one.fit.name: one.weight for one in weighted}
