@@ -46,7 +46,7 @@ class Columns:
             self._pending = [whole[full:]]
 
     def finish(self) -> None:
-        """Write the rest and tie every array to its dimension."""
+        """Write the rest, tie every array to its dimension, and give the samples' arrays a name at the root too."""
         rest = concatenate(self._pending)
         if not self._written or len(rest):
             self._write(rest, growing=bool(self._written))
@@ -57,6 +57,8 @@ class Columns:
                 for name in arrays:
                     if name != scale:
                         arrays[name].dims[0].attach_scale(arrays[scale])
+            for name, array in self.file[layout.SIGNAL].items():
+                self.file[name] = array  # a second name of the same array: it takes no room
 
     def _demand_fit(self, block: Block) -> None:
         expected = (self.first or 0) + self.rows

@@ -110,15 +110,19 @@ class Contents:
             raise RunDamaged(self.path, str(error), FOREIGN) from error
 
     def demand_own_signal(self) -> None:
-        """Refuse arrays beside the columns, which other tools would show with them.
+        """Refuse arrays beside the columns, and at the root, which other tools would show for them.
 
         Raises
         ------
         RunClosed, RunDamaged
         """
-        names = list(self.at(layout.SIGNAL, layout.SIGNAL))
-        if added := sorted(set(names) - set(self.header.columns)):
+        signal, root = self.at(layout.SIGNAL, layout.SIGNAL), self.at("/", "/")
+        if added := sorted(set(signal) - set(self.header.columns)):
             raise damaged(self.path, f"{layout.SIGNAL}/{added[0]}", "it was added")
+        with reading(self.path, "/"):
+            for name in root:
+                if name not in layout.GROUPS and (name not in signal or root[name] != signal[name]):
+                    raise damaged(self.path, f"/{name}", "it is no second name of a column, and was added")
 
     def check(self, name: str, sha256: str) -> None:
         """Hold a column's digest against the one written.

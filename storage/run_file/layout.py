@@ -2,7 +2,8 @@
 
 ::
 
-    /                     @Conventions @NX_class=NXroot @default=entry @kind
+    /                     @Conventions @NX_class=NXroot @default=entry @kind; second names of the signal's arrays, for
+                          tools that look at the root alone (files from before there were any have none)
     /entry                NXentry @default=signal; title, start_time where known
     /entry/signal         NXdata @signal=distance @axes=[time] @kind; on the dimension ``time``:
         time              f8 s, elapsed; @epoch says when t = 0 was, @clock where the times come from
@@ -43,6 +44,7 @@ from storage.run_file.header import Header, json_text
 __all__ = [
     "CHUNK",
     "COLUMNS",
+    "GROUPS",
     "HEADER",
     "INSTRUMENT",
     "MAGIC",
@@ -64,6 +66,8 @@ HEADER = "/entry/provenance/header"
 SIGNAL = "/entry/signal"
 INSTRUMENT = "/entry/instrument"
 WIRE = "/wire"
+GROUPS = frozenset({"entry", "raw", "wire"})
+"""What stands at the root besides second names of columns."""
 NO_HOST_NS = -1
 """Stands in ``host_mono_ns`` and ``record_mono_ns`` where no host saw the sample or record."""
 

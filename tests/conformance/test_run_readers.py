@@ -14,6 +14,7 @@ import pytest
 from acquisition.block import Block, Flag
 from acquisition.recordings.recording import Original, Trap
 from acquisition.source import SourceInfo
+from storage.errors import RunDamaged
 from storage.run_file.layout import CHUNK
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
@@ -73,6 +74,46 @@ def test_xarray_opens_the_signal(path: Path, engine: Literal["h5netcdf", "netcdf
             assert set(mine) == set(theirs)
             assert all(np.array_equal(mine[key], theirs[key]) for key in mine)
         assert found.distance.dtype == np.float64
+
+
+@pytest.mark.parametrize("engine", [None, *ENGINES])
+def test_xarray_opens_the_file_without_being_told_a_group(path: Path, engine: Literal["h5netcdf", "netcdf4"]) -> None:
+    """Time, distance, flags and what else the file has stand at the root, whichever engine xarray chooses."""
+    with open_run(path) as run:
+        own = run.load_dataset()
+    with xr.open_dataset(path, engine=engine) as found:
+        xr.testing.assert_equal(found, own)
+        assert {"distance", "quality"} <= set(found)
+        assert found.attrs["kind"] == own.attrs["kind"]
+        assert found.distance.attrs["units"] == "m"
+
+
+def test_a_file_without_names_at_the_root_opens(path: Path) -> None:
+    """As files from before there were any: it verifies, and its samples are the same."""
+    with open_run(path) as run:
+        own, names = run.load_dataset(), list(run.dataset().variables)
+    with h5py.File(path, "r+") as file:
+        for name in names:
+            del file[name]
+        assert set(file) <= {"entry", "raw", "wire"}
+    with open_run(path) as run:
+        run.verify()
+        xr.testing.assert_identical(run.load_dataset(), own)
+
+
+@pytest.mark.parametrize("name", ["distance", "other"])
+def test_an_array_at_the_root_that_is_no_column_is_refused(tmp_path: Path, name: str) -> None:
+    """Another array under a column's name there, or under a new one, would be shown for the run's own."""
+    path = write(tmp_path / "run.h5", 300, full=False)
+    with h5py.File(path, "r+") as file:
+        values = file["entry/signal/distance"][:]
+        if name in file:
+            del file[name]
+        file[name] = values
+    with open_run(path) as run, pytest.raises(RunDamaged, match=f"/{name}.* it is no second name of a column"):
+        run.verify()
+    with open_run(path) as run, pytest.raises(RunDamaged, match=f"/{name}"):
+        run.dataset()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
