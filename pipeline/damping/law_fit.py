@@ -118,7 +118,8 @@ class LawFit:
         """
         theta = self.joint.values
         u = np.sqrt(np.maximum(np.diag(self.joint.covariance), 0.0))
-        steps = np.maximum(1e-3 * u, 1e-7 * np.maximum(np.abs(theta), 1e-9))
+        steps = np.maximum(1e-3 * u, 1e-7 * np.abs(theta))
+        steps = np.where(steps > 0.0, steps, 1e-16)
         shifts = zip(np.diag(steps), steps, strict=True)
         return np.array([(np.asarray(f(theta + d)) - f(theta - d)) / (2.0 * h) for d, h in shifts])
 

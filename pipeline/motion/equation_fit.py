@@ -230,6 +230,11 @@ def fit_equation(
         )
     search = Search.of(conditioned, demodulated, damping, names, _stop_row(conditioned), params.clip_sigmas)
     search.clean()
+    if math.isinf(search.noise_m):
+        return EquationMisfit(
+            f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err, and no motion with "
+            f"{LAWS[search.richest].words} comes near the samples: the averaged law stands"
+        )
     if not search.noise_m <= params.misfit * search.expected_m:
         return EquationMisfit(
             f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err, and the equation of "

@@ -188,7 +188,7 @@ class Search:
         )
 
     def clean(self, rounds: int = 3) -> None:
-        """Fit the richest law until the set of false echoes stays; its residual then is the noise."""
+        """Fit the richest law until the set of false echoes stays; its residual is the noise, infinite without any."""
         every = np.ones(self.used.size, np.bool_)
         for _ in range(rounds):
             fit = self.fit(self.richest, self.theta)
@@ -198,6 +198,10 @@ class Search:
             candidates = self.within & ~self.conditioned.near_plateau(whole, self.noise_m)
             spread = max(mad_sigma(residual[candidates]), self.expected_m)
             kept = candidates & (np.abs(residual) <= self.clip_sigmas * spread)
+            if np.count_nonzero(kept) <= len(NAMES):
+                # It explains no sample: no motion that these laws know.
+                self.noise_m = math.inf
+                return
             same = np.array_equal(kept, self.used)
             self.used = kept
             if same:

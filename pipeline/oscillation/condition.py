@@ -21,6 +21,7 @@ QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard no
 TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
 CREST_SIGMAS = 3.5
 BLOCK = 256  # samples that tell the curvature where they are
+ROUNDING = 1e-9  # of the largest value: values that differ by less are one, converted twice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,7 +211,7 @@ def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
         What stands where values do not repeat, or show no coarser step.
     """
     steps = np.diff(ordered)
-    apart = steps > 1e-9
+    apart = steps > ROUNDING * max(-float(ordered[0]), float(ordered[-1]), 0.0)
     if not 0 < np.count_nonzero(apart) <= 0.5 * ordered.size:
         return stated_m
     least = float(steps[apart].min())
@@ -247,10 +248,10 @@ def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
     return flags
 
 
-def _least_noise(second: F8) -> tuple[float, bool]:
+def _least_noise(second: F8, rounding: float) -> tuple[float, bool]:
     """Noise that a third of the fourth differences still shows, and whether even so many are not clean.
 
-    From the second differences, three at least.
+    From the second differences, three at least; of values in coarse steps many are 0 but for their rounding.
 
     A fifth of the samples being spikes leaves a third of the fourth differences clean, two fifths leave a twelfth.
     """
@@ -260,7 +261,7 @@ def _least_noise(second: F8) -> tuple[float, bool]:
     gain = float(FOURTH_DIFFERENCE_GAIN)
     quarter = float(ordered[many]) / (QUARTER_TO_SIGMA * gain)
     twentieth = float(ordered[few]) / (TWENTIETH_TO_SIGMA * gain)
-    flooded = 0.0 < twentieth < 0.25 * quarter
+    flooded = rounding < twentieth < 0.25 * quarter
     return (twentieth if flooded else quarter), flooded
 
 
@@ -269,8 +270,9 @@ def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
     if y.size < 8:
         return np.zeros(y.size, np.bool_)
     second = np.diff(y, 2)
-    noise_m, flooded = _least_noise(second)
-    if noise_m == 0.0:  # most samples say what their neighbours say: single ones a step beside are no spikes
+    rounding = 1e-12 * float(np.abs(y).max())
+    noise_m, flooded = _least_noise(second, rounding)
+    if noise_m <= rounding:  # most samples say what their neighbours say: single ones a step beside are no spikes
         half_step = 0.5 * (coarsest_step(np.sort(y), 2.0 * half_step) or 0.0)
     # What curvature alone does: a quantile of the second differences that spikes on a fifth of the samples spare; of
     # a cosine's second differences 0.15 lie within 0.40 of what 0.4 of them do.

@@ -316,12 +316,15 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     phase instead: linear in a and b, they are right on average in the deepest noise, and an amplitude may come out
     negative.
     """
-    size = np.maximum(np.hypot(a, b), 1e-150)
+    size = np.hypot(a, b)
+    # What is nothing beside the others divides by nothing smaller, whatever the record's unit.
+    size = np.maximum(size, 1e-30 * float(size.max()) + 1e-150)
     along, scale = np.arctan2(b, a), size
     weak = np.zeros(a.size, np.bool_)
     if smooth_amplitude is not None:
         u = np.sqrt(0.5 * (covariance[:, 1, 1] + covariance[:, 2, 2]))
-        weak = smooth_amplitude < WEAK * u
+        # So is a window without a swing of its own, whatever the curve says there.
+        weak = (smooth_amplitude < WEAK * u) | (size < u)
         along = np.where(weak, smooth_phase, along)
         scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
     cosine, sine = np.cos(along), np.sin(along)
@@ -335,5 +338,5 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     slope[:, 1, 1], slope[:, 1, 2] = -sine / scale, cosine / scale
     slope[:, 2, 0] = 1.0
     turned_into = slope @ covariance @ slope.transpose(0, 2, 1)
-    amplitude = np.where(weak, a * cosine + b * sine, size * (1.0 - 0.5 * turned_into[:, 1, 1]))
+    amplitude = np.where(weak, a * cosine + b * sine, size * (1.0 - 0.5 * np.minimum(turned_into[:, 1, 1], 1.0)))
     return amplitude, smooth_phase + turned, turned_into

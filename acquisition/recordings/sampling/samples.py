@@ -29,7 +29,7 @@ IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
 
 _COARSE_M = 1e-3
-_FAR_M, _FAR_SPREADS = 0.5, 10.0
+_FAR_SPREADS, _FAR_GAP = 30.0, 3.0  # how far off a lost target reads: times the usual, and times the next nearest
 _SAMPLE = 65536
 _FEWEST = 50  # distances; with fewer, a common step may be chance
 _ZEROS = 10
@@ -193,12 +193,12 @@ def value_traps(
         flags[tail:] |= Flag.MISSING.value
         message = f"the last {count} distances are exactly 0, which no rangefinder reads; kept as missing samples"
         traps.append(Trap("zero_filled_tail", message, count, line(tail)))
-    far = _far(distance) if length else np.empty(0, np.int64)
+    far = _far(distance, resolution) if length else np.empty(0, np.int64)
     if far.size:
         flags[far] |= Flag.FALSE_ECHO.value
         low, high = float(np.min(distance[far])), float(np.max(distance[far]))
         message = (
-            f"{far.size} distances of {low:.3g} to {high:.3g} m lie more than {_FAR_M:g} m off all others: "
+            f"{far.size} distances of {low:.3g} to {high:.3g} m lie far off all others, and nothing between: "
             "the target was lost; kept and flagged"
         )
         traps.append(Trap("lost_target", message, int(far.size), line(int(far[0]))))
@@ -223,14 +223,23 @@ def _some(values: F8) -> F8:
     return some[np.isfinite(some)]
 
 
-def _far(distance: F8) -> NDArray[np.int64]:
-    """Return the samples that lie far off the median, compared with how far the others do."""
-    some = _some(distance)
-    if some.size < _ZEROS or np.fmax.reduce(distance) - np.fmin.reduce(distance) <= _FAR_M:
-        return np.empty(0, np.int64)
+def _far(distance: F8, resolution: float) -> NDArray[np.int64]:
+    """Return the samples far off the median, compared with how far the others are, with nothing between.
+
+    No length is far by itself, nobody knowing how large an experiment is; a motion that dies away has no gap.
+    """
+    some, none = _some(distance), np.empty(0, np.int64)
+    if some.size < _ZEROS:
+        return none
     middle = median(some)
-    limit = _FAR_M + _FAR_SPREADS * median(np.abs(some - middle))
-    return np.flatnonzero(np.abs(distance - middle) > limit)
+    least = _FAR_SPREADS * max(median(np.abs(some - middle)), resolution)
+    away = np.abs(distance - middle)
+    if least == 0.0 or not np.fmax.reduce(away) > least:
+        return none
+    ordered = np.sort(away[np.isfinite(away)])
+    first = int(np.searchsorted(ordered, least, side="right"))
+    gaps = np.flatnonzero(ordered[first:] > _FAR_GAP * np.maximum(ordered[first - 1 : -1], least / _FAR_SPREADS))
+    return np.flatnonzero(away >= ordered[first + gaps[0]]) if gaps.size else none
 
 
 def _common_step(distance: F8, resolution: float) -> float:
