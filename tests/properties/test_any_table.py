@@ -51,8 +51,58 @@ def heading(name: str, unit: str, form: str) -> str:
     return {"brackets": f"{name} ({unit})", "square": f"{name} [{unit}]", "slash": f"{name} / {unit}"}[form]
 
 
+Names, Rows = list[tuple[str, str]], list[tuple[str, ...]]
+
+
+def monitor(names: Names, rows: Rows) -> list[str]:
+    """Write what a serial monitor logs: the clock before each line."""
+    lines = [", ".join(f"{name} ({unit})" if unit else name for name, unit in names), *map(",".join, rows)]
+    return [f"15:{i // 6000:02d}:{i // 100 % 60:02d}.{i % 100:02d}0 -> {line}" for i, line in enumerate(lines)]
+
+
+def labelled(names: Names, rows: Rows) -> list[str]:
+    """Write the name before each number and the unit behind."""
+    return [
+        ", ".join(f"{name}: {cell} {unit}".strip() for (name, unit), cell in zip(names, row, strict=True))
+        for row in rows
+    ]
+
+
+def objects(names: Names, rows: Rows) -> list[str]:
+    """Write an object of JSON a line."""
+    keys = [f"{name} ({unit})" if unit else name for name, unit in names]
+    return ["{" + ", ".join(f'"{key}": {x}' for key, x in zip(keys, row, strict=True)) + "}" for row in rows]
+
+
+def lists(names: Names, rows: Rows) -> list[str]:
+    """Write a list of Python a column."""
+    by_column = zip(names, zip(*rows, strict=True), strict=True)
+    return [f"{name}{f' ({unit})' if unit else ''} = [{', '.join(cells)}]" for (name, unit), cells in by_column]
+
+
+def tuples(names: Names, rows: Rows) -> list[str]:
+    """Write a tuple a line, below the names behind a comment mark."""
+    head = "# " + ", ".join(f"{name} [{unit}]" if unit else name for name, unit in names)
+    return [head, *(f"({', '.join(row)})," for row in rows)]
+
+
+def markdown(names: Names, rows: Rows) -> list[str]:
+    """Write a table of Markdown."""
+    head = [f"{name} ({unit})" if unit else name for name, unit in names]
+    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows)]
+
+
+def quoted(names: Names, rows: Rows) -> list[str]:
+    """Write cells in quotes, with decimal commas between commas."""
+    head = [f"{name} ({unit})" if unit else name for name, unit in names]
+    return [",".join(f'"{cell.replace(".", ",")}"' for cell in row) for row in (head, *rows)]
+
+
+DRESSES = (monitor, labelled, objects, lists, tuples, markdown, quoted)
+
+
 def write(seed: int) -> Written:
-    """Write one table: separators, decimal mark, preamble, names, units, extra columns and the jitter of its times."""
+    """Write one table: separators, decimal mark, preamble, names, units, extra columns, jitter, and what wraps rows."""
     draw = random.Random(seed)
     noise = np.random.default_rng(seed)
     size = draw.randint(60, 400)
@@ -89,8 +139,13 @@ def write(seed: int) -> Written:
             lines.append("")
     elif form == "below":
         unit = time_unit = ""
-    numbers = [mark.join(cells) for cells in zip(*(cells for _, _, cells in columns), strict=True)]
+    rows = list(zip(*(cells for _, _, cells in columns), strict=True))
+    numbers = [mark.join(cells) for cells in rows]
     lines += [row.replace(".", ",") if decimal == "," else row for row in numbers]
+    plain = all(name != "state" for name, _, _ in columns)
+    if plain and (dress := draw.choice((None, None, None, *DRESSES))) is not None:
+        lines = dress([(name, own if unit and time_unit else "") for name, own, _ in columns], rows)
+        unit, time_unit = (unit, time_unit) if unit and time_unit else ("", "")
     end = draw.choice(("\n", "\r\n"))
     text = draw.choice(("", "\ufeff")) + end.join(lines) + draw.choice(("", end))
     scale = UNITS[unit] if unit else 1.0

@@ -20,27 +20,28 @@ from acquisition.recordings.tables.finding import Found, clock_s, find_table
 from acquisition.recordings.tables.roles import columns_of, is_aside, times_by_name, times_by_steps
 from acquisition.recordings.tables.sheet import ColumnFormat
 from acquisition.recordings.tables.text import Text, decode, is_text, parse_number, text_of
+from acquisition.recordings.tables.wrapped import SETTINGS, begins_with_lists, unwrapped
 
 __all__ = ["FORMAT"]
 
 _HEAD_LINES = 300
 _DAY_S = 86400.0
+_MONITOR = b" -> "
 _BLANKS = bytes.maketrans(b"[];", b"   ")
 
 
 def _evidence(head: bytes) -> str:
     if not is_text(head) or head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<"):
         return ""
-    found = find_table(Text.of(head).head(_HEAD_LINES))
+    _, found = _find(Text.of(head))
     if found is None:
-        return ""
+        return "it holds lists of numbers with names" if begins_with_lists(decode(head)) else ""
     names = ", ".join(f'"{each.name}"' for each in found.headings if each.name)
     return f"numbers begin in line {found.line.number}, below {names or 'no names'}"
 
 
 def _contents(path: str, data: bytes) -> Contents:
-    text = text_of(path, data)
-    found = find_table(text.head(_HEAD_LINES))
+    text, found = _find(text_of(path, data))
     if found is None:
         raise FormatError(path, "expected rows of numbers, three or more alike", "check that the export ended")
     columns = columns_of(found.rows)
@@ -86,6 +87,21 @@ def _contents(path: str, data: bytes) -> Contents:
         channels = [replace(each, aside=False) for each in channels]
     title = found.preamble[0] if found.preamble else ""
     return Contents(tuple(channels), title=title, traps=tuple(traps), zeros=text.zeros)
+
+
+def _find(text: Text) -> tuple[Text, Found | None]:
+    """Find the table; where rows are wrapped in words or brackets, in the text without these."""
+    wrapped = _MONITOR in text.data[: 1 << 16] or text.data.startswith(SETTINGS.encode(), text.start)
+    found = None if wrapped else find_table(text.head(_HEAD_LINES))
+    told = None if found is not None else unwrapped(text)
+    if told is None:
+        return text, found or find_table(text.head(_HEAD_LINES))
+    plain, headings = told
+    found = find_table(plain.head(_HEAD_LINES))
+    if found is not None and len(headings) == len(found.headings):
+        both = zip(headings, found.headings, strict=True)
+        found = replace(found, headings=tuple(Heading(a.name or b.name, a.unit or b.unit) for a, b in both))
+    return plain, found
 
 
 def _name(heading: Heading, column: int) -> str:

@@ -41,7 +41,13 @@ def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
         runs = [each["run"] if each else "" for each in found]
         return tuple(Heading(name, unit, run) for (name, unit), run in zip(named, runs, strict=True)), mark
     words = [cell.lower() for cell in cells]
-    if len(cells) > 1 and is_time(words[0]) and all(word in _QUANTITIES for word in words[1:]):
+    # Behind a comment mark it is of somebody else.
+    if (
+        len(cells) > 1
+        and words[0][:1] not in "#%"
+        and is_time(words[0])
+        and all(word in _QUANTITIES for word in words[1:])
+    ):
         return tuple(Heading(cell, "") for cell in cells), mark
     return (), mark
 

@@ -21,6 +21,7 @@ from acquisition.recordings.tables.contents import (
     name_and_unit,
     named,
     of_run,
+    split_heading,
 )
 from acquisition.recordings.tables.text import parse_number
 from acquisition.recordings.units import TIMES, Measure, known_units, measure_of, time_power, unit_words
@@ -212,7 +213,8 @@ def _begins_anew(sheet: Sheet, column: int) -> bool:
 def _first_times(sheet: Sheet, column: int, most: int = _FIRST_ROWS) -> F8:
     read = []
     for line in sheet.text.lines(sheet.start):
-        cells = line.text.split(sheet.delimiter or None)
+        quoted = sheet.delimiter and '"' in line.text
+        cells = split_heading(line.text, sheet.delimiter)[0] if quoted else line.text.split(sheet.delimiter or None)
         value = parse_number(cells[column].strip(' "')) if column < len(cells) else None
         if value is not None:
             read.append(value)

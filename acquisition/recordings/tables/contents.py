@@ -220,7 +220,7 @@ def is_time(name: str) -> bool:
     >>> is_time("Zeit"), is_time("Position"), is_time("t_{1}"), is_time("time for 10 swings")
     (True, False, True, False)
     """
-    words = _WORDS.findall(_CAMEL.sub(" ", name).lower())
+    words = [word.rstrip("0123456789") or word for word in _WORDS.findall(_CAMEL.sub(" ", name).lower())]
     told = [word for word in words if word in _TIME_WORDS]
     beside = [word for word in words if word not in told]
     if not told or words[0].isdecimal() or (len(words[0]) == 1 and words[0] not in _TIME_WORDS):
@@ -303,8 +303,8 @@ def numbered_apart(names: Sequence[str]) -> list[str]:
     return apart
 
 
-def split_heading(line: str) -> tuple[list[str], str]:
-    """Split a line of headings, quoted or not; return its cells and what separates them.
+def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
+    """Split a line of headings, quoted or not; return its cells and what separates them, told or found.
 
     Examples
     --------
@@ -312,7 +312,7 @@ def split_heading(line: str) -> tuple[list[str], str]:
     (['Time (s)', 'Length, total (m)'], ',')
     """
     bare = re.sub(r'"[^"]*"', "", line)
-    mark = next((mark for mark in "\t;," if mark in bare), "\t")
+    mark = mark or next((mark for mark in "\t;," if mark in bare), "\t")
     cells = [each.strip() for each in re.split(rf'{mark}(?=(?:[^"]*"[^"]*")*[^"]*$)', line)]
     while cells and not cells[-1]:
         cells.pop()

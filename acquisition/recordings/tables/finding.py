@@ -22,7 +22,8 @@ _BRACKETS = re.compile(r"[\[\];]")  # rows as MATLAB writes a matrix
 _NUMBERS = re.compile(r"[-+\d.,;eE\s\[\]]*\d[-+\d.,;eE\s\[\]]*")
 _DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}", re.ASCII)
 _CLOCK = re.compile(
-    r"(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d{1,9})?))?"
+    r"(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?"
+    r"(?:(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d{1,9})?))?|(?P<m2>\d{1,2}):(?P<s2>\d\d[.,]\d{1,9}))"
     r"\s*(?P<half>[aApP]\.?[mM]\.?)?(?:Z|[+-]\d\d:?\d\d)?",
     re.ASCII,
 )
@@ -99,6 +100,8 @@ def _find_table(lines: tuple[Line, ...]) -> Found | None:
 
 
 def _cells(line: str, mark: str, brackets: bool) -> list[str]:
+    if '"' in line and mark and not brackets:
+        return [cell.strip() for cell in split_heading(line, mark)[0]]
     cells = split_cells(_BRACKETS.sub(" ", line) if brackets else line, mark)
     return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells]
 
@@ -203,7 +206,7 @@ def _with_names(lines: Sequence[Line], start: int, mark: str, brackets: bool, wi
 
 def _names(line: str, mark: str, width: int) -> list[str]:
     """Split a line into as many names as there are columns; none where it cannot be."""
-    plain = line.lstrip(_COMMENT).rstrip()
+    plain = line.lstrip(_COMMENT).rstrip().removeprefix("DEF=")
     for cells in _splits(plain, mark, width):
         words = [cell for cell in cells if cell and parse_number(cell) is None and not _CLOCK.fullmatch(cell)]
         if words and 2 * len(words) >= len([cell for cell in cells if cell]) and max(map(len, words)) <= 80 + len(line):
@@ -273,8 +276,9 @@ def clock_s(cell: str) -> tuple[str, float, int] | None:
     found = _CLOCK.fullmatch(cell)
     if found is None:
         return None
-    hour = int(found["h"]) % 12 + 12 * (found["half"][0] in "pP") if found["half"] else int(found["h"])
-    seconds = (found["s"] or "0").replace(",", ".")
+    hour = int(found["h"] or 0)
+    hour = hour % 12 + 12 * (found["half"][0] in "pP") if found["half"] else hour
+    seconds = (found["s"] or found["s2"] or "0").replace(",", ".")
     decimals = len(seconds.partition(".")[2])
-    at = hour * 3600 + int(found["m"]) * 60 + float(seconds)
+    at = hour * 3600 + int(found["m"] or found["m2"]) * 60 + float(seconds)
     return (found["date"] or "").strip(" ,T"), round(at, decimals), decimals

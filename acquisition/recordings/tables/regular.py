@@ -32,6 +32,7 @@ I1 = NDArray[np.int8]
 _MOST_WHOLE = 10**15  # whole numbers up to this and powers of ten up to 10^22 are exact in binary, so that their
 _MOST_POWER = 22  # quotient is rounded once
 _LONGEST_EXPONENT = len("e-99")
+_QUOTED_COMMA = re.compile(rb'"([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)"')  # a decimal comma where commas separate
 _NEWLINE, _RETURN, _BLANK, _PLUS, _MINUS, _POINT, _ZERO, _NINE, _E, _LOWER = (*(ord(c) for c in "\n\r +-.09e"), 0x20)
 
 
@@ -51,6 +52,8 @@ def unified(page: bytes, delimiter: str) -> bytes:
     if not page.endswith(b"\n"):
         page += b"\n"
     if b'"' in page:
+        if delimiter == ",":
+            page = _QUOTED_COMMA.sub(rb"\1.\2", page)
         mark = re.escape((delimiter or "\t").encode())
         page = re.sub(rb'(?<![^%b\n])"([^"%b\n]*)"(?![^%b\n])' % (mark, mark, mark), rb"\1", page)
     if not delimiter:

@@ -20,6 +20,7 @@ _NEUTRAL = re.compile(r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|column \d+", re.IGN
 """Names that say nothing against a column of times."""
 _SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10", re.IGNORECASE)
 """Names of times that are no clock: how long something took."""
+_SPARSE = 0.2  # a column with numbers in fewer of its rows is none of samples
 _CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
 _UNCERTAIN = re.compile(
     r".*\b(u?n?certain\w*|err\w*|sigma|std|incert\w*|unsicher\w*|fehler|sd)\b.*|[dδΔσu][_ ]?[a-zθφ]|[a-zθφ]'|[\d.,]+",
@@ -52,7 +53,7 @@ def _is_even(column: F8) -> bool:
 
 
 def is_aside(heading: Heading, column: F8, others: bool) -> bool:
-    """Tell row numbers and uncertainties, which are there for the sake of other columns.
+    """Tell row numbers and uncertainties, which are there for the sake of other columns, and columns nearly empty.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def is_aside(heading: Heading, column: F8, others: bool) -> bool:
     """
     name = " ".join(heading.name.lower().replace("_", " ").split())
     index = others and are_row_numbers(column) and (name.rstrip("s") in _INDEX or name in _INDEX or "number" in name)
-    return index or bool(name and _UNCERTAIN.fullmatch(name)) or not np.isfinite(column).any()
+    return index or bool(name and _UNCERTAIN.fullmatch(name)) or bool(np.mean(np.isfinite(column)) < _SPARSE)
 
 
 def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[int]:

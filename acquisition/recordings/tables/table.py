@@ -232,7 +232,8 @@ class _Rows:
             self.bad[row] = UNREAD in forms
         else:
             self.bad[row] = len(cells) < self.width or any(cells[self.width :]) or min(forms) <= EMPTY
-        if not self.bad[row]:
+        # In a ragged row a word in one column says nothing of the numbers in the others.
+        if self.width is None or not self.bad[row]:
             for k, (cell, form) in enumerate(zip(wanted, forms, strict=True)):
                 if form >= 0:
                     self.counts[k, form] += 1

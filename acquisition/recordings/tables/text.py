@@ -28,6 +28,9 @@ __all__ = [
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?(\d*)|\.(\d+))(?:[eE][+-]?\d{1,3})?", re.ASCII)
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n\r\f\x1a")
+_FOREIGN = re.compile(rb"[\x80-\xff]+[\x21-\x7e]?")
+_HANZI = re.compile(rb"(?:[\xb0-\xd7\xa1-\xa3][\xa1-\xfe])+[\x21-\x7e]?")
+"""Chinese characters in common use, in GB 2312; what cp1252 has there are capitals, which seldom stand in pairs."""
 _LINE_END = re.compile(rb"\r\n|\r|\n")
 _BLANKS = "\t\f "
 
@@ -129,7 +132,7 @@ def decode(data: bytes) -> str:
     """Decode a text whatever its encoding; a byte that has no meaning becomes U+FFFD and fails as a number.
 
     Byte order marks are obeyed and removed. UTF-16 without one is known by its zero bytes. What is not UTF-8
-    is read as cp1252; a character cut off at the very end does not decide that.
+    is read as cp1252, or as GB 2312 where it looks like that; a character cut off at the very end does not decide it.
 
     Examples
     --------
@@ -147,6 +150,8 @@ def decode(data: bytes) -> str:
     except UnicodeDecodeError as error:
         if error.reason == "unexpected end of data" and error.end == len(data) and error.start:
             return data[: error.start].decode("utf-8")
+        if all(_HANZI.fullmatch(each) for each in _FOREIGN.findall(data)):
+            return data.decode("gb18030", errors="replace")
         return data.decode("cp1252", errors="replace")
 
 
