@@ -63,7 +63,8 @@ def unwrapped(text: Text) -> tuple[Text, tuple[Heading, ...]] | None:
     if count < max(_FEWEST, _SHARE * sum(skeletons.values()) - 1) or "#" not in skeleton or not skeleton.strip("# \t"):
         return None
     rows = ["\t".join(_CELL.findall(line)) if _skeleton(line) == skeleton else _plain(line) for line in lines]
-    return Text.of("\n".join(rows).encode()), _headings(skeleton)
+    whole_rows = "" if skeleton.endswith("#") else "\n"  # what stands behind the last number says that it is whole
+    return Text.of(("\n".join(rows) + whole_rows).encode()), _headings(skeleton)
 
 
 def begins_with_lists(head: str) -> bool:
@@ -139,7 +140,7 @@ def _objects(lines: Sequence[str]) -> tuple[Text, tuple[Heading, ...]] | None:
     if not keys or sum(each is not None for each in found) < max(_FEWEST, _SHARE * len(filled)):
         return None
     rows = ("" if each is None else "\t".join(each.get(key, "") for key in keys) for each in found)
-    return Text.of("\n".join(rows).encode()), tuple(Heading(*heading_of(key)) for key in keys)
+    return Text.of("\n".join(rows).encode() + b"\n"), tuple(Heading(*heading_of(key)) for key in keys)
 
 
 def _flat(above: str, told: dict[str, object]) -> Iterator[tuple[str, str]]:
