@@ -172,7 +172,10 @@ def _add_trade(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_formats(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("input", nargs="?", metavar="FILE", help="say what this file is")
+    parser.add_argument(
+        "input", nargs="?", metavar="FILE", help="say what this file is; of a folder or a zip, all in it"
+    )
+    parser.add_argument("--explain", action="store_true", help="show how the file is read, column by column")
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
     _add_input_options(parser)
 

@@ -21,6 +21,8 @@ class Survey:
     rate_hz : float or None
         None where it must be given.
     traps : tuple of Trap
+    span_s : float or None
+        From the first time to the last; None where they must be given.
     """
 
     run: str
@@ -29,6 +31,7 @@ class Survey:
     samples: int
     rate_hz: float | None
     traps: tuple[Trap, ...]
+    span_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

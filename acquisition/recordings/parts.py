@@ -10,6 +10,7 @@ import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import PurePosixPath
 
 from acquisition.errors import FormatError
 from acquisition.recordings.base import HEAD_BYTES
@@ -120,4 +121,10 @@ def members(path: str, data: bytes, most_bytes: int = MOST_BYTES) -> Iterator[tu
 
 
 def _wanted(listed: Sequence[zipfile.ZipInfo]) -> list[zipfile.ZipInfo]:
-    return [each for each in listed if not each.is_dir() and not each.filename.startswith(("__MACOSX/", "."))]
+    return [
+        each
+        for each in listed
+        if not each.is_dir()
+        and not each.filename.startswith("__MACOSX/")
+        and PurePosixPath(each.filename).name[:1] != "."
+    ]

@@ -1,22 +1,25 @@
-"""``springmass formats``: the families of recordings, or what one file is."""
+"""``springmass formats``: the families of recordings, what one file is, how it is read, or what a folder holds."""
 
 from __future__ import annotations
 
 import argparse
 import json
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from acquisition.errors import NeedsAnswer, visible
+from acquisition.recordings.explained import explain
 from acquisition.recordings.identify import formats, inspect
 from acquisition.recordings.inspection import Inspection, Survey
 from springmass.commands import completions
-from springmass.errors import OK
+from springmass.errors import OK, USAGE, ProgramError
 from springmass.runs.json_results import picked, plain
 from springmass.runs.loading import Loaded, kind_of, load
+from springmass.runs.shelf import Entry, is_shelf, shelf
 
 __all__ = ["run"]
 
@@ -24,6 +27,8 @@ OURS = {
     "run": "springmass run file (HDF5, opens in xarray, h5py and NeXus tools)",
     "wire": "springmass wire log: what was on disk while a run was recorded",
 }
+_WIDTHS = (44, 13, 36, 11, 11, 100)
+_MOST_ABOVE = 30
 _WHY = {"run": "it begins with the signature of HDF5", "wire": "it begins with the mark of a log's record"}
 
 
@@ -31,12 +36,66 @@ def run(options: argparse.Namespace) -> int:
     """List the formats, or describe a file."""
     if options.input is None:
         return _list(options)
+    if options.explain:
+        return _explain(Path(options.input), as_json=options.json)
+    if is_shelf(Path(options.input)):
+        return _shelf(Path(options.input), as_json=options.json)
     facts = _describe(Path(options.input), completions(options))
     if options.json:
         print(json.dumps(facts, allow_nan=False))
         return OK
     for line in _lines(facts):
         print(visible(line))
+    return OK
+
+
+def _shelf(path: Path, *, as_json: bool) -> int:
+    """Print one table of all files in a folder or a zip."""
+    entries = shelf(path)
+    if as_json:
+        for each in entries:
+            print(json.dumps(asdict(each), allow_nan=False))
+        return OK
+    rows = [("file", "family", "channels", "rate", "span", "missing"), *map(_row, entries)]
+    widths = [min(max(map(len, column)), most) for column, most in zip(zip(*rows, strict=True), _WIDTHS, strict=True)]
+    for row in rows:
+        cells = (_fitted(visible(cell), width).ljust(width) for cell, width in zip(row, widths, strict=True))
+        print("  ".join(cells).rstrip())
+    return OK
+
+
+def _row(each: Entry) -> tuple[str, ...]:
+    rate = "" if each.rate_hz is None else f"{each.rate_hz:.4g} Hz"
+    span = "" if each.span_s is None else f"{each.span_s:.4g} s"
+    missing = each.error.partition(" (tried ")[0] or ", ".join(f"--{option}" for option in each.missing)
+    return each.file, each.family or "none", ", ".join(each.channels), rate, span, missing
+
+
+def _fitted(cell: str, width: int) -> str:
+    return cell if len(cell) <= width else f"{cell[: width - 3]}..."
+
+
+def _explain(path: Path, *, as_json: bool) -> int:
+    """Print how a file is read: what stands above the rows, and what each column is taken for."""
+    if (kind := kind_of(path)) != "recording":
+        raise ProgramError(f"{path}: --explain shows columns of old recordings, got a {kind} file; leave it out", USAGE)
+    family, why, layouts = explain(path)
+    if as_json:
+        told = {"path": str(path), "format": family, "why": why, "tables": [asdict(each) for each in layouts]}
+        print(json.dumps(told, allow_nan=False))
+        return OK
+    print(visible(f"{'format':<10} {family}: {why}"))
+    for each in layouts:
+        if any(each.runs):
+            print(visible(f"{'run':<10} {', '.join(each.runs)}"))
+        for number, text in each.above[:_MOST_ABOVE]:
+            print(visible(f"{'above':<10} {f'line {number}':<10} {text.strip()[:100]}"))
+        if len(each.above) > _MOST_ABOVE:
+            print(f"{'above':<10} and {len(each.above) - _MOST_ABOVE} lines more")
+        for number, column in enumerate(each.columns, 1):
+            unit = f" ({column.unit})" if column.unit else ""
+            label = column.name or "no name"
+            print(visible(f"{f'column {number}':<10} {label}{unit}: {column.meaning}: {', '.join(column.cells)}, ..."))
     return OK
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -136,3 +137,82 @@ def test_a_name_that_no_terminal_can_show_is_shown_escaped(cli: Cli, recording: 
     done = cli("formats", odd)
     assert done.code == 0
     assert "a\\udcff.txt" in done.out
+
+
+def test_a_folder_is_one_table(cli: Cli, tmp_path: Path) -> None:
+    """A row a file: family, channels, rate, span and what is missing; what is no recording says why."""
+    shelf = tmp_path / "shelf"
+    (shelf / "old").mkdir(parents=True)
+    rows = "".join(f"{i / 10:.1f},{0.1 * (i % 4):.1f},{i % 3}\n" for i in range(41))
+    (shelf / "a.csv").write_text("Time (s),Position (m),n\n" + rows, encoding="utf-8")
+    (shelf / "old" / "b.csv").write_text("t,x,y\n" + rows, encoding="utf-8")
+    (shelf / "notes.md").write_text("What we did.\n", encoding="utf-8")
+    (shelf / ".hidden").write_text(rows, encoding="utf-8")
+    done = cli("formats", shelf)
+    assert (done.code, done.err) == (0, "")
+    table = [line.split() for line in done.out.splitlines()]
+    assert table[0] == ["file", "family", "channels", "rate", "span", "missing"]
+    assert table[1] == ["a.csv", "table", "Position", "10", "Hz", "4", "s"]
+    assert table[2] == ["notes.md", "none", "no", "format", "recognises", "it"]
+    assert table[3] == ["old/b.csv", "tracker", "x,", "y", "10", "Hz", "4", "s", "--channel,", "--unit"]
+    entries = cli("formats", "--json", shelf).results
+    assert [each["file"] for each in entries] == ["a.csv", "notes.md", "old/b.csv"]
+    assert entries[2]["missing"] == ["channel", "unit"]
+
+
+def test_a_zip_is_one_table(cli: Cli, tmp_path: Path) -> None:
+    """As a folder is, whatever its files are called."""
+    with zipfile.ZipFile(tmp_path / "runs.zip", "w") as archive:
+        for name in ("a.csv", "../a.csv", "deep/a.csv"):
+            archive.writestr(name, "Time (s),Position (m)\n0.0,0.1\n0.1,0.3\n0.2,0.2\n0.3,0.1\n")
+    done = cli("formats", tmp_path / "runs.zip")
+    assert done.code == 0
+    assert [line.split()[:3] for line in done.out.splitlines()[1:]] == [
+        ["a.csv", "csv", "Position"],
+        ["../a.csv", "csv", "Position"],
+        ["deep/a.csv", "csv", "Position"],
+    ]
+    assert not (tmp_path.parent / "a.csv").exists()
+
+
+def test_how_a_file_is_read_is_shown(cli: Cli, tmp_path: Path) -> None:
+    """The text above the rows is kept and shown, each column with its meaning and its first cells."""
+    path = tmp_path / "run.txt"
+    rows = "\n".join(f"{i}\t{i / 10:.1f}\t{i % 3}\tok" for i in range(9))
+    path.write_text(f"Pendulum 3\nn\tt (s)\ttheta (rad)\tstate\n{rows}\n", encoding="utf-8")
+    lines = cli("formats", "--explain", path).out.splitlines()
+    assert lines == [
+        'format     table: numbers begin in line 3, below "n", "t", "theta", "state"',
+        "above      line 1     Pendulum 3",
+        "above      line 2     n\\tt (s)\\ttheta (rad)\\tstate",
+        "column 1   n: beside others: taken where it is named: 0, 1, 2, 3, ...",
+        "column 2   t (s): time: 0.0, 0.1, 0.2, 0.3, ...",
+        "column 3   theta (rad): channel: 0, 1, 2, 0, ...",
+        "column 4   state: beside others: taken where it is named: ok, ok, ok, ok, ...",
+    ]
+    (told,) = cli("formats", "--explain", "--json", path).results
+    assert told["tables"][0]["columns"][1]["meaning"] == "time"
+
+
+def test_how_markup_is_read_is_shown(cli: Cli, tmp_path: Path) -> None:
+    """Numbers that stand in XML have no lines above them."""
+    path = tmp_path / "run.labx"
+    channels = "".join(
+        f"<channel><quantity>{name}</quantity><symbol>{name[0]}</symbol><unit>{unit}</unit>"
+        f"<values>{''.join(f'<value>{x}</value>' for x in values)}</values></channel>"
+        for name, unit, values in (("Zeit", "s", (0, 1, 2)), ("Weg", "m", (0.1, 0.2, 0.1)))
+    )
+    path.write_text(f"<?xml version='1.0'?><cassylab>{channels}</cassylab>", encoding="utf-8")
+    assert cli("formats", "--explain", path).out.splitlines() == [
+        "format     cassy: it is XML with the root <cassylab>",
+        "column 1   Zeit Z (s): time: 0, 1, 2, ...",
+        "column 2   Weg W (m): channel: 0.1, 0.2, 0.1, ...",
+    ]
+
+
+def test_explaining_a_run_file_is_refused(cli: Cli, recording: Path, tmp_path: Path) -> None:
+    """It has no columns, and one line says so."""
+    assert cli("convert", recording, tmp_path / "run.h5").code == 0
+    done = cli("formats", "--explain", tmp_path / "run.h5")
+    assert done.code == 2
+    assert "--explain shows columns of old recordings, got a run file" in done.err

@@ -107,7 +107,8 @@ class ColumnFormat:
             none = Trap("empty_channel", str(error).removeprefix(path).lstrip(", :"))
             return Survey(channel.run, channel.name, channel.unit, 0, None, (none,))
         rate_hz, traps = column.timing.rate_hz, column.traps
-        return Survey(channel.run, channel.name, channel.unit, column.t.size, rate_hz, traps)
+        span_s = float(column.t.max() - column.t.min())
+        return Survey(channel.run, channel.name, channel.unit, column.t.size, rate_hz, traps, span_s)
 
 
 def headed_format(

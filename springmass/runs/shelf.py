@@ -1,0 +1,106 @@
+"""A shelf of recordings, a folder or a zip: what each file on it is, and what it leaves to be said."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from acquisition.errors import AcquisitionError, FormatError, NeedsAnswer
+from acquisition.recordings.base import read_bytes
+from acquisition.recordings.identify import inspect, sniff
+from acquisition.recordings.parts import members
+from springmass.errors import ProgramError
+from springmass.runs.loading import load
+from storage.errors import StorageError
+
+__all__ = ["Entry", "is_shelf", "shelf"]
+
+_OPTION = re.compile(r" --([a-z-]+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One file.
+
+    Parameters
+    ----------
+    file : str
+        Its name on the shelf.
+    family : str
+        Empty where no family knows it.
+    channels : tuple of str
+        The one that is taken, or all that may be.
+    rate_hz, span_s : float or None
+    missing : tuple of str
+        Options that it asks for.
+    error : str
+        Why it cannot be read; empty where it can.
+    """
+
+    file: str
+    family: str
+    channels: tuple[str, ...] = ()
+    rate_hz: float | None = None
+    span_s: float | None = None
+    missing: tuple[str, ...] = ()
+    error: str = ""
+
+
+def is_shelf(path: Path) -> bool:
+    """Tell a folder or a zip archive."""
+    if path.is_dir():
+        return True
+    try:
+        return sniff(path) == "zip"
+    except FormatError:
+        return False
+
+
+def shelf(path: Path) -> Iterator[Entry]:
+    """Yield what every file of a folder, its folders among it, or of a zip archive is; hidden files are left out.
+
+    Raises
+    ------
+    FormatError
+        If an archive cannot be unpacked.
+    """
+    if path.is_dir():
+        for file in sorted(each for each in path.rglob("*") if each.is_file()):
+            inner = file.relative_to(path)
+            if not any(part.startswith(".") for part in inner.parts):
+                yield _entry(file, str(inner))
+        return
+    with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
+        for number, (name, data) in enumerate(members(str(path), read_bytes(path))):
+            file = Path(folder) / f"{number}" / (PurePosixPath(name).name or "file")
+            file.parent.mkdir()
+            file.write_bytes(data)
+            yield _entry(file, name)
+
+
+def _entry(path: Path, name: str) -> Entry:
+    try:
+        try:
+            loaded = load(path)
+        except NeedsAnswer as asked:
+            return _asked(path, name, asked)
+    except (AcquisitionError, StorageError, ProgramError) as error:
+        return Entry(name, "", error=str(error).removeprefix(str(path)).lstrip(":, "))
+    t = loaded.samples.t[np.isfinite(loaded.samples.t)]
+    span = float(t.max() - t.min()) if t.size else None
+    return Entry(name, loaded.format, (loaded.channel,), loaded.info.rate_hz, span)
+
+
+def _asked(path: Path, name: str, asked: NeedsAnswer) -> Entry:
+    found = inspect(path)
+    missing = tuple(dict.fromkeys(_OPTION.findall(str(asked).partition("? springmass analyse")[2])))
+    told = [each for each in found.surveys if each.samples]
+    channels = tuple(dict.fromkeys(each.channel for each in told))
+    timed = bool(told) and not {"rate-hz", "time-unit"} & {*missing}
+    rate_hz, span_s = (told[0].rate_hz, told[0].span_s) if timed else (None, None)
+    return Entry(name, found.format, channels, rate_hz, span_s, missing)
