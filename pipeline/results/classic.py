@@ -38,6 +38,10 @@ class Classic:
         spring_constant, velocity_rms and reynolds_number.
     window_t, window_amplitude : (m,) float64, s, m
         The sliding amplitude.
+    crests_t, crests_y : (8,) float64, s, m
+        The sampled maxima: the period is from the first to the last of them.
+    extremes : ((t, y), (t, y))
+        The least and the greatest distance: half of what lies between them is the amplitude.
     chi2 : float
         Sum of squared deviations of the sliding amplitude from the exponential over the stated error squared.
     """
@@ -45,7 +49,15 @@ class Classic:
     estimates: dict[str, Estimate]
     window_t: F8
     window_amplitude: F8
+    crests_t: F8
+    crests_y: F8
+    extremes: tuple[tuple[float, float], tuple[float, float]]
     chi2: float
+
+    def exponential(self) -> F8:
+        """Return the exponential that the report fits, at the windows' times, m."""
+        since = self.window_t - self.window_t[0]
+        return np.asarray(self.window_amplitude[0] * np.exp(-self.estimates["damping_rate"].value * since))
 
 
 def classic(track: Track, scene: Scene | None = None) -> Classic:
@@ -92,7 +104,8 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
     if t.size < 2:
         raise AnalysisError(f"the classic method needs distances, got {t.size} of {len(track)} samples; record longer")
     estimates: dict[str, Estimate] = {}
-    period = _period(t, y)
+    crests = _crests(t, y)
+    period = Estimate(float(t[crests[-1]] - t[crests[0]]) / CYCLES, READING_S / CYCLES, "s")
     estimates["period"] = period
     frequency = Estimate(1.0 / period.value, period.u / period.value**2, "Hz")
     estimates["frequency"] = frequency
@@ -112,7 +125,9 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
         estimates["spring_constant"] = Estimate(k, k * relative, "N/m")
     if track.velocity is not None and np.isfinite(track.velocity).any():
         _add_velocity(estimates, track.velocity[np.isfinite(track.velocity)], scene)
-    return Classic(estimates, window_t, window_amplitude, chi2)
+    lowest, highest = int(np.argmin(y)), int(np.argmax(y))
+    extremes = (float(t[lowest]), float(y[lowest])), (float(t[highest]), float(y[highest]))
+    return Classic(estimates, window_t, window_amplitude, t[crests], y[crests], extremes, chi2)
 
 
 def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:
@@ -149,25 +164,25 @@ def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:
     return t[:count], half_range[whole]
 
 
-def _period(t: F8, y: F8) -> Estimate:
-    """Time between the first sampled maximum and the seventh after it, over seven."""
+def _crests(t: F8, y: F8) -> list[int]:
+    """Return the rows of the first sampled maximum and the seven after it."""
     middle = 0.5 * (float(y.max()) + float(y.min()))
     above = y > middle
     rises = np.flatnonzero(~above[:-1] & above[1:]) + 1
     falls = np.flatnonzero(above[:-1] & ~above[1:]) + 1
-    crests: list[float] = []
+    crests: list[int] = []
     for rise in rises:
         after = falls[falls > rise]
         if after.size:
-            crest = float(t[rise + int(np.argmax(y[rise : after[0]]))])
+            crest = int(rise) + int(np.argmax(y[rise : after[0]]))
             # Noise at the crossing makes runs of a few samples; an eye sees one crest.
-            if not crests or crest - crests[-1] > 0.2:
+            if not crests or t[crest] - t[crests[-1]] > 0.2:
                 crests.append(crest)
     if len(crests) <= CYCLES:
         raise AnalysisError(
             f"the classic method needs {CYCLES + 1} maxima, the record shows {len(crests)}; record longer"
         )
-    return Estimate((crests[CYCLES] - crests[0]) / CYCLES, READING_S / CYCLES, "s")
+    return crests[: CYCLES + 1]
 
 
 def _exponential(t: F8, amplitude: F8) -> tuple[float, float]:

@@ -130,7 +130,8 @@ def _position(analysis: Analysis, _: Oscillation) -> str:
 
 def _amplitude(_: Analysis, motion: Oscillation) -> str:
     return (
-        "Amplitude in windows of one period or a few, with one standard uncertainty u, and every law; "
+        "Amplitude in windows of one period or a few, with one standard uncertainty u, and every law, named where it "
+        "matters; "
         f"beneath, the residuals of the selected law, {motion.damping.selected}, over u."
     )
 
@@ -146,9 +147,11 @@ def _phase(analysis: Analysis, motion: Oscillation) -> str:
 def _energy(analysis: Analysis, motion: Oscillation) -> str:
     mass = motion.derived.effective_mass_kg
     of = f"the mass that oscillates, {kept(mass)}" if mass is not None else "one kilogram, as no mass was given"
+    parts = ", and the parts as they change into each other" if analysis.track.unit == "m" else ""
     return (
-        f"Energy of the oscillation, m ω² A²/2{_of_displacement(analysis)}, for {of}; beneath, what single amplitudes "
-        "deviate from the law. "
+        f"Energy of the oscillation, m ω² A²/2{_of_displacement(analysis)}, for {of}, with its kinetic and potential "
+        "parts, one half each in the mean of a period; beneath, what single amplitudes "
+        f"deviate from the law{parts}. "
         "Points bear their own scatter. The band is one standard uncertainty of the law, with all that points share: "
         "mass, frequency, the distances' scale and the choice among admissible laws."
     )
@@ -179,11 +182,23 @@ def _motion(analysis: Analysis, _: Oscillation) -> str:
     if analysis.track.unit != "m":
         first, rate = f"First and second derivative of the {noun(analysis.track.unit)}", "first derivative"
         rows = rows.replace("position, velocity and acceleration", "the value and its derivatives")
+    above = f"The {rate} over the whole record; beneath, " if is_long(analysis) else ""
+    first = f"{first[:1].lower()}{first[1:]}" if above else first
     return (
-        f"{first} over {periods}, from an oscillator smoother: every sample speaks on every "
+        f"{above}{first} over {periods}, from an oscillator smoother: every sample speaks on every "
         f"other, nothing is differenced. Beneath{whole}, what the {rate} differs from the fitted law's, in its band "
         "of one standard uncertainty u, and u of both: larger at the edges, where one side is missing. Clock and "
         f"scale, which move all alike, are not in u. motion.csv holds {rows}."
+    )
+
+
+def _classic(_: Analysis, motion: Oscillation) -> str:
+    return (
+        "What the lab report's own method takes, over this analysis. Above, the two sampled maxima whose distance in "
+        "time is seven periods, each to a sample's width, and the extremes of the whole record, half of whose distance "
+        "is its amplitude: noise and false echoes are among them. Beneath, half of what lies between the extremes in "
+        "1.5 s, at every sample, with the exponential that it "
+        f"fits through the first of these; points and black curve, {motion.damping.selected}, are this analysis's."
     )
 
 
@@ -194,4 +209,5 @@ _CAPTIONS: dict[str, Callable[[Analysis, Oscillation], str]] = {
     "energy": _energy,
     "motion": _motion,
     "phase": _phase,
+    "classic": _classic,
 }

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from springmass.report.budgets import budget_csv
-from springmass.report.figures import KINDS, MAKERS, comparison_figure, draw, render
+from springmass.report.figures import KINDS, NAMES, comparison_figure, draw, render
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
+from springmass.report.recorded import notes_of
 from springmass.report.tables import results_csv
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
@@ -79,7 +80,7 @@ _TABLES = ("results.json", "results.csv", "table.tex", "budget.csv", "budget.tex
 
 def _names(stems: Sequence[str]) -> set[str]:
     """Return the name of every file that a report of these runs may hold."""
-    pictures = [f"{stem}{name}" for stem in stems for name in MAKERS]
+    pictures = [f"{stem}{name}" for stem in stems for name in NAMES]
     figures = {f"figures/{name}.{kind}" for name in (*pictures, "comparison") for kind in KINDS}
     return {PAGE, *_TABLES, *figures, *(f"{stem}motion.csv" for stem in stems)}
 
@@ -96,7 +97,7 @@ def _write(
     pictures = []
     for stem, run in zip(stems, runs, strict=True):
         smoothed = smoothed_or_why(run.analysis)
-        figures = draw(run.analysis, smoothed)
+        figures = draw(run.analysis, smoothed, notes=notes_of(run.recorded), classic=run.classic)
         drawn = {name: {kind: render(figure, kind) for kind in KINDS} for name, figure in figures.items()}
         for name, files in drawn.items():
             for kind, data in files.items():

@@ -7,19 +7,22 @@ file, so that the page stays small. A further figure is a maker and a line in :d
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.motion.smoother import Smoothed
+from pipeline.results.classic import Classic
 from springmass.report.figures.amplitude import amplitude_figure
 from springmass.report.figures.canvas import KINDS, render, save
+from springmass.report.figures.classic_method import classic_figure
 from springmass.report.figures.comparison import comparison_figure
 from springmass.report.figures.energy_drag import drag_figure, energy_figure
 from springmass.report.figures.phase_plot import phase_figure
 from springmass.report.figures.position import position_figure
 from springmass.report.figures.velocity import motion_figure
+from springmass.report.recorded import Note
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +30,9 @@ if TYPE_CHECKING:
 __all__ = [
     "KINDS",
     "MAKERS",
+    "NAMES",
     "amplitude_figure",
+    "classic_figure",
     "comparison_figure",
     "drag_figure",
     "draw",
@@ -49,7 +54,17 @@ MAKERS: dict[str, Callable[[Analysis], Figure | None]] = {
 }
 
 
-def draw(analysis: Analysis, smoothed: Smoothed | str | None = None) -> dict[str, Figure]:
+NAMES = (*MAKERS, "classic")
+"""Of every figure that a run's report may hold."""
+
+
+def draw(
+    analysis: Analysis,
+    smoothed: Smoothed | str | None = None,
+    *,
+    notes: Sequence[Note] = (),
+    classic: Classic | None = None,
+) -> dict[str, Figure]:
     """Return every figure of a run by name, in the report's order; the position alone of one at rest.
 
     Parameters
@@ -57,13 +72,21 @@ def draw(analysis: Analysis, smoothed: Smoothed | str | None = None) -> dict[str
     analysis : Analysis
     smoothed : Smoothed or str, optional
         The run's ``smoothed()``, where it is at hand, or why there is none; left out, it is worked out.
+    notes : sequence of Note
+        Marks and events of the recording, for the position.
+    classic : Classic, optional
+        The lab report's own method on the same record, which then has its figure.
     """
     if not isinstance(analysis.motion, Oscillation):
-        return {"position": position_figure(analysis)}
-    makers = dict(MAKERS)
+        return {"position": position_figure(analysis, notes)}
+    makers = MAKERS | {"position": partial(position_figure, notes=notes)}
     if isinstance(smoothed, str):
         del makers["motion"]
     else:
+        smoothed = analysis.smoothed() if smoothed is None else smoothed
         makers["motion"] = partial(motion_figure, smoothed=smoothed)
+        makers["energy"] = partial(energy_figure, smoothed=smoothed)
+    if classic is not None:
+        makers["classic"] = partial(classic_figure, classic=classic)
     drawn = {name: maker(analysis) for name, maker in makers.items()}
     return {name: figure for name, figure in drawn.items() if figure is not None}

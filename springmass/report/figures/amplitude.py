@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["amplitude_figure", "amplitude_panel"]
 
+MOST_NAMED = 4
 _DASHES = ((0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
 
 
@@ -73,7 +74,8 @@ def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None 
     analysis : Analysis
         Of a record that oscillates.
     laws : sequence of str, optional
-        Names of the laws to draw; left out, all that were fitted.
+        Names of the laws to draw; left out, all that were fitted, those named that matter: the selected one and the
+        best of what the record takes for as good.
 
     Raises
     ------
@@ -90,15 +92,22 @@ def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None 
     if not kept.all():
         panel.plot(t[~kept], amplitude[~kept], "o", mfc="none", color=ORANGE, ms=4, label="left out of the fits")
     shown = [float(np.min(amplitude - u)), float(np.max(amplitude + u))]
-    for i, name in enumerate(sorted(damping.fits, key=lambda name: name == damping.selected)):
-        if laws is not None and name not in laws:
-            continue
-        status = law_status(damping, name)
-        chosen, rejected = name == damping.selected, status.startswith("rejected")
-        colour = "#000000" if chosen else GREY if rejected else (GREEN, PURPLE, VERMILLION, ORANGE)[i % 4]
+    matter = laws or list(dict.fromkeys((damping.selected, *damping.admissible)))[:MOST_NAMED]
+    others = [name for name in damping.fits if name not in matter] if laws is None else []
+    for i, name in enumerate(others):
+        label = (
+            None if i else f"{len(others)} other laws" if len(others) > 1 else f"{name} ({law_status(damping, name)})"
+        )
+        curve = damping.fits[name].amplitude(grid - damping.t0) * factor
+        panel.plot(grid, curve, color=GREY, ls="--", lw=0.7, label=label, zorder=2.5)
+    for i, name in enumerate(sorted(matter, key=lambda name: name == damping.selected)):
+        chosen = name == damping.selected
+        colour = "#000000" if chosen else (GREEN, PURPLE, VERMILLION, ORANGE)[i % 4]
         dashes = "-" if chosen else _DASHES[i % len(_DASHES)]
         curve = damping.fits[name].amplitude(grid - damping.t0) * factor
-        panel.plot(grid, curve, color=colour, ls=dashes, lw=1.0, label=f"{name} ({status})", zorder=3)
+        panel.plot(
+            grid, curve, color=colour, ls=dashes, lw=1.0, label=f"{name} ({law_status(damping, name)})", zorder=3
+        )
     margin = 0.12 * max(shown[1] - shown[0], 1e-9 * abs(shown[1])) or 1.0
     panel.set_ylim(shown[0] - margin, shown[1] + margin)
     panel.set_ylabel(value_label("amplitude", analysis.track.unit))

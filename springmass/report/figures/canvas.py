@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.quantity import SHOWN, in_unit
 from pipeline.track import F8
@@ -35,6 +36,7 @@ __all__ = [
     "KINDS",
     "ORANGE",
     "PURPLE",
+    "RASTER_POINTS",
     "RIGHT",
     "SKY",
     "VERMILLION",
@@ -42,6 +44,7 @@ __all__ = [
     "blank",
     "derivative_label",
     "error_bars",
+    "escaped",
     "finish_residual",
     "legend_above",
     "legend_row",
@@ -76,11 +79,12 @@ _SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "springmass",
     "pdf.fonttype": 42,
-    "savefig.dpi": 200,
+    "savefig.dpi": 150,
 }
 WIDTH = 7.2  # inches, as all lengths here
 LEFT, RIGHT, BOTTOM = 0.72, 0.12, 0.45
-DENSE_POINTS = 2500
+DENSE_POINTS = 2500  # of samples; more are a line between the least and the greatest of every bin
+RASTER_POINTS = 300  # of markers; more are pixels in the file, fewer bytes than as many shapes
 KINDS: tuple[Literal["svg"], Literal["pdf"]] = ("svg", "pdf")
 
 
@@ -100,7 +104,24 @@ def render(figure: Figure, kind: Literal["svg", "pdf"]) -> bytes:
     with style():
         _shrink_wide_numbers(figure)
         figure.savefig(out, format=kind, metadata=metadata[kind])
-    return out.getvalue()
+    return _rounded(out.getvalue()) if kind == "svg" else out.getvalue()
+
+
+def _rounded(svg: bytes) -> bytes:
+    """Round an SVG file's paths to a tenth of a point, a sixth of a screen's pixel; text and pixels stay."""
+    paths = re.sub(rb' d="[^"]*"', lambda path: _LONG[2].sub(_to_tenths, b" " + b" ".join(path[0].split())), svg)
+    return re.sub(rb' (?:x|y|transform)="[^"]*"', lambda found: _LONG[3].sub(_to_hundredths, found[0]), paths)
+
+
+_LONG = {digits: re.compile(rb"-?\d+\.\d{%d,}" % digits) for digits in (2, 3)}
+
+
+def _to_tenths(number: re.Match[bytes]) -> bytes:
+    return b"%.10g" % round(float(number[0]), 1)
+
+
+def _to_hundredths(number: re.Match[bytes]) -> bytes:
+    return b"%.10g" % round(float(number[0]), 2)
 
 
 def save(figure: Figure, folder: Path, name: str) -> None:
@@ -218,6 +239,11 @@ def error_bars(panel: Axes, t: F8, y: F8, u: F8, label: str) -> None:
     """Set points with their standard uncertainties."""
     look: dict[str, Any] = {"ms": 3.4, "mew": 0, "color": SKY, "ecolor": BLUE, "elinewidth": 0.9, "capsize": 1.5}
     panel.errorbar(t, y, yerr=u, fmt="o", label=label, **look)
+
+
+def escaped(text: str) -> str:
+    """Return a text from outside, its control characters visible, for matplotlib to set as it stands."""
+    return visible(text).replace("$", r"\$")  # else what stands between two is set as mathematics
 
 
 def value_label(what: str, unit: str) -> str:

@@ -8,7 +8,18 @@ import numpy as np
 
 from acquisition.errors import visible
 from pipeline.results.compare import Comparison
-from springmass.report.figures.canvas import BLUE, BOTTOM, RIGHT, SKY, VERMILLION, WIDTH, blank, legend_row, style
+from springmass.report.figures.canvas import (
+    BLUE,
+    BOTTOM,
+    RIGHT,
+    SKY,
+    VERMILLION,
+    WIDTH,
+    blank,
+    escaped,
+    legend_row,
+    style,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,4 +87,4 @@ def _short(name: str, most: int) -> str:
     # Names of one experiment differ at their ends as often as at their beginnings: keep both.
     half = most // 2
     shown = name if len(name) <= most else f"{name[: half - 1]}…{name[-half:]}"
-    return shown.replace("$", r"\$")  # else matplotlib sets what stands between two as mathematics
+    return escaped(shown)

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.analyse import Analysis
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.errors import AnalysisError
+from pipeline.motion.smoother import Smoothed
 from pipeline.numerics.quantity import SHOWN
 from pipeline.results.curves import Curve
 from pipeline.track import F8
-from springmass.report.figures.canvas import BLUE, SKY, legend_above, moving, panels, share, style, value_label
+from springmass.report.figures.canvas import (
+    BLUE,
+    GREEN,
+    SKY,
+    VERMILLION,
+    legend_above,
+    moving,
+    panels,
+    share,
+    style,
+    value_label,
+)
+from springmass.report.figures.position import ZOOM_PERIODS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,9 +35,11 @@ if TYPE_CHECKING:
 
 __all__ = ["drag_figure", "drag_panel", "energy_figure", "energy_panel"]
 
+MOST_MEANS = 120  # of each part; of more periods several share one
 
-def energy_figure(analysis: Analysis) -> Figure | None:
-    """Draw the mechanical energy with its band, and beneath it what single amplitudes deviate from the law.
+
+def energy_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figure | None:
+    """Draw the mechanical energy with its band, its kinetic and its potential part, and what deviates from the law.
 
     None where the record tells no displacement.
 
@@ -31,14 +47,24 @@ def energy_figure(analysis: Analysis) -> Figure | None:
     ----------
     analysis : Analysis
         Of a record that oscillates. Without a mass in its scene the energy is that of one kilogram.
+    smoothed : Smoothed, optional
+        Its motion, which tells the two parts apart; left out, they are not drawn.
     """
     motion = moving(analysis)
     curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
     if curve is None:
         return None
     with style():
-        figure, (above, below) = panels([(2.3, 0.0), (1.1, 0.08)])
+        smoothed = smoothed if analysis.track.unit == "m" else None
+        rows = [(2.1, 0.0), (1.0, 0.08)]
+        figure, axes = panels(rows if smoothed is None else [*rows, (1.5, 0.42)])
+        above, below = axes[:2]
         energy_panel(above, analysis)
+        if smoothed is not None:
+            parts = _parts(motion, smoothed)
+            _draw_means(above, motion, *parts)
+            _draw_parts(axes[2], analysis, *parts)
+            axes[2].set_ylabel(above.get_ylabel())
         law = np.interp(curve.x_points, curve.x, curve.y)
         deviation, scatter = 100.0 * (curve.y_points / law - 1.0), 100.0 * curve.u_points / law
         width = 100.0 * curve.u / curve.y
@@ -48,10 +74,50 @@ def energy_figure(analysis: Analysis) -> Figure | None:
         reach = 1.08 * max(float(np.max(np.abs(deviation) + scatter)), float(np.max(width)), 1e-6)
         below.set_ylim(-reach, reach)
         below.set_ylabel("deviation / %")
-        below.set_xlabel("time / s")
         share(above, below, float(curve.x[0]), float(np.nanmax(analysis.track.t)))
+        axes[-1].set_xlabel("time / s")
         legend_above(above)
         return figure
+
+
+def _parts(motion: Oscillation, smoothed: Smoothed) -> tuple[F8, F8, F8]:
+    """Return times in order, and the kinetic and the potential energy at each, J, or J/kg without a mass."""
+    rows = np.flatnonzero(np.isfinite(smoothed.t))
+    rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
+    stiffness = motion.derived.half_stiffness
+    assert stiffness is not None  # there is an energy
+    t, half = smoothed.t[rows], stiffness.value
+    displacement = smoothed.position[rows] - motion.rest.at(t)
+    # Both from one constant: m v^2 / 2 is k (v/omega)^2 / 2.
+    quadrature = smoothed.velocity[rows] / motion.phase.angular_frequency.value
+    return t, half * quadrature**2, half * displacement**2
+
+
+def _draw_means(panel: Axes, motion: Oscillation, t: F8, kinetic: F8, potential: F8) -> None:
+    """Set each part's mean over every whole period, of many periods over several."""
+    together = max(1, math.ceil(motion.cycles.count / MOST_MEANS))
+    turn = np.floor((t - t[0]) * motion.cycles.frequency_hz / together).astype(np.intp)
+    counts = np.bincount(turn)
+    whole = counts > 0.9 * float(np.median(counts))
+    times = np.bincount(turn, t)[whole] / counts[whole]
+    # Both are half of the whole: the one is drawn inside the other.
+    for part, colour, ms, label in ((kinetic, VERMILLION, 4.2, "kinetic"), (potential, GREEN, 2.0, "potential")):
+        mean = 1e3 * np.bincount(turn, part)[whole] / counts[whole]
+        panel.plot(times, mean, "o", ms=ms, mew=0, color=colour, label=f"{label}, mean of a period")
+
+
+def _draw_parts(panel: Axes, analysis: Analysis, t: F8, kinetic: F8, potential: F8) -> None:
+    """Draw how both parts change into each other in the first periods, and their sum."""
+    motion = moving(analysis)
+    end = min(float(t[0]) + ZOOM_PERIODS / motion.cycles.frequency_hz, float(t[-1]))
+    rows = np.flatnonzero(t <= end)
+    rows = rows[:: max(1, rows.size // 600)]
+    for part, colour, dashes in ((kinetic, VERMILLION, "-"), (potential, GREEN, (0, (4, 1.5)))):
+        panel.plot(t[rows], 1e3 * part[rows], color=colour, ls=dashes, lw=0.9)
+    panel.plot(t[rows], 1e3 * (kinetic + potential)[rows], color="#000000", lw=0.9)
+    panel.set_title("kinetic, potential (dashed) and their sum in the first periods", loc="left", fontsize=8.5, pad=3)
+    panel.set_ylim(bottom=0.0)
+    panel.set_xlim(float(t[0]), end)
 
 
 def energy_panel(panel: Axes, analysis: Analysis) -> None:

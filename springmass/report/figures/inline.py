@@ -1,4 +1,4 @@
-"""A figure's file as an element of a page: names of its own, no more digits than eyes see."""
+"""A figure's file as an element of a page, where names are its own and nothing speaks for the whole page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["inline_svg"]
 
 
 def inline_svg(svg: bytes, prefix: str) -> Markup:
-    """Return an SVG file as an element for a page: names of its own, coordinates to a hundredth of a point.
+    """Return an SVG file as an element for a page: names of its own.
 
     Parameters
     ----------
@@ -39,17 +39,8 @@ def inline_svg(svg: bytes, prefix: str) -> Markup:
     # A style for "*" would reach the whole page from here.
     text = re.sub(r"<style[^>]*>.*?</style>", "", text, flags=re.DOTALL)
     text = re.sub(r"<defs>\s*</defs>", "", text)
-    text = re.sub(r"<[^>]+>", _rounded, text)
     text = _shared_styles(text)
     return Markup(re.sub(r">\s+<", "><", text).strip())
-
-
-def _rounded(tag: re.Match[str]) -> str:
-    # Text between tags, such as 0.0025 at an axis, is not touched, nor are pixels.
-    if tag[0].startswith("<image"):
-        return tag[0]
-    shorter = re.sub(r"-?\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0])
-    return re.sub(r"\s+", " ", shorter)
 
 
 def _shared_styles(text: str) -> str:

@@ -11,7 +11,7 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.track import F8, UNUSABLE
 from springmass.report.figures.canvas import (
-    DENSE_POINTS,
+    RASTER_POINTS,
     derivative_label,
     legend_above,
     model_phase,
@@ -86,7 +86,7 @@ def phase_panel(panel: Axes, analysis: Analysis) -> ScalarMappable:
         "ms": 2.8,
         "mew": 0,
         "color": "#a0a0a0",
-        "rasterized": np.count_nonzero(drawn) > DENSE_POINTS // 5,
+        "rasterized": bool(np.count_nonzero(drawn) > RASTER_POINTS),
     }
     fastest = 1.3 * float(np.nanmax(np.abs(motion.waveform.velocity)))
     beyond = int(np.count_nonzero(np.abs(velocity[drawn]) > fastest))

@@ -16,8 +16,10 @@ from springmass.report.figures.canvas import (
     GREEN,
     ORANGE,
     PURPLE,
+    RASTER_POINTS,
     SKY,
     VERMILLION,
+    escaped,
     finish_residual,
     legend_above,
     model_phase,
@@ -27,6 +29,7 @@ from springmass.report.figures.canvas import (
     thinned,
     value_label,
 )
+from springmass.report.recorded import Note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,6 +47,7 @@ _FLAGGED: tuple[tuple[int, str, str, str], ...] = (
 ZOOM_PERIODS = 8
 LONG_PERIODS = 14  # more than these are drawn whole and as a detail
 DENSE_PERIODS = 40  # more than these are a band to the eye
+MOST_WORDS = 12  # marks whose words have room
 VISIBLE_NOISE = 0.005  # of the panel's height; error bars of less vanish in the points
 
 
@@ -58,7 +62,7 @@ def has_error_bars(analysis: Analysis) -> bool:
     return isinstance(analysis.motion, Oscillation) and bool(analysis.conditioned.noise_m > VISIBLE_NOISE * np.ptp(y))
 
 
-def position_figure(analysis: Analysis) -> Figure:
+def position_figure(analysis: Analysis, notes: Sequence[Note] = ()) -> Figure:
     """Draw the distance with its fit, and beneath it the residual over the noise of one sample.
 
     Flagged samples have markers of their own; those off the axis stand at its edge. A long record is followed
@@ -67,6 +71,8 @@ def position_figure(analysis: Analysis) -> Figure:
     Parameters
     ----------
     analysis : Analysis
+    notes : sequence of Note
+        Marks and events of the recording; marks, the trigger and losses are drawn.
     """
     track, motion = analysis.track, analysis.motion
     start, end = float(np.nanmin(track.t)), float(np.nanmax(track.t))
@@ -74,6 +80,7 @@ def position_figure(analysis: Analysis) -> Figure:
         if not isinstance(motion, Oscillation):
             figure, (only,) = panels([(2.6, 0.0)])
             position_panel(only, analysis, start, end)
+            _draw_notes(only, notes)
             legend_above(only)
             only.set_xlabel("time / s")
             return figure
@@ -81,6 +88,7 @@ def position_figure(analysis: Analysis) -> Figure:
         rows = [(1.75, 0.0), (0.85, 0.08)]
         figure, axes = panels([*rows, (1.9, 0.58), (0.85, 0.08)] if long else [(2.3, 0.0), (1.0, 0.08)])
         _draw_pair(axes[:2], analysis, motion, start, end)
+        _draw_notes(axes[0], notes)
         legend_above(axes[0])
         if long:
             first = float(track.t[analysis.conditioned.used][0])
@@ -150,11 +158,29 @@ def _draw_pair(axes: Sequence[Axes], analysis: Analysis, motion: Oscillation, st
     noise = analysis.estimates["noise"].value or 1.0
     inside = ((analysis.flags & UNUSABLE) == 0) & (t >= start) & (t <= end)
     residual = motion.waveform.residual[inside] / noise
-    dense = residual.size > DENSE_POINTS
-    size, alpha = (1.6, 0.5) if dense else (2.6, 1.0)
-    below.plot(t[inside], residual, ".", ms=size, mew=0, color=BLUE, alpha=alpha, rasterized=dense)
+    # Thousands of points are pixels, which take a third of the bytes of round ones.
+    look: dict[str, Any] = {"marker": ",", "alpha": 0.7} if residual.size > DENSE_POINTS else {"marker": ".", "ms": 2.6}
+    dense = residual.size > RASTER_POINTS
+    below.plot(t[inside], residual, ls="", mew=0, color=BLUE, rasterized=dense, **look)
     finish_residual(below, residual, "residual / σ")
     share(above, below, start, end)
+
+
+def _draw_notes(panel: Axes, notes: Sequence[Note]) -> None:
+    """Draw a line at every mark, at the trigger and at losses; few marks bear their words."""
+    marks = [note for note in notes if note.kind == "mark"]
+    for kind, colour in (("mark", PURPLE), ("trigger", GREEN), ("lost", VERMILLION), ("reopened", VERMILLION)):
+        times = [note.t_s for note in notes if note.kind == kind]
+        for i, t_s in enumerate(times):
+            label = None if i else kind if len(times) == 1 else f"{kind} ({len(times)})"
+            panel.axvline(t_s, color=colour, lw=0.9, ls=(0, (4, 2)), label=label, zorder=4)
+    if len(marks) <= MOST_WORDS:
+        for mark in marks:
+            words = mark.text if len(mark.text) <= 24 else f"{mark.text[:22]}…"
+            look: dict[str, Any] = {"fontsize": 7.0, "va": "top", "ha": "right", "clip_on": True, "zorder": 5}
+            at = (mark.t_s, 0.97)
+            text = panel.text(*at, escaped(words), rotation=90, transform=panel.get_xaxis_transform(), **look)
+            text.set_bbox({"facecolor": "#ffffff", "alpha": 0.7, "linewidth": 0, "pad": 0.5})
 
 
 def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) -> None:
@@ -168,7 +194,8 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
         ends = thinned(y[used], 900)
         panel.plot(track.t[used][ends], y[used][ends], color=SKY, lw=0.5, label="samples used")
     else:
-        panel.plot(track.t[used], y[used], ".", ms=4.0, mew=0, color=SKY, label="samples used")
+        dense = np.count_nonzero(used) > RASTER_POINTS
+        panel.plot(track.t[used], y[used], ".", ms=4.0, mew=0, color=SKY, label="samples used", rasterized=dense)
         if has_error_bars(analysis):
             u = analysis.conditioned.noise_m * factor
             panel.vlines(track.t[used], y[used] - u, y[used] + u, color=SKY, lw=0.6, alpha=0.6)
@@ -197,5 +224,12 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
 
 def _mark(panel: Axes, t: F8, y: F8, marker: str, colour: str, label: str) -> None:
     """Set markers on top of everything, whole also at the edge."""
-    look: dict[str, Any] = {"ms": 7 if marker == "|" else 3.2, "mew": 0.8, "color": colour, "ls": ""}
+    dense = t.size > RASTER_POINTS
+    look: dict[str, Any] = {
+        "rasterized": dense,
+        "ms": 7 if marker == "|" else 3.2,
+        "mew": 0.8,
+        "color": colour,
+        "ls": "",
+    }
     panel.plot(t, y, marker, mfc="none", label=label, clip_on=False, zorder=4, **look)

@@ -12,11 +12,12 @@ from pipeline.numerics.quantity import SHOWN
 from pipeline.track import F8
 from springmass.report.figures.canvas import (
     BLUE,
-    DENSE_POINTS,
+    RASTER_POINTS,
     SKY,
     VERMILLION,
     derivative_label,
     legend_above,
+    legend_row,
     model_phase,
     moving,
     panels,
@@ -39,7 +40,7 @@ BINS = 250  # of a dense series: each gives the least and the greatest of what i
 def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figure:
     """Draw the smoother's velocity and acceleration, the difference from the fitted law, and the uncertainties.
 
-    Of a long record the first periods stand above, the whole of it beneath.
+    Of a long record the velocity stands above as a whole, then the first periods, and beneath them the whole again.
 
     Parameters
     ----------
@@ -58,11 +59,20 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
     long = is_long(analysis)
     detail = start + ZOOM_PERIODS / motion.cycles.frequency_hz if long else end
     with style():
-        figure, axes = panels([(1.7, 0.0), (1.4, 0.08), (0.95, 0.42 if long else 0.08), (0.95, 0.08)], right=0.66)
+        heights = [(1.7, 0.42 if long else 0.0), (1.4, 0.08), (0.95, 0.42 if long else 0.08), (0.95, 0.08)]
+        figure, axes = panels([(1.2, 0.0), *heights] if long else heights, right=0.66)
+        label = derivative_label(("velocity v", "derivative"), "m/s", unit)
+        if long:
+            whole, *axes = axes
+            keep = thinned(velocity, 2 * BINS)
+            whole.plot(t[keep], velocity[keep], color="#000000", lw=0.4)
+            whole.set_xlim(start, end)
+            whole.set_ylabel(label)
+            whole.axvspan(start, detail, color="#000000", alpha=0.07, lw=0)
         _draw_samples(axes[0], analysis, motion, start, detail)
         inside = t <= detail
         _draw_value(axes[0], t[inside], velocity[inside], u_velocity[inside], labelled=True)
-        axes[0].set_ylabel(derivative_label(("velocity v", "derivative"), "m/s", unit))
+        axes[0].set_ylabel(label)
         acceleration, u_acceleration = smoothed.acceleration[rows], smoothed.u_acceleration[rows]
         _draw_value(axes[1], t[inside], acceleration[inside], u_acceleration[inside])
         axes[1].set_ylabel(derivative_label(("acceleration a", "2nd derivative"), "m/s^2", unit))
@@ -76,7 +86,10 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
             axes[2].axvspan(start, detail, color="#000000", alpha=0.07, lw=0)
         else:
             axes[1].tick_params(labelbottom=False)
-        legend_above(axes[0])
+        if long:
+            legend_row(axes[0], 3)
+        else:
+            legend_above(axes[0])
         return figure
 
 
@@ -88,7 +101,7 @@ def _draw_samples(panel: Axes, analysis: Analysis, motion: Oscillation, start: f
     fastest = 1.3 * float(np.nanmax(np.abs(motion.waveform.velocity)))
     beyond = int(np.count_nonzero(np.abs(velocity[drawn]) > fastest))
     label += f" ({beyond} off the axis)" if beyond else ""
-    dense = bool(np.count_nonzero(drawn) > DENSE_POINTS)
+    dense = bool(np.count_nonzero(drawn) > RASTER_POINTS)
     panel.plot(t[drawn], velocity[drawn], ".", ms=4.0, mew=0, color="#a0a0a0", label=label, rasterized=dense)
     panel.set_ylim(-fastest, fastest)
 
