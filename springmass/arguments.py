@@ -58,6 +58,7 @@ def _add_analyse(parser: argparse.ArgumentParser) -> None:
     written = parser.add_mutually_exclusive_group()
     written.add_argument("--report", action="store_true", help="write a report of each of several inputs too")
     written.add_argument("--no-report", action="store_true", help="print, but write no files")
+    _add_pdf(parser)
     _add_si(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object per input on stdout")
     parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
@@ -106,6 +107,7 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", dest="from_s", type=_finite, metavar="S", help="use samples from this second on")
     parser.add_argument("--to", dest="to_s", type=_finite, metavar="S", help="use samples up to this second")
     parser.add_argument("--out", metavar="DIR", help="folder for the report (default: none is written)")
+    _add_pdf(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
 
@@ -291,3 +293,7 @@ COMMANDS = {
     "ports": (_add_ports, "list the serial ports and what speaks on them"),
     "doctor": (_add_json, "check this installation"),
 }
+
+
+def _add_pdf(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--pdf", action="store_true", help="figures of a report as PDF too, for a paper")

@@ -97,7 +97,7 @@ def _one(task: _Task) -> int:
     else:
         _print_text(analysed, si=task.options.si)
     if task.report is not None:
-        tell(f"report: {_write(analysed, task.report)}")
+        tell(f"report: {_write(analysed, task.report, pdf=task.options.pdf)}")
     code, complaints = _judged(analysed, task)
     for line in complaints:
         complain(line)
@@ -162,7 +162,7 @@ def _work(task: _Task) -> _Done:
     page = None
     if task.report is not None:
         try:
-            page = _write(analysed, task.report)
+            page = _write(analysed, task.report, pdf=task.options.pdf)
         except WriteFailed as error:
             code, complaints = USAGE, (*complaints, str(error))
     analysis = analysed.analysis
@@ -225,10 +225,10 @@ def _print_together(analysed: Sequence[_Done], options: argparse.Namespace) -> N
     print(shared_findings_text({done.name: done.result["findings"] for done in analysed}))
 
 
-def _write(analysed: Analysed, results: Path) -> Path:
+def _write(analysed: Analysed, results: Path, *, pdf: bool) -> Path:
     from springmass.report.write import write_report
 
-    return write_report(results, [analysed])
+    return write_report(results, [analysed], pdf=pdf)
 
 
 def _write_together(analysed: Sequence[_Done], folder: Path) -> Path:

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     if out is not None:
         from springmass.report.write import write_report
 
-        tell(f"report: {write_report(out, runs, compared=compared, summary=result)}")
+        tell(f"report: {write_report(out, runs, compared=compared, summary=result, pdf=options.pdf)}")
     findings = [*result["findings"], *(f for run in runs for f in run.result["findings"])]
     if options.strict and (wrong := rejected(findings)):
         complain(f"rejected under --strict: {', '.join(wrong)}")

@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from springmass.report.budgets import budget_csv
 from springmass.report.figures import KINDS, NAMES, comparison_figure, draw, render
@@ -30,6 +30,7 @@ def write_report(
     *,
     compared: Compared | None = None,
     summary: Mapping[str, Any] | None = None,
+    pdf: bool = False,
 ) -> Path:
     """Write the report of one run or of several side by side.
 
@@ -44,6 +45,8 @@ def write_report(
     summary : mapping, optional
         What ``results.json`` holds in place of the runs' results. Its ``provenance``, else the first run's, goes into
         the page: version, parameters, time, whatever says how to make this report again.
+    pdf : bool
+        Whether figures are written as PDF too: that takes as long as all the rest, the fonts in them above all.
 
     Returns
     -------
@@ -61,8 +64,8 @@ def write_report(
     -----
     Besides the page: ``results.json`` (``summary``, else one object for one run and a list for several; what is no
     number is null), ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, ``motion.csv`` of each run that
-    oscillates, and ``figures/`` with every figure as SVG and PDF. Names of figures and motions begin with their run's
-    where there are several.
+    oscillates, and ``figures/`` with every figure as SVG, and as PDF where asked for. Names of figures and motions
+    begin with their run's where there are several.
     The same arguments give the same bytes.
     """
     if not runs:
@@ -70,7 +73,7 @@ def write_report(
     directory, names = Path(directory), [run.name for run in runs]
     stems = _stems(names)
     with whole_folder(directory, _names(stems), PAGE) as folder:
-        _write(folder, runs, stems, compared, summary)
+        _write(folder, runs, stems, compared, summary, KINDS if pdf else KINDS[:1])
     return directory / PAGE
 
 
@@ -91,6 +94,7 @@ def _write(
     stems: Sequence[str],
     compared: Compared | None,
     summary: Mapping[str, Any] | None,
+    kinds: Sequence[Literal["svg", "pdf"]],
 ) -> None:
     (folder / "figures").mkdir()
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
@@ -98,7 +102,7 @@ def _write(
     for stem, run in zip(stems, runs, strict=True):
         smoothed = smoothed_or_why(run.analysis)
         figures = draw(run.analysis, smoothed, notes=notes_of(run.recorded), classic=run.classic)
-        drawn = {name: {kind: render(figure, kind) for kind in KINDS} for name, figure in figures.items()}
+        drawn = {name: {kind: render(figure, kind) for kind in kinds} for name, figure in figures.items()}
         for name, files in drawn.items():
             for kind, data in files.items():
                 write_whole(folder / "figures" / f"{stem}{name}.{kind}", data)
@@ -120,7 +124,7 @@ def _write(
         write_whole(folder / name, table)
     overview = {}
     if compared is not None:
-        overview = {kind: render(comparison_figure(compared.comparison), kind) for kind in KINDS}
+        overview = {kind: render(comparison_figure(compared.comparison), kind) for kind in kinds}
         for kind, data in overview.items():
             write_whole(folder / "figures" / f"comparison.{kind}", data)
     provenance = (summary or results[0])["provenance"]

@@ -98,7 +98,7 @@ def _draw_means(panel: Axes, motion: Oscillation, t: F8, kinetic: F8, potential:
     together = max(1, math.ceil(motion.cycles.count / MOST_MEANS))
     turn = np.floor((t - t[0]) * motion.cycles.frequency_hz / together).astype(np.intp)
     counts = np.bincount(turn)
-    whole = counts > 0.9 * float(np.median(counts))
+    whole = counts >= np.median(counts) - 1  # a period is no whole number of samples
     times = np.bincount(turn, t)[whole] / counts[whole]
     # Both are half of the whole: the one is drawn inside the other.
     for part, colour, ms, label in ((kinetic, VERMILLION, 4.2, "kinetic"), (potential, GREEN, 2.0, "potential")):

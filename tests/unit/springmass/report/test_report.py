@@ -10,6 +10,7 @@ import io
 import itertools
 import json
 import re
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from springmass.report.figures.inline import inline_svg
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
+from springmass.report.recorded import Note
 from springmass.report.tables import law_status, pretty, pretty_number, results_csv
 from springmass.report.words import caption, verdict
 from springmass.report.write import write_report
@@ -104,8 +106,8 @@ def files_in(directory: Path) -> dict[str, bytes]:
 
 
 def test_every_file_of_a_report_is_written(tmp_path: Path) -> None:
-    """A report is a page, six tables and every figure that the scene allows in two forms, and nothing besides."""
-    written(tmp_path / "run.results", run_of(bare()))
+    """A report is a page, six tables and every figure that the scene allows, as PDF if asked, and nothing besides."""
+    written(tmp_path / "run.results", run_of(bare()), pdf=True)
     figures = {
         f"figures/{name}.{kind}"
         for name in ("position", "amplitude", "phase", "energy", "motion")
@@ -114,8 +116,11 @@ def test_every_file_of_a_report_is_written(tmp_path: Path) -> None:
     tables = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv", "budget.tex", "motion.csv"}
     assert set(files_in(tmp_path / "run.results")) == tables | figures
     written(tmp_path / "disc.results", run_of(damped()))
-    drag = {"figures/drag.svg", "figures/drag.pdf"}
-    assert set(files_in(tmp_path / "disc.results")) == tables | figures | drag
+    drawn = {name for name in figures | {"figures/drag.svg"} if name.endswith(".svg")}
+    assert set(files_in(tmp_path / "disc.results")) == tables | drawn
+    for name, content in files_in(tmp_path / "disc.results").items():
+        if name.endswith(".svg"):
+            assert ElementTree.fromstring(content).tag.endswith("svg")
 
 
 def test_the_page_needs_nothing_from_outside(tmp_path: Path) -> None:
@@ -233,9 +238,56 @@ def test_the_same_arguments_give_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_the_page_of_a_long_record_stays_small(tmp_path: Path) -> None:
-    """Twelve thousand samples make a page of less than 700 kB."""
-    page = written(tmp_path, run_of(analyse(track_of(120.0), SCENE)))
+    """Of twelve thousand samples no figure takes more than 150 kB of the page, and the page less than 700 kB."""
+    track = track_of(120.0)
+    run = dataclasses.replace(run_of(analyse(track, SCENE)), classic=classic(track, SCENE))
+    page = written(tmp_path, run)
+    drawn = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    assert len(drawn) == 7
+    assert max(map(len, drawn)) < 150_000
     assert len(page.encode()) < 700_000
+
+
+def test_marks_and_the_trigger_are_drawn() -> None:
+    """Each stands in the figure of the position at its time, a mark with its words."""
+    notes = [Note(6.2, "fan $on$", "mark"), Note(0.5, "threshold m 0.01", "trigger"), Note(9.0, "", "ended")]
+    panel = draw(damped(), notes=notes)["position"].axes[0]
+    lines = {str(line.get_label()): line.get_xdata()[0] for line in panel.lines if len(set(line.get_xdata())) == 1}
+    assert lines == {"mark": 6.2, "trigger": 0.5}
+    assert [text.get_text() for text in panel.texts] == [r"fan \$on\$"]
+
+
+def test_the_classic_method_is_drawn_over_this_analysis() -> None:
+    """Its two maxima are seven of its periods apart, and its exponential and windows lie over the amplitudes."""
+    found = classic(track_of(60.0), SCENE)
+    above, below = draw(damped(), classic=found)["classic"].axes
+    (picked,) = [line for line in above.lines if "picked" in str(line.get_label())]
+    assert np.ptp(picked.get_xdata()) == pytest.approx(7 * found.estimates["period"].value)
+    curves = {str(line.get_label()): np.asarray(line.get_ydata()) for line in below.lines}
+    assert curves["its exponential"][0] == pytest.approx(1e3 * found.window_amplitude[0])
+    assert {"half the range in 1.5 s", "linear+quadratic (selected)"} <= set(curves)
+
+
+def test_energy_is_split_into_its_parts() -> None:
+    """Kinetic and potential energy are each half of the whole in the mean of a period, and add up to it."""
+    above, _, parts = draw(damped())["energy"].axes
+    kinetic, potential = (np.asarray(line.get_ydata()) for line in above.lines if "mean" in str(line.get_label()))
+    law = next(line for line in above.lines if "law" in str(line.get_label()))
+    expected = np.interp(above.lines[1].get_xdata(), law.get_xdata(), law.get_ydata())
+    np.testing.assert_allclose(kinetic / potential, 1.0, atol=0.02)
+    assert np.median(kinetic + potential) == pytest.approx(np.median(expected), rel=0.02)
+    swings = [np.asarray(line.get_ydata()) for line in parts.lines]
+    np.testing.assert_allclose(swings[0] + swings[1], swings[2])
+    assert np.ptp(swings[2]) < 0.3 * np.ptp(swings[0])
+
+
+def test_the_legend_names_the_laws_that_matter() -> None:
+    """The selected law and those as good have names, the others together one grey entry."""
+    motion = damped().motion
+    assert isinstance(motion, Oscillation)
+    labels = draw(damped())["amplitude"].axes[0].get_legend_handles_labels()[1]
+    assert "linear+quadratic (selected)" in labels
+    assert f"{len(motion.damping.fits) - 1} other laws" in labels
 
 
 def test_the_motion_is_written_at_every_sample() -> None:
@@ -264,7 +316,7 @@ def test_the_band_of_the_velocity_is_wider_at_the_edges() -> None:
 
 def test_the_law_of_the_figure_is_the_motion_itself() -> None:
     """On a record that follows its law the difference drawn stays within three of its uncertainties."""
-    difference = np.asarray(motion_figure(damped()).axes[2].lines[0].get_ydata())
+    difference = np.asarray(motion_figure(damped()).axes[3].lines[0].get_ydata())
     assert 0.0 < np.max(np.abs(difference)) < 3e3 * np.max(damped().smoothed().u_velocity)
 
 
@@ -422,10 +474,7 @@ def test_a_run_without_oscillation_gives_a_report_too(tmp_path: Path) -> None:
     assert isinstance(still().motion, Still)
     written(tmp_path, run_of(bare()))
     page = written(tmp_path, run_of(still()))
-    assert {name for name in files_in(tmp_path) if "figures" in name} == {
-        "figures/position.svg",
-        "figures/position.pdf",
-    }
+    assert {name for name in files_in(tmp_path) if "figures" in name} == {"figures/position.svg"}
     assert 'class="error"' in page
     assert "Phase plot" not in page
 
@@ -468,7 +517,7 @@ def test_several_runs_stand_side_by_side(tmp_path: Path) -> None:
     assert page.count('<th scope="col">same</th>') == 2
     assert len(re.findall(r"<h3[^>]*>Phase plot</h3>", page)) == 2
     assert html.escape(comparison.message.replace("+-", "±")) in page
-    assert len([name for name in files_in(tmp_path) if name.endswith(".pdf")]) == 13
+    assert len([name for name in files_in(tmp_path) if name.endswith(".svg")]) == 13
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.1])
