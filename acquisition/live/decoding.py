@@ -99,17 +99,17 @@ class SensorChain:
     def block(self) -> Block:
         """Return the samples of the readings held, with the next indices of the run, and hold none."""
         held, self._held = self._held, []
-        host_ns, _, _, echo_us, distance_m, _ = zip(*held, strict=True) if held else _NONE
-        t, flagged = zip(*map(self.timebase.push, held), strict=True) if held else _NONE[:2]
+        host_ns, sequence, device_us, echo_us, distance_m, _ = zip(*held, strict=True) if held else _NONE
+        stamps = np.array(host_ns, np.int64)
+        t, flags = self.timebase.push_all(held, stamps, np.array(sequence, np.int64), np.array(device_us, np.int64))
         distance = self.calibration.distance(np.array(echo_us, np.float64), np.array(distance_m, np.float64))
-        flags = np.array(flagged, np.uint8)
         flags[np.isnan(distance)] |= MISSING
         if self._breaks:
             flags[[at for at in self._breaks if at < len(held)]] |= GAP_BEFORE
             self._breaks = [0] if self._breaks[-1] == len(held) else []
         first = self._next
         self._next += len(held)
-        return Block(first, np.array(t, np.float64), distance, flags, np.array(host_ns, np.int64))
+        return Block(first, t, distance, flags, stamps)
 
     def lost(self) -> None:
         """The port went away: a frame cut in half by that is no frame, and the next sample is flagged."""
@@ -138,10 +138,11 @@ class SensorChain:
     def report(self, t: F8, host_ns: I8) -> dict[str, Any]:
         """Return faults, gaps and the clock's rate error as plain numbers, for the run's provenance."""
         clock = fit_clock(t, host_ns)
-        known = np.isfinite(clock.rate_error_ppm)
+        known, left_out = np.isfinite(clock.rate_error_ppm), self.timebase.gaps_left_out
         return {
             "faults": dict(self.decoder.faults),
             "gaps": [{"index": g.index, "length_s": g.length_s, "lost": g.lost} for g in self.timebase.gaps],
+            **({"gaps_left_out": dict(left_out)} if left_out["count"] else {}),
             "restarts": self.timebase.restarts,
             "clock": {
                 "kind": self.timebase.clock,

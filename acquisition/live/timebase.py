@@ -6,18 +6,26 @@ is used wherever it is sent, and the host clock is regressed on it to find the c
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from acquisition.block import Flag
+import numpy as np
+
+from acquisition.block import F8, I8, U8, Flag
 from acquisition.errors import SensorError
 from acquisition.readings import Reading
 from acquisition.source import ClockKind
 
-__all__ = ["RATES_HZ", "Gap", "Timebase", "demand_within"]
+__all__ = ["KEPT_GAPS", "RATES_HZ", "Gap", "Timebase", "demand_within"]
 
 RATES_HZ = (1e-6, 1e9)
 """Readings per second that a sensor may be set to: more and fewer than any bench has."""
 
+KEPT_GAPS = 10_000
+"""So many are remembered one by one, as a run file's header may hold; those after them are counted."""
+
+TOGETHER = 32  # readings from which on arrays are worth their making
+ALONE = 64  # readings taken one by one behind one that is out of step: where many are, arrays would be made in vain
 WRAP_US = 1 << 32
 WRAP_S = WRAP_US * 1e-6
 NANO = 1e-9
@@ -86,6 +94,7 @@ class Timebase:
         self._jitter_s = max(0.25, 3.0 / rate_hz)
         self._longest_s = 1.5 / rate_hz  # a step that is longer has readings missing in it
         self.gaps: list[Gap] = []
+        self.gaps_left_out = {"count": 0, "lost": 0, "longest_s": 0.0}  # of those after the first KEPT_GAPS
         self.restarts = 0
         self._count = 0
         self._last_raw: int | None = None
@@ -134,6 +143,58 @@ class Timebase:
             self._counts = reading.device_us < 0 <= reading.sequence
         return self._step(raw, unit_s, host_ns)
 
+    def push_all(self, readings: Sequence[Reading], host_ns: I8, sequence: I8, device_us: I8) -> tuple[F8, U8]:
+        """Return of many readings what :meth:`push` returns of each, in a fourth of the time where all is in step.
+
+        Parameters
+        ----------
+        readings : sequence of Reading
+        host_ns, sequence, device_us : (n,) int64
+            Their columns.
+        """
+        n = len(readings)
+        t, flags = np.empty(n), np.zeros(n, np.uint8)
+        at = 0
+        while at < n:
+            if n - at >= TOGETHER:
+                at += self._in_step(t[at:], host_ns[at:], sequence[at:], device_us[at:])
+            for row in range(at, min(at + ALONE, n)):
+                t[row], flags[row] = self.push(readings[row])
+            at += ALONE
+        return t, flags
+
+    def _in_step(self, t: F8, host_ns: I8, sequence: I8, device_us: I8) -> int:
+        """Fill in the times of the readings that follow one after the other as they should; return how many do."""
+        if self._last_raw is None or self._held:
+            return 0
+        if device_us[0] >= 0:
+            raw, unit_s = device_us, 1e-6
+        elif sequence[0] >= 0:
+            raw, unit_s = np.where(device_us < 0, sequence, -1), self._period_s
+        else:
+            raw, unit_s = np.where(np.maximum(device_us, sequence) < 0, host_ns, -1), NANO
+        # One that has no such clock ends the row, as one does that runs backward.
+        differences = np.diff(raw, prepend=self._last_raw)
+        ticks = self._ticks + np.cumsum(differences)
+        times = self._anchor_s + ticks * unit_s
+        steps, forward = differences * unit_s, np.diff(times, prepend=self._latest_s)
+        sound = (raw >= 0) & (steps > 0.0) & (steps <= self._longest_s) & (forward > 0.0) & (forward <= self._longest_s)
+        count = sound.size if sound.all() else int(np.argmin(sound))
+        if count:
+            t[:count] = times[:count]
+            self._last_raw, self._last_host_ns = int(raw[count - 1]), int(host_ns[count - 1])
+            self._ticks, self._latest_s = int(ticks[count - 1]), float(times[count - 1])
+            self._count += count
+        return count
+
+    def _note_gap(self, gap: Gap) -> None:
+        if len(self.gaps) < KEPT_GAPS:
+            self.gaps.append(gap)
+            return
+        rest = self.gaps_left_out
+        rest["count"], rest["lost"] = rest["count"] + 1, rest["lost"] + gap.lost
+        rest["longest_s"] = max(rest["longest_s"], gap.length_s)
+
     def _step(self, raw: int, unit_s: float, host_ns: int) -> tuple[float, int]:
         restarted = self._advance(raw, unit_s, host_ns)
         first = self._last_raw is None
@@ -147,7 +208,7 @@ class Timebase:
             flag = int(Flag.NON_MONOTONIC_TIME)
         elif restarted or (step > self._longest_s and not self._only_jitter(unit_s, step)):
             flag = int(Flag.GAP_BEFORE)
-            self.gaps.append(Gap(self._count, step, max(round(step * self.rate_hz) - 1, 0)))
+            self._note_gap(Gap(self._count, step, max(round(step * self.rate_hz) - 1, 0)))
             self._held, self._in_time = unit_s == NANO, 0
         elif self._held:
             flag |= self._of_a_burst(step)

@@ -137,7 +137,7 @@ def progress_of(
         (now_ns - start_ns) * 1e-9,
         shown.samples,
         shown.missing,
-        sum(len(chain.timebase.gaps) for chain in chains),
+        sum(len(chain.timebase.gaps) + int(chain.timebase.gaps_left_out["count"]) for chain in chains),
         shown.rate_hz(now_ns),
         motion,
         None if recorder is None else recorder.status,

@@ -23,7 +23,6 @@ __all__ = ["SensorRun"]
 
 FIRST_SAMPLES = 1000
 """Of so many the earliest stamp says when t = 0 was; later ones would bring in the difference of the clocks' rates."""
-KEPT_GAPS = 10_000
 CLOCK_SAMPLES = 1 << 19
 """At most so many, at least half as many, evenly spread over the run, tell how the clocks run against each other."""
 
@@ -83,7 +82,7 @@ class SensorRun:
         extra : mapping
             Goes into the provenance besides.
         """
-        decoding = _cut(self._chain.report(*self._clock.columns()))
+        decoding = self._chain.report(*self._clock.columns())
         faults, damage = decoding["faults"], self._contents.damage
         end_ns = end_of(notes.events(), [last_ns], header.mono_ns)
         losses = self._losses.losses(notes.events(self._sensor.channel), header.mono_ns, end_ns)
@@ -114,16 +113,6 @@ class SensorRun:
             },
         )
         return RecoveredRun(self._sensor, self._writer.path, self._samples, faults, decoding, losses)
-
-
-def _cut(decoding: dict[str, Any]) -> dict[str, Any]:
-    """Return what the chain reports with no more gaps than a header should hold, and a count of the rest."""
-    gaps, rest = decoding["gaps"][:KEPT_GAPS], decoding["gaps"][KEPT_GAPS:]
-    if not rest:
-        return decoding
-    longest_s = max(gap["length_s"] for gap in rest)
-    left = {"count": len(rest), "lost": sum(gap["lost"] for gap in rest), "longest_s": longest_s}
-    return {**decoding, "gaps": gaps, "gaps_left_out": left}
 
 
 class _ClockSamples:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from acquisition.block import Flag
 from acquisition.errors import SensorError
+from acquisition.live import timebase
 from acquisition.live.timebase import Gap, Timebase
 from acquisition.readings import Reading, Readings
 
@@ -178,6 +180,39 @@ def test_the_short_way_of_regular_readings_is_the_general_one(steps: list[int], 
     assert (base.gaps, base.restarts) == (general.gaps, general.restarts)
     unflagged = t[(flags & (Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)) == 0]
     assert np.all(np.diff(unflagged) > 0)
+
+
+@given(
+    steps=STEPS, kinds=st.lists(st.sampled_from([0, 0, 0, 0, 0, 0, 1, 2]), min_size=120, max_size=120), cut=st.data()
+)
+def test_readings_taken_together_are_those_taken_one_by_one(
+    steps: list[int], kinds: list[int], cut: st.DataObject
+) -> None:
+    """However a stream is cut into batches, times, flags and gaps are those of single readings, to the last bit."""
+    device, kind = np.cumsum(np.abs(steps)) % WRAP, np.array(kinds[: len(steps)])
+    whole = readings(
+        device_us=np.where(kind == 0, device, -1),
+        sequence=np.where(kind <= 1, device // STEP_US, -1),
+        host_ns=device * 1000,
+    )
+    t, flags, base = pushed(whole)
+    together, parts, start = Timebase(RATE_HZ), [], 0
+    with mock.patch.multiple(timebase, TOGETHER=3, ALONE=2):
+        while start < len(whole):
+            part = Readings(whole[start : start + cut.draw(st.integers(1, 60))])
+            parts.append(together.push_all(part, part.host_ns, part.sequence, part.device_us))
+            start += len(part)
+    assert np.concatenate([at for at, _ in parts]).tobytes() == t.tobytes()
+    assert np.concatenate([flag for _, flag in parts]).tolist() == flags.tolist()
+    assert (together.gaps, together.restarts, together.clock) == (base.gaps, base.restarts, base.clock)
+
+
+def test_gaps_beyond_the_bound_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stream with a gap at each reading takes no more memory than its bound; what is beyond is added up."""
+    monkeypatch.setattr(timebase, "KEPT_GAPS", 5)
+    _, _, base = pushed(readings(device_us=2 * STEP_US * np.arange(40)))
+    assert [gap.index for gap in base.gaps] == [1, 2, 3, 4, 5]
+    assert base.gaps_left_out == {"count": 34, "lost": 34, "longest_s": pytest.approx(0.02)}
 
 
 def test_the_first_reading_decides_the_clock() -> None:

@@ -12,12 +12,12 @@ import pytest
 from acquisition.block import Block, Flag, concatenate
 from acquisition.clock import VirtualClock
 from acquisition.decoders.registry import get_family
+from acquisition.live import timebase
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from storage.atomic import whole_file
 from storage.errors import OutOfMemory, RunDamaged, RunExists
 from storage.recorder import Recorder
-from storage.recovery import building
 from storage.recovery import recover as module
 from storage.recovery.recover import recover, verify_against_log
 from storage.run_file.arrays import Columns, Originals
@@ -277,7 +277,7 @@ def test_notes_beyond_the_bound_are_counted(tmp_path: Path, monkeypatch: pytest.
 
 def test_gaps_beyond_the_bound_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A sensor half as fast as its rate says has a gap at each reading: the first are shown, the rest are counted."""
-    monkeypatch.setattr(building, "KEPT_GAPS", 5)
+    monkeypatch.setattr(timebase, "KEPT_GAPS", 5)
     sensor = SensorEntry(0, FAMILY, rate_hz=200.0)
     log = write(tmp_path / "run.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0), count=40)
     report = recover(log)
