@@ -183,10 +183,18 @@ def _add_formats(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_record(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--port", action="append", default=[], metavar="P", help="port of a sensor; again for another")
+    parser.add_argument(
+        "--port",
+        action="append",
+        default=[],
+        metavar="P",
+        help="port of a sensor; again for another (default: the only one that a known sensor speaks on)",
+    )
     parser.add_argument("--sensor", action="append", default=[], metavar="NAME", help="its family, see `sensors`")
     parser.add_argument("--simulate", metavar="SCENE.toml", help="a simulated bench behind a pseudo-terminal instead")
-    parser.add_argument("-o", "--output", required=True, metavar="RUN.h5", help="run file to make; never replaced")
+    parser.add_argument(
+        "-o", "--output", metavar="RUN.h5", help="run file to make, never replaced (default: date, time and title)"
+    )
     parser.add_argument("--seconds", type=_positive, metavar="N", help="how long (default: until Ctrl-C)")
     parser.add_argument(
         "--scene", metavar="FILE", help="scene file stored with the run; its air sets the speed of sound"
@@ -210,6 +218,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pre", type=_positive, metavar="S", help="seconds to keep from before (default 2)")
     parser.add_argument("--roll-mb", type=_positive, metavar="MB", help="begin another log after this (default 1000)")
     parser.add_argument("--roll-hours", type=_positive, metavar="H", help="begin another log after this, too")
+    parser.add_argument("--no-trace", action="store_true", help="draw no motion on the terminal")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated bench's noise (default 0)")
     parser.add_argument(
         "--crystal-ppm", type=_crystal, default=0.0, metavar="PPM", help="of the simulated sensor's clock"

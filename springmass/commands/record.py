@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import queue
 import shlex
 import sys
-import threading
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -24,17 +23,22 @@ from pipeline.bench.added_mass import scene_air
 from pipeline.bench.air import speed_of_sound
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
+from springmass.commands.ports import name_sensors
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
 from springmass.runs.analysing import made_now
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.session.console import Console
-from springmass.session.output import demand_new
-from springmass.session.progress_line import ProgressLine
+from springmass.session.output import default_name, demand_new
 from springmass.session.session import BYTES_PER_READ, Ended, Sensor, Session, Trigger
+from springmass.session.simulated_bench import REST_M, Release, bench_position
 from springmass.session.stops import Stops
+from springmass.terminal.keys import marks_by_keys
+from springmass.terminal.look import look_of
+from springmass.terminal.recording import ProgressLine
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
 from storage.recovery.recover import RecoverReport, recover
+from storage.run_file.reading import open_run
 from storage.wire_log.appending import Roll
 
 __all__ = ["run"]
@@ -45,18 +49,24 @@ UNLIMITED_S = 3600.0  # how long a run without --seconds is taken to be, for the
 
 def run(options: argparse.Namespace) -> int:
     """Record, then build the run file from the log."""
-    out = Path(options.output)
+    source = options.scene or options.simulate
+    what = options.title or (
+        "run" if source is None else Path(source).name.removesuffix(".toml").removesuffix(".scene")
+    )
+    out = default_name(what, datetime.now()) if options.output is None else Path(options.output)
     if out.suffix.lower() != ".h5":
         raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5", USAGE)
-    demand_new(out, len(options.port))
     _demand_sense(options)
     _fill_standard_streams()
-    scene_path = options.scene or options.simulate
-    scene = None if scene_path is None else read_scene(scene_path)
+    if options.simulate is None:
+        name_sensors(options)
+    demand_new(out, len(options.port))
+    scene = None if source is None else read_scene(source)
     if scene is not None:
-        ask_about(scene, scene_path)
+        ask_about(scene, source)
     log = out.with_suffix(".wire")
-    with Stops() as stops, _sensors(options, scene) as (sensors, kind):
+    bench = Release(SystemClock())
+    with Stops() as stops, _sensors(options, scene, bench) as (sensors, kind):
         rate = sum(sensor.rate_hz or sensor.family.rate_hz for sensor in sensors)
         check_disk(out, int(BYTES_PER_READ * rate * (options.seconds or UNLIMITED_S)) + 1_000_000)
         clock = SystemClock()
@@ -70,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
         )
         console = Console(clock, lambda error: session.failures.note("stderr", error))
         try:
-            ended = _record(session, options, log, console)
+            ended = _record(session, options, log, console, bench)
             session.stop()
             log = ended.log
             return _built(ended, out, session, console)
@@ -110,10 +120,16 @@ def _built(ended: Ended, out: Path, session: Session, console: Console) -> int:
         console.line(line)
     if not report.log_removed:
         console.line(f"{log}: the log stays")
-    return _exit_code(ended, report, console)
+    if console.terminal:
+        console.line(f"next: springmass analyse {shlex.quote(str(report.runs[0].path))}")
+    return _exit_code(ended, report, session, console)
 
 
-def _exit_code(ended: Ended, report: RecoverReport, console: Console) -> int:
+def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: Console) -> int:
+    if useless := [run.path for run in report.runs if not _usable(run.path, run.sensor.channel, session)]:
+        named = ", ".join(map(str, useless))
+        console.line(f"springmass: {named}: no usable distance was recorded; check aim, distance and wiring")
+        return SENSOR
     if ended.by == "the disk":
         console.line("springmass: the disk took nothing more and ended the recording; the run holds what came before")
         return SENSOR
@@ -123,6 +139,15 @@ def _exit_code(ended: Ended, report: RecoverReport, console: Console) -> int:
         return OK
     console.line(f"stopped by {ended.by}; the run is complete up to there")
     return INTERRUPTED
+
+
+def _usable(path: Path, channel: int, session: Session) -> bool:
+    """Tell whether a run holds a distance: one that was shown, else any in the file."""
+    shown = session.shown
+    if shown is not None and channel in shown.useful and shown.useful[channel].usable:
+        return True
+    with open_run(path) as run:
+        return bool(np.isfinite(run.samples().distance).any())
 
 
 def _what_to_do(log: Path) -> str:
@@ -149,24 +174,27 @@ def _demand_sense(options: argparse.Namespace) -> None:
             raise ProgramError(f"--{option} must be {least:g} to {greatest:g} {unit}, got {value:g}", USAGE)
 
 
-def _record(session: Session, options: argparse.Namespace, log: Path, console: Console) -> Ended:
+def _record(session: Session, options: argparse.Namespace, log: Path, console: Console, bench: Release) -> Ended:
     """Run the session."""
-    session.listen()
+    session.listen(console.line)
     rest = None if options.still is None else _rest(session, options.still, options.ruler, console)
     trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
-    show = ProgressLine(console)
-    try:
-        return session.record(
-            log,
-            seconds=options.seconds,
-            trigger=trigger,
-            rest=rest,
-            progress=show,
-            marks=_typed_marks(),
-            roll=_roll(options),
-        )
-    finally:
-        show.end()
+    bench.after(0.0 if trigger is None else trigger.keep_s + 0.5)
+    look = look_of(sys.stderr)
+    with marks_by_keys(watched=look.terminal) as marks:
+        show = ProgressLine(console, look, trace=not options.no_trace, keys=marks is not None)
+        try:
+            return session.record(
+                log,
+                seconds=options.seconds,
+                trigger=trigger,
+                rest=rest,
+                progress=show,
+                marks=marks,
+                roll=_roll(options),
+            )
+        finally:
+            show.end()
 
 
 def _roll(options: argparse.Namespace) -> Roll:
@@ -213,34 +241,19 @@ def _ask(demand: str, console: Console) -> None:
         )
 
 
-def _typed_marks() -> queue.SimpleQueue[str] | None:
-    """Lines typed at the terminal become marks in the run."""
-    if not sys.stdin or not sys.stdin.isatty():
-        return None
-    marks: queue.SimpleQueue[str] = queue.SimpleQueue()
-
-    def read() -> None:
-        with contextlib.suppress(OSError, ValueError):  # a terminal that was closed: no more marks come
-            for text in sys.stdin:
-                marks.put(text.strip() or "mark")
-
-    threading.Thread(target=read, name="springmass-marks", daemon=True).start()
-    return marks
-
-
 @contextlib.contextmanager
-def _sensors(options: argparse.Namespace, scene: Scene | None) -> Iterator[tuple[list[Sensor], str]]:
+def _sensors(options: argparse.Namespace, scene: Scene | None, bench: Release) -> Iterator[tuple[list[Sensor], str]]:
     """Open what is to be recorded: the ports named, or a simulated bench behind a port of its own."""
     family_options = dict(_option(text) for text in options.option)
     for name in options.sensor:
         get_family(name).demand_options(family_options)
     calibration = _calibration(options, scene)
     if options.simulate is not None:
-        with _simulated(options, family_options, calibration) as sensor:
+        with _simulated(options, family_options, calibration, bench) as sensor:
             yield [sensor], "simulated"
         return
-    if not options.port or len(options.sensor) not in (1, len(options.port)):
-        raise ProgramError("--port and --sensor must be named, one sensor for each port (or one for all)", USAGE)
+    if len(options.sensor) not in (1, len(options.port)):
+        raise ProgramError("--sensor must be named once for all ports, or once for each in their order", USAGE)
     names = options.sensor * len(options.port) if len(options.sensor) == 1 else options.sensor
     families = [get_family(name) for name in names]
     sensors: list[Sensor] = []
@@ -257,16 +270,20 @@ def _sensors(options: argparse.Namespace, scene: Scene | None) -> Iterator[tuple
 
 @contextlib.contextmanager
 def _simulated(
-    options: argparse.Namespace, family_options: dict[str, Any], calibration: Calibration
+    options: argparse.Namespace, family_options: dict[str, Any], calibration: Calibration, bench: Release
 ) -> Iterator[Sensor]:
     if os.name == "nt":
         raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port", USAGE)
     from acquisition.simulated.pseudo_terminal import VirtualPort
     from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
-    from springmass.session.simulated_bench import bench_position
 
     family = get_family(options.sensor[0] if options.sensor else "line-protocol")
-    position = bench_position(read_scene(options.simulate), where=str(options.simulate))
+    if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):
+        got = ", ".join(f"{each:g}" for each in options.ruler)
+        raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that", USAGE)
+    position = bench_position(
+        read_scene(options.simulate), where=str(options.simulate), release=None if options.still is None else bench
+    )
     rate = options.rate_hz or family.rate_hz
     model = VirtualSensor(rate_hz=rate, crystal_ppm=options.crystal_ppm)
     rng = np.random.default_rng(options.seed)
@@ -279,9 +296,10 @@ def _simulated(
         seconds=seconds,
         rng=rng.spawn(1)[0],
         options=family_options,
-    ) as bench:
-        port = SerialPort(bench.path, family.baud)
-        bench.start()
+    ) as virtual:
+        port = SerialPort(virtual.path, family.baud)
+        virtual.start()
+        bench.begin()
         try:
             yield Sensor(family, port, options.rate_hz, family_options, calibration, family.baud, options.clock_ppm)
         finally:

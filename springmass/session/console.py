@@ -51,6 +51,14 @@ class Console:
         except (OSError, ValueError):
             return False
 
+    @property
+    def columns(self) -> int:
+        """How wide the terminal is now."""
+        try:
+            return max(os.get_terminal_size(self._stream.fileno()).columns, 1) if self._stream is not None else 80
+        except (OSError, ValueError, AttributeError):
+            return 80
+
     def line(self, text: str) -> None:
         """Write a line, also where a file's name breaks over several."""
         self.write(" ".join(text.splitlines()) + "\n")

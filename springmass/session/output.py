@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+import re
+from datetime import datetime
 from pathlib import Path
 
 from springmass.errors import USAGE, ProgramError
 from storage.recovery.recover import run_paths
 
-__all__ = ["demand_new"]
+__all__ = ["default_name", "demand_new"]
+
+
+def default_name(what: str, now: datetime) -> Path:
+    """Return a name that says when and what, numbered where it is taken.
+
+    Examples
+    --------
+    >>> str(default_name("undamped", datetime(2026, 11, 22, 14, 5)))
+    '2026-11-22_1405_undamped.h5'
+    """
+    stem = f"{now:%Y-%m-%d_%H%M}_{re.sub(r'[^A-Za-z0-9.+-]+', '-', what).strip('-.')[:60] or 'run'}"
+    taken = {path.name.removeprefix(stem).split(".")[0] for path in Path().glob(f"{stem}*")}
+    number = next(text for text in itertools.chain([""], (f"-{n}" for n in itertools.count(2))) if text not in taken)
+    return Path(f"{stem}{number}.h5")
 
 
 def demand_new(path: Path, sensors: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -11,9 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.block import I8, Block, Flag
+from acquisition.decoders.family import Family
 from acquisition.live.decoding import SensorChain
 from pipeline.accuracy import params_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
+from pipeline.track import F8
 from springmass.session.failures import Failures
 from springmass.session.reads import Tee
 from storage.recorder import Recorder, RecorderStatus
@@ -21,6 +24,9 @@ from storage.recorder import Recorder, RecorderStatus
 __all__ = ["Progress", "Shown", "progress_of"]
 
 SECOND_NS = 1_000_000_000
+USELESS_S = 0.8
+"""So long nothing but no-target codes, or one distance, is a trouble: said at the display's first turn."""
+RECENT_S = 10.0
 MOTION_EVERY_NS = 1_900_000_000
 """Every second line of progress: a swing lasts about as long, and an analysis costs some milliseconds."""
 
@@ -51,6 +57,16 @@ class Progress:
         Why ports are lost that have not come back.
     silent_s : float
         How long no reading of the first sensor came, s.
+    missing_share : float
+        Of the first sensor's readings of the last turn.
+    trouble : str
+        What makes the readings useless, and what to check; empty where nothing does.
+    latest : callable
+        Returns times (n,), s, and distances (n,), m, of the first sensor's last ten seconds.
+    marks : sequence of (float, str)
+        Seconds since the beginning, and texts of the marks so far.
+    tick : bool
+        Whether a second has gone by; else it is a mark that is to be shown.
     """
 
     seconds: float
@@ -65,6 +81,53 @@ class Progress:
     unshown: int = 0
     gone: Sequence[str] = ()
     silent_s: float = 0.0
+    missing_share: float = 0.0
+    trouble: str = ""
+    latest: Callable[[], tuple[F8, F8]] = lambda: (np.empty(0), np.empty(0))
+    marks: Sequence[tuple[float, str]] = ()
+    tick: bool = True
+
+
+class Usefulness:
+    """Whether a sensor's readings can be of any use: the first things that are wrong at a bench."""
+
+    def __init__(self) -> None:
+        self.usable = 0
+        self._last = math.nan
+        self._end = self._missing_since = self._same_since = math.nan
+
+    def push(self, block: Block) -> None:
+        """Take samples."""
+        if not len(block):
+            return
+        known = np.isfinite(block.distance)
+        self.usable += int(np.count_nonzero(known))
+        self._end = float(block.t[-1])
+        if known.any():
+            behind = int(np.flatnonzero(known)[-1]) + 1
+            self._missing_since = float(block.t[behind]) if behind < len(block) else math.nan
+            distance = block.distance[known]
+            changed = np.flatnonzero(np.diff(distance, prepend=self._last) != 0.0)  # the first differs from NaN
+            if changed.size:
+                self._same_since = float(block.t[known][changed[-1]])
+            self._last = float(distance[-1])
+        elif math.isnan(self._missing_since):
+            self._missing_since = float(block.t[0])
+
+    def trouble(self, family: Family) -> str:
+        """Return what is wrong and what to check; empty where nothing is."""
+        near, far = family.range_m
+        if self._end - self._missing_since >= USELESS_S:
+            return (
+                f"no target for {self._end - self._missing_since:.0f} s: check that the bob hangs over the sensor, "
+                f"{near:g} to {far:g} m away, and that the sensor looks at it"
+            )
+        if self._end - self._same_since >= USELESS_S:
+            return (
+                f"{self._last * 1e3:.1f} mm unchanged for {self._end - self._same_since:.0f} s: "
+                "does the bob hang still, or does something fixed stand in the beam?"
+            )
+        return ""
 
 
 class Shown:
@@ -82,6 +145,9 @@ class Shown:
         self._motion = MotionAccumulator(rate_hz, params=params_for("fast"))
         self._found: LiveMotion | NotYet = NotYet("no samples so far")
         self._found_ns = 0
+        self.useful: dict[int, Usefulness] = {}
+        self._recent: deque[tuple[F8, F8]] = deque()
+        self._missing_share = 0.0
         self._stamps: deque[I8] = deque()
         self._last_ns: int | None = None
 
@@ -89,8 +155,14 @@ class Shown:
         """Take blocks of samples by channel."""
         for channel, block in blocks:
             self.samples += len(block)
-            self.missing += int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
-            if channel == 0:
+            missing = int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
+            self.missing += missing
+            self.useful.setdefault(channel, Usefulness()).push(block)
+            if channel == 0 and len(block):
+                self._missing_share = missing / len(block)
+                self._recent.append((block.t, block.distance))
+                while self._recent[0][0][-1] < block.t[-1] - RECENT_S:
+                    self._recent.popleft()
                 self._motion.push(block.t, block.distance, block.flags)
                 if block.host_ns is not None and len(block):
                     self._stamps.append(block.host_ns)
@@ -101,6 +173,18 @@ class Shown:
         if isinstance(self._found, NotYet) or now_ns - self._found_ns >= MOTION_EVERY_NS:
             self._found, self._found_ns = self._motion.value(), now_ns
         return self._found
+
+    @property
+    def missing_share(self) -> float:
+        """Share of the first sensor's latest readings that measured nothing."""
+        return self._missing_share
+
+    def latest(self) -> tuple[F8, F8]:
+        """Return times (n,), s, and distances (n,), m, of the first sensor's last seconds."""
+        if not self._recent:
+            return np.empty(0), np.empty(0)
+        t, distance = zip(*self._recent, strict=True)
+        return np.concatenate(t), np.concatenate(distance)
 
     def silent_s(self, now_ns: int) -> float:
         """Return how long ago the first sensor's last reading came; 0 before there was one."""
@@ -122,6 +206,9 @@ def progress_of(
     recorder: Recorder | None,
     start_ns: int,
     now_ns: int,
+    marks: Sequence[tuple[float, str]] = (),
+    *,
+    tick: bool = True,
 ) -> Progress:
     """Return where a recording stands, that began at a moment; without a recorder, one that waits for its trigger."""
 
@@ -146,7 +233,22 @@ def progress_of(
         tee.unshown,
         tuple(tee.gone.values()),
         shown.silent_s(now_ns),
+        shown.missing_share,
+        _trouble(shown, chains, waiting=recorder is None),
+        shown.latest,
+        marks,
+        tick,
     )
+
+
+def _trouble(shown: Shown, chains: Sequence[SensorChain], *, waiting: bool) -> str:
+    """Return what is wrong with the first sensor that something is wrong with."""
+    for channel, useful in sorted(shown.useful.items()):
+        told = useful.trouble(chains[channel].family)
+        # A bob that the trigger waits for hangs still.
+        if told and not (waiting and "unchanged" in told):
+            return told if len(chains) == 1 else f"sensor {channel}: {told}"
+    return ""
 
 
 def _free_bytes(folder: Path) -> int | None:

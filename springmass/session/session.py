@@ -39,6 +39,7 @@ from storage.wire_log.records import LogHeader
 
 __all__ = ["Ended", "Progress", "Sensor", "Session", "Trigger"]
 
+SAY_NS = 1_500_000_000  # silence so long before a run is said
 HEAR_S = 3.0  # silence longer than this before a run is no sensor
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # of samples that nobody looked at before the run began
@@ -82,6 +83,8 @@ class Session:
     ----------
     failures : Failures
         What failed beside the recording.
+    shown : Shown or None
+        What the samples so far amount to, as far as they were shown.
     """
 
     def __init__(
@@ -105,9 +108,16 @@ class Session:
         self._reader: PortReader | None = None
         self._reader_failure: BaseException | None = None
         self._stops = stops or Stops()
+        self._marks: list[tuple[float, str]] = []
+        self.shown: Shown | None = None
 
-    def listen(self) -> None:
+    def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
         """Start reading, and return when every sensor has been heard.
+
+        Parameters
+        ----------
+        say : callable
+            Takes a line after a second and a half in which a sensor was not heard.
 
         Raises
         ------
@@ -120,7 +130,12 @@ class Session:
         # A slow sensor takes several of its own periods to be distinguished from silence.
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
+        said_ns: int | None = self._clock.now_ns() + SAY_NS
         while min(self._tee.readings) < 3:
+            if said_ns is not None and self._clock.now_ns() > said_ns:
+                mute = next(i for i, count in enumerate(self._tee.readings) if count < 3)
+                say(f"{self.sensors[mute].transport.name}: nothing readable so far; check power, wiring and --baud")
+                said_ns = None
             if self._clock.now_ns() > deadline:
                 mute = next(i for i, count in enumerate(self._tee.readings) if count < 3)
                 self.stop()
@@ -256,7 +271,9 @@ class Session:
             if recorder.status.error:
                 return "the disk"
             while marks is not None and not marks.empty():
-                recorder.mark(marks.get())
+                recorder.mark(text := marks.get())
+                self._marks.append(((self._clock.now_ns() - start_ns) * 1e-9, text))
+                self._ring(display, self._tee.blocks, start_ns, recorder, tick=False)
             if turn_ns == end_ns:
                 break
             if turn_ns == tick_ns:
@@ -298,12 +315,21 @@ class Session:
             self.failures.note("reader", failure)
 
     def _display(self, progress: Callable[[Progress], None]) -> Display:
-        return Display(Shown(self._chains[0].timebase.rate_hz), progress, self.failures)
+        self.shown = Shown(self._chains[0].timebase.rate_hz)
+        return Display(self.shown, progress, self.failures)
 
-    def _ring(self, display: Display, take: Callable[[], Samples], start_ns: int, recorder: Recorder | None) -> None:
+    def _ring(
+        self,
+        display: Display,
+        take: Callable[[], Samples],
+        start_ns: int,
+        recorder: Recorder | None,
+        *,
+        tick: bool = True,
+    ) -> None:
         now_ns = self._clock.now_ns()
-        state = (self.failures, self._chains, self._tee, recorder, start_ns, now_ns)
-        display.ring(take, lambda shown: progress_of(shown, *state))
+        state = (self.failures, self._chains, self._tee, recorder, start_ns, now_ns, tuple(self._marks))
+        display.ring(take, lambda shown: progress_of(shown, *state, tick=tick))
 
     def _header(self) -> LogHeader:
         return LogHeader(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -27,7 +28,7 @@ from pipeline.streaming import NotYet
 from springmass import load
 from springmass.session.console import Console
 from springmass.session.progress import Progress
-from springmass.session.progress_line import ProgressLine, line_of
+from springmass.terminal.recording import ProgressLine, line_of
 from storage.run_file.reading import open_run
 
 SCENE = """
@@ -179,7 +180,7 @@ def test_silence_is_told_before_a_run_starts(cli: Callable, tmp_path: Path, sile
     """A port on which nothing comes: one line, exit code 4, and no log is left behind."""
     done = cli("record", "--port", silent_port, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
     assert done.code == 4
-    assert "not a byte came" in done.complaint
+    assert "not a byte came" in done.err.splitlines()[-1]
     assert not list(tmp_path.iterdir())
 
 
@@ -189,8 +190,8 @@ def test_another_sensor_is_recognised_by_its_bytes(cli: Callable, tmp_path: Path
         sensor.start()
         done = cli("record", "--port", sensor.path, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
     assert done.code == 4
-    assert "looks like" in done.complaint
-    assert "FF" in done.complaint
+    assert "looks like" in done.err.splitlines()[-1]
+    assert "FF" in done.err.splitlines()[-1]
 
 
 def test_an_unknown_sensor_is_refused_with_the_known_ones(cli: Callable, tmp_path: Path) -> None:
@@ -297,7 +298,10 @@ def test_a_disk_nearly_full_is_told_before_a_run_starts(
 
 def test_a_moving_bob_is_no_rest_position(cli: Callable, tmp_path: Path, scene: Path) -> None:
     """--still on a bob that swings: one line that says so, exit code 4, no run."""
-    done = cli("record", "--simulate", scene, "--still", "1", "--seconds", "1", "-o", tmp_path / "run.h5")
+    with speaking("line-protocol") as sensor:
+        sensor.start()
+        named = ("--port", sensor.path, "--sensor", "line-protocol")
+        done = cli("record", *named, "--still", "1", "--seconds", "1", "-o", tmp_path / "run.h5")
     assert done.code == 4
     assert "the bob moves" in done.err.splitlines()[-1]
     assert not (tmp_path / "run.h5").exists()
@@ -489,3 +493,82 @@ def test_the_progress_line_says_what_is_recorded_and_not_shown() -> None:
     found = Progress(3.0, 300, 0, 0, 100.0, lambda: NotYet("too short"), None, None, waiting=False)
     assert "not shown" not in line_of(found)
     assert line_of(replace(found, unshown=41)).endswith("| 41 samples recorded and not shown")
+
+
+def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable, tmp_path: Path, scene: Path) -> None:
+    """--still, --ruler and --trigger work without hardware: the ruler's distance is the rest, the run its motion."""
+    done = cli(
+        *("record", "--simulate", scene, "--still", "0.5", "--ruler", "0.26", "--trigger", "0.01", "--pre", "0.2"),
+        *("--seconds", "2", "-o", tmp_path / "run.h5"),
+    )
+    assert done.code == 0, done.err
+    distance = load(tmp_path / "run.h5").samples.distance
+    np.testing.assert_allclose(distance[:10], 0.26, atol=0.002)
+    assert distance.max() > 0.3
+    assert cli("record", "--simulate", scene, "--still", "1", "--ruler", "0.5", "-o", tmp_path / "b.h5").code == 2
+
+
+@pytest.mark.parametrize("away", [0.005, 0.3])
+def test_useless_readings_are_said_at_once(cli: Callable, tmp_path: Path, away: float) -> None:
+    """No target and an echo of something fixed are said with what to check; a run without a distance ends with 4."""
+    finder = VirtualRangefinder(
+        lambda _: away, VirtualSensor(noise_m=0.0, false_echo_rate_hz=0.0), np.random.default_rng(5)
+    )
+    with VirtualPort(get_family("line-protocol"), finder, SystemClock(), seconds=30.0) as sensor:
+        sensor.start()
+        named = ("--port", sensor.path, "--sensor", "line-protocol")
+        done = cli("record", *named, "--seconds", "1.5", "-o", tmp_path / "run.h5")
+    first = done.err.splitlines()[0]
+    if away < 0.02:
+        assert done.code == 4
+        assert "no target for 1 s: check that the bob hangs over the sensor, 0.02 to 1.7 m away" in first
+        assert "no usable distance was recorded" in done.err.splitlines()[-1]
+    else:
+        assert done.code == 0
+        assert "unchanged for 1 s" in first
+    assert (tmp_path / "run.h5").is_file()
+
+
+def test_silence_is_said_before_the_recording_gives_up(cli: Callable, tmp_path: Path, silent_port: str) -> None:
+    """After a second and a half a line says what to check; after three the recording ends with 4."""
+    done = cli("record", "--port", silent_port, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
+    assert done.code == 4
+    first, last = done.err.splitlines()
+    assert "nothing readable so far; check power, wiring and --baud" in first
+    assert "not a byte came" in last
+
+
+def test_record_alone_finds_the_only_rangefinder(
+    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, silent_port: str
+) -> None:
+    """Of two ports one speaks: it is named and recorded, into a file named by date, time and title."""
+    monkeypatch.chdir(tmp_path)
+    with speaking("line-protocol") as sensor:
+        ports = [SimpleNamespace(device=path, description="") for path in (silent_port, sensor.path)]
+        monkeypatch.setattr("springmass.commands.ports.list_ports", lambda: ports)
+        sensor.start()
+        done = cli("record", "--seconds", "0.5", "--title", "undamped bob")
+        assert done.code == 0, done.err
+        assert done.err.splitlines()[0] == f"{sensor.path}: a line-protocol sensor at 115200 baud"
+        assert cli("record", "--seconds", "0.5", "--title", "undamped bob").code == 0
+    names = sorted(path.name for path in tmp_path.glob("*.h5"))
+    assert len(names) == 2
+    assert all(re.fullmatch(r"\d{4}-\d\d-\d\d_\d{4}_undamped-bob(-2)?\.h5", name) for name in names)
+
+
+def test_no_rangefinder_and_several_are_told(
+    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, silent_port: str
+) -> None:
+    """What was heard on each port is said, with what to name; exit code 4."""
+    monkeypatch.setattr("springmass.commands.ports.list_ports", list)
+    done = cli("record", "-o", tmp_path / "run.h5")
+    assert (done.code, "this machine has no serial port" in done.complaint) == (4, True)
+    with speaking("line-protocol") as one, speaking("line-protocol") as other:
+        ports = [SimpleNamespace(device=sensor.path, description="") for sensor in (one, other)]
+        monkeypatch.setattr("springmass.commands.ports.list_ports", lambda: ports)
+        for sensor in (one, other):
+            sensor.start()
+        done = cli("record", "-o", tmp_path / "run.h5")
+    assert done.code == 4
+    assert "several speak" in done.complaint
+    assert other.path in done.complaint

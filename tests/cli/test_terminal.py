@@ -10,6 +10,8 @@ from types import ModuleType
 
 import pytest
 
+from storage.run_file.reading import open_run
+
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are POSIX's")
 
 
@@ -51,3 +53,44 @@ def test_a_poor_terminal_gets_ascii(
     ).stdout
     assert piped.isascii()
     assert ("0.05101 +- 0.00028 m" in terminal.screen.text) == ("TERM" in environment)
+
+
+SCENE = """
+[bob]
+mass_kg = 0.05
+[spring]
+constant_n_per_m = 14.0
+[start]
+displacement_m = 0.05
+"""
+
+
+@pytest.mark.parametrize("columns", [80, 50])
+def test_a_recording_stays_in_its_lines_and_takes_marks(screen: ModuleType, tmp_path: Path, columns: int) -> None:
+    """Progress, trace and keys are rewritten in place; space marks at once, a word with Enter, Ctrl-C stops."""
+    (tmp_path / "bench.toml").write_text(SCENE)
+    with screen.OnTerminal(["record", "--simulate", "bench.toml", "-o", "run.h5"], tmp_path, columns) as terminal:
+        terminal.until("space marks, Ctrl-C stops")
+        terminal.type(" ")
+        terminal.until("mark 1 at")
+        terminal.type("touched\r")
+        terminal.until("mark 2 at")
+        terminal.until("trust" if columns == 80 else "A ")
+        assert len(terminal.screen.text.splitlines()) == 6
+        assert any("\u2801" <= character <= "\u28ff" for character in terminal.screen.text)
+        assert terminal.screen.wrapped == 0
+        terminal.type("\x03")
+        assert terminal.end() == 130
+    with open_run(tmp_path / "run.h5") as run:
+        assert [mark["text"] for mark in run.provenance["marks"]] == ["mark", "touched"]
+    assert "next: springmass analyse run.h5" in terminal.screen.text
+
+
+def test_a_recording_without_a_trace_has_two_lines(screen: ModuleType, tmp_path: Path) -> None:
+    """--no-trace leaves progress and keys."""
+    (tmp_path / "bench.toml").write_text(SCENE)
+    arguments = ["record", "--simulate", "bench.toml", "--seconds", "2", "--no-trace", "-o", "run.h5"]
+    with screen.OnTerminal(arguments, tmp_path) as terminal:
+        terminal.until("space marks")
+        assert len(terminal.screen.text.splitlines()) == 2
+        assert terminal.end() == 0
