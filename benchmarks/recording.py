@@ -69,7 +69,8 @@ def measure(port: str, seconds: int, *, terminal: bool) -> tuple[int, int, float
         run = Path(folder) / "run.h5"
         command = ["record", "--port", port, "--sensor", "line-protocol", "--seconds", str(seconds), "-o", str(run)]
         with _stderr(terminal) as stderr:
-            child = subprocess.Popen([sys.executable, "-m", "springmass", *command], stderr=stderr)
+            environment = {**os.environ, "TERM": "xterm-256color", "PYTHONUTF8": "1"}
+            child = subprocess.Popen([sys.executable, "-m", "springmass", *command], stderr=stderr, env=environment)
             _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         if child.returncode:
