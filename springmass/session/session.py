@@ -262,6 +262,7 @@ class Session:
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
         # Without marks a turn a second will do: the samples are shown once a second, and an error of the disk stands.
         wait_ns, tick_ns = int((1.0 if marks is None else LOOK_FOR_MARKS_S) * 1e9), start_ns + SECOND_NS
+        self._ring(display, self._tee.blocks, start_ns, recorder, tick=False)
         while end_ns is None or self._clock.now_ns() < end_ns:
             turn_ns = min(self._clock.now_ns() + wait_ns, tick_ns, tick_ns if end_ns is None else end_ns)
             try:

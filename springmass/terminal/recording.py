@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.streaming import LiveMotion
+from pipeline.streaming import LiveMotion, NotYet
 from springmass.session.console import Console
 from springmass.session.progress import Progress
 from springmass.terminal.look import PLAIN, Look
@@ -15,6 +15,7 @@ __all__ = ["ProgressLine", "line_of", "trust_in"]
 UNWATCHED_LINES = 30
 PATIENCE_S = 0.2  # a progress line that nobody reads is left out
 SILENT_S = 1.5  # of a sensor, said in the progress line
+FIRST_MOTION_S = 1.5
 SHOWN_PERIODS, SHOWN_S = 4.0, 4.0
 KEYS = "space marks, Ctrl-C stops"
 
@@ -70,7 +71,8 @@ class ProgressLine:
         self._drawn = len(lines)
 
     def _lines(self, progress: Progress) -> list[str]:
-        found = progress.motion()
+        # The first analysis loads what it needs: troubles and keys do not wait for that.
+        found = progress.motion() if progress.seconds >= FIRST_MOTION_S else NotYet("listening")
         lines = [_head(progress, found, self._look, self._console.columns - 1)]
         if troubles := _troubles(progress):
             lines.append("; ".join(troubles))
@@ -106,14 +108,14 @@ def trust_in(found: LiveMotion, missing_share: float) -> str:
     return "fair" if off <= 10.0 and missing_share <= 1 / 3 else "poor"
 
 
-def _head(progress: Progress, found: object, look: Look, width: int) -> str:
+def _head(progress: Progress, found: LiveMotion | NotYet, look: Look, width: int) -> str:
     """As much as fits of: time, motion and trust in it, rate, what is missing, what is safe on the disk."""
     parts = ["waiting for the bob" if progress.waiting else f"{progress.seconds:.0f} s"]
     if isinstance(found, LiveMotion):
         parts += [f"T {concise(found.period, look)}", f"A {concise(found.amplitude, look)}"]
         parts.append(f"trust {trust_in(found, progress.missing_share)}")
     else:
-        parts.append(str(getattr(found, "why", "")))
+        parts.append(found.why)
     parts.append(f"{progress.rate_hz:.0f} Hz")
     parts.append(f"{progress.missing} missing" + (f", {progress.gaps} gaps" if progress.gaps else ""))
     if progress.status is not None:
