@@ -5,7 +5,7 @@ BIN = $(VENV)/bin
 WORKERS ?= 2
 PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
 
-.PHONY: help demo test trials accuracy bench lint docs-figures docs-trade clean
+.PHONY: help demo test trials accuracy bench lint docs docs-figures docs-trade clean
 
 help:
 	@echo "make demo     from two old recordings to Table 1 and a report"
@@ -13,6 +13,7 @@ help:
 	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
 	@echo "make bench    speed, as ratios to named references"
 	@echo "make lint     ruff, mypy, import contracts"
+	@echo "make docs     the pages and the reference of the Python API as a site, docs/_build/index.html"
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -52,6 +53,9 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(VENV)/.installed-dev
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build
+
 docs-figures: $(VENV)/.installed
 	$(BIN)/python docs/figures/draw.py
 
@@ -59,4 +63,4 @@ docs-trade: $(VENV)/.installed-dev
 	$(BIN)/python docs/figures/trade.py
 
 clean:
-	rm -rf $(VENV) demo-output dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) demo-output dist build docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

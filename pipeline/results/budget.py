@@ -78,13 +78,9 @@ class Budget:
 
     @property
     def dof(self) -> float:
-        """Effective degrees of freedom: :math:`\\nu = u^4 / \\sum_i u_i^4/\\nu_i` (Welch-Satterthwaite) [1]_.
+        """Effective degrees of freedom: :math:`\\nu = u^4 / \\sum_i u_i^4/\\nu_i` (Welch-Satterthwaite).
 
-        Infinite beyond a million.
-
-        References
-        ----------
-        .. [1] JCGM 100:2008, G.4.1.
+        JCGM 100:2008, G.4.1; infinite beyond a million.
         """
         below = sum(c.share**2 / c.dof for c in self.contributions)
         return 1.0 / below if below > 1.0 / MANY else math.inf

@@ -59,7 +59,7 @@ def analyse(
     scene : Scene, path or mapping, optional
         What is known of the bench. Left out: of ``NAME.h5`` the ``[scene]`` of ``NAME.about.toml`` beside it, else the
         scene inside the run file, else nothing.
-    params : Params, optional
+    params : pipeline.analyse.Params, optional
         Options of every stage, in place of a tier's.
     accuracy : {"fast", "standard", "best"}, optional
         Tier, "standard" where it is left out; not together with ``params``.

@@ -19,6 +19,7 @@ __all__ = ["LAWS", "Drag", "FunctionLaw", "Law", "Power", "find_law", "make_law"
 
 _ALL: tuple[Law, ...] = (*DRAGS, Power())
 LAWS: dict[str, Law] = {law.name: law for law in _ALL}
+"""The damping laws that ship, by name, in the order in which they are tried."""
 
 
 def find_law(law: str | Law) -> Law:
