@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import mmap
 import os
+import sys
 from io import FileIO
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from acquisition.errors import FormatError
@@ -13,7 +15,7 @@ from acquisition.recordings.recording import Recording
 from acquisition.recordings.tables.text import is_text
 from acquisition.regular import open_regular
 
-__all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "read_bytes", "read_head"]
+__all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "dialect_folder", "read_bytes", "read_head"]
 
 HEAD_BYTES = 8192
 """How much of a file a format sees to recognise it."""
@@ -99,6 +101,13 @@ class PairFormat(Format, Protocol):
     ) -> Recording:
         """Read two files, each a path and its content, and join them by time."""
         ...
+
+
+def dialect_folder() -> Path:
+    """Return where a user's dialects are: under ``XDG_CONFIG_HOME``, or where the system keeps settings."""
+    told = os.environ.get("XDG_CONFIG_HOME") or (os.environ.get("APPDATA") if sys.platform == "win32" else None)
+    usual = "~/Library/Application Support" if sys.platform == "darwin" else "~/.config"
+    return (Path(told) if told else Path(usual).expanduser()) / "springmass" / "dialects"
 
 
 def read_head(path: str | os.PathLike[str]) -> bytes:

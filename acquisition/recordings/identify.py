@@ -2,7 +2,8 @@
 
 The table holds names only: a format's module is imported when it is asked. A package elsewhere adds one with
 an entry point in the group ``springmass.formats`` that names an object like
-:class:`acquisition.recordings.base.Format`.
+:class:`acquisition.recordings.base.Format`; a user declares one without code
+(:mod:`acquisition.recordings.families.declared`).
 """
 
 from __future__ import annotations
@@ -14,7 +15,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
-from acquisition.recordings.base import HEAD_BYTES, Format, PairFormat, SurveyFormat, read_bytes, read_head
+from acquisition.recordings.base import (
+    HEAD_BYTES,
+    Format,
+    PairFormat,
+    SurveyFormat,
+    dialect_folder,
+    read_bytes,
+    read_head,
+)
 from acquisition.recordings.foreign import refuse
 from acquisition.recordings.inspection import Inspection
 from acquisition.recordings.recording import Recording
@@ -48,12 +57,12 @@ _LAST = "table"  # takes any rows of numbers, so that everybody else is asked be
 
 
 def formats() -> tuple[Format, ...]:
-    """Return every format, those of this package first.
+    """Return every format: those that the user declares, those of this package, those of others.
 
     Examples
     --------
-    >>> formats()[0].name
-    'motion-sensor'
+    >>> "motion-sensor" in [each.name for each in formats()]
+    True
     """
     return tuple(_every())
 
@@ -68,10 +77,13 @@ def get_format(name: str) -> Format:
     """
     if name in _TABLE:
         return _built_in(name)
+    declared = {each.name: each for each in _declared()}
+    if name in declared:
+        return declared[name]
     entries = _entry_points()
     if name in entries:
         return _load(entries[name])
-    known = ", ".join([*_TABLE, *entries])
+    known = ", ".join([*declared, *_TABLE, *entries])
     raise UnknownFormat(f'format "{name}"', f"must be one of {known}", "name one of these or leave it out")
 
 
@@ -159,7 +171,8 @@ def _recognise(path: str, head: bytes) -> Format:
 
 
 def _every() -> Iterator[Format]:
-    """Yield one format after the other; entry points are looked for only if the table is used up."""
+    """Yield one format after the other, what the user declares first; entry points only if the table is used up."""
+    yield from _declared()
     for name in _TABLE:
         if name != _LAST:
             yield _built_in(name)
@@ -167,6 +180,17 @@ def _every() -> Iterator[Format]:
         if name not in _TABLE:
             yield _load(entry)
     yield _built_in(_LAST)
+
+
+def _declared() -> Iterator[Format]:
+    """Yield the user's own dialects; their reader is imported where there are any."""
+    if not dialect_folder().is_dir():
+        return
+    for each in import_module("acquisition.recordings.families.declared").dialects():
+        if each.name in _TABLE:
+            where = dialect_folder() / f"{each.name}.toml"
+            raise AcquisitionError(f'{where}: "{each.name}" is a family already; give the file another name')
+        yield each
 
 
 def _built_in(name: str) -> Format:

@@ -1,0 +1,95 @@
+"""Dialects that a user declares in TOML."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from acquisition.errors import AcquisitionError, NeedsAnswer
+from acquisition.recordings.base import dialect_folder
+from acquisition.recordings.families.declared import dialect
+from acquisition.recordings.identify import formats, get_format, inspect, open_recording
+
+LOG = """
+title = "height log of bench 12"
+begins = "Height log"
+separator = "tab"
+heading = 2
+rate_hz = 50
+
+[[column]]
+name = "n"
+aside = true
+
+[[column]]
+name = "height"
+unit = "mm"
+"""
+DATA = "Height log 12\nn\th\n" + "".join(f"{i}\t{200 + i % 7},5\n" for i in range(30))
+
+
+@pytest.fixture
+def declare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], Path]:
+    """Return what writes a dialect into the user's folder."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    folder = tmp_path / "config" / "springmass" / "dialects"
+
+    def write(name: str, text: str) -> Path:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+        return folder / name
+
+    return write
+
+
+def test_a_declared_dialect_is_a_family(declare: Callable[[str, str], Path], tmp_path: Path) -> None:
+    """It is listed, found by its name, and asked before all others; its files open with what it says."""
+    path = declare("height-log.toml", LOG)
+    assert path.parent == dialect_folder()
+    assert formats()[0].name == get_format("height-log").name == "height-log"
+    (tmp_path / "run.txt").write_text(DATA, encoding="utf-8")
+    recording = open_recording(tmp_path / "run.txt")
+    assert (recording.format, recording.channel, recording.info.rate_hz) == ("height-log", "height", 50.0)
+    assert recording.samples.distance[:2].tolist() == [0.2005, 0.2015]
+    assert inspect(tmp_path / "run.txt").why == 'line 1 begins with "Height log", as height-log.toml says'
+    assert open_recording(tmp_path / "run.txt", channel="n", unit="mm").samples.distance[3] == 0.003
+
+
+def test_what_a_dialect_leaves_out_is_asked_for(declare: Callable[[str, str], Path], tmp_path: Path) -> None:
+    """As of any family."""
+    declare("height-log.toml", LOG.replace("rate_hz = 50", "").replace('unit = "mm"', ""))
+    (tmp_path / "run.txt").write_text(DATA, encoding="utf-8")
+    with pytest.raises(NeedsAnswer, match="--rate-hz R --unit m"):
+        open_recording(tmp_path / "run.txt")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('begins = "Height log"', "", "expected begins, got none"),
+        ('begins = "Height log"', 'begins = " "', "begins must be what line 1"),
+        ("rate_hz = 50", "rate = 50", 'key must be one of title, begins, .*, got "rate"'),
+        ("rate_hz = 50", "rate_hz = 0", "rate_hz must be a positive number, got 0"),
+        ("rate_hz = 50", "rate_hz = true", "rate_hz must be int or float, got True"),
+        ('"tab"', '"x"', 'separator must be one of "tab", .*, got "x"'),
+        ("heading = 2", "heading = -1", "heading must be 0 to 1000 lines, got -1"),
+        ('name = "n"', "name = 3", "column 1: name must be str, got 3"),
+        ("aside = true", 'time = true\nunit = "m"', 'column 1: unit of a time must be one of s, .*, got "m"'),
+        ("[[column]]", "[column", "expected TOML, got"),
+    ],
+)
+def test_what_no_dialect_can_say_is_refused_by_name(old: str, new: str, words: str) -> None:
+    """One line with file, key, value and what is allowed."""
+    with pytest.raises(AcquisitionError, match=words) as caught:
+        dialect("height-log.toml", LOG.replace(old, new))
+    assert str(caught.value).startswith("height-log.toml: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_family_s_name_cannot_be_taken(declare: Callable[[str, str], Path], tmp_path: Path) -> None:
+    """A dialect called as a family of the package would hide it."""
+    declare("bare.toml", LOG)
+    with pytest.raises(AcquisitionError, match='"bare" is a family already; give the file another name'):
+        formats()
