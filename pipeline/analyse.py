@@ -11,6 +11,7 @@ from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.checks.clock_findings import judge_clock
 from pipeline.checks.finding import Checked, Finding, by_severity
+from pipeline.checks.modulation import judge_modulation
 from pipeline.checks.plausibility import judge_plausibility
 from pipeline.checks.sample_findings import STEPS, count_quality, find_clusters, judge_samples
 from pipeline.checks.segment_findings import judge_rows, judge_segments
@@ -260,6 +261,7 @@ def _oscillation(
         judge_rows(windows.conditioned, waveform.rms_m),
         Checked() if bent else check_residuals(windows.conditioned, demodulated, disturbances, phase, u_amplitude),
         judge_plausibility(windows.conditioned, demodulated, phase),
+        Checked() if bent else judge_modulation(demodulated, damping, phase, track.unit),
     )
     derived = derive(
         demodulated,

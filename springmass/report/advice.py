@@ -60,6 +60,7 @@ ADVICE = {
     "amplitude_dependent_frequency": "Quote the amplitude with the period.",
     "rest_drift": "Check the clamp and the sensor's mount.",
     "sideways_mode": "Release the bob without sideways motion.",
+    "amplitude_modulated": "Record for longer than a beat, and see what else moves.",
     "correlated_residuals": "Look at the figure of the amplitude; analyse parts of the record with --from and --to.",
     "not_converged": "Look at the residuals for what no smooth model describes.",
     "runs_exchanged": "Check which record belongs to which bob.",

@@ -45,6 +45,7 @@ CODES = {
     "amplitude_dependent_frequency",
     "rest_drift",
     "sideways_mode",
+    "amplitude_modulated",
     "quantised",
     "short_record",
     "overdamped",

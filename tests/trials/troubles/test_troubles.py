@@ -1,0 +1,31 @@
+"""Records that benches really give: a number is right within its uncertainty, or a warning names what is wrong."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from pipeline.accuracy import TIERS
+from tests.trials.troubles.judge import try_one
+from tests.trials.troubles.kinds import TROUBLES
+from tests.trials.troubles.table import as_text, summed, total
+
+# One record of each kind by default, so that the three tiers take a few minutes; SPRINGMASS_TRIALS=20 for the whole.
+SEEDS = min(20, int(os.environ.get("SPRINGMASS_TRIALS", "1")))
+WRONG, ANY_KIND, RIGHT_OR_NAMED = 0.01, 0.1, 0.95
+
+pytestmark = pytest.mark.trials
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_no_number_is_confidently_wrong(tier: str) -> None:
+    """One record in a hundred at most is wrong by four uncertainties and not named, and one in ten of any kind."""
+    verdicts = [try_one(kind, seed, tier) for kind in TROUBLES for seed in range(SEEDS)]
+    lines = summed(TROUBLES, verdicts)
+    print(f"\n{as_text(lines)}\n{tier}: {total(lines)}")
+    wrong, refused = (sum(line.count(word) for line in lines) for word in ("confident wrong", "refused"))
+    assert wrong <= WRONG * len(verdicts)
+    assert not [line.kind.name for line in lines if line.count("confident wrong") > max(ANY_KIND * line.n, 1)]
+    assert len(verdicts) - wrong - refused >= RIGHT_OR_NAMED * len(verdicts)
+    assert not [line.kind.name for line in lines if line.too_wide]
