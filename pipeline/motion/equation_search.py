@@ -28,6 +28,7 @@ NAMES = (*STATE, *COEFFICIENTS)
 PRECISION = 0.01  # of the standard uncertainties, at which a fit stops
 FEW = 6  # windows under which the laws of the amplitude say too little to start from
 COARSE, ROUGH, FIRST_STEPS = 0.2, 0.1, 30  # step in rad, precision and most steps while a start is looked for
+SETTLED = 1.05  # times the noise: what a fit of the richest law may leave and need no other start
 HOPELESS = 1000.0  # rise of chi-square, to first order, from which a law is not fitted any more
 
 
@@ -125,12 +126,18 @@ class Search:
         ]
         ends = [self.fit(self.richest, starts[i], ROUGH, FIRST_STEPS) for i in best]
         end = min(ends, key=lambda end: end.cost)
-        if self.stopped:
+        if self.stopped and not self.settled(end):
             # Where friction ends the motion the number of swings is whole, and each number has a minimum of its own.
             others = self.exchanged(self.full(self.richest, end.values)) + self.by_friction(starts[int(best[0])])
             tried = [self.fit(self.richest, start, ROUGH, FIRST_STEPS) for start in others]
             end = min([end, *tried], key=lambda end: end.cost)
         return self.full(self.richest, end.values)
+
+    def settled(self, end: least_squares.Fit) -> bool:
+        """Whether a fit leaves noise alone with no term that drives: no other minimum can be better."""
+        rms = math.sqrt(end.cost / max(int(np.count_nonzero(self.used)) - len(NAMES), 1))
+        least = -2.0 * np.sqrt(np.diag(end.covariance))
+        return rms < SETTLED and bool(np.all((end.values > least)[len(STATE) :]))
 
     def by_friction(self, theta: F8) -> list[F8]:
         """Return where the simpler laws with friction end: none of their terms hides in another's negative."""

@@ -6,6 +6,7 @@ import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from springmass.runs.json_results import all_findings
 from springmass.runs.loading import load
 from tests.trials.troubles.record import Kind, Record
 
-__all__ = ["LIMIT", "Given", "Verdict", "try_one"]
+__all__ = ["LIMIT", "Given", "Verdict", "clean_seconds", "try_one"]
 
 LIMIT = 4.0  # stated uncertainties beyond which a number is wrong
 
@@ -67,6 +68,9 @@ class Verdict:
         Whether a warning names the kind.
     cpu_s : float
         Processor time of the analysis.
+    rows : int
+        Of the record.
+    tier : str
     """
 
     kind: str
@@ -77,6 +81,8 @@ class Verdict:
     refused: bool
     named: bool
     cpu_s: float
+    rows: int
+    tier: str
 
     @property
     def worst(self) -> float:
@@ -120,14 +126,38 @@ def try_one(kind: Kind, seed: int, tier: str) -> Verdict:
         spent = time.process_time() - began
         # A refusal names the trouble if it does so by a finding's code; its sentence is not searched for words.
         code = getattr(error, "code", "")
-        return Verdict(kind.name, seed, {}, (code,) if code else (), (), True, code in kind.codes, spent)
+        return Verdict(
+            kind.name, seed, {}, (code,) if code else (), (), True, code in kind.codes, spent, record.t.size, tier
+        )
     spent = time.process_time() - began
     warnings = tuple(dict.fromkeys(f.code for f in findings if f.severity != "info"))
     notes = tuple(dict.fromkeys(f.code for f in findings if f.severity == "info"))
     given = _held_against(analysis, record)
     sought = [name for name in record.truth if name != "offset"]
     refused = bool(sought) and not any(name in given for name in sought)
-    return Verdict(kind.name, seed, given, warnings, notes, refused, bool(kind.codes & set(warnings)), spent)
+    named = bool(kind.codes & set(warnings))
+    return Verdict(kind.name, seed, given, warnings, notes, refused, named, spent, record.t.size, tier)
+
+
+@cache
+def clean_seconds(rows: int, tier: str) -> float:
+    """Return the processor time that a record without trouble takes at a tier, s: the least of three.
+
+    Parameters
+    ----------
+    rows : int
+        At 100 Hz.
+    tier : {"fast", "standard", "best"}
+    """
+    t = np.arange(rows) / 100.0
+    noise = 3e-4 * np.random.default_rng(1).standard_normal(rows)
+    track = Track.from_arrays(t, 0.3 + 0.05 * np.exp(-min(0.01, 3.0 / t[-1]) * t) * np.cos(8.3 * t) + noise)
+    spent = []
+    for _ in range(3):
+        began = time.process_time()
+        analyse(track, Scene(), params_for(tier))
+        spent.append(time.process_time() - began)
+    return min(spent)
 
 
 def _analysed(record: Record, tier: str) -> tuple[Analysis, tuple[Finding, ...]]:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.trials.troubles.judge import LIMIT, Verdict
+from tests.trials.troubles.judge import LIMIT, Verdict, clean_seconds
 from tests.trials.troubles.record import Kind
 
 __all__ = ["Line", "as_markdown", "as_text", "summed", "total"]
 
+SLOWEST = 20.0  # times what a record without trouble takes, of as many rows or of 12,000 if that is more
 CURED = 3.0  # greatest median u, over the rms error, of a kind that is to be cured
 MEASURED = 16  # records of which the rms error is known well enough to be held against that
 
@@ -71,6 +72,17 @@ class Line:
         return ", ".join(f"{code} {codes.count(code)}" for code in shares)
 
     @property
+    def slow(self) -> float:
+        """The median time of an analysis over that of a record without trouble and as many rows."""
+        return float(np.median([one.cpu_s / clean_seconds(one.rows, one.tier) for one in self.verdicts]))
+
+    @property
+    def too_slow(self) -> bool:
+        """Whether an analysis takes more than the limit of a record without trouble; short ones may take 12,000's."""
+        times = [one.cpu_s / clean_seconds(max(one.rows, 12_000), one.tier) for one in self.verdicts]
+        return float(np.median(times)) > SLOWEST
+
+    @property
     def seconds(self) -> float:
         """Median processor time of an analysis."""
         return float(np.median([one.cpu_s for one in self.verdicts]))
@@ -82,7 +94,7 @@ class Line:
             return False
         if self.kind.plain and any(one.warnings for one in self.verdicts):
             return False
-        return self.count("refused") <= self.n // 10 and not self.too_wide
+        return self.count("refused") <= self.n // 10 and not self.too_wide and not self.too_slow
 
     @property
     def too_wide(self) -> bool:
@@ -112,16 +124,18 @@ def total(lines: Sequence[Line]) -> str:
 
 def as_text(lines: Sequence[Line]) -> str:
     """Return the table for a terminal, the worst kinds marked."""
-    head = f"  {'kind':<42}{'n':>4}{'wrong':>6}{'right':>6}{'named':>6}{'refus':>6}{'u/rms':>7}{'|z|':>8}{'s':>7}"
+    head = (
+        f"  {'kind':<42}{'n':>4}{'wrong':>6}{'right':>6}{'named':>6}{'refus':>6}{'u/rms':>7}{'|z|':>8}{'s':>7}{'x':>6}"
+    )
     rows = [head]
     for line in lines:
         ratio, name = line.wide
         counts = "".join(f"{line.count(w):>6}" for w in ("confident wrong", "right", "named", "refused"))
         cure = f"{ratio:.1f}" + ("*" if line.kind.cure else " ")
-        notes = [line.worst, f"wide: {name}" if line.too_wide else "", line.warnings]
+        notes = [line.worst, f"wide: {name}" if line.too_wide else "", "slow" * line.too_slow, line.warnings]
         rows.append(
             f"{' ' if line.holds else '!'} {line.kind.name:<42}{line.n:>4}{counts}{cure:>7}{line.median_z:>8.1f}"
-            f"{line.seconds:>7.2f}  {'; '.join(note for note in notes if note)}"
+            f"{line.seconds:>7.2f}{line.slow:>6.1f}  {'; '.join(note for note in notes if note)}"
         )
     return "\n".join(rows)
 
@@ -129,8 +143,9 @@ def as_text(lines: Sequence[Line]) -> str:
 def as_markdown(lines: Sequence[Line]) -> str:
     """Return the table for a page of the documentation: kinds by what stands before the colon of their names."""
     rows = [
-        "| trouble | kinds | records | right | named | refused | wrong, not named | greatest median u over rms error |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| trouble | kinds | records | right | named | refused | wrong, not named | greatest median u over rms error "
+        "| time over a clean record's |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     groups: dict[str, list[Line]] = {}
     for line in lines:
@@ -138,6 +153,7 @@ def as_markdown(lines: Sequence[Line]) -> str:
     for name, group in groups.items():
         counts = [sum(line.count(w) for line in group) for w in ("right", "named", "refused", "confident wrong")]
         cured = max((line.wide[0] for line in group if line.kind.cure), default=0.0)
+        slow = max(line.slow for line in group)
         numbers = [len(group), sum(line.n for line in group), *counts]
-        rows.append(f"| {name} | {' | '.join(map(str, numbers))} | {f'{cured:.1f}' if cured else ''} |")
+        rows.append(f"| {name} | {' | '.join(map(str, numbers))} | {f'{cured:.1f}' if cured else ''} | {slow:.1f} |")
     return "\n".join(rows)

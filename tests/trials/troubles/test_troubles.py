@@ -29,3 +29,4 @@ def test_no_number_is_confidently_wrong(tier: str) -> None:
     assert not [line.kind.name for line in lines if line.count("confident wrong") > max(ANY_KIND * line.n, 1)]
     assert len(verdicts) - wrong - refused >= RIGHT_OR_NAMED * len(verdicts)
     assert not [line.kind.name for line in lines if line.too_wide]
+    assert not [line.kind.name for line in lines if line.too_slow]
