@@ -66,7 +66,8 @@ class TableRow:
     Parameters
     ----------
     name : str
-        As in ``Analysis.estimates``; "gamma", "beta", "mu", "c" and "n" are the selected law's.
+        As in ``Analysis.estimates``; "gamma" and "beta" are those of both drags together, with "mu", "c" and "n"
+        the selected law's, where these do not describe the record.
     quantity : str
         In words.
     symbol, page_symbol, tex_symbol : str

@@ -81,6 +81,8 @@ def _damped(damping: Damping) -> str:
         if name != "A0"
     ]
     text += f", {', '.join(parameters)}" if parameters else ""
+    # A term that does not show is not zero; Table 1 has what holds then.
+    text += " if nothing else damps" if len(parameters) == 1 else ""
     others = [damping.fits[name].law.words for name in damping.admissible if name != damping.selected]
     if others:
         return f"{text}; as far as this record can tell, as good: {'; '.join(others)}."

@@ -224,6 +224,12 @@ def test_rejected_laws_are_named_in_words() -> None:
     assert re.search(r'linear<br><span class="sub">rejected', table)
 
 
+def test_a_lone_term_is_stated_with_its_condition() -> None:
+    """Of a record that shows one term the sentence says that gamma holds if nothing else damps; of two it does not."""
+    assert re.search(r"γ\s=\s[^;]*if nothing else damps", verdict(bare())[1])
+    assert "if nothing else damps" not in verdict(damped())[1]
+
+
 def test_simulated_data_cannot_pass_for_measured() -> None:
     """A simulated run says so at its head, a replayed one does not."""
     assert "simulated, not measured" in page_of(run_of(bare()))
