@@ -104,8 +104,9 @@ def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, law
     Notes
     -----
     The coefficient that purely quadratic drag would need to take the same energy in one cycle:
-    :math:`C(A) = F\\,(-\\dot A - \\mu)/A^2`. Friction is no drag and stays out where the law has it; every other loss,
-    the spring's own included, is in. The points are slopes of ln A through stretches of the record.
+    :math:`C(A) = F\\,(-\\dot A - \\mu)/A^2`. Friction is no drag and stays out where the selected law has it, by as
+    much as that law says; every other loss, the spring's own included, is in. The points are slopes of ln A through
+    stretches of the record.
     """
     best = damping.best
     elapsed = demodulated.t - damping.t0
@@ -117,7 +118,8 @@ def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, law
     x = np.geomspace(least, most, POINTS)
 
     def coefficient(fit: LawFit, theta: F8) -> F8:
-        return factor.value * (fit.law.rate(x, theta) - _friction(fit, theta)) / x**2
+        friction = _friction(best, theta if fit.name == best.name else best.joint.values)
+        return factor.value * (fit.law.rate(x, theta) - friction) / x**2
 
     y = coefficient(best, best.joint.values)
     variance = (y * factor.u / factor.value) ** 2

@@ -79,6 +79,18 @@ def test_other_admissible_laws_widen_the_bands(windows: Windows) -> None:
     np.testing.assert_array_equal(curve.y, one)
 
 
+def test_friction_that_only_another_law_has_takes_no_drag_away(windows: Windows) -> None:
+    """Twelve periods know no friction: a law with it says the same of all losses, and the band stays narrow."""
+    points = mixed(windows, 4e-5, periods=12)
+    damping = fit_damping(points, 0.0)
+    other = damping.fits["linear+friction"]
+    assert "mu" not in damping.best.joint.names
+    assert other.joint["mu"].u > 0.2 * other.rates(np.array([START]))[0][0]
+    curve = drag_curve(damping, points, Estimate(13.0, 0.0), (Weighted(damping.best, 0.5), Weighted(other, 0.5)))
+    assert curve is not None
+    assert np.all(curve.u < 0.1 * curve.y)
+
+
 def alone_energy(damping: object, points: Demodulated) -> np.ndarray:
     """Return the times of the curve: from the first sample to the last window."""
     return np.linspace(0.0, float(points.t[-1]), 200)
