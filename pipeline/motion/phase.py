@@ -203,6 +203,7 @@ def amplitude_integral(
 
     grid = np.linspace(first - middle, last - middle, TABLE)
     power = np.abs(fit.amplitude(grid + (middle - t0))) ** exponent
+    power[~np.isfinite(power)] = 0.0  # before the part that was analysed a law may have a pole
     integral = cumulative_trapezoid(power, grid, initial=0.0)
     return grid, np.asarray(integral - np.interp(0.0, grid, integral))
 

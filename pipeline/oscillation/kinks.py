@@ -17,6 +17,8 @@ from pipeline.track import F8
 
 __all__ = ["Params", "find_kink"]
 
+LINE = np.array([-0.3, -0.05, 0.2, 0.45, 0.7])  # weights that continue a line through five windows by half of one
+NEAR = 6.0  # standard deviations of a window by which the jump may differ from near, four of what such lines are off
 DEGREE = 4  # of the polynomials that logarithm of the amplitude and phase are smooth by
 
 
@@ -38,7 +40,7 @@ class Params:
 
     gain: float = 45.0
     least: float = 0.004
-    apart: int = 4
+    apart: int = 5
     scatter: float = 1.35
 
 
@@ -79,7 +81,17 @@ def find_kink(demodulated: Demodulated, params: Params | None = None) -> Segment
     rest = max((left - gain[k]) / (free - 3), 1.0)
     if gain[k] < params.gain * rest or math.hypot(amplitude, angle) < params.least:
         return None
+    # What goes to and fro faster than the polynomials lowers chi-square by a jump as well, but is none from near.
+    off = _near(both[0], k) - amplitude, _near(both[1], k) - angle
+    if math.hypot(*off) > max(0.5 * math.hypot(amplitude, angle), NEAR * float(np.hypot(*u[:, k]))):
+        return None
     return _longer(demodulated, k, amplitude, angle)
+
+
+def _near(y: F8, k: int) -> float:
+    """The jump before window k by straight lines through the windows on either side of it."""
+    before, after = LINE @ y[k - LINE.size : k], LINE[::-1] @ y[k : k + LINE.size]
+    return float(after - before)
 
 
 def _jumps(y: F8, design: F8, weight: F8) -> tuple[float, F8, F8]:

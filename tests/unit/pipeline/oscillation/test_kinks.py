@@ -36,3 +36,13 @@ def test_what_runs_smoothly_is_not_parted(bend: float) -> None:
     for seed in range(20):
         codes = {one.code for one in analyse(record(seed, bend=bend)).findings}
         assert not codes & {"touched", "phase_jump", "handled"}
+
+
+def test_an_amplitude_that_goes_to_and_fro_is_not_touched() -> None:
+    """Energy given away and taken back every twelve seconds is faster than the polynomials, and still no jump."""
+    t = np.arange(4000) / 100.0
+    for seed in range(4):
+        noise = 3e-4 * np.random.default_rng(seed).standard_normal(t.size)
+        size = 0.05 * np.exp(-0.012 * t) * (1.0 + 0.15 * np.cos(2.0 * np.pi * t / 12.0 + seed))
+        found = analyse(Track.from_arrays(t, 0.3 + size * np.cos(OMEGA * t) + noise))
+        assert not {one.code for one in found.findings} & {"touched", "phase_jump"}
