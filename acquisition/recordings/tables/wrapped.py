@@ -22,6 +22,7 @@ SETTINGS = "Record Length,"
 """How a file of Tektronix begins that has the settings beside its first rows: ``Record Length,2500,,-0.025,0.04,``."""
 
 _FEWEST, _SHARE, _PROBE = 3, 0.8, 40
+_OF_TEXT = 0.3  # so much of a text must be lists, if these are what it holds
 _NUMBER = r"(?<![\w.])[-+]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][-+]?\d{1,3})?(?![\d:])"
 _CLOCK = r"(?<![\w.:])\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?(?![\d:])"
 _CELL = re.compile(rf"{_CLOCK}|{_NUMBER}")
@@ -69,8 +70,8 @@ def unwrapped(text: Text) -> tuple[Text, tuple[Heading, ...]] | None:
 
 def begins_with_lists(head: str) -> bool:
     """Tell a text that begins with a list of numbers with its name, however long the list."""
-    cells = _LIST_BEGINS.search(head)
-    return cells is not None and len(_CELL.findall(cells["cells"])) >= _FEWEST
+    found = [each for each in _LIST_BEGINS.finditer(head) if len(_CELL.findall(each["cells"])) >= _FEWEST]
+    return bool(found) and sum(len(each[0]) for each in found) >= _OF_TEXT * len(head)
 
 
 def _skeleton(line: str) -> str:
@@ -165,7 +166,10 @@ def _beside_settings(lines: Sequence[str]) -> tuple[Text, tuple[Heading, ...]] |
 def _lists(whole: str) -> tuple[Text, tuple[Heading, ...]] | None:
     """Return the columns of lists with names, all as long as the longest."""
     columns = {}
-    for found in _LIST.finditer(whole):
+    lists = [*_LIST.finditer(whole)]
+    if sum(len(each[0]) for each in lists) < _OF_TEXT * len(whole):
+        return None  # a program that has a list somewhere
+    for found in lists:
         cells = [cell.strip(" \n\"'") for cell in found["cells"].split(",")]
         if len(cells) >= _FEWEST and all(_CELL.fullmatch(cell) or cell in ("", "null", "nan", "NaN") for cell in cells):
             columns[found["name"].strip()] = [cell for cell in cells if cell]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquisition.errors import UnknownFormat
 from acquisition.recordings.identify import open_recording
 
 N = 60
@@ -95,3 +96,12 @@ def test_times_may_be_named_by_name_or_number(tmp_path: Path, answers: dict[str,
     path = tmp_path / "run.csv"
     path.write_text("x (m),t (s),n (s)\n" + rows("{x:.4f},{t:.3f},{i}") + "\n", encoding="utf-8")
     np.testing.assert_allclose(open_recording(path, channel="x", **answers).samples.t, T, atol=1e-9)
+
+
+def test_a_program_with_a_list_in_it_is_no_recording(tmp_path: Path) -> None:
+    """Lists are columns where they are most of a text, and not one line of many."""
+    path = tmp_path / "plot.py"
+    code = "\n".join(f"def figure_{name}(axes):\n    axes.plot(first, second, label={name!r})" for name in "abcdefgh")
+    path.write_text(f"masses = [0.1, 0.2, 0.3, 0.4]\n{code}\n", encoding="utf-8")
+    with pytest.raises(UnknownFormat):
+        open_recording(path)
