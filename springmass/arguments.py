@@ -9,7 +9,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["COMMANDS"]
+__all__ = ["BENCH", "COMMANDS"]
 
 
 def _add_input_options(parser: argparse.ArgumentParser) -> None:
@@ -48,6 +48,12 @@ def _add_analyse(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="scene file (TOML): masses, disc, air, sensor; one for all inputs, or again for each in their order",
     )
+    bench = parser.add_argument_group(
+        "the bench, in place of what the scene says (a scene file states uncertainties too)"
+    )
+    for (_, key), (option, of_u, words) in BENCH.items():
+        bench.add_argument(option, type=_finite, metavar="X", help=words)
+        bench.add_argument(of_u, type=_not_negative, metavar="U", help=f"standard uncertainty of {key}")
     _add_accuracy(parser)
     parser.add_argument("--method", choices=("classic",), help="the lab report's own method, to compare against")
     _add_input_options(parser)
@@ -238,6 +244,37 @@ def _add_ports(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
 
 
+def _add_help(parser: argparse.ArgumentParser) -> None:
+    topics = sorted(COMMANDS)
+    parser.add_argument("topic", nargs="?", choices=topics, metavar="COMMAND", help=f"one of {', '.join(topics)}")
+
+
+def _add_completion(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("shell", choices=("bash", "zsh", "tcsh"), metavar="SHELL", help="bash, zsh or tcsh")
+
+
+def _add_scene(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="?", metavar="RECORDING", help="note what follows beside this recording")
+    parser.add_argument("--check", metavar="FILE", help="say what a scene file states, and what of it no bench has")
+    parser.add_argument("--scene", metavar="FILE", help="scene file to be used with the recording from now on")
+    parser.add_argument("--note", action="append", default=[], metavar="TEXT", help="a remark; again for another")
+    parser.add_argument(
+        "--mark",
+        action="append",
+        default=[],
+        type=_mark,
+        metavar="S=TEXT",
+        help="a mark at this second of the record; again for another",
+    )
+
+
+def _mark(text: str) -> tuple[float, str]:
+    seconds, equals, words = text.partition("=")
+    if not equals or not words.strip():
+        raise argparse.ArgumentTypeError(f"must be SECONDS=TEXT, got {text!r}")
+    return _finite(seconds), words.strip()
+
+
 def _add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
 
@@ -283,6 +320,14 @@ def _speed(text: str) -> float:
     return math.inf if text == "max" else _positive(text)
 
 
+# Table and key of the scene to the options of analyse for its value and standard uncertainty, and help.
+BENCH = {
+    ("bob", "mass_kg"): ("--mass-kg", "--mass-u-kg", "mass of all that hangs on the spring, kg"),
+    ("spring", "mass_kg"): ("--spring-mass-kg", "--spring-mass-u-kg", "mass of the spring, kg"),
+    ("disc", "diameter_m"): ("--disc-diameter-m", "--disc-diameter-u-m", "diameter of the disc, m"),
+    ("air", "temperature_c"): ("--temperature-c", "--temperature-u-c", "temperature of the air, degrees Celsius"),
+}
+
 # Command to what adds its arguments, and its help; the module of its name in springmass.commands does its work.
 COMMANDS = {
     "demo": (_add_demo, "replay, analyse and compare the bundled recordings: Table 1 in one command"),
@@ -300,6 +345,9 @@ COMMANDS = {
     "formats": (_add_formats, "list the families of recordings, or say what a file is"),
     "sensors": (_add_json, "list the families of rangefinders with their rate, resolution, range and limits"),
     "ports": (_add_ports, "list the serial ports and what speaks on them"),
+    "scene": (_add_scene, "print a scene to fill in, check one, or note scene and marks beside a recording"),
+    "completion": (_add_completion, "print what a shell needs to complete commands and options"),
+    "help": (_add_help, "say what a command does"),
     "doctor": (_add_json, "check this installation"),
 }
 

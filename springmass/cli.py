@@ -11,7 +11,7 @@ import sys
 
 from springmass import __version__
 from springmass.arguments import COMMANDS
-from springmass.errors import INTERRUPTED, OK, SENSOR, SOME_FAILED, UNREADABLE, USAGE, complain
+from springmass.errors import INTERRUPTED, OK, SENSOR, SOME_FAILED, UNREADABLE, USAGE, complain, hush
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=_formatter,
     )
     parser.add_argument("--version", action="version", version=f"springmass {__version__}")
+    parser.add_argument("-q", "--quiet", action="store_true", help="say on stderr what is wrong, and nothing else")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, (add, summary) in COMMANDS.items():
         described = summary[0].upper() + summary[1:] + "."
@@ -84,6 +85,8 @@ def _formatter(prog: str) -> argparse.HelpFormatter:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit code; a user's mistake is one line on stderr."""
     options = build_parser().parse_args(arguments)
+    if options.quiet:
+        hush()
     from importlib import import_module
 
     # A title or a name that the terminal's code lacks is shown escaped. Line by line, so that both streams come in the

@@ -26,9 +26,12 @@ __all__ = [
     "USAGE",
     "ProgramError",
     "complain",
+    "hush",
+    "suggest",
     "tell",
 ]
 
+_quiet = False
 OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERRUPTED = 0, 1, 2, 3, 4, 5, 130
 
 
@@ -50,11 +53,29 @@ class ProgramError(Exception):
 
 def complain(message: object) -> None:
     """Write one line to stderr, also where a file's name or a library's message breaks over several."""
-    tell(f"springmass: {' '.join(str(message).splitlines())}")
+    _write(f"springmass: {' '.join(str(message).splitlines())}")
 
 
 def tell(message: str) -> None:
-    """Write one line to stderr, control characters in it made visible."""
+    """Write one line to stderr, control characters in it made visible; nothing under ``-q``."""
+    if not _quiet:
+        _write(message)
+
+
+def hush() -> None:
+    """Write from here on what is wrong, and nothing else."""
+    global _quiet
+    _quiet = True
+
+
+def suggest(command: str) -> None:
+    """Say what to type next, where somebody watches."""
+    with contextlib.suppress(OSError, ValueError):
+        if sys.stderr is not None and sys.stderr.isatty():
+            tell(f"next: {command}")
+
+
+def _write(message: str) -> None:
     from acquisition.errors import visible  # not at the top: `--help` has nothing to tell
 
     with contextlib.suppress(OSError, ValueError):  # nobody hears it; the exit code still says what it was

@@ -26,7 +26,7 @@ from springmass.runs.analysing import Analysed, distinct_names
 from springmass.runs.comparing import Compared, compare_analysed, demand_one_spring
 from springmass.runs.json_results import all_findings
 from springmass.runs.loading import Loaded, cut, load
-from springmass.runs.scenes import read_scene, scene_beside
+from springmass.runs.scenes import read_scene
 from storage.run_file.reading import Run
 
 if TYPE_CHECKING:
@@ -291,4 +291,4 @@ def _scene(given: Any, loaded: Loaded | None) -> Scene:
         return read_scene(given)
     if loaded is None:
         return Scene()
-    return scene_beside(loaded.path) or Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
+    return Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")

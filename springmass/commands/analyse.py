@@ -20,13 +20,14 @@ from pipeline.analyse import Oscillation, Overdamped
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
+from springmass.arguments import BENCH
 from springmass.commands import completions
-from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, tell
-from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder
+from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, suggest, tell
+from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder, scene_of
 from springmass.runs.inputs import Found, files_of
 from springmass.runs.json_results import picked, rejected
 from springmass.runs.loading import load
-from springmass.runs.scenes import read_scenes
+from springmass.runs.scenes import amended, read_scenes
 from storage.errors import StorageError, WriteFailed
 
 __all__ = ["run"]
@@ -97,7 +98,9 @@ def _one(task: _Task) -> int:
     else:
         _print_text(analysed, si=task.options.si)
     if task.report is not None:
-        tell(f"report: {_write(analysed, task.report, pdf=task.options.pdf)}")
+        page = _write(analysed, task.report, pdf=task.options.pdf)
+        tell(f"report: {page}")
+        suggest(f"open {page} in a browser")
     code, complaints = _judged(analysed, task)
     for line in complaints:
         complain(line)
@@ -109,7 +112,7 @@ def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | No
     from springmass.terminal.progress import counted
 
     everything: list[_Done] = []
-    for done in counted(_worked(tasks), len(tasks), "reports" if options.report else "runs"):
+    for done in counted(_worked(tasks), len(tasks), "reports" if options.report else "runs", quiet=options.quiet):
         everything.append(done)
         if options.json and done.result:
             print(json.dumps(done.result, allow_nan=False), flush=True)
@@ -173,10 +176,11 @@ def _attempt(task: _Task) -> Analysed | _Done:
     options = task.options
     asked = {**completions(options), "velocity": options.velocity or task.found.velocity}
     try:
+        bench = _bench(options)
         loaded = load(task.found.path, **asked, from_s=options.from_s, to_s=options.to_s, clock_ppm=options.clock_ppm)
         return analyse_loaded(
             loaded,
-            task.scene,
+            amended(scene_of(loaded, task.scene), bench, where="the command line") if bench else task.scene,
             parameters={**picked(options, PARAMETERS), "velocity": asked["velocity"]},
             accuracy=options.accuracy,
             with_classic=options.method == "classic",
@@ -187,6 +191,18 @@ def _attempt(task: _Task) -> Analysed | _Done:
         return _Done(task.name, UNREADABLE, (str(error),))
     except PipelineError as error:
         return _Done(task.name, UNREADABLE, (f"{task.found.path}: {error}",))
+
+
+def _bench(options: argparse.Namespace) -> dict[tuple[str, str], dict[str, float]]:
+    """Return what the command line says of the bench, by table and key of the scene."""
+    found = {}
+    for place, (option, of_u, _) in BENCH.items():
+        value, u = (getattr(options, name[2:].replace("-", "_")) for name in (option, of_u))
+        if value is not None:
+            found[place] = {"value": value, "u": u or 0.0}
+        elif u is not None:
+            raise ProgramError(f"{of_u} does nothing without {option}; name both or neither", USAGE)
+    return found
 
 
 def _judged(analysed: Analysed, task: _Task) -> tuple[int, tuple[str, ...]]:

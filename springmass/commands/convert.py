@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Sequence
 from pathlib import Path, PurePath
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
 from springmass.commands import completions
-from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, tell
+from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, suggest, tell
 from springmass.runs.analysing import made_now
 from springmass.runs.loading import Loaded, load
 from springmass.runs.scenes import read_scene
@@ -30,6 +31,7 @@ def run(options: argparse.Namespace) -> int:
     if out.suffix.lower() in RUN_SUFFIXES:
         written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=scene, overwrite=options.overwrite)
         tell(f"{written}: {len(loaded.samples)} samples from {loaded.path}")
+        suggest(f"springmass analyse {shlex.quote(str(written))}")
         return OK
     if not _holds(loaded, out):
         return _write_form(loaded, out, overwrite=options.overwrite)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -16,7 +17,7 @@ from acquisition.recordings.explained import explain
 from acquisition.recordings.identify import formats, inspect
 from acquisition.recordings.inspection import Inspection, Survey
 from springmass.commands import completions
-from springmass.errors import OK, USAGE, ProgramError
+from springmass.errors import OK, USAGE, ProgramError, suggest
 from springmass.runs.json_results import picked, plain
 from springmass.runs.loading import Loaded, kind_of, load
 from springmass.runs.shelf import Entry, is_shelf, shelf
@@ -46,6 +47,8 @@ def run(options: argparse.Namespace) -> int:
         return OK
     for line in _lines(facts):
         print(visible(line))
+    if "needs" not in facts:
+        suggest(f"springmass analyse {shlex.quote(options.input)}")
     return OK
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 
-from springmass.errors import OK, tell
+from springmass.errors import OK, suggest, tell
 from springmass.runs.analysing import made_now
 from storage.recovery.recover import recover
 
@@ -23,4 +24,5 @@ def run(options: argparse.Namespace) -> int:
     )
     for line in report.describe():
         tell(line)
+    suggest(f"springmass analyse {shlex.quote(str(report.runs[0].path))}")
     return OK

@@ -6,6 +6,7 @@ import argparse
 import io
 import json
 import math
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Joint
 from pipeline.track import F8
 from springmass.commands import completions
-from springmass.errors import OK, USAGE, ProgramError, tell
+from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.runs.analysing import in_a_name, made_now, make_folder
 from springmass.runs.loading import load
 from springmass.runs.scenes import ask_about, read_scene
@@ -80,6 +81,7 @@ def run(options: argparse.Namespace) -> int:
     if options.out is not None or not options.json:
         folder = _write(simulation, against, band, scene, options)
         print(f"written          {visible(str(folder))}", file=say)
+        suggest(f"springmass analyse {shlex.quote(str(folder / 'run.h5'))} --scene {shlex.quote(options.scene)}")
     if options.json:
         print(json.dumps(summary(simulation, against, band)))
     return OK

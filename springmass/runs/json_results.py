@@ -87,6 +87,7 @@ def result_of(
     content = {
         "schema": SCHEMA,
         "input": input_of(loaded),
+        "recorded": _recorded(loaded),
         "quality": _quality(loaded, analysis),
         "estimates": estimates,
         "budget": _budgets(analysis) if classic is None else {},
@@ -116,6 +117,18 @@ def input_of(loaded: Loaded) -> dict[str, Any]:
         "samples": len(track),
         "rate_hz": track.rate_hz,
         "duration_s": track.t[-1] - track.t[0] if len(track) else 0.0,
+    }
+
+
+def _recorded(loaded: Loaded) -> dict[str, Any]:
+    """Return what was noted while a run was recorded, and afterwards: marks, trigger and other events, calibration."""
+    told = loaded.provenance
+    return {
+        "start_time": told.get("start_time"),
+        "calibration": (told.get("sensor") or {}).get("calibration") or {},
+        "events": list(told.get("events", ())),
+        "marks": list(told.get("marks", ())),
+        "notes": list(told.get("notes", ())),
     }
 
 

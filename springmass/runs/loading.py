@@ -19,7 +19,8 @@ from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular import open_regular
 from acquisition.source import SourceInfo
 from pipeline.track import Track
-from springmass.errors import UNREADABLE, USAGE, ProgramError, complain
+from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, tell
+from springmass.runs.about import about_of
 from springmass.runs.tracks import to_track
 from storage.errors import RunDamaged
 from storage.recovery.recover import recover
@@ -173,6 +174,14 @@ def load(
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             complain(f"{where}: {trap.message}")
+    if told := (about := about_of(where)).described():
+        tell(f"{about.path}: {told} noted beside the recording")
+        scene = loaded.scene if about.scene is None else about.scene.to_mapping()
+        marks = [*loaded.provenance.get("marks", ()), *({"t_s": t_s, "text": text} for t_s, text in about.marks)]
+        noted = {"marks": marks} if marks else {}
+        if about.notes:
+            noted["notes"] = list(about.notes)
+        loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
     if clock_ppm is not None:
         loaded = replace(loaded, track=replace(loaded.track, clock_limit=clock_ppm * 1e-6))
     return replace(loaded, track=cut(loaded.track, from_s, to_s, where=where))

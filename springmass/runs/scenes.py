@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import USAGE, ProgramError, complain
 
-__all__ = ["ask_about", "read_scene", "read_scenes", "scene_beside"]
+__all__ = ["amended", "ask_about", "read_scene", "read_scenes", "read_tables"]
 
 LONGEST_SCENE = 1 << 14  # bytes; of longer ones some take seconds to parse
 
@@ -35,26 +35,6 @@ def read_scenes(paths: Sequence[str], count: int) -> list[Scene | None]:
     return scenes * count if len(scenes) == 1 else scenes
 
 
-def scene_beside(path: Path) -> Scene | None:
-    """Return the scene that was noted beside a recording after it was made, if there is one.
-
-    Parameters
-    ----------
-    path : Path
-        Of ``NAME.h5``, say: the table ``[scene]`` of ``NAME.about.toml`` holds what a scene file does.
-
-    Raises
-    ------
-    ProgramError
-        As :func:`read_scene`.
-    """
-    about = path.with_suffix(".about.toml")
-    if not about.exists():
-        return None
-    tables = _read_tables(about)
-    return _scene_of(tables["scene"], f"{about} [scene]") if "scene" in tables else None
-
-
 def read_scene(path: str | Path) -> Scene:
     """Read a scene file (TOML).
 
@@ -63,10 +43,17 @@ def read_scene(path: str | Path) -> Scene:
     ProgramError
         With exit code 2 if it is absent, no TOML, or says something impossible; the line names file, key and value.
     """
-    return _scene_of(_read_tables(path), str(path))
+    return _scene_of(read_tables(path), str(path))
 
 
-def _read_tables(path: str | Path) -> dict[str, Any]:
+def read_tables(path: str | Path) -> dict[str, Any]:
+    """Read a small TOML file of a scene or of notes.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if it is absent, longer than any scene, or no TOML.
+    """
     try:
         with open_regular(path) as file:
             content = file.read(LONGEST_SCENE + 1) or b""
@@ -89,6 +76,31 @@ def _read_tables(path: str | Path) -> dict[str, Any]:
 
 
 def _scene_of(tables: Any, where: str) -> Scene:
+    try:
+        return Scene.from_mapping(tables, where=where)
+    except SceneError as error:
+        raise ProgramError(str(error), USAGE) from error
+
+
+def amended(scene: Scene, values: Mapping[tuple[str, str], Mapping[str, float]], *, where: str) -> Scene:
+    """Return a scene with some values replaced.
+
+    Parameters
+    ----------
+    scene : Scene
+    values : mapping
+        By table and key: ``{"value": ..., "u": ...}``.
+    where : str
+        Named in errors.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 for an impossible value.
+    """
+    tables = scene.to_mapping()
+    for (table, key), value in values.items():
+        tables.setdefault(table, {})[key] = dict(value)
     try:
         return Scene.from_mapping(tables, where=where)
     except SceneError as error:

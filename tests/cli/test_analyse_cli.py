@@ -109,6 +109,7 @@ def check_schema(result: Mapping[str, Any]) -> None:
     assert list(result) == [
         "schema",
         "input",
+        "recorded",
         "quality",
         "estimates",
         "budget",

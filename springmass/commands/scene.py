@@ -1,0 +1,71 @@
+"""``springmass scene``: a scene to fill in, a scene checked, and what is noted beside a recording afterwards."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from springmass.errors import OK, USAGE, ProgramError, tell
+
+__all__ = ["run"]
+
+TEMPLATE = """\
+# What was at the bench. Every value may be left out (#): what is not known is not used.
+# { value = ..., u = ... } states a standard uncertainty; a plain number counts as exact.
+
+[bob]
+mass_kg = { value = 0.2000, u = 0.0001 }    # all that hangs on the spring, disc included
+
+[spring]
+mass_kg = { value = 0.0100, u = 0.0005 }    # a third of it swings along
+# constant_n_per_m = 14.0                   # for springmass simulate; an analysis measures it
+
+# [disc]
+# diameter_m = { value = 0.102, u = 0.0005 }
+
+[air]
+temperature_c = { value = 20.0, u = 1.0 }   # sets the speed of sound: the scale of all distances
+# pressure_pa = 101325
+# relative_humidity = 0.5
+
+[sensor]
+position = "below"                          # or "above" the bob
+
+# For springmass simulate and record --simulate:
+# [start]
+# displacement_m = 0.05
+# [damping]                                 # dA/dt = -(mu + gamma A + beta A^2)
+# gamma_per_s = 0.0073
+# beta_per_m_s = 0.235
+# mu_m_per_s = 0.0
+"""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
+    from springmass.runs.about import about_of, write_about
+    from springmass.runs.scenes import ask_about, read_scene
+
+    noted = options.scene is not None or options.note or options.mark
+    if options.check is not None:
+        if options.input is not None or noted:
+            raise ProgramError("--check looks at a scene file alone; leave the rest out", USAGE)
+        scene = read_scene(options.check)
+        ask_about(scene, options.check)
+        told = ", ".join(f"[{table}] {key}" for table, keys in scene.to_mapping().items() for key in keys)
+        print(f"{options.check}: a scene that states {told or 'nothing'}")
+        return OK
+    if options.input is None:
+        if noted:
+            raise ProgramError("--scene, --note and --mark belong to a recording; name it", USAGE)
+        print(TEMPLATE, end="")
+        return OK
+    if not noted:
+        raise ProgramError(f"{options.input}: nothing to note; give --scene, --note or --mark S=TEXT", USAGE)
+    path = Path(options.input)
+    if not path.is_file():
+        raise ProgramError(f"{path}: a recording to note something of was demanded, got none; check the name", USAGE)
+    given = None if options.scene is None else read_scene(options.scene)
+    written = write_about(about_of(path).with_more(given, options.note, options.mark))
+    tell(f"{written}: used from now on with {path.name}")
+    return OK

@@ -1,0 +1,100 @@
+"""What is noted of a recording afterwards: scene, remarks and marks in ``NAME.about.toml`` beside it.
+
+Recordings and run files are never changed; this file is. Every command that reads the recording uses it, and says so.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pipeline.bench.scene import Scene
+from pipeline.errors import SceneError
+from springmass.errors import USAGE, ProgramError
+from springmass.runs.scenes import read_tables
+from storage.atomic import write_whole
+
+__all__ = ["About", "about_of", "write_about"]
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What is noted beside a recording.
+
+    Parameters
+    ----------
+    path : Path
+        Of the notes, whether they are there or not.
+    scene : Scene or None
+    notes : tuple of str
+    marks : tuple of (float, str)
+        Seconds of the record, and texts.
+    """
+
+    path: Path
+    scene: Scene | None = None
+    notes: tuple[str, ...] = ()
+    marks: tuple[tuple[float, str], ...] = ()
+
+    def with_more(self, scene: Scene | None, notes: Sequence[str], marks: Sequence[tuple[float, str]]) -> About:
+        """Return it with another scene, where one is given, and with more notes and marks."""
+        together = tuple(sorted({*self.marks, *marks}))
+        return replace(self, scene=scene or self.scene, notes=(*self.notes, *notes), marks=together)
+
+    def described(self) -> str:
+        """Return what it holds, in words; empty where it holds nothing."""
+        parts = ["its scene"] if self.scene is not None else []
+        parts += [f"{len(self.notes)} notes"] if self.notes else []
+        parts += [f"{len(self.marks)} marks"] if self.marks else []
+        return ", ".join(parts)
+
+
+def about_of(recording: Path) -> About:
+    """Read what is noted beside a recording; nothing where there is no such file.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if the file is there and says something that it cannot.
+    """
+    path = recording.with_name(f"{recording.stem}.about.toml")
+    if not os.path.exists(path):  # Path.exists would raise for a name that is too long
+        return About(path)
+    told = read_tables(path)
+    if unknown := sorted(set(told) - {"scene", "notes", "marks"}):
+        raise ProgramError(f"{path}: unknown key {unknown[0]!r}; allowed are scene, notes, marks", USAGE)
+    try:
+        scene = Scene.from_mapping(told["scene"], where=f"{path} [scene]") if "scene" in told else None
+        marks = tuple((float(mark["t_s"]), str(mark["text"])) for mark in told.get("marks", ()))
+        notes = tuple(str(note) for note in told.get("notes", ()))
+    except SceneError as error:
+        raise ProgramError(str(error), USAGE) from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        demand = "notes are a list of texts, marks are [[marks]] with t_s and text"
+        raise ProgramError(f"{path}: {demand}; mend or remove the file", USAGE) from error
+    return About(path, scene, notes, marks)
+
+
+def write_about(about: About) -> Path:
+    """Write the notes whole, in place of those that stood there; return their path."""
+    lines = [f"notes = [{', '.join(map(_text, about.notes))}]"] if about.notes else []
+    for table, keys in (about.scene.to_mapping() if about.scene is not None else {}).items():
+        lines += ["", f"[scene.{table}]", *(f"{key} = {_value(value)}" for key, value in keys.items())]
+    for t_s, text in about.marks:
+        lines += ["", "[[marks]]", f"t_s = {t_s!r}", f"text = {_text(text)}"]
+    return write_whole(about.path, "\n".join([*lines, ""]), overwrite=True)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{key} = {_value(inner)}' for key, inner in value.items())} }}"
+    return _text(value) if isinstance(value, str) else repr(float(value))
+
+
+def _text(text: str) -> str:
+    """Write a text as TOML's basic string, which JSON's is but for one control character."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

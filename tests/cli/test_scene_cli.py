@@ -1,0 +1,144 @@
+"""A scene to fill in, checked, given value by value, and noted beside a recording."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from springmass.runs.scenes import read_scene
+
+Cli = Callable[..., Any]
+
+
+@pytest.fixture
+def run(tmp_path: Path, data: Path) -> Path:
+    """Return a copy of the damped recording in a folder of its own."""
+    path = tmp_path / "damped.txt"
+    path.write_bytes((data / "damped_simulated_position.txt").read_bytes())
+    return path
+
+
+def test_the_template_is_a_scene_and_passes_its_check(cli: Cli, tmp_path: Path) -> None:
+    """What is printed is read without a question, with its comments taken out as well."""
+    text = cli("scene").out
+    path = tmp_path / "bench.toml"
+    path.write_text(text)
+    done = cli("scene", "--check", path)
+    assert (done.code, done.err) == (0, "")
+    assert "[bob] mass_kg, [spring] mass_kg" in done.out
+    whole = [
+        line.removeprefix("# ")
+        for line in text.splitlines()
+        if line.startswith(("[", "# [")) or " = " in line.partition("{")[0]
+    ]
+    path.write_text("\n".join(whole))
+    assert read_scene(path).unusual() == ()
+    assert len(read_scene(path).to_mapping()) == 7
+
+
+def test_a_check_asks_about_values_and_refuses_what_cannot_be(cli: Cli, tmp_path: Path) -> None:
+    """Grams are asked about, an unknown key is exit code 2."""
+    path = tmp_path / "bench.toml"
+    path.write_text("[bob]\nmass_kg = 217.6\n")
+    assert "did you mean grams: 0.2176?" in cli("scene", "--check", path).err
+    path.write_text("[bob]\nmass_g = 217.6\n")
+    assert cli("scene", "--check", path).code == 2
+
+
+def test_values_of_the_bench_on_the_command_line_stand_for_a_scene(cli: Cli, run: Path, data: Path) -> None:
+    """Masses with their uncertainties give the spring constant that the scene gives; one amends a scene."""
+    masses = (
+        "--mass-kg",
+        "0.2176",
+        "--mass-u-kg",
+        "0.00005",
+        "--spring-mass-kg",
+        "0.01",
+        "--spring-mass-u-kg",
+        "0.0005",
+    )
+    bench = (*masses, "--disc-diameter-m", "0.102", "--disc-diameter-u-m", "0.0005", "--temperature-c", "20")
+    (typed,) = cli("analyse", run, "--json", *bench).results
+    (filed,) = cli("analyse", run, "--json", "--scene", data / "damped.scene.toml").results
+    for name in ("value", "u"):
+        typed_k, filed_k = (result["estimates"]["spring_constant"][name] for result in (typed, filed))
+        assert typed_k == pytest.approx(filed_k, rel=1e-3)
+    (amended,) = cli("analyse", run, "--json", "--scene", data / "damped.scene.toml", "--mass-kg", "0.3").results
+    assert amended["provenance"]["parameters"]["scene"]["bob"]["mass_kg"] == 0.3
+    assert amended["provenance"]["parameters"]["scene"]["disc"] == filed["provenance"]["parameters"]["scene"]["disc"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--mass-u-kg", "0.1"), "--mass-u-kg does nothing without --mass-kg"),
+        (("--mass-kg", "-1"), "[bob] mass_kg must be"),
+    ],
+)
+def test_impossible_values_are_refused(cli: Cli, run: Path, options: tuple[str, ...], words: str) -> None:
+    """Exit code 2 and one line."""
+    done = cli("analyse", run, "--json", *options)
+    assert (done.code, words in done.complaint) == (2, True)
+
+
+def test_what_is_noted_beside_a_recording_is_used_and_said(cli: Cli, run: Path, data: Path) -> None:
+    """Scene, remarks and marks outlive the command; a given scene goes before; the recording stays as it was."""
+    before = run.read_bytes()
+    first = cli("scene", run, "--scene", data / "damped.scene.toml", "--mark", '12.5=touched "it"', "--note", "by hand")
+    assert first.code == 0
+    assert cli("scene", run, "--mark", "3=door").code == 0
+    beside = run.with_name("damped.about.toml")
+    assert [mark["t_s"] for mark in tomllib.loads(beside.read_text())["marks"]] == [3.0, 12.5]
+    done = cli("analyse", run, "--json")
+    assert done.complaint == f"{beside}: its scene, 1 notes, 2 marks noted beside the recording"
+    (result,) = done.results
+    assert "spring_constant" in result["estimates"]
+    assert result["recorded"]["marks"] == [{"t_s": 3.0, "text": "door"}, {"t_s": 12.5, "text": 'touched "it"'}]
+    assert result["recorded"]["notes"] == ["by hand"]
+    (given,) = cli("analyse", run, "--json", "--scene", data / "undamped.scene.toml").results
+    assert given["provenance"]["parameters"]["scene"]["bob"]["mass_kg"]["value"] == 0.2007
+    assert run.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "text", ["marks = 3", "[scene.bob]\nmass_kg = -1", "what = 1", "notes = [", "[[marks]]\nt_s = 'a'"]
+)
+def test_notes_that_cannot_be_read_are_refused(cli: Cli, run: Path, text: str) -> None:
+    """One line that names the file; nothing is guessed from half of it."""
+    beside = run.with_name("damped.about.toml")
+    beside.write_text(text)
+    done = cli("analyse", run, "--json")
+    assert done.code == 2
+    assert str(beside) in done.complaint
+
+
+@pytest.mark.parametrize(
+    "line", [("--note", "x"), ("nothing.txt", "--note", "x"), ("--check", "a.toml", "--note", "x")]
+)
+def test_notes_of_nothing_are_refused(cli: Cli, line: tuple[str, ...]) -> None:
+    """Exit code 2."""
+    assert cli("scene", *line).code == 2
+
+
+def test_help_and_completion(cli: Cli) -> None:
+    """`help COMMAND` is `COMMAND --help`; the scripts of the shells name commands and options."""
+    assert cli("help", "analyse").out == cli("analyse", "--help").out
+    assert cli("help").out == cli("--help").out
+    assert cli("help", "analyze").err.rstrip().endswith("did you mean analyse?")
+    for shell in ("bash", "zsh", "tcsh"):
+        done = cli("completion", shell)
+        assert done.code == 0
+        assert "analyse" in done.out
+        assert "accuracy" in done.out
+
+
+def test_quiet_leaves_what_is_wrong(cli: Cli, run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """-q takes the lines that only inform, and no error."""
+    monkeypatch.setattr("springmass.errors._quiet", False)
+    run.with_name("damped.about.toml").write_text('notes = ["x"]\n')
+    done = cli("-q", "analyse", run, "absent.txt", "--json")
+    assert done.complaint.startswith("springmass: absent.txt: cannot be opened")
