@@ -42,7 +42,22 @@ def error_of(case: dict[str, Any], trajectory: Trajectory) -> float:
 @pytest.mark.parametrize("name", STORED["cases"])
 def test_the_error_against_forty_digits_is_the_predicted_one(integrator: Integrator, name: str) -> None:
     """Against a reference that shares no code, the error is no larger than predicted, up to a stated factor."""
-    case = STORED["cases"][name]
+    # Scipy's take seconds for two minutes; half a minute tells of them here, the whole in the trials.
+    demand_the_predicted_error(integrator, STORED["cases"][name], 3000 if integrator.name in SHORT else None)
+
+
+@pytest.mark.trials
+@pytest.mark.parametrize("name", STORED["cases"])
+@pytest.mark.parametrize("scipys", SHORT)
+def test_the_error_of_scipys_methods_is_the_predicted_one_to_the_end(scipys: str, name: str) -> None:
+    """Over the whole of each stored case, two minutes at the most, scipy's adaptive methods err as predicted too."""
+    demand_the_predicted_error(get_integrator(scipys), STORED["cases"][name])
+
+
+def demand_the_predicted_error(integrator: Integrator, case: dict[str, Any], most: int | None = None) -> None:
+    """Hold an integrator to its prediction over a stored case, or over its first steps."""
+    kept = [k for k, row in enumerate(case["rows"]) if most is None or row <= most]
+    case = {**case, "rows": [case["rows"][k] for k in kept], "y": [case["y"][k] for k in kept]}
     problem, steps = problem_of(case), case["rows"][-1]
     if integrator.refusal(problem):
         with pytest.raises(DynamicsError, match=integrator.name):
