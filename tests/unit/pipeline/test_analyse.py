@@ -418,3 +418,16 @@ def test_a_start_of_more_than_a_period_lost_is_not_stated_for(synthetic: ModuleT
     y = synthetic.noisy(synthetic.Truth(gamma=0.05), t, 3e-4, 3)
     y[:150] = np.nan
     assert motion_of(analyse(Track.from_arrays(t, y))).damping.t0 == 1.5
+
+
+def test_drag_of_a_power_between_linear_and_quadratic_is_physics(synthetic: ModuleType) -> None:
+    """A boundary layer's A^(3/2) is selected and stated with its power, and nothing warns of it."""
+    result = run(synthetic, 120.0, 1e-4, c=0.07, n=1.5)
+    motion = motion_of(result)
+    assert motion.damping.selected == "power"
+    n = motion.derived.coefficients["n"]
+    assert abs(n.value - 1.5) < 4.0 * n.u < 0.05
+    assert (
+        abs(result.estimates["damping_rate"].value - 0.07 * math.sqrt(0.05)) < 4.0 * result.estimates["damping_rate"].u
+    )
+    assert {finding.severity for finding in result.findings} <= {"info"}
