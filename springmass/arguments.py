@@ -124,8 +124,29 @@ def _add_demo(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_page_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--page-port", type=int, default=0, metavar="N", help="port of the page (default: a free one)")
+    parser.add_argument("--no-browser", action="store_true", help="print the page's address and open no browser")
+    parser.add_argument(
+        "--want-us",
+        type=_positive,
+        default=20.0,
+        metavar="U",
+        help="uncertainty of the period to record for, in microseconds: the page says how much longer (default 20)",
+    )
+
+
+def _add_page(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", metavar="INPUT", help="recording, run file, or the wire log of a running recording")
+    _add_page_options(parser)
+    parser.add_argument("--recorder", action="store_true", help="as `record --page` starts it")
+    _add_input_options(parser)
+
+
 def _add_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", metavar="INPUT", help="recording or run file")
+    parser.add_argument("--page", action="store_true", help="play it on the page, in a browser, instead")
+    _add_page_options(parser)
     parser.add_argument("--speed", type=_speed, default=1.0, metavar="X", help="times real time, or max (default 1)")
     parser.add_argument("--seek", type=_finite, metavar="S", help="start at this second of the record")
     parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
@@ -202,6 +223,8 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
         "-o", "--output", metavar="RUN.h5", help="run file to make, never replaced (default: date, time and title)"
     )
     parser.add_argument("--seconds", type=_positive, metavar="N", help="how long (default: until Ctrl-C)")
+    parser.add_argument("--page", action="store_true", help="show the recording in a browser, with marks and stop")
+    _add_page_options(parser)
     parser.add_argument(
         "--scene", metavar="FILE", help="scene file stored with the run; its air sets the speed of sound"
     )
@@ -334,6 +357,7 @@ COMMANDS = {
     "analyse": (_add_analyse, "turn recordings into Table 1, findings and a report"),
     "compare": (_add_compare, "compare several runs of one spring: do they agree, and does one damping law hold"),
     "record": (_add_record, "record a run from the bench, so that nothing is lost"),
+    "page": (_add_page, "look at a recording in a browser, as it happens or as it was"),
     "recover": (_add_recover, "build a run file from a wire log, however torn"),
     "replay": (_add_replay, "play a recording back through the interface of a live sensor"),
     "simulate": (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import queue
 import shlex
 import sys
 from collections.abc import Iterator
@@ -29,6 +30,7 @@ from springmass.runs.analysing import made_now
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.session.console import Console
 from springmass.session.output import default_name, demand_new
+from springmass.session.page_process import PAGE, PageProcess
 from springmass.session.session import BYTES_PER_READ, Ended, Sensor, Session, Trigger
 from springmass.session.simulated_bench import REST_M, Release, bench_position
 from springmass.session.stops import Stops
@@ -66,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
         ask_about(scene, source)
     log = out.with_suffix(".wire")
     bench = Release(SystemClock())
-    with Stops() as stops, _sensors(options, scene, bench) as (sensors, kind):
+    with Stops() as stops, _sensors(options, scene, bench) as (sensors, kind), contextlib.ExitStack() as beside:
         rate = sum(sensor.rate_hz or sensor.family.rate_hz for sensor in sensors)
         check_disk(out, int(BYTES_PER_READ * rate * (options.seconds or UNLIMITED_S)) + 1_000_000)
         clock = SystemClock()
@@ -80,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
         )
         console = Console(clock, lambda error: session.failures.note("stderr", error))
         try:
-            ended = _record(session, options, log, console, bench)
+            ended = _record(session, options, log, console, bench, beside)
             session.stop()
             log = ended.log
             return _built(ended, out, session, console)
@@ -135,7 +137,7 @@ def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: C
         return SENSOR
     if any(run.gone for run in report.runs):
         return SENSOR
-    if ended.by == "seconds":
+    if ended.by in ("seconds", PAGE):
         return OK
     console.line(f"stopped by {ended.by}; the run is complete up to there")
     return INTERRUPTED
@@ -174,15 +176,28 @@ def _demand_sense(options: argparse.Namespace) -> None:
             raise ProgramError(f"--{option} must be {least:g} to {greatest:g} {unit}, got {value:g}", USAGE)
 
 
-def _record(session: Session, options: argparse.Namespace, log: Path, console: Console, bench: Release) -> Ended:
-    """Run the session."""
+def _record(
+    session: Session,
+    options: argparse.Namespace,
+    log: Path,
+    console: Console,
+    bench: Release,
+    beside: contextlib.ExitStack,
+) -> Ended:
+    """Run the session; what goes on beside it until the run file is built is entered into ``beside``."""
     session.listen(console.line)
     rest = None if options.still is None else _rest(session, options.still, options.ruler, console)
     trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
     bench.after(0.0 if trigger is None else trigger.keep_s + 0.5)
     look = look_of(sys.stderr)
-    with marks_by_keys(watched=look.terminal) as marks:
-        show = ProgressLine(console, look, trace=not options.no_trace, keys=marks is not None)
+    with marks_by_keys(watched=look.terminal) as typed:
+        marks: queue.SimpleQueue[str] | None = typed
+        page = None
+        if options.page:
+            marks = queue.SimpleQueue() if marks is None else marks
+            process = PageProcess(log, _page_options(options), marks, session.stops, session.failures)
+            page = beside.enter_context(process)
+        show = ProgressLine(console, look, trace=not options.no_trace, keys=typed is not None)
         try:
             return session.record(
                 log,
@@ -195,6 +210,13 @@ def _record(session: Session, options: argparse.Namespace, log: Path, console: C
             )
         finally:
             show.end()
+            if page is not None:
+                page.ended()
+
+
+def _page_options(options: argparse.Namespace) -> list[str]:
+    given = ["--page-port", str(options.page_port), "--want-us", str(options.want_us)]
+    return [*given, "--no-browser"] if options.no_browser else given
 
 
 def _roll(options: argparse.Namespace) -> Roll:

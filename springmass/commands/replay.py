@@ -24,6 +24,10 @@ def run(options: argparse.Namespace) -> int:
     """Play the input to stdout, a line per sample, or into a run file."""
     if options.loop and options.output is not None:
         raise ProgramError("--loop never ends and a run file is written whole at the end; leave one of them out", USAGE)
+    if options.page:
+        from springmass.commands import page
+
+        return page.run(options)
     loaded = load(options.input, **completions(options))
     fast = math.isinf(options.speed)
     clock: Clock = VirtualClock() if fast else SystemClock()

@@ -107,7 +107,7 @@ class Session:
         self._tee = Tee(self._chains, self.failures)
         self._reader: PortReader | None = None
         self._reader_failure: BaseException | None = None
-        self._stops = stops or Stops()
+        self.stops = stops or Stops()
         self._marks: list[tuple[float, str]] = []
         self.shown: Shown | None = None
 
@@ -210,7 +210,7 @@ class Session:
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
         self._chains = [sensor.chain() for sensor in self.sensors]
         recorder = Recorder(log, self._header(), self._clock, roll=roll)
-        with self._stops.counted():
+        with self.stops.counted():
             display = self._display(progress)
             start_ns = self._clock.now_ns()
             self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
@@ -268,7 +268,7 @@ class Session:
             try:
                 self._wait_until(turn_ns)
             except KeyboardInterrupt:
-                return self._stops.by or "Ctrl-C"
+                return self.stops.by or "Ctrl-C"
             if recorder.status.error:
                 return "the disk"
             while marks is not None and not marks.empty():
@@ -308,7 +308,7 @@ class Session:
 
     def _wait_until(self, deadline_ns: int) -> None:
         """Wait, or let the user end it; note what the reading tripped over, if over anything."""
-        with self._stops.raised():
+        with self.stops.raised():
             self._clock.sleep_until_ns(deadline_ns)
         failure = None if self._reader is None else self._reader.failure
         if failure is not None and failure is not self._reader_failure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import signal
 import threading
@@ -62,6 +63,15 @@ class Stops:
             yield
         finally:
             self._raises = before
+
+    def ask(self, by: str) -> None:
+        """End the recording from another thread, as the first signal would."""
+        self.by = self.by or by
+        main = threading.main_thread().ident
+        if hasattr(signal, "pthread_kill") and main is not None:
+            signal.pthread_kill(main, signal.SIGINT)  # wakes a wait, which a flag would not
+        else:
+            _thread.interrupt_main()
 
     def _heard(self, number: int, *_: object) -> None:
         self.by = self.by or NAMES[signal.Signals(number).name]

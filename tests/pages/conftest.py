@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
-from collections.abc import Iterator
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, sync_playwright
 
 from springmass.cli import main
 from springmass.runs.loading import sample_data
@@ -16,6 +25,21 @@ QUIET = (
     "--no-sandbox --disable-gpu --disable-background-networking --disable-component-update --disable-sync "
     "--no-first-run --disable-dev-shm-usage"
 )
+
+LIMIT_S = 60.0
+SCENE = """
+[bob]
+mass_kg = { value = 0.2, u = 0.0001 }
+[spring]
+constant_n_per_m = 14.0
+mass_kg = { value = 0.01, u = 0.0005 }
+[air]
+temperature_c = 20.0
+[damping]
+gamma_per_s = 0.01
+[start]
+displacement_m = 0.05
+"""
 
 
 @pytest.fixture(scope="session")
@@ -47,3 +71,93 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "warned": out / "clipped_simulated_position.results" / "report.html",
         "compare": out / "compared" / "report.html",
     }
+
+
+@dataclass
+class Program:
+    """A process of the program with a page."""
+
+    process: subprocess.Popen[str]
+    address: str
+    said: list[str]
+    out: Path
+
+    def ended(self) -> int:
+        """Wait for its end; return the exit code."""
+        return self.process.wait(LIMIT_S)
+
+    def end(self) -> None:
+        """End it as Ctrl-C does."""
+        self.process.send_signal(signal.SIGINT)
+        self.ended()
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
+    """Return a function that starts the program and waits for the address of its page; none outlives the test."""
+    with ExitStack() as stack:
+
+        def started(*arguments: str) -> Program:
+            command = [sys.executable, "-m", "springmass", *arguments, "--no-browser"]
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                env={**os.environ, "PYTHONUNBUFFERED": "1"},
+                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL) and None,
+            )
+            said: list[str] = []
+            told = threading.Event()
+
+            def read() -> None:
+                assert process.stderr is not None
+                for line in process.stderr:
+                    said.append(line)
+                    if "page: http" in line:
+                        told.set()
+                told.set()
+
+            reader = threading.Thread(target=read)
+            reader.start()
+
+            def stop() -> None:
+                if process.poll() is None:
+                    process.kill()
+                process.wait()
+                reader.join(LIMIT_S)
+                assert process.stderr is not None
+                process.stderr.close()
+
+            stack.callback(stop)
+            assert told.wait(LIMIT_S)
+            found = re.search(r"page: (http\S+)", "".join(said))
+            assert found, "".join(said)
+            return Program(process, found[1], said, tmp_path / "run.h5")
+
+        yield started
+
+
+@pytest.fixture
+def record(start: Callable[..., Program], tmp_path: Path) -> Callable[..., Program]:
+    """Return a function that records a simulated bench with its page."""
+
+    def recording(*arguments: str) -> Program:
+        scene = tmp_path / "bench.toml"
+        scene.write_text(SCENE)
+        return start("record", "--simulate", str(scene), "-o", str(tmp_path / "run.h5"), "--page", *arguments)
+
+    return recording
+
+
+@pytest.fixture
+def context(browser: Browser) -> Iterator[BrowserContext]:
+    """Return a browser of its own, as far as cookies go, in which an error on a page fails the test."""
+    context = browser.new_context(viewport={"width": 1366, "height": 900})
+    context.set_default_timeout(LIMIT_S * 1e3)
+    wrong: list[Any] = []
+    context.on("weberror", lambda error: wrong.append(error.error))
+    yield context
+    context.close()
+    assert not wrong

@@ -1,0 +1,218 @@
+"""The motion of what has been recorded so far, worked out again and again beside the page, never in its way."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from acquisition.clock import Clock
+from pipeline.accuracy import params_for
+from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.bench.scene import Scene
+from pipeline.errors import PipelineError
+from pipeline.numerics.estimate import Estimate
+from pipeline.track import F8, Track
+from springmass.page.stopping import ALPHA, more_seconds, widening
+from springmass.page.view import View
+
+__all__ = ["Watcher", "motion_of"]
+
+SHARE = 0.08
+"""Of a core that the analysis takes at most: it waits twelve times as long as it worked."""
+LEAST_WAIT_S = 1.0
+NAMES = ("period", "spring_constant", "damping_rate", "noise", "offset", "quality_factor")
+CURVE_POINTS = 200
+LAST_WINDOWS = 4
+U_CLOCK_REACH = 2.0
+"""So many u of a fixed, unknown rate of the clock: nobody stops on it."""
+SPECTRUM_SAMPLES = 1 << 13
+SPECTRUM_POINTS = 1024
+
+
+def motion_of(track: Track, scene: Scene, wanted_u_s: float) -> dict[str, Any]:
+    """Analyse a record and return the message on its motion.
+
+    Parameters
+    ----------
+    track : Track
+    scene : Scene
+    wanted_u_s : float
+        Standard uncertainty of the period that is aimed at, s.
+    """
+    message: dict[str, Any] = {"type": "motion", "why": "", "spectrum": spectrum(track)}
+    try:
+        analysis = analyse(track, scene, params_for("fast"))
+    except PipelineError as error:
+        return {**message, "why": str(error)}
+    message["findings"] = [
+        {"code": f.code, "severity": f.severity, "message": f.message}
+        for f in analysis.findings
+        if f.severity != "info"
+    ]
+    motion = analysis.motion
+    if not isinstance(motion, Oscillation):
+        return {**message, "why": motion.why}
+    return {**message, **_oscillation(analysis, motion, wanted_u_s)}
+
+
+def _oscillation(analysis: Analysis, motion: Oscillation, wanted_u_s: float) -> dict[str, Any]:
+    damping, windows = motion.damping, motion.demodulated
+    kept = np.flatnonzero(damping.scatter.kept)
+    start, end = damping.t0, float(np.nanmax(analysis.track.t))
+    times = np.linspace(start, end, CURVE_POINTS)
+    estimates = {name: analysis.estimates[name] for name in NAMES if name in analysis.estimates}
+    if (now := _now(windows.amplitude[kept], damping.scatter.u[kept])) is not None:
+        estimates["amplitude_now"] = now
+    period, frequency = analysis.estimates["period"], motion.phase.angular_frequency
+    # What the samples leave open shrinks with the recording; what the sensor's clock may be off does not.
+    u_samples = min(period.value * frequency.u / frequency.value, period.u)
+    u_clock = math.sqrt(period.u**2 - u_samples**2)
+    wanted_u_samples_s = math.sqrt(wanted_u_s**2 - u_clock**2) if wanted_u_s > u_clock else None
+    reach = math.hypot(widening(u_samples, wanted_u_samples_s or wanted_u_s) * u_samples, U_CLOCK_REACH * u_clock)
+    need = math.inf
+    if wanted_u_samples_s is not None:
+        need = more_seconds(u_samples, wanted_u_samples_s, end - start, damping.best.amplitude)
+    return {
+        "estimates": {name: _told(each) for name, each in estimates.items()},
+        "amplitude": {
+            "t": windows.t[kept].tolist(),
+            "value": windows.amplitude[kept].tolist(),
+            "u": damping.scatter.u[kept].tolist(),
+        },
+        "laws": [
+            {"name": name, "t": times.tolist(), "value": fit.amplitude(times - damping.t0).tolist()}
+            for name, fit in damping.considered.items()
+        ],
+        "law": damping.selected,
+        "settled": damping.settled,
+        "rest_m": analysis.estimates["offset"].value,
+        "omega": analysis.estimates["angular_frequency"].value,
+        "fit": _latest_fit(motion, end),
+        "stop": {
+            "wanted_u_s": wanted_u_s,
+            "u_s": period.u,
+            "u_clock_s": u_clock,
+            "covers": 1.0 - ALPHA,
+            "low": period.value - reach,
+            "high": period.value + reach,
+            "more_s": need if math.isfinite(need) else None,
+        },
+    }
+
+
+def _now(amplitude: F8, u: F8) -> Estimate | None:
+    """Return the mean of the last windows' amplitudes: three to five swings, as people read it off."""
+    values, weights = amplitude[-LAST_WINDOWS:], u[-LAST_WINDOWS:] ** -2.0
+    if values.size < 2 or not np.isfinite(weights).all():
+        return None
+    return Estimate(float(np.average(values, weights=weights)), float(weights.sum() ** -0.5), "m")
+
+
+def _latest_fit(motion: Oscillation, end: float) -> dict[str, float]:
+    """Return the last window's sine: position = rest + amplitude cos(omega (t - moment) + phase)."""
+    windows = motion.demodulated
+    return {
+        "moment": float(windows.t[-1]),
+        "amplitude": float(windows.amplitude[-1]),
+        "phase": float(windows.phase[-1]),
+        "rest": float(windows.offset[-1]),
+        "omega": windows.angular_frequency,
+        "end": end,
+    }
+
+
+def _told(estimate: Estimate) -> dict[str, Any]:
+    u = estimate.u if math.isfinite(estimate.u) else None
+    return {"value": estimate.value, "u": u, "unit": estimate.unit, "text": str(estimate)}
+
+
+def spectrum(track: Track) -> dict[str, list[float]]:
+    """Return frequencies in Hz and amplitudes of the latest samples, by a Hann window; the mean for missing ones."""
+    y = track.y[-SPECTRUM_SAMPLES:]
+    if y.size < 64:
+        return {"f": [], "value": []}
+    seen = np.isfinite(y)
+    if not seen.any():
+        return {"f": [], "value": []}
+    rest = np.where(seen, y - y[seen].mean(), 0.0)
+    window = np.hanning(y.size)
+    amplitude = 2.0 * np.abs(np.fft.rfft(rest * window)) / window.sum()
+    f = np.fft.rfftfreq(y.size, 1.0 / track.rate_hz)
+    group = max(1, f.size // SPECTRUM_POINTS)
+    whole = f.size // group * group
+    return {
+        "f": f[:whole].reshape(-1, group)[:, 0].tolist(),
+        "value": amplitude[:whole].reshape(-1, group).max(axis=1).tolist(),  # a line stays as high as it is
+    }
+
+
+class Watcher:
+    """Analyses the first sensor's samples on a thread of its own, as often as its share of a core allows.
+
+    Parameters
+    ----------
+    view : View
+    scene : mapping or None
+        What the recording says of its bench.
+    clock : Clock
+    wanted_u_s : float
+        Of the period, s.
+
+    Attributes
+    ----------
+    message : dict
+        The latest; its ``count`` tells one from the one before.
+    """
+
+    def __init__(self, view: View, scene: Mapping[str, Any] | None, clock: Clock, wanted_u_s: float) -> None:
+        self._view = view
+        self._scene = Scene.from_mapping(scene or {}, where="the recording's scene")
+        self._clock = clock
+        self._wanted_u_s = wanted_u_s
+        self._stop = threading.Event()
+        self.message: dict[str, Any] = {"type": "motion", "count": 0, "why": "no samples so far"}
+        self._thread = threading.Thread(target=self._run, name="springmass-page-analysis", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Ask for no more; the thread ends with its analysis."""
+        self._stop.set()
+
+    def track(self, low: float = -math.inf, high: float = math.inf) -> Track:
+        """Return the first sensor's samples between two times."""
+        t, y, flags = self._view.series[0].columns()
+        keep = (t >= low) & (t <= high)
+        view = self._view
+        return Track(
+            t[keep],
+            y[keep],
+            flags[keep],
+            view.rate_hz,
+            clock=view.clock,
+            quantity=view.quantity,
+            unit=view.unit,
+        )
+
+    def region(self, low: float, high: float) -> dict[str, Any]:
+        """Return the message on the motion between two times."""
+        found = motion_of(self.track(low, high), self._scene, self._wanted_u_s)
+        return {**found, "type": "region", "from": low, "to": high}
+
+    def _run(self) -> None:
+        count, seen, wait_s = 0, 0, 0.0
+        while not self._stop.wait(wait_s):
+            wait_s = LEAST_WAIT_S
+            if len(self._view.series[0]) == seen:
+                continue
+            start_ns = self._clock.now_ns()
+            seen, count = len(self._view.series[0]), count + 1
+            try:
+                self.message = {**motion_of(self.track(), self._scene, self._wanted_u_s), "count": count}
+            except Exception as error:  # a defect of the analysis is shown, and the samples go on
+                self.message = {"type": "motion", "count": count, "why": f"{type(error).__name__}: {error}"}
+            if count > 1:  # the first one loads what it needs
+                wait_s = max(LEAST_WAIT_S, (self._clock.now_ns() - start_ns) * 1e-9 / SHARE)

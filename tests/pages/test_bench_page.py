@@ -1,0 +1,225 @@
+"""The bench page as its user meets it, in a real browser, on real processes."""
+
+from __future__ import annotations
+
+import csv
+import http.client
+import json
+import os
+import struct
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import BrowserContext, Page
+from websockets.exceptions import ConnectionClosedError, InvalidStatus
+from websockets.sync.client import connect
+
+import springmass
+from storage.run_file.reading import open_run
+
+SEEN = "() => samples.length && samples[0].count > {count}"
+MOVES = "() => motion && motion.estimates && motion.estimates.period"
+
+
+def answer(page: Page, text: str) -> None:
+    """Have the page's next question answered."""
+    page.once("dialog", lambda dialog: dialog.accept(text))
+
+
+def cookie_of(address: str) -> str:
+    """Exchange the token for the cookie, as a browser does."""
+    parts = urlsplit(address)
+    connection = http.client.HTTPConnection(parts.netloc)
+    connection.request("GET", f"/?{parts.query}")
+    response = connection.getresponse()
+    response.read()
+    connection.close()
+    assert response.status == 303
+    return str(response.headers["Set-Cookie"]).split(";")[0]
+
+
+def test_from_opening_to_the_run_file(record: Callable[..., Any], context: BrowserContext) -> None:
+    """Open, see the motion, mark, stop: the mark is shown once the log has it, and the run file holds all of it."""
+    program = record()
+    page = context.new_page()
+    page.goto(program.address)
+    page.wait_for_function(SEEN.format(count=300))
+    assert page.inner_text("#source") == "SIMULATED"
+    page.wait_for_function(MOVES)
+    period = page.evaluate("motion.estimates.period")
+    assert period["value"] == pytest.approx(0.7573, abs=0.005)
+    assert "Whenever you stop" in page.inner_text("#stopping")
+    answer(page, "lamp on")
+    page.keyboard.press("m")
+    page.wait_for_function("() => state.marks.length === 1")
+    assert "lamp on" in page.inner_text("#marks")
+    answer(page, "")
+    page.keyboard.press("s")
+    assert program.ended() == 0
+    page.wait_for_function("() => !document.getElementById('trouble').hidden")
+    assert "has ended" in page.inner_text("#trouble")
+    with open_run(program.out) as run:
+        assert [mark["text"] for mark in run.provenance["marks"]] == ["lamp on"]
+        (ended,) = [event["facts"] for event in run.provenance["events"] if event["kind"] == "ended"]
+        distance = run.samples().distance
+    assert ended["by"] == "the page"
+    shown = np.array(page.evaluate("Array.from(samples[0].y.subarray(0, samples[0].count))"), np.float64)
+    np.testing.assert_array_equal(shown, distance[: shown.size])
+    assert distance.size - shown.size < 50
+
+
+def test_a_killed_page_ends_no_recording(record: Callable[..., Any]) -> None:
+    """The page's process is gone; the recording ends with its seconds, and lacks no reading."""
+    program = record("--seconds", "5")
+    found = subprocess.run(
+        ["pgrep", "-f", f"springmass page --recorder.* {program.out.with_suffix('.wire')}"],
+        capture_output=True,
+        text=True,
+    )
+    (pid,) = found.stdout.split()
+    os.kill(int(pid), 9)
+    assert program.ended() == 0
+    with open_run(program.out) as run:
+        samples = run.samples()
+    assert len(samples) > 450
+    assert np.isfinite(samples.distance).all()
+
+
+@pytest.fixture
+def replay(start: Callable[..., Any], context: BrowserContext) -> Page:
+    """Return the page of an old run."""
+    program = start("replay", str(springmass.sample_data() / "damped_simulated_position.txt"), "--page")
+    page = context.new_page()
+    page.goto(program.address)
+    page.wait_for_function(SEEN.format(count=11000))
+    page.wait_for_function(MOVES)
+    return page
+
+
+def test_a_region_of_an_old_run_is_fitted(replay: Page) -> None:
+    """Drawn with the mouse; its period is that of the run within their uncertainties."""
+    box = replay.locator("#position .u-over").bounding_box()
+    assert box is not None
+    middle = box["y"] + box["height"] / 2
+    replay.mouse.move(box["x"] + 0.2 * box["width"], middle)
+    replay.mouse.down()
+    replay.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
+    replay.mouse.up()
+    replay.wait_for_selector("#region:not([hidden]) dd")
+    text = replay.inner_text("#region-estimates")
+    value = float(text.split("period\n")[1].split("(")[0])
+    assert value == pytest.approx(0.7901, abs=0.0005)
+    assert "Region" in replay.inner_text("#region-title")
+
+
+def test_an_old_run_is_played(replay: Page) -> None:
+    """Space plays and pauses, the scrub bar moves, and nothing is recorded: no mark, no stop."""
+    assert replay.inner_text("#source") == "SIMULATED · REPLAY"
+    assert replay.is_hidden("#mark")
+    assert replay.is_hidden("#stop")
+    replay.select_option("#speed", "20")
+    replay.keyboard.press(" ")
+    replay.wait_for_function("() => play_time > samples[0].t[0] + 2")
+    replay.keyboard.press(" ")
+    assert not replay.evaluate("playing")
+    replay.locator("#time").fill("0.5")
+    half = replay.evaluate("play_time / (samples[0].t[0] + samples[0].t[samples[0].count - 1])")
+    assert half == pytest.approx(0.5, abs=0.01)
+
+
+def test_what_is_in_view_is_saved(replay: Page, tmp_path: Path) -> None:
+    """As CSV, cell for cell what was recorded."""
+    with replay.expect_download() as download:
+        replay.keyboard.press("c")
+    path = tmp_path / "view.csv"
+    download.value.save_as(path)
+    with path.open() as file:
+        rows = list(csv.reader(file))
+    recorded = springmass.load(springmass.sample_data() / "damped_simulated_position.txt").samples
+    assert rows[0] == ["time_s", "distance_m"]
+    assert len(rows) == len(recorded) + 1
+    np.testing.assert_array_equal([float(row[0]) for row in rows[1:]], recorded.t)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1366, 390])
+def test_everybody_can_read_it(replay: Page, width: int, scheme: Any) -> None:
+    """No violation of the accessibility rules, nothing wider than the screen, the keys named on wide ones."""
+    replay.emulate_media(color_scheme=scheme)
+    replay.set_viewport_size({"width": width, "height": 844})
+    replay.wait_for_function(f"() => document.querySelector('#position canvas').clientWidth < {width}")
+    found = Axe().run(replay)
+    assert found.violations_count == 0, found.generate_report()
+    assert replay.evaluate("document.documentElement.scrollWidth") <= width
+    assert replay.locator("#freeze kbd").is_visible() == (width > 700)
+
+
+def test_every_key_has_its_button(replay: Page) -> None:
+    """Freeze and fixed axes are pressed or not, the window goes round, and speech is written too."""
+    for key, button in (("f", "freeze"), ("a", "axes")):
+        replay.keyboard.press(key)
+        assert replay.get_attribute(f"#{button}", "aria-pressed") == "true"
+        replay.locator(f"#{button}").click()
+        assert replay.get_attribute(f"#{button}", "aria-pressed") == "false"
+    assert replay.inner_text("#window").startswith("all")
+    replay.keyboard.press("w")
+    assert replay.inner_text("#window").startswith("5 s")
+    replay.keyboard.press("v")
+    assert replay.inner_text("#said").startswith("Period 0.790 seconds")
+
+
+def test_two_look_and_a_stranger_does_not(record: Callable[..., Any], browser: Any, context: BrowserContext) -> None:
+    """The cookie opens a second page in the same browser; another browser, host or origin gets nothing."""
+    program = record()
+    first, second = context.new_page(), context.new_page()
+    first.goto(program.address)
+    second.goto(program.address.partition("?")[0])
+    for page in (first, second):
+        page.wait_for_function(SEEN.format(count=50))
+    stranger = browser.new_context()
+    assert stranger.new_page().goto(program.address).status == 403
+    stranger.close()
+    netloc = urlsplit(program.address).netloc
+    connection = http.client.HTTPConnection(netloc)
+    connection.request("GET", "/", headers={"Host": "evil.example"})
+    assert connection.getresponse().status == 403
+    connection.close()
+    with pytest.raises(InvalidStatus):
+        connect(f"ws://{netloc}/v1/run", origin="http://evil.example")  # type: ignore[arg-type]
+    program.end()
+
+
+def test_a_client_of_ten_lines(record: Callable[..., Any]) -> None:
+    """As docs/reference/page-messages.md has it; a message that means nothing closes the connection."""
+    program = record()
+    cookie, netloc = cookie_of(program.address), urlsplit(program.address).netloc
+    with connect(f"ws://{netloc}/v1/run", origin=f"http://{netloc}", additional_headers={"Cookie": cookie}) as run:  # type: ignore[arg-type]
+        hello = json.loads(run.recv())
+        assert (hello["type"], hello["version"], hello["simulated"]) == ("hello", 1, True)
+        count = 0
+        while count < 100:
+            message = run.recv()
+            if isinstance(message, bytes):
+                kind, sensor, first, size = struct.unpack_from("<4I", message)
+                t = np.frombuffer(message, "<f8", size, 16)
+                assert (kind, sensor, first) == (1, 0, count)
+                assert np.all(np.diff(t) > 0)
+                count += size
+        run.send('{"type": "mark", "text": "from a script"}')
+        while True:
+            message = run.recv()
+            if isinstance(message, str) and json.loads(message).get("marks"):
+                break
+        assert json.loads(message)["marks"][0][1] == "from a script"
+        run.send('{"type": "rm"}')
+        with pytest.raises(ConnectionClosedError):
+            for _ in run:
+                pass
+        assert run.close_code == 1003
+    program.end()

@@ -1,0 +1,102 @@
+"""What the page is sent is what the log holds."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springmass
+from acquisition.block import Block
+from acquisition.clock import VirtualClock
+from pipeline.bench.scene import Scene
+from springmass.page.feeds import LogFeed, view_of
+from springmass.page.view import MOST_PER_MESSAGE, Series
+from springmass.page.watching import motion_of, spectrum
+from storage.recorder import Recorder
+from storage.wire_log.records import LogHeader, SensorEntry
+
+
+def test_messages_hold_every_sample_once() -> None:
+    """In order, a missing one as NaN, however many come at a time."""
+    count = 2 * MOST_PER_MESSAGE + 17
+    t = np.arange(count) / 100
+    y = np.where(np.arange(count) % 7, 0.2 + 1e-3 * t, np.nan)
+    series = Series()
+    for start in range(0, count, 999):
+        part = slice(start, start + 999)
+        series.push(Block(start, t[part], y[part], np.zeros(t[part].size, np.uint8)))
+    found_t, found_y, first = [], [], 0
+    while first < len(series):
+        message = series.message(3, first)
+        kind, sensor, start, size = struct.unpack_from("<4I", message)
+        assert (kind, sensor, start) == (1, 3, first)
+        values = np.frombuffer(message, "<f8", offset=16)
+        found_t.append(values[:size])
+        found_y.append(values[size:])
+        first += size
+    np.testing.assert_array_equal(np.concatenate(found_t), t)
+    np.testing.assert_array_equal(np.concatenate(found_y), y)
+
+
+def test_a_log_is_seen_as_it_grows(tmp_path: Path) -> None:
+    """Samples, marks at the record's own times, and what befell the recording; ended once the log is."""
+    header = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr"),), mono_ns=0, unix_ns=0, kind="live", title="bob")
+    with Recorder(tmp_path / "run.wire", header, VirtualClock()) as recorder:
+        feed = LogFeed(tmp_path / "run.wire")
+        for number in range(50):
+            recorder.put(0, number * 100_000_000, b"R%04d\r" % (300 + number))
+        recorder.mark("released", host_ns=2_000_000_000)
+        recorder.event(0, 2_500_000_000, "timeout", {"after_s": 1.0})
+        recorder.drain()
+        feed.poll()
+        assert (feed.view.source, feed.view.title) == ("LIVE", "bob")
+        seen = len(feed.view.series[0])
+        assert seen >= 48
+        ((moment, text),) = feed.view.marks
+        assert text == "released"
+        assert moment == pytest.approx(2.0, abs=0.2)
+        assert feed.view.notes == ["timeout: after_s 1.0"]
+        assert not feed.view.ended
+    feed.poll()
+    assert feed.view.ended
+    assert feed.view.error == ""
+    feed.close()
+
+
+def test_the_motion_of_a_run_is_that_of_an_analysis() -> None:
+    """The same numbers as ``analyse`` at ``fast``, with the law's curve through the amplitudes."""
+    loaded = springmass.load(springmass.sample_data() / "damped_simulated_position.txt")
+    view = view_of(loaded)
+    assert len(view.series[0]) == len(loaded.samples)
+    message = motion_of(loaded.track, Scene(), 20e-6)
+    found = message["estimates"]
+    assert found["period"]["value"] == pytest.approx(0.790066, abs=5 * found["period"]["u"])
+    assert message["stop"]["low"] < 0.790066 < message["stop"]["high"]
+    law = next(each for each in message["laws"] if each["name"] == message["law"])
+    curve = np.interp(message["amplitude"]["t"], law["t"], law["value"])
+    assert np.median(np.abs(curve / message["amplitude"]["value"] - 1.0)) < 0.01
+
+
+def test_what_does_not_move_is_said() -> None:
+    """In the analysis's own words, with the spectrum of what is there."""
+    rng = np.random.default_rng(3)
+    t = np.arange(2000) / 100
+    track = springmass.Track.from_arrays(t, 0.3 + 1e-4 * rng.standard_normal(2000))
+    message = motion_of(track, Scene(), 20e-6)
+    assert message["why"]
+    assert "estimates" not in message
+    assert len(message["spectrum"]["f"]) == len(message["spectrum"]["value"]) > 100
+
+
+def test_a_line_of_the_spectrum_has_its_amplitude() -> None:
+    """At its frequency, whatever is missing."""
+    t = np.arange(8192) / 100
+    y = 0.2 + 0.05 * np.cos(2 * np.pi * (t[1] ** -1 * 100 / 8192) * t)
+    y[::500] = np.nan
+    found = spectrum(springmass.Track.from_arrays(t, y))
+    peak = int(np.argmax(found["value"]))
+    assert found["value"][peak] == pytest.approx(0.05, rel=0.02)
+    assert found["f"][peak] == pytest.approx(100 * 100 / 8192, abs=0.06)
