@@ -17,7 +17,11 @@ import springmass
 __all__ = ["Check", "examine", "foreign_packages"]
 
 PACKAGES = ("acquisition", "pipeline", "storage")
-LIBRARIES = ("numpy", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2", "rich")
+LIBRARIES = (
+    *("numpy", "scipy", "threadpoolctl", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2"),
+    *("serial", "nptdms", "python_calamine", "rich", "shtab", "starlette", "uvicorn", "websockets"),
+)
+DISTRIBUTIONS = {"serial": "pyserial"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +93,7 @@ def _libraries() -> Iterator[Check]:
     for name in LIBRARIES:
         try:
             importlib.import_module(name)
-            yield Check(f"library {name}", True, importlib.metadata.version(name))
+            yield Check(f"library {name}", True, importlib.metadata.version(DISTRIBUTIONS.get(name, name)))
         except ImportError as error:
             yield Check(f"library {name}", False, str(error), "install springmass again: pip install --force-reinstall")
 
