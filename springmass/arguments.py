@@ -48,9 +48,7 @@ def _add_analyse(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="scene file (TOML): masses, disc, air, sensor; one for all inputs, or again for each in their order",
     )
-    bench = parser.add_argument_group(
-        "the bench, in place of what the scene says (a scene file states uncertainties too)"
-    )
+    bench = parser.add_argument_group("the bench, in place of what the scene says")
     for (_, key), (option, of_u, words) in BENCH.items():
         bench.add_argument(option, type=_finite, metavar="X", help=words)
         bench.add_argument(of_u, type=_not_negative, metavar="U", help=f"standard uncertainty of {key}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from acquisition.errors import visible
@@ -21,19 +21,21 @@ NAMED = 5  # runs that a line names
 FIRST = 3  # that change a number stand by themselves
 
 
-def findings_text(findings: Sequence[Mapping[str, Any]]) -> str:
+def findings_text(findings: Sequence[Mapping[str, Any]], written: Callable[[str], str] = str) -> str:
     """Return findings as wrapped lines, each with its severity and code.
 
     Parameters
     ----------
     findings : sequence of mapping
         As in the result's JSON: code, severity, message.
+    written : callable
+        How a message is written on this terminal.
     """
     if not findings:
         return "No findings."
     standing = [f["code"] for f in findings if f["code"] in STANDING and f["severity"] == "info"]
     own = [f for f in findings if f["code"] not in standing]
-    told = [f"{_MARKS[f['severity']]} {f['code']}: {f['message']}" for f in own]
+    told = [f"{_MARKS[f['severity']]} {f['code']}: {written(f['message'])}" for f in own]
     grave = sum(f["severity"] != "info" for f in own)
     lines = [wrapped(one, " " * 8) for one in told]
     if grave > FIRST:
@@ -44,13 +46,15 @@ def findings_text(findings: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], written: Callable[[str], str] = str) -> str:
     """Return the findings of several runs that change a number, a paragraph a code, and how many notes there are.
 
     Parameters
     ----------
     runs : mapping
         By name of the run, its findings as in the result's JSON.
+    written : callable
+        How a message is written on this terminal.
     """
     grave: dict[str, dict[str, Mapping[str, Any]]] = {}
     notes = 0
@@ -65,7 +69,7 @@ def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]]) -> str
         told = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
         first = next(iter(by_run.values()))
         head = f"{_MARKS[first['severity']]} {code}, {len(names)} of {len(runs)} runs ({told}): "
-        lines.append(wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{first['message']}", " " * 8))
+        lines.append(wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{written(first['message'])}", " " * 8))
     lines.append(f"{notes} notes, which change no number: --json has them.")
     return "\n".join(lines)
 

@@ -218,6 +218,7 @@ def _judged(analysed: Analysed, task: _Task) -> tuple[int, tuple[str, ...]]:
 def _print_text(analysed: Analysed, *, si: bool) -> None:
     from springmass.printing import classic_text, findings_text, fitted
     from springmass.report.budgets import budget_text
+    from springmass.report.words import typeset
     from springmass.terminal.look import look_of
     from springmass.terminal.tables import text_table
 
@@ -228,17 +229,20 @@ def _print_text(analysed: Analysed, *, si: bool) -> None:
     elif told := budget_text(analysed.analysis):
         print(fitted(told, look.width) if look.terminal else told)
     print()
-    print(findings_text(analysed.result["findings"]))
+    print(findings_text(analysed.result["findings"], typeset if look.unicode else str))
 
 
 def _print_together(analysed: Sequence[_Done], options: argparse.Namespace) -> None:
     from springmass.printing import shared_findings_text
+    from springmass.report.words import typeset
     from springmass.terminal.look import look_of
     from springmass.terminal.tables import text_table
 
     names = [done.name for done in analysed]
-    print(text_table(names, [done.table for done in analysed], look_of(sys.stdout, si=options.si)))
-    print(shared_findings_text({done.name: done.result["findings"] for done in analysed}))
+    look = look_of(sys.stdout, si=options.si)
+    print(text_table(names, [done.table for done in analysed], look))
+    findings = {done.name: done.result["findings"] for done in analysed}
+    print(shared_findings_text(findings, typeset if look.unicode else str))
 
 
 def _write(analysed: Analysed, results: Path, *, pdf: bool) -> Path:

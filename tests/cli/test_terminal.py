@@ -24,6 +24,7 @@ def test_a_terminal_gets_one_page_that_fits(screen: ModuleType, data: Path, tmp_
     assert terminal.screen.wrapped == 0
     assert "52.006 ± 0.0" in terminal.screen.text
     assert "s⁻¹" in terminal.screen.text
+    assert "+-" not in terminal.screen.text
 
 
 def test_several_runs_on_a_terminal_share_a_table_and_leave_no_bar_behind(

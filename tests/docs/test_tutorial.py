@@ -29,6 +29,7 @@ PAGES = (
     "docs/how-to/compare-with-the-classic-method.md",
     "docs/how-to/read-the-budget.md",
     "docs/how-to/record-at-the-bench.md",
+    "docs/how-to/simulate-a-bench.md",
     "docs/reference/run-file.md",
     "docs/reference/command-line.md",
     "docs/explanation/accuracy.md",
