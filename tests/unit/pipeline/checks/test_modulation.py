@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import Analysis, analyse
+from pipeline.checks import modulation
 from pipeline.track import F8, Track
 
 OMEGA, AMPLITUDE, RATE = 8.3, 0.05, 0.012
@@ -38,3 +39,17 @@ def test_a_bent_phase_is_no_second_oscillation() -> None:
         codes = {one.code for one in analysed(seed, 0.0, cubic=60.0).findings}
         assert "amplitude_dependent_frequency" in codes
         assert "amplitude_modulated" not in codes
+
+
+def test_what_flutters_from_window_to_window_is_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bob that a fast second oscillation disturbs costs no fit of two slow ones; a slow one does."""
+    searched: list[int] = []
+    real = modulation._two_oscillations
+    monkeypatch.setattr(modulation, "_two_oscillations", lambda *of: searched.append(len(of)) or real(*of))
+    rng = np.random.default_rng(3)
+    size = AMPLITUDE * np.exp(-RATE * T) + 2e-3 * np.repeat(rng.standard_normal(T.size // 75), 75)
+    y = 0.3 + size * np.cos(OMEGA * T) + 3e-4 * rng.standard_normal(T.size)
+    analyse(Track.from_arrays(T, y))
+    assert searched == []
+    analysed(0, 2e-3)
+    assert searched != []
