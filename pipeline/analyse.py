@@ -11,6 +11,7 @@ from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.checks.clock_findings import judge_clock
 from pipeline.checks.finding import Checked, Finding, by_severity
+from pipeline.checks.halves import judge_halves
 from pipeline.checks.modulation import judge_modulation
 from pipeline.checks.plausibility import judge_plausibility
 from pipeline.checks.sample_findings import STEPS, count_quality, find_clusters, judge_samples
@@ -279,6 +280,7 @@ def _oscillation(
         judge_segments(windows.segments),
         judge(cycles, demodulated, damping, phase, rest, waveform, disturbances),
         checked.findings,
+        () if bent else judge_halves(demodulated, damping, phase, whole=fitted.full is not None),
         judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters),
         judge_scene(scene, effects),
         judge_fits(fitted.full, solved),

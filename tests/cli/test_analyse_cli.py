@@ -46,6 +46,7 @@ CODES = {
     "rest_drift",
     "sideways_mode",
     "amplitude_modulated",
+    "halves_differ",
     "quantised",
     "short_record",
     "overdamped",
