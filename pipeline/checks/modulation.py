@@ -22,7 +22,6 @@ BENT = 2.0  # chi-square for each degree of freedom that phases leave beside the
 LEAST_WINDOWS = 16
 GAIN = 60.0  # fall of chi-square by which two oscillations must beat a damping law and a bent phase
 FITS = 2.0  # chi-square for each degree of freedom that they may leave
-ROUGHEST = 4.0  # mean square of what differs from window to window, over its variance: nothing that is slow does so
 MOST_WINDOWS = 2000  # longer records hold beats that are no slower than they
 ROUGH = 8  # evaluations from each start, before the best goes on
 TURNS = (0.3, 0.7, 1.2)  # turns of the one against the other within the record, to start from
@@ -64,7 +63,8 @@ def judge_modulation(demodulated: Demodulated, damping: Damping, phase: PhaseFit
     start = float(abs(damping.best.joint["A0"].value))
     u_size, u_phase = np.sqrt(demodulated.covariance[:, 0, 0]), np.sqrt(demodulated.covariance[:, 1, 1])
     slow = demodulated.phase - demodulated.angular_frequency * demodulated.t
-    if _roughness(demodulated.amplitude, u_size) + _roughness(slow, u_phase) > 2.0 * ROUGHEST:
+    rough = 0.5 * (_roughness(demodulated.amplitude, u_size) + _roughness(slow, u_phase))
+    if rough > FITS * (1.0 + 2.0 / math.sqrt(count)):  # its own scatter; whatever is smooth leaves as much
         return Checked()
     fallen = demodulated.amplitude - damping.best.amplitude(demodulated.t - damping.t0)
     turned = demodulated.phase - phase.total(demodulated.t)
