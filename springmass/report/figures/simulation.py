@@ -16,7 +16,7 @@ from pipeline.dynamics import Trajectory, get_integrator
 from pipeline.dynamics.band import Band
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
-from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, VERMILLION, blank, legend_row, style
+from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, VERMILLION, blank, legend_row, style, thinned
 from springmass.runs.simulation import Against, Simulation
 
 if TYPE_CHECKING:
@@ -26,10 +26,12 @@ if TYPE_CHECKING:
 __all__ = ["EULERS", "against_figure", "band_figure", "draw_simulation"]
 
 EULERS = (("forward-euler", "forward Euler", VERMILLION), ("symplectic-euler", "symplectic Euler", BLUE))
-PERIODS, TURNS = 14, 6  # drawn against time, and in a phase plot
+PERIODS, TURNS = 14, 6  # of a long run drawn against time once more, and in a phase plot
 POINTS = 1500
 GROWN = 1e6  # times the starting amplitude: beyond it a curve says nothing more
 DASHED: dict[str, Any] = {"color": "#000000", "lw": 0.9, "ls": (0, (2, 1.5))}  # what is exact, or expected
+_EXACT: dict[str, Any] = {**DASHED, "lw": 0.6, "label": "exact"}
+BINS = 250  # of a dense series: each gives the least and the greatest of what it holds
 WIDTH, LEFT, GAP, RIGHT, BOTTOM, TOP = 7.2, 0.68, 0.72, 0.12, 0.45, 0.62
 
 
@@ -148,29 +150,40 @@ def _stacked(height: float, *rows: tuple[float, float]) -> tuple[Figure, list[Ax
     return figure, [figure.add_axes((LEFT / WIDTH, at, wide, tall)) for at, tall in rows]
 
 
-def _pair(height: float, labels: tuple[str, str]) -> tuple[Figure, list[Axes]]:
-    """Make two panels beside each other, each under its method's name."""
-    whole, wide = height + BOTTOM + TOP, (WIDTH - LEFT - GAP - RIGHT) / 2.0
+def _pair(height: float, labels: tuple[str, str], rows: int = 1) -> tuple[Figure, list[Axes]]:
+    """Make two panels beside each other, each under its method's name; as many rows of them, the upper ones first."""
+    whole, wide = rows * (height + BOTTOM) + TOP, (WIDTH - LEFT - GAP - RIGHT) / 2.0
     figure, axes = blank(WIDTH, whole), []
-    for i, (_, words, _) in enumerate(EULERS):
-        at = (LEFT + i * (wide + GAP)) / WIDTH
-        panel = figure.add_axes((at, BOTTOM / whole, wide / WIDTH, height / whole))
-        panel.set_title(words, loc="left", fontsize=9.0, pad=18)
+    for row in range(rows):
+        for i, (_, words, _) in enumerate(EULERS):
+            at, up = (LEFT + i * (wide + GAP)) / WIDTH, BOTTOM + (rows - 1 - row) * (height + BOTTOM)
+            panel = figure.add_axes((at, up / whole, wide / WIDTH, height / whole))
+            if row == 0:
+                panel.set_title(words, loc="left", fontsize=9.0, pad=18)
+            axes.append(panel)
+        axes[-2].set_ylabel(labels[1])
+    for panel in axes[-2:]:
         panel.set_xlabel(labels[0])
-        axes.append(panel)
-    axes[0].set_ylabel(labels[1])
     return figure, axes
 
 
 def _against_time(simulation: Simulation, runs: Sequence[Trajectory], what: str, factor: float, label: str) -> Figure:
-    figure, axes = _pair(2.3, ("time / s", label))
-    for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
-        rows = _shown(simulation, run, PERIODS)
-        t = run.t[rows]
-        panel.plot(t, getattr(run, what)[rows] * factor, color=colour, lw=1.0, label=words)
-        panel.plot(t, getattr(simulation.truth, what)[rows] * factor, label="exact", **DASHED)
-        panel.set_xlim(float(t[0]), float(t[-1]))
+    """The whole run, and of a long one its first periods beneath."""
+    long = any(len(run.y) > _shown(simulation, run, PERIODS).stop for run in runs)
+    figure, axes = _pair(1.7 if long else 2.3, ("time / s", label), 2 if long else 1)
+    for panel, run, (_, words, colour) in zip(axes[:2], runs, EULERS, strict=True):
+        for of, look in ((run, {"color": colour, "lw": 1.0, "label": words}), (simulation.truth, _EXACT)):
+            value = getattr(of, what)[: len(run.y)] * factor
+            rows = thinned(value, BINS)
+            panel.plot(run.t[rows], value[rows], **look)
+        panel.set_xlim(float(run.t[0]), float(run.t[-1]))
         legend_row(panel, 2, pad=0.15, columnspacing=1.2)
+    for panel, run, (_, _, colour) in zip(axes[2:], runs if long else (), EULERS if long else (), strict=True):
+        first = _shown(simulation, run, PERIODS)
+        t = run.t[first]
+        panel.plot(t, getattr(run, what)[first] * factor, color=colour, lw=1.0)
+        panel.plot(t, getattr(simulation.truth, what)[first] * factor, **DASHED)
+        panel.set_xlim(float(t[0]), float(t[-1]))
     return figure
 
 
