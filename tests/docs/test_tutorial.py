@@ -27,6 +27,7 @@ PAGES = (
     "docs/how-to/add-a-law.md",
     "docs/how-to/compare-runs.md",
     "docs/how-to/compare-with-the-classic-method.md",
+    "docs/how-to/make-a-lab-report.md",
     "docs/how-to/read-the-budget.md",
     "docs/how-to/record-at-the-bench.md",
     "docs/how-to/simulate-a-bench.md",
