@@ -139,12 +139,16 @@ def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
         return
     import signal
     from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
     from multiprocessing import get_context
 
     # Fresh processes: a fork of one that has threads of linear algebra may hang. Ctrl-C is this process's.
     with ProcessPoolExecutor(workers, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
         try:
             yield from pool.map(_work, tasks)
+        except BrokenProcessPool as error:
+            demand = "a process that makes reports was ended from outside, for lack of memory perhaps"
+            raise ProgramError(f"{demand}; give fewer inputs at once", SOME_FAILED) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

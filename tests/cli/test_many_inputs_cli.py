@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
@@ -104,3 +105,22 @@ def test_velocity_and_report_options_that_contradict_are_refused(cli: Cli, bench
     assert done.code == 2
     assert "got a folder" in done.complaint
     assert cli("analyse", bench, "--report", "--no-report").code == 2
+
+
+def test_a_process_ended_from_outside_is_one_line(cli: Cli, bench: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the system takes a process that makes reports, the line says so and the exit code is 1."""
+
+    class Broken:
+        def __init__(self, *_: object) -> None: ...
+        def __enter__(self) -> Broken:
+            return self
+
+        def __exit__(self, *_: object) -> None: ...
+        def map(self, *_: object) -> list[object]:
+            raise BrokenProcessPool
+
+    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Broken)
+    monkeypatch.setattr("springmass.commands.analyse._cores", lambda: 2)
+    done = cli("analyse", bench, "--report", "--out", bench / "out")
+    assert done.code == 1
+    assert "a process that makes reports was ended from outside" in done.err.splitlines()[-1]
