@@ -24,9 +24,10 @@ from pipeline.motion import overdamped as relaxations
 from pipeline.motion import phase as phases
 from pipeline.motion import waveform_fit as fullfits
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equation
-from pipeline.motion.kinds import Fitted, Windows, by_equation, by_windows, see_windows
+from pipeline.motion.kinds import Fitted, Windows, astray, by_equation, by_windows, incoherent, see_windows
 from pipeline.motion.overdamped import Overdamped, find_overdamped, spring_constant
 from pipeline.motion.smoother import Smoothed, smooth
+from pipeline.motion.two_modes import TwoModes, find_two_modes
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.threads import one_thread
@@ -72,6 +73,7 @@ class Params:
 
 
 STANDARD = Params()
+BEATING = 0.3  # of the amplitude, by which periods miss the oscillation found: there may be two
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,11 +212,20 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     if isinstance(relaxed, Overdamped):
         found = _overdamped(conditioned, scene, relaxed)
     elif isinstance(windows, NoOscillation):
-        found = _still(conditioned, relaxed or windows)
+        two = find_two_modes(conditioned) if windows.code == "no_oscillation" else None
+        found = _still(conditioned, relaxed or windows) if two is None else _two_modes(conditioned, two)
     elif isinstance(solved, EquationFit):  # strongly damped
         found = _oscillation(windows, by_equation(windows, solved), solved, scene, params)
     else:
-        found = _oscillation(windows, by_windows(windows, params.phase, params.full), solved, scene, params)
+        fitted = by_windows(windows, params.phase, params.full)
+        why = incoherent(fitted, conditioned.track)
+        two = find_two_modes(conditioned) if why is not None or astray(fitted) > BEATING else None
+        if two is not None:
+            found = _two_modes(conditioned, two)
+        elif why is not None:
+            found = _still(conditioned, why)
+        else:
+            found = _oscillation(windows, fitted, solved, scene, params)
     return Analysis(conditioned.track, scene, params, conditioned, *found)
 
 
@@ -302,6 +313,12 @@ def _still(conditioned: Conditioned, why: NoOscillation) -> Found:
     if (held := holding(conditioned)) > 1:
         findings = by_severity(findings, (judge_held(held, 1.0 / conditioned.track.rate_hz, conditioned.track.unit),))
     return Still(why.why), (), findings, _at_rest(conditioned)
+
+
+def _two_modes(conditioned: Conditioned, two: TwoModes) -> Found:
+    """A record of two oscillations, neither of which is the motion."""
+    findings = _findings(conditioned, Finding("two_modes", "error", two.why))
+    return Still(two.why), (), findings, {**_at_rest(conditioned), **two.estimates}
 
 
 def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:

@@ -30,13 +30,16 @@ from pipeline.oscillation.kinks import find_kink
 from pipeline.oscillation.rows import are_interleaved
 from pipeline.oscillation.segments import Params as SegmentsParams
 from pipeline.oscillation.segments import Segments, Span, find_segments
-from pipeline.track import UNUSABLE, Quality
+from pipeline.track import UNUSABLE, Quality, Track
 
-__all__ = ["Fitted", "Windows", "by_equation", "by_windows", "see_windows"]
+__all__ = ["Fitted", "Windows", "astray", "by_equation", "by_windows", "incoherent", "see_windows"]
 
 MOST_BENT = 0.25  # of the amplitude: parabolas leave 0.19, a motion of which little but plateaus is seen 0.35
 FOLDED = 32  # parts of a period
 ALIKE = 0.25  # of the residual's variance: what periods that are alike may differ by
+WANDERING = 0.3  # of the amplitude: what a sinusoid may leave beyond white noise
+FEWEST, ASTRAY = 4, 0.8  # windows, and how far astray they may be over their amplitudes, to be one oscillation
+ALONE, SEEN = 1e-6, 0.5  # chance of a line in white noise, and the share of its evidence that the fit has to keep
 ROUNDS = 4  # most times that a part is looked for within the part that was found
 
 
@@ -205,7 +208,10 @@ def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscill
     left, unit = demodulated.noise_m, conditioned.track.unit
     if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
         return NoOscillation(f"the {noun(unit)} does not follow the period that its spectrum shows")
-    if left <= max(0.15 * size, 4.0 * conditioned.noise_m):
+    # Noise that knows of itself, a ride and a walk have more between their samples than white noise.
+    noise = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
+    excess = math.sqrt(max(left**2 - noise**2, 0.0))
+    if left <= 0.15 * size or (left <= 4.0 * conditioned.noise_m and excess <= WANDERING * size):
         return None
     if left > MOST_BENT * size or not _repeats(conditioned, demodulated):
         return NoOscillation(
@@ -223,6 +229,52 @@ def _repeats(conditioned: Conditioned, demodulated: Demodulated) -> bool:
     bins = ((turns - np.floor(turns)) * FOLDED).astype(np.int64) % FOLDED
     means = np.bincount(bins, left, FOLDED) / np.maximum(np.bincount(bins, minlength=FOLDED), 1)
     return demodulated.t.size >= 4 and float(np.var(left - means[bins])) < ALIKE * float(np.var(left))
+
+
+def incoherent(fitted: Fitted, track: Track) -> NoOscillation | None:
+    """Return why a motion is no oscillation although single periods look like one: they do not follow one another.
+
+    Parameters
+    ----------
+    fitted : Fitted
+    track : Track
+        The record.
+
+    Notes
+    -----
+    Every window's amplitude and phase are one arrow, and the amplitude's law and the phase's line tell where it should
+    point. Arrows at random miss that by more than their own length; half of the motion, by the arrows' lengths, has to
+    miss it by less than :data:`ASTRAY` of them. And the oscillation has to explain something: of n samples in white
+    noise a line that stands out by itself lowers the squares by :math:`(2/n)\\ln(n/\\alpha)` of what is left.
+    """
+    demodulated = fitted.demodulated
+    if demodulated.t.size < FEWEST:
+        return None
+    used = (demodulated.flags & UNUSABLE) == 0
+    left = fitted.waveform.residual[used]
+    swing = left + (fitted.waveform.position - fitted.rest.at(track.t))[used]
+    gain = 0.5 * left.size * (float(swing @ swing) / max(float(left @ left), 1e-300) - 1.0)
+    if gain < SEEN * math.log(left.size / ALONE):
+        return NoOscillation(f"what oscillates in the {noun(track.unit)} explains no more of it than noise may")
+    typical = astray(fitted)
+    if typical < ASTRAY:
+        return None
+    return NoOscillation(
+        f"the {noun(track.unit)} moves to and fro, but at no period that lasts: half of the motion is {typical:.0%} of "
+        "its amplitude and more away from the oscillation that comes nearest"
+    )
+
+
+def astray(fitted: Fitted) -> float:
+    """Return by what share of their amplitude half of the windows, by amplitude, miss the oscillation fitted."""
+    demodulated, phase = fitted.demodulated, fitted.phase
+    told = phase.damping.best.amplitude(demodulated.t - phase.t0) * np.exp(1j * phase.total(demodulated.t))
+    own = demodulated.amplitude * np.exp(1j * demodulated.phase)
+    size = np.abs(own)
+    missed = np.abs(own - told) / np.maximum(size, 1e-12 * float(size.max()))
+    order = np.argsort(missed)
+    middle = int(np.searchsorted(np.cumsum(size[order]), 0.5 * float(size.sum())))
+    return float(missed[order][middle])
 
 
 def by_windows(windows: Windows, phases: PhaseParams, waveforms: WaveformParams | None) -> Fitted:

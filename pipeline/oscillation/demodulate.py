@@ -318,7 +318,8 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     """
     size = np.hypot(a, b)
     # What is nothing beside the others divides by nothing smaller, whatever the record's unit.
-    size = np.maximum(size, 1e-30 * float(size.max()) + 1e-150)
+    least = 1e-30 * float(size.max()) + 1e-150
+    size = np.maximum(size, least)
     along, scale = np.arctan2(b, a), size
     weak = np.zeros(a.size, np.bool_)
     if smooth_amplitude is not None:
@@ -339,4 +340,4 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     slope[:, 2, 0] = 1.0
     turned_into = slope @ covariance @ slope.transpose(0, 2, 1)
     amplitude = np.where(weak, a * cosine + b * sine, size * (1.0 - 0.5 * np.minimum(turned_into[:, 1, 1], 1.0)))
-    return amplitude, smooth_phase + turned, turned_into
+    return np.where(amplitude == 0.0, least, amplitude), smooth_phase + turned, turned_into

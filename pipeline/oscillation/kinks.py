@@ -66,7 +66,8 @@ def find_kink(demodulated: Demodulated, params: Params | None = None) -> Segment
         return None
     t, size, phase = t[:last], size[:last], phase[:last]
     both = np.array([np.log(size), phase - demodulated.angular_frequency * (t - t[0])])
-    u = np.array([u_size[:last] / size, np.sqrt(demodulated.covariance[:last, 1, 1])])
+    # Of a computed record nothing is uncertain but its digits.
+    u = np.maximum([u_size[:last] / size, np.sqrt(demodulated.covariance[:last, 1, 1])], 1e-12)
     powers = np.vander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, DEGREE + 1)
     free = 2 * (last - DEGREE - 1)
     q, _ = np.linalg.qr(powers)

@@ -21,7 +21,7 @@ _BESIDE = {
         "at_rest handled restarted touched phase_jump clipped false_echoes locked_echoes missing_samples "
         "duplicate_time non_monotonic_time quantised held_samples smoothed_sensor not_sinusoidal undersampled "
         "rest_drift correlated_residuals lost_target rows_lost interleaved_records zero_filled_tail no_oscillation "
-        "overdamped mains_hum implausible_motion implausible_distance sensor_lost"
+        "two_modes overdamped mains_hum implausible_motion implausible_distance sensor_lost"
     ),
     "amplitude": "sideways_mode strongly_damped short_record not_converged",
     "phase": "amplitude_dependent_frequency",
@@ -30,6 +30,7 @@ _FIGURE_OF = {code: figure for figure, codes in _BESIDE.items() for code in code
 
 ADVICE = {
     "no_oscillation": "Look at the record, and record longer.",
+    "two_modes": "Start the one without the other.",
     "handled": "See in the figure of the position whether the times are right.",
     "restarted": "Analyse the other parts with --from and --to.",
     "touched": "Analyse the other parts with --from and --to.",

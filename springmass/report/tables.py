@@ -30,6 +30,10 @@ __all__ = [
 # name, quantity in words, symbol in ASCII, on the page, in LaTeX
 _QUANTITIES = (
     ("period", "period", "T", "T", "T"),
+    ("first_mode_period", "period of the first mode", "T_1", "T 1", "T_1"),
+    ("second_mode_period", "period of the second mode", "T_2", "T 2", "T_2"),
+    ("first_mode_amplitude", "amplitude of the first mode", "A_1", "A 1", "A_1"),
+    ("second_mode_amplitude", "amplitude of the second mode", "A_2", "A 2", "A_2"),
     ("frequency", "frequency", "f", "f", "f"),
     ("angular_frequency", "angular frequency", "omega", "ω", r"\omega"),
     ("spring_constant", "spring constant", "k", "k", "k"),

@@ -54,6 +54,9 @@ def verdict(analysis: Analysis) -> tuple[str, ...]:
     if isinstance(analysis.motion, Overdamped):
         why = typeset(analysis.motion.why)
         return (f"{why[0].upper()}{why[1:]}.",)
+    if "first_mode_period" in analysis.estimates and isinstance(analysis.motion, Still):
+        why = typeset(analysis.motion.why)
+        return (f"{why[0].upper()}{why[1:]}.",)
     if isinstance(analysis.motion, Still):
         return ("Nothing oscillates in this record; rest position and noise are all that it gives.",)
     found = analysis.estimates
@@ -104,7 +107,8 @@ def caption(name: str, analysis: Analysis) -> str:
     if isinstance(analysis.motion, Overdamped):
         return f"{_subject(analysis)} with the fitted relaxation. Samples scatter by {_sigma(analysis)}."
     if isinstance(analysis.motion, Still):
-        return f"{_subject(analysis)}; nothing oscillates. Samples scatter by {_sigma(analysis)}."
+        what = "two modes at once" if "first_mode_period" in analysis.estimates else "nothing oscillates"
+        return f"{_subject(analysis)}; {what}. Samples scatter by {_sigma(analysis)}."
     return _CAPTIONS[name](analysis, analysis.motion)
 
 

@@ -11,6 +11,8 @@ import pytest
 
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.identify import inspect, open_recording
+from pipeline.analyse import analyse
+from springmass.runs.tracks import to_track
 
 DEG = np.pi / 180
 
@@ -259,3 +261,74 @@ def test_every_wild_file_has_a_row(recordings: Path) -> None:
     names = {path.name for path in (recordings / "wild").iterdir()} - {"ORIGIN.md"}
     told = {name for name in names if any(name.startswith(row.start) for row in TABLE) or name.startswith("xlsx")}
     assert told == names
+
+
+# Of the rows above, by file and channel: those that oscillate, and those in which nothing does, or nothing for long.
+OSCILLATE = (
+    *("cassycsv", "chartrec", "coupled", "datcsv", "heidelberg", "microbit__ES2Spring2019-ComputinginEngineering__L13"),
+    *(
+        "microbit__ES2Spring2019-ComputinginEngineering__data",
+        "moku",
+        "picoscope",
+        "Pos B",
+        "qpd",
+        "runhead",
+        "tracker",
+    ),
+    *("trkerr", "tunit", "labx", "trk__", "xyerr"),
+)
+DO_NOT = (
+    *("anglelog", "capstone", "ecp", "fluids", "ga-csv", "lvm__spikelucky__test.lvm", "lvm__spikelucky__test2"),
+    *("lvm__spikelucky__hyd", "pendser", "phyphox__tomas", "vernier", "lab__", "cmbl"),
+)
+
+
+def of(names: tuple[str, ...]) -> list[Row]:
+    """Return the rows of these files or channels; of a file named alone all its rows."""
+    return [row for row in TABLE if row.start in names or row.channel in names]
+
+
+def independent_period(t: np.ndarray, y: np.ndarray) -> float:
+    """Return the period by scipy alone: a robust fit of a damped sinusoid on a straight line, from the spectrum's peak.
+
+    The whole record is one fit; nothing is cut into windows, and no law is chosen.
+    """
+    from scipy.optimize import least_squares
+    from scipy.signal import detrend
+
+    known = np.isfinite(t) & np.isfinite(y)
+    t, y = t[known] - t[known][0], y[known]
+    y = (y - np.median(y)) / np.std(y)
+    span, step = float(t[-1]), float(np.median(np.diff(t)))
+    grid = np.arange(int(span / step)) * step
+    power = np.abs(np.fft.rfft(detrend(np.interp(grid, t, y)) * np.hanning(grid.size), 8 * grid.size))
+    rates = np.fft.rfftfreq(8 * grid.size, step)
+    omega = 2.0 * np.pi * rates[np.argmax(np.where(rates > 1.5 / span, power, 0.0))]
+    waves = np.stack([np.ones_like(t), t / span, np.cos(omega * t), np.sin(omega * t)], axis=1)
+    start = np.linalg.lstsq(waves, y, rcond=None)[0]
+
+    def left(x: np.ndarray) -> np.ndarray:
+        fall = np.exp(-np.clip(x[5] * t / span, -5.0, 50.0))
+        angle = (omega + x[4] / span) * t
+        return x[0] + x[1] * t / span + fall * (x[2] * np.cos(angle) + x[3] * np.sin(angle)) - y
+
+    ends = [least_squares(left, [*start, 0.0, rate], loss="soft_l1", f_scale=0.1) for rate in (0.0, 1.0, 4.0)]
+    best = min(ends, key=lambda end: float(end.cost))
+    return float(2.0 * np.pi / (omega + best.x[4] / span))
+
+
+@pytest.mark.parametrize("row", of(OSCILLATE), ids=lambda row: f"{row.start}:{row.channel}")
+def test_what_oscillates_has_the_period_of_an_independent_fit(recordings: Path, row: Row) -> None:
+    """Within three standard uncertainties and, since pendulums' periods follow their amplitude, 0.02 %."""
+    recording = open_recording(only(recordings, row.start), **row.said)
+    period = analyse(to_track(recording.samples, recording.info)).estimates["period"]
+    expected = independent_period(recording.samples.t, recording.samples.distance)
+    assert abs(period.value - expected) < 3.0 * period.u + 2e-4 * expected
+    assert period.u < 5e-3 * period.value
+
+
+@pytest.mark.parametrize("row", of(DO_NOT), ids=lambda row: f"{row.start}:{row.channel}")
+def test_what_does_not_oscillate_has_no_period(recordings: Path, row: Row) -> None:
+    """A ride, a drop, a switch, a relaxation, a stroke against a rubber band, a chaotic pendulum."""
+    recording = open_recording(only(recordings, row.start), **row.said)
+    assert "period" not in analyse(to_track(recording.samples, recording.info)).estimates

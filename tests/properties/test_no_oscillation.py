@@ -1,0 +1,173 @@
+"""What is no oscillation gets no period, of whatever quantity; what oscillates and rests, or beats, is told so."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from acquisition.recordings.identify import open_recording
+from pipeline.analyse import Analysis, analyse
+from pipeline.track import UNITS, Track
+from springmass.runs.tracks import to_track
+
+SEEDS = range(6)
+SMALL = 0.03  # of the period: an uncertainty that a reader would believe
+HEADINGS = ("position (m)", "x (mm)", "theta (rad)", "angle (deg)", "U (V)", "a (m/s^2)", "F (N)")
+F8 = np.ndarray
+
+
+def ride(rng: np.random.Generator, t: F8) -> F8:
+    """Return the acceleration of a lift or a car: it starts, cruises and brakes, over rough ground."""
+    step = float(t[1])
+    pushes = np.repeat(rng.choice([0.0, 0.0, 1.0, -1.0], t.size) * rng.uniform(0.3, 3.0, t.size), 80)[: t.size]
+    width = int(rng.uniform(0.1, 0.6) / step) + 1
+    return np.asarray(
+        np.convolve(pushes, np.ones(width) / width, "same") + rng.normal(0, rng.uniform(0.02, 0.3), t.size)
+    )
+
+
+def way(rng: np.random.Generator, t: F8) -> F8:
+    """Return the way that such a ride takes."""
+    pushes = ride(rng, t)
+    return np.asarray(np.cumsum(np.cumsum(pushes - pushes.mean())) * float(t[1]) ** 2)
+
+
+def fall(rng: np.random.Generator, t: F8) -> F8:
+    """Return the height of a thing that is let go and lies still."""
+    since = np.maximum(t - rng.uniform(0.1, 0.7) * t[-1], 0.0)
+    return np.asarray(np.maximum(rng.uniform(0.5, 2.0) - 4.905 * since**2, 0.0) + rng.normal(0, 1e-3, t.size))
+
+
+def weightless(rng: np.random.Generator, t: F8) -> F8:
+    """Return the acceleration that a telephone feels which falls and hits the ground."""
+    start = rng.uniform(0.1, 0.7) * t[-1]
+    felt = np.where((t > start) & (t < start + 0.5), 0.0, 9.81)
+    felt[np.searchsorted(t, start + 0.5) :][:5] += rng.uniform(20.0, 80.0)
+    return np.asarray(felt + rng.normal(0, 0.05, t.size))
+
+
+def switching(rng: np.random.Generator, t: F8) -> F8:
+    """Return a signal that is switched on and off at random."""
+    turns = np.cumsum(rng.exponential(rng.uniform(0.5, 2.0), t.size))
+    return np.asarray(rng.uniform(1, 5) * (np.searchsorted(turns, t) % 2) + rng.normal(0, 0.01, t.size))
+
+
+def square(rng: np.random.Generator, t: F8) -> F8:
+    """Return one that is switched by a clock."""
+    turn = t / rng.uniform(0.5, 3.0) + rng.uniform()
+    return np.asarray(rng.uniform(1, 5) * (turn % 1 < rng.uniform(0.3, 0.7)) + rng.normal(0, 0.01, t.size))
+
+
+def walk(rng: np.random.Generator, t: F8) -> F8:
+    """Return a random walk."""
+    return np.asarray(np.cumsum(rng.normal(0, 1, t.size)))
+
+
+def remembering(rng: np.random.Generator, t: F8) -> F8:
+    """Return noise whose power falls with the frequency."""
+    spectrum = rng.normal(size=t.size) + 1j * rng.normal(size=t.size)
+    return np.fft.irfft(spectrum[: t.size // 2 + 1] / np.sqrt(np.arange(t.size // 2 + 1) + 1.0), t.size)
+
+
+def white(rng: np.random.Generator, t: F8) -> F8:
+    """Return white noise."""
+    return rng.normal(0, 1, t.size)
+
+
+def double_pendulum(rng: np.random.Generator, t: F8) -> F8:
+    """Return an angle of a double pendulum of equal arms, let go high up, in closed form as textbooks have it."""
+
+    def rates(_: float, state: F8) -> list[float]:
+        a, b, p, q = state
+        d, pull = a - b, 2.0 - np.cos(a - b) ** 2
+        along = -9.81 * (2.0 * np.sin(a) - np.sin(b) * np.cos(d)) - np.sin(d) * (q * q + p * p * np.cos(d))
+        return [p, q, along / pull, np.sin(d) * (2.0 * p * p + 2.0 * 9.81 * np.cos(a) + q * q * np.cos(d)) / pull]
+
+    start = [*rng.uniform(1.8, 3.0, 2), 0.0, 0.0]
+    turned = solve_ivp(rates, (0.0, float(t[-1])), start, t_eval=t, rtol=1e-8, atol=1e-8).y[rng.integers(0, 2)]
+    return np.asarray(turned + rng.normal(0, 0.005, t.size))
+
+
+KINDS = (ride, way, fall, weightless, switching, square, walk, remembering, white, double_pendulum)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_what_is_no_oscillation_gets_no_period(tmp_path: Path, kind: Callable[[np.random.Generator, F8], F8]) -> None:
+    """Six files of each kind, of a quantity, size, rate and length at random: no period that anybody would believe."""
+    believed = {}
+    for seed in SEEDS:
+        rng, draw = np.random.default_rng(seed), random.Random(seed)
+        t = np.arange(int(rng.uniform(8.0, 40.0) * 50)) / 50.0
+        y = kind(rng, t) * 10.0 ** rng.uniform(-2, 2)
+        path = tmp_path / "run.csv"
+        rows = (f"{a:.3f},{b:.6g}" for a, b in zip(t, y, strict=True))
+        path.write_text("\n".join([f"t (s),{draw.choice(HEADINGS)}", *rows]), encoding="utf-8")
+        recording = open_recording(path)
+        found = analyse(to_track(recording.samples, recording.info))
+        period = found.estimates.get("period")
+        said = [each.code for each in found.findings if each.severity != "info"]
+        if period is not None and period.u < SMALL * period.value and not said:
+            believed[seed] = str(period)
+    assert not believed
+
+
+def test_noise_and_rides_give_hardly_any_period_at_all() -> None:
+    """Not even a doubtful one: of fifteen records of each kind one at most."""
+    for kind in (white, walk, switching, double_pendulum, way):
+        given = 0
+        for seed in range(5 if kind is double_pendulum else 15):
+            rng = np.random.default_rng(100 + seed)
+            t = np.arange(1000) / 50.0
+            found = analyse(Track.from_arrays(t, kind(rng, t), quantity="voltage", unit="V"))
+            given += "period" in found.estimates
+        assert given <= 1, kind.__name__
+
+
+@pytest.mark.parametrize("noise", [1e-3, 0.02, 0.05])
+@pytest.mark.parametrize("share", [0.2, 1.0 / 3.0])
+def test_what_rests_for_most_of_the_record_is_analysed_while_it_moves(share: float, noise: float) -> None:
+    """Whether friction stops it, it dies away, or a hand holds it: the period is that of the motion."""
+    t = np.arange(3000) / 50.0
+    stop = share * t[-1]
+    envelopes = (np.maximum(1 - t / stop, 0), np.exp(-4 * t / stop), np.where(t < stop, np.exp(-t / stop), 0))
+    for seed, envelope in enumerate(envelopes):
+        y = 0.3 + envelope * np.cos(2 * np.pi * t / 1.69 + 1.0)
+        y += noise * np.random.default_rng(seed).standard_normal(t.size)
+        period = analyse(Track.from_arrays(t, y, quantity="angle", unit="rad")).estimates["period"]
+        # The period of strong friction's averaged law is off by a few thousandths of itself at most.
+        assert abs(period.value - 1.69) < 3.0 * period.u + 0.003
+        assert period.u < 0.01
+
+
+def told_modes(found: Analysis) -> list[float]:
+    """Return the periods of two modes that an analysis names, ascending."""
+    if "first_mode_period" in found.estimates:
+        assert [each.code for each in found.findings][:1] == ["two_modes"]
+        assert "period" not in found.estimates
+        return sorted(found.estimates[f"{name}_mode_period"].value for name in ("first", "second"))
+    (said,) = [each.message for each in found.findings if each.code == "sideways_mode"]
+    return sorted([found.estimates["period"].value, 1.0 / float(said.split(" Hz")[0].split(" at ")[1])])
+
+
+@pytest.mark.parametrize("ratio", [0.6, 1.02, 1.1, 1.25, 1.4])
+@pytest.mark.parametrize("quantity", ["length", "angle"])
+def test_two_modes_of_equal_strength_are_both_named(ratio: float, quantity: str) -> None:
+    """Neither is the oscillation; both periods are given, to a thousandth."""
+    t = np.arange(3000) / 50.0
+    y = np.cos(5.0 * t) + np.cos(5.0 * ratio * t + 0.4) + 0.01 * np.random.default_rng(2).standard_normal(t.size)
+    found = analyse(Track.from_arrays(t, 0.05 * y, quantity=quantity, unit=UNITS[quantity]))
+    expected = sorted([2 * np.pi / 5.0, 2 * np.pi / (5.0 * ratio)])
+    assert told_modes(found) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_clocked_switch_is_not_two_modes() -> None:
+    """Its fundamental and third harmonic keep step."""
+    t = np.arange(3000) / 50.0
+    y = np.where(t % 2.0 < 1.0, 1.0, 0.0) + 0.01 * np.random.default_rng(2).standard_normal(t.size)
+    found = analyse(Track.from_arrays(t, y, quantity="voltage", unit="V"))
+    assert found.estimates.keys() == {"offset", "noise"}
