@@ -9,7 +9,6 @@ The rooms in the order in which data flows; each imports only from those before 
     damping/        amplitudes to the laws by which they fall
     dynamics/       the equation of motion and its integrators
     motion/         which kind of motion it is, and the fit for that kind
-    checks/         the record judged against itself: findings before any number is believed
-    results/        estimates, effects, findings, comparisons
+    results/        checks/ of the record against itself before a number is believed; estimates, effects, findings
     analyse         the line through the rooms; accuracy: its presets; streaming: the same while samples still come
 """

@@ -9,14 +9,6 @@ import numpy as np
 
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
-from pipeline.checks.clock_findings import judge_clock
-from pipeline.checks.finding import Checked, Finding, by_severity
-from pipeline.checks.halves import judge_halves
-from pipeline.checks.modulation import judge_modulation
-from pipeline.checks.plausibility import judge_plausibility
-from pipeline.checks.sample_findings import STEPS, count_quality, find_clusters, judge_samples
-from pipeline.checks.segment_findings import judge_rows, judge_segments
-from pipeline.checks.self_check import check_residuals, holding, judge_held
 from pipeline.damping import select as dampings
 from pipeline.errors import AnalysisError
 from pipeline.motion import equation_fit as equations
@@ -39,6 +31,14 @@ from pipeline.oscillation import segments as segmentation
 from pipeline.oscillation.condition import Conditioned, coarsest_step, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
 from pipeline.results import derive as derivation
+from pipeline.results.checks.clock_findings import judge_clock
+from pipeline.results.checks.finding import Checked, Finding, by_severity
+from pipeline.results.checks.halves import judge_halves
+from pipeline.results.checks.modulation import judge_modulation
+from pipeline.results.checks.plausibility import judge_plausibility
+from pipeline.results.checks.sample_findings import STEPS, count_quality, find_clusters, judge_samples
+from pipeline.results.checks.segment_findings import judge_rows, judge_segments
+from pipeline.results.checks.self_check import check_residuals, holding, judge_held
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
 from pipeline.results.findings import judge, judge_fits, judge_overdamped, judge_scene

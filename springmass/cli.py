@@ -1,4 +1,4 @@
-"""The command line: parsing and exit codes here, arguments in ``springmass.arguments``, work in ``commands``.
+"""The command line: parsing and exit codes here, arguments in ``springmass.terminal.arguments``, work in ``commands``.
 
 Nothing heavier than argparse is imported before a command is known, so that ``--help`` answers at once.
 """
@@ -10,8 +10,8 @@ import os
 import sys
 
 from springmass import __version__
-from springmass.arguments import COMMANDS
 from springmass.errors import INTERRUPTED, OK, SENSOR, SOME_FAILED, UNREADABLE, USAGE, complain, hush
+from springmass.terminal.arguments import COMMANDS
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

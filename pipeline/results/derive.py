@@ -14,7 +14,6 @@ from pipeline.bench.added_mass import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
-from pipeline.checks.finding import Misfit
 from pipeline.damping.average import Weighted, average_over_laws
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.select import Damping
@@ -25,6 +24,7 @@ from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, estimate_of, function_of, joint_of
+from pipeline.results.checks.finding import Misfit
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality

@@ -9,7 +9,6 @@ import numpy as np
 
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE
-from pipeline.checks.finding import GRAVITY_M_PER_S2, Finding, by_severity
 from pipeline.damping.mixture import MixedDrag, find_mixed
 from pipeline.damping.select import Damping
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit
@@ -21,6 +20,7 @@ from pipeline.numerics.quantity import amount
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
+from pipeline.results.checks.finding import GRAVITY_M_PER_S2, Finding, by_severity
 from pipeline.results.effects import Effect
 
 __all__ = ["judge", "judge_fits", "judge_overdamped", "judge_scene"]

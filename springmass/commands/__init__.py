@@ -1,9 +1,9 @@
 """One module a command: `run(options) -> exit code`.
 
-In: the parsed command line (arguments are declared in `springmass.arguments`). Out: lines on stdout, messages on
-stderr, files, an exit code of `springmass.errors`. Free to change: what one command prints; a new command is a module
-here and two lines in `springmass.arguments`. Heavy parts are imported inside the functions that need them, so that
-`--help` answers at once.
+In: the parsed command line (arguments are declared in `springmass.terminal.arguments`). Out: lines on stdout, messages
+on stderr, files, an exit code of `springmass.errors`. Free to change: what one command prints; a new command is a
+module here and two lines in `springmass.terminal.arguments`. Heavy parts are imported inside the functions that need
+them, so that `--help` answers at once.
 """
 
 from __future__ import annotations

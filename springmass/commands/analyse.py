@@ -20,7 +20,6 @@ from pipeline.analyse import Oscillation, Overdamped
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
-from springmass.arguments import BENCH
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, suggest, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder, scene_of
@@ -28,6 +27,7 @@ from springmass.runs.inputs import Found, files_of
 from springmass.runs.json_results import picked, rejected
 from springmass.runs.loading import load
 from springmass.runs.scenes import amended, read_scenes
+from springmass.terminal.arguments import BENCH
 from storage.errors import StorageError, WriteFailed
 
 __all__ = ["run"]
@@ -220,10 +220,10 @@ def _judged(analysed: Analysed, task: _Task) -> tuple[int, tuple[str, ...]]:
 
 
 def _print_text(analysed: Analysed, *, si: bool) -> None:
-    from springmass.printing import classic_text, findings_text, fitted
     from springmass.report.budgets import budget_text
     from springmass.report.words import typeset
     from springmass.terminal.look import look_of
+    from springmass.terminal.printing import classic_text, findings_text, fitted
     from springmass.terminal.tables import text_table
 
     look = look_of(sys.stdout, si=si)
@@ -237,9 +237,9 @@ def _print_text(analysed: Analysed, *, si: bool) -> None:
 
 
 def _print_together(analysed: Sequence[_Done], options: argparse.Namespace) -> None:
-    from springmass.printing import shared_findings_text
     from springmass.report.words import typeset
     from springmass.terminal.look import look_of
+    from springmass.terminal.printing import shared_findings_text
     from springmass.terminal.tables import text_table
 
     names = [done.name for done in analysed]

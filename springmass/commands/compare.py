@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print_text(compared: Compared, runs: list[Analysed]) -> None:
-    from springmass.printing import comparison_text, findings_text, wrapped
+    from springmass.terminal.printing import comparison_text, findings_text, wrapped
 
     print(comparison_text(compared.comparison, [run.analysis for run in runs]))
     for joint in compared.joint:

@@ -10,13 +10,13 @@ from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.convert import write_loaded
 from springmass.errors import OK
-from springmass.printing import findings_text
 from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed, analyse_loaded, make_folder
 from springmass.runs.comparing import compare_analysed
 from springmass.runs.loading import load, sample_data
 from springmass.runs.scenes import read_scene
 from springmass.terminal.look import look_of
+from springmass.terminal.printing import findings_text
 from springmass.terminal.tables import text_table
 
 __all__ = ["run"]

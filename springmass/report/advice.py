@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from springmass.printing import STANDING
 from springmass.report.words import typeset
+from springmass.terminal.printing import STANDING
 
 __all__ = ["ADVICE", "LAW_CODES", "MOST_HEEDED", "Told", "sorted_out"]
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
-from pipeline.checks.finding import Finding
 from pipeline.damping.joint import JointDamping, JointFit, fit_joint
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.results.checks.finding import Finding
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.analysing import Analysed

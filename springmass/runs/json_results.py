@@ -11,8 +11,8 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.checks.finding import Finding, by_severity
 from pipeline.results.budget import Contribution
+from pipeline.results.checks.finding import Finding, by_severity
 from pipeline.results.classic import Classic
 from springmass import __version__
 from springmass.runs.loading import Loaded

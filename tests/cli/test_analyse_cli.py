@@ -16,7 +16,7 @@ import pytest
 
 import springmass
 from pipeline.accuracy import params_for
-from pipeline.checks.finding import Finding
+from pipeline.results.checks.finding import Finding
 from pipeline.results.classic import classic
 
 Cli = Callable[..., Any]

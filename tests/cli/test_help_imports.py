@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import springmass
-from springmass.arguments import COMMANDS
+from springmass.terminal.arguments import COMMANDS
 
 HEAVY = {
     "numpy",

@@ -16,11 +16,11 @@ from acquisition.recordings.identify import formats
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS
 from springmass import analyse, load, sample_data
-from springmass.arguments import COMMANDS
 from springmass.cli import build_parser, main
 from springmass.runs.analysing import analyse_loaded
 from springmass.runs.json_results import all_findings
 from springmass.runs.scenes import read_scene
+from springmass.terminal.arguments import COMMANDS
 from storage.run_file.layout import COLUMNS
 
 ROOT = Path(__file__).resolve().parents[2]

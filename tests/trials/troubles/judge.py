@@ -14,8 +14,8 @@ import numpy as np
 from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
-from pipeline.checks.finding import Finding
 from pipeline.errors import AnalysisError
+from pipeline.results.checks.finding import Finding
 from pipeline.track import Track
 from springmass.runs.json_results import all_findings
 from springmass.runs.loading import load

@@ -11,8 +11,8 @@ import pytest
 
 from pipeline.analyse import analyse
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
-from pipeline.checks.clock_findings import judge_clock
 from pipeline.errors import TrackError
+from pipeline.results.checks.clock_findings import judge_clock
 from pipeline.track import Track
 
 PLAIN = Track.from_arrays(np.arange(100) / 100.0, np.zeros(100))

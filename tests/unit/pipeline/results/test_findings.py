@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import Analysis, analyse
-from pipeline.checks.finding import Finding
-from pipeline.checks.sample_findings import count_quality, judge_samples
 from pipeline.oscillation.condition import condition
+from pipeline.results.checks.finding import Finding
+from pipeline.results.checks.sample_findings import count_quality, judge_samples
 from pipeline.track import Quality, Track
 
 RANK = {"error": 0, "warning": 1, "info": 2}

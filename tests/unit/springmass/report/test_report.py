@@ -19,8 +19,8 @@ import pytest
 
 from pipeline.analyse import Analysis, Oscillation, Overdamped, Still, analyse
 from pipeline.bench.scene import Scene
-from pipeline.checks.finding import Finding
 from pipeline.numerics.estimate import Estimate
+from pipeline.results.checks.finding import Finding
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import UNUSABLE, Track

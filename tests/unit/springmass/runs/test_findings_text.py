@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from springmass.printing import FIRST, findings_text
+from springmass.terminal.printing import FIRST, findings_text
 
 
 def _one(code: str, severity: str) -> dict[str, str]:

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from pipeline.checks.finding import GRAVITY_M_PER_S2, Checked, Finding, Misfit
 from pipeline.motion.phase import PhaseFit
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
+from pipeline.results.checks.finding import GRAVITY_M_PER_S2, Checked, Finding, Misfit
 from pipeline.track import UNUSABLE
 
 __all__ = ["judge_plausibility"]

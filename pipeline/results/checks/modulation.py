@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checks.finding import Checked, Finding, Misfit
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.quantity import amount
 from pipeline.oscillation.demodulate import Demodulated
+from pipeline.results.checks.finding import Checked, Finding, Misfit
 from pipeline.track import F8
 
 __all__ = ["judge_modulation"]

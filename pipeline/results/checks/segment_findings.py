@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pipeline.checks.finding import Checked, Finding, Misfit
 from pipeline.numerics.quantity import noun
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.rows import count_lost
 from pipeline.oscillation.segments import Break, Segments, Span
+from pipeline.results.checks.finding import Checked, Finding, Misfit
 
 __all__ = ["judge_rows", "judge_segments"]
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.checks.sample_findings import Clusters, find_clusters
 from pipeline.oscillation.demodulate import Demodulated
+from pipeline.results.checks.sample_findings import Clusters, find_clusters
 
 Windows = Callable[..., Demodulated]
 

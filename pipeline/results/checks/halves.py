@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.checks.finding import Finding
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
 from pipeline.oscillation.demodulate import Demodulated
+from pipeline.results.checks.finding import Finding
 from pipeline.track import F8
 
 __all__ = ["judge_halves"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.bench.instrument import Instrument
-from pipeline.checks.finding import Finding
+from pipeline.results.checks.finding import Finding
 from pipeline.track import Track
 
 __all__ = ["judge_clock"]

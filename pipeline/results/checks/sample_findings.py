@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checks.finding import Finding
 from pipeline.numerics.quantity import amount, noun, plural
 from pipeline.oscillation.condition import Conditioned, Cut
 from pipeline.oscillation.demodulate import Demodulated
+from pipeline.results.checks.finding import Finding
 from pipeline.track import F8, U8, UNUSABLE, Quality
 
 __all__ = ["STEPS", "Clusters", "count_quality", "find_clusters", "judge_samples"]

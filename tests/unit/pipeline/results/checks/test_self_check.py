@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import Analysis, Oscillation, analyse
-from pipeline.checks.self_check import holding
 from pipeline.oscillation.condition import condition
+from pipeline.results.checks.self_check import holding
 from pipeline.track import F8, Track
 
 OMEGA, AMPLITUDE, REST = 8.3, 0.05, 0.3

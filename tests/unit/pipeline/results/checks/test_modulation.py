@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import Analysis, analyse
-from pipeline.checks import modulation
+from pipeline.results.checks import modulation
 from pipeline.track import F8, Track
 
 OMEGA, AMPLITUDE, RATE = 8.3, 0.05, 0.012

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checks.finding import Checked, Finding, Misfit
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.quantity import amount, noun, plural
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
+from pipeline.results.checks.finding import Checked, Finding, Misfit
 from pipeline.track import F8, UNUSABLE
 
 __all__ = ["check_residuals", "holding", "judge_held"]
