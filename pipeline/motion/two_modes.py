@@ -22,6 +22,7 @@ MOST, THIN = 100_000, 50.0  # samples that are fitted, and how many sample inter
 WEAKER = 1.0 / 3.0  # of the stronger amplitude: below it one of them is the oscillation
 APART = 0.8  # of a beat within the record, and
 FEWEST = 3.0  # periods of the slower mode, without which two are not told from one that changes
+ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # of the values: what a still record scatters by
 SEARCH = Params(precision=1e-3, steps=60, again=False)
 
 
@@ -58,7 +59,11 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     t, y, unit = conditioned.track.t[used], conditioned.track.y[used], conditioned.track.unit
     tau, span = t - t[0], float(t[-1] - t[0])
     scale = float(np.std(y))
-    if not 32 <= y.size <= MOST or not scale > 0.0 or not 0.0 < span < THIN * y.size * float(np.median(np.diff(t))):
+    if (
+        not 32 <= y.size <= MOST
+        or scale <= ROUNDING * float(np.max(np.abs(y)))
+        or not 0.0 < span < THIN * y.size * float(np.median(np.diff(t)))
+    ):
         return None
     values = (y - y.mean()) / scale
     first = _strongest(tau, values)

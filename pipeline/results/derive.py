@@ -309,11 +309,18 @@ class _Laws:
 
     def __init__(self, damping: Damping, inputs: Inputs, demodulated: Demodulated) -> None:
         elapsed, best = demodulated.t - damping.t0, damping.best
-        self.weighted = average_over_laws(damping, math.sqrt(float(np.mean(demodulated.amplitude**2))))
+        every = average_over_laws(damping, math.sqrt(float(np.mean(demodulated.amplitude**2))))
+        found = [(one, *_of_law(one.fit, elapsed)) for one in every]
+        # A law whose fit runs to infinity within the record states nothing that the others could be averaged with.
+        found = [(one, values, slopes) for one, values, slopes in found if np.isfinite(values @ slopes).all()]
+        if not found:
+            found = [(Weighted(best, 1.0), *_of_law(best, elapsed))]
+        self.weighted = tuple(one for one, *_ in found)
         self.stated = self.weighted[0].fit
         self.squared_rate = mean_squared_rate(best, best.amplitude(elapsed))
-        each = [_of_law(one.fit, elapsed) for one in self.weighted]
+        each = [(values, slopes) for _, values, slopes in found]
         weights = np.array([one.weight for one in self.weighted])
+        weights /= weights.sum()
         self.values: F8 = weights @ np.array([values for values, _ in each])
         self.variables = inputs.add_joint("damping_law", self.stated.joint, "A", self.stated.dof)
         departures = [x - value for x, value in zip(self.variables, self.stated.joint.values.tolist(), strict=True)]
@@ -321,13 +328,22 @@ class _Laws:
         quantities = self.values + slopes @ np.array(departures)
         if weights.size > 1:
             covariance = np.zeros((3, 3))
-            for (values, by_parameters), one in zip(each, self.weighted, strict=True):
-                covariance += one.weight * np.outer(values - self.values, values - self.values)
+            for (values, by_parameters), one, weight in zip(each, self.weighted, weights, strict=True):
+                covariance += weight * np.outer(values - self.values, values - self.values)
                 if one.fit is not self.stated:
-                    covariance += one.weight * by_parameters @ one.fit.joint.covariance @ by_parameters.T
+                    factor = by_parameters @ _root(one.fit.joint.covariance)
+                    covariance += weight * factor @ factor.T
             joint = Joint(("amplitude", "damping_rate", "displacement"), np.zeros(3), covariance, ("m", "1/s", "m"))
             quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))
         self.start, self.rate_at_start, self.root_mean_square = quantities.tolist()
+
+
+def _root(covariance: F8) -> F8:
+    """Return R with R R^T the covariance (p, p): products with it keep no negative variance, however it is scaled."""
+    u = np.sqrt(np.diag(covariance))
+    scale = np.where(u > 0.0, u, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _of_law(fit: LawFit, elapsed: F8) -> tuple[F8, F8]:

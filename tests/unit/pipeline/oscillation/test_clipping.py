@@ -61,12 +61,25 @@ def report_twin(seed: int) -> Track:
     return Track.from_arrays(t, y)
 
 
+@pytest.fixture(scope="module")
+def twins() -> list[Analysis]:
+    """Return the analyses of ten twins."""
+    return [analyse(report_twin(seed)) for seed in range(10)]
+
+
+def test_twins_of_a_reports_recording(twins: list[Analysis]) -> None:
+    """Without a single far crest the amplitude is right within 2 u, nine times in ten, and within 0.1 mm always."""
+    errors = np.array([found.estimates["amplitude"].value - 0.0714 for found in twins])
+    u = np.array([found.estimates["amplitude"].u for found in twins])
+    assert np.abs(errors).max() < 0.1e-3
+    assert np.count_nonzero(np.abs(errors) > 2.0 * u) <= 1
+    assert np.sqrt(np.mean((errors / u) ** 2)) < 1.3
+
+
 @pytest.mark.parametrize("seed", range(10))
-def test_twin_of_a_reports_recording(seed: int) -> None:
-    """Of a recording without a single far crest the amplitude is right within 2 u and 2 mm, the noise the sensor's."""
-    found = analyse(report_twin(seed))
-    amplitude = found.estimates["amplitude"]
-    assert amplitude.value == pytest.approx(0.0714, abs=min(2e-3, 2.0 * amplitude.u))
+def test_twin_of_a_reports_recording(twins: list[Analysis], seed: int) -> None:
+    """The noise is the sensor's, the period right, and the cut is found where it lies."""
+    found = twins[seed]
     assert found.estimates["noise"].value == pytest.approx(0.069e-3, rel=0.25)
     assert found.estimates["period"].value == pytest.approx(PERIOD_S, abs=1e-4)
     (cut,) = cuts(found)
