@@ -21,7 +21,7 @@ GENERIC = {"correlated_residuals", "law_rejected", "not_converged", "laws_not_se
 def verdict(*, z: float, named: bool = False, refused: bool = False) -> Verdict:
     """Return a verdict on one estimate."""
     given = {} if refused else {"period": Given(z, 1.0, 1.0)}
-    return Verdict("made up", 0, given, (), (), refused, named, 0.0)
+    return Verdict("made up", 0, given, (), (), refused, named, 0.0, 1000, "standard")
 
 
 def test_linear_drag_follows_the_solution_by_hand() -> None:
@@ -102,7 +102,10 @@ def test_a_verdict_is_one_of_four(one: Verdict, word: str) -> None:
 
 def test_a_huge_uncertainty_does_not_pass() -> None:
     """A kind to be cured is beyond the limits where its uncertainty is ten times its error."""
-    wide = [Verdict("made up", seed, {"period": Given(0.1, 1.0, 1.0)}, (), (), False, False, 0.0) for seed in range(20)]
+    wide = [
+        Verdict("made up", seed, {"period": Given(0.1, 1.0, 1.0)}, (), (), False, False, 0.0, 1000, "standard")
+        for seed in range(20)
+    ]
     assert Line(PLAIN[0], wide).wide[0] == pytest.approx(10.0)
     assert not Line(replace(PLAIN[0], cure=True), wide).holds
 

@@ -15,8 +15,6 @@ from acquisition.block import UNITS, Block
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
 from acquisition.source import SourceInfo
-from pipeline.analyse import analyse
-from pipeline.errors import TrackError
 from springmass.runs.loading import load
 from storage.errors import RunDamaged, WriteFailed
 from storage.run_file.reading import open_run
@@ -90,9 +88,3 @@ def test_two_quantities_make_no_run(tmp_path: Path) -> None:
     with pytest.raises(WriteFailed, match="samples of angle were demanded, got voltage from sample 100"):
         write_run(tmp_path / "run.h5", [block("angle"), block("voltage", first=100)], INFO)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_an_angle_is_not_analysed_as_a_length(tmp_path: Path) -> None:
-    """Spring constants of radians would be numbers without sense."""
-    with pytest.raises(TrackError, match="a length in m so far, got angle in rad"):
-        analyse(load(write_run(tmp_path / "run.h5", [block()], INFO)).track)
