@@ -11,6 +11,7 @@ from tests.trials.troubles.judge import try_one
 from tests.trials.troubles.kinds import TROUBLES
 from tests.trials.troubles.table import as_text, summed, total
 
+# Times are in the table, where a kind beyond the limit is marked; no test hangs on a machine's speed.
 # Two records of each kind by default, so that the three tiers take a few minutes; SPRINGMASS_TRIALS=20 for the whole.
 SEEDS = min(20, int(os.environ.get("SPRINGMASS_TRIALS", "2")))
 WRONG, ANY_KIND, RIGHT_OR_NAMED = 0.01, 0.1, 0.95
@@ -29,4 +30,3 @@ def test_no_number_is_confidently_wrong(tier: str) -> None:
     assert not [line.kind.name for line in lines if line.count("confident wrong") > max(ANY_KIND * line.n, 1)]
     assert len(verdicts) - wrong - refused >= RIGHT_OR_NAMED * len(verdicts)
     assert not [line.kind.name for line in lines if line.too_wide]
-    assert not [line.kind.name for line in lines if line.too_slow]
