@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from acquisition.decoders.family import Family
 from acquisition.errors import SensorError
+from acquisition.extensions import entry_points_of, load_entry
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -144,17 +145,9 @@ def _checked(name: str, found: Any) -> Family:
 
 
 def _entry_points() -> dict[str, EntryPoint]:
-    from importlib.metadata import entry_points  # costs more than all the rest of this module
-
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
+    return entry_points_of(GROUP)
 
 
 def _load(entry: EntryPoint) -> Family:
-    try:
-        return _checked(entry.name, entry.load())
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        raise SensorError(
-            f"sensor {entry.name!r} ({entry.value}): cannot be loaded ({type(error).__name__}: {reason}); "
-            "repair or remove the package that brings it"
-        ) from error
+    found = load_entry(entry, f"sensor {entry.name!r}", SensorError, lambda found: _checked(entry.name, found))
+    return cast(Family, found)

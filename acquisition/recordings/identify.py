@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
+from acquisition.extensions import entry_points_of, load_entry
 from acquisition.recordings.base import (
     HEAD_BYTES,
     Format,
@@ -197,19 +197,9 @@ def _built_in(name: str) -> Format:
     return cast(Format, import_module(f"acquisition.recordings.families.{_TABLE[name]}").FORMAT)
 
 
-@cache
 def _entry_points() -> dict[str, EntryPoint]:
-    from importlib.metadata import entry_points  # costs more than all the rest of this module
-
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
+    return entry_points_of(GROUP)
 
 
 def _load(entry: EntryPoint) -> Format:
-    try:
-        return cast(Format, entry.load())
-    except Exception as error:
-        reason = " ".join(str(error).split())
-        raise AcquisitionError(
-            f'format "{entry.name}" ({entry.value}): cannot be loaded ({type(error).__name__}: {reason}); '
-            "repair or remove the package that brings it"
-        ) from error
+    return cast(Format, load_entry(entry, f'format "{entry.name}"', AcquisitionError))
