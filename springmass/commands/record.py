@@ -8,8 +8,9 @@ import os
 import queue
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,14 +27,16 @@ from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.commands.ports import name_sensors
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
+from springmass.page.process import PAGE, PageProcess
 from springmass.runs.analysing import made_now
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.session.console import Console
+from springmass.session.operator import Closed, Operator
 from springmass.session.output import default_name, demand_new
-from springmass.session.page_process import PAGE, PageProcess
 from springmass.session.session import BYTES_PER_READ, Ended, Sensor, Session, Trigger
 from springmass.session.simulated_bench import REST_M, Release, bench_position
 from springmass.session.stops import Stops
+from springmass.session.trigger import Disarmed
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.look import look_of
 from springmass.terminal.recording import ProgressLine
@@ -82,10 +85,18 @@ def run(options: argparse.Namespace) -> int:
         )
         console = Console(clock, lambda error: session.failures.note("stderr", error))
         try:
-            ended = _record(session, options, log, console, bench, beside)
+            page = _page(options, log, session, beside) if options.page else None
+            ended = _record(session, options, log, console, bench, page)
             session.stop()
             log = ended.log
-            return _built(ended, out, session, console)
+            code, run_file = _built(ended, out, session, console)
+            if page is not None and run_file is not None and ended.by == PAGE:
+                page.tell("built", run=str(run_file))
+                page.attend()
+            return code
+        except Closed:
+            console.line("nothing was recorded: the page was closed before")
+            return OK
         except KeyboardInterrupt:
             if not os.path.lexists(log):
                 raise
@@ -96,8 +107,8 @@ def run(options: argparse.Namespace) -> int:
             session.stop()
 
 
-def _built(ended: Ended, out: Path, session: Session, console: Console) -> int:
-    """Build the run file, say what became of the recording, and return the exit code."""
+def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple[int, Path | None]:
+    """Build the run file, say what became of the recording, and return the exit code and the first run's file."""
     log, status = ended.log, ended.status
     if status.astray:
         console.line(f"springmass: {status.astray} during the recording; it is {log}")
@@ -117,14 +128,14 @@ def _built(ended: Ended, out: Path, session: Session, console: Console) -> int:
         )
     except Exception as error:
         console.line(f"springmass: the run file was not built ({one_line(error)}); {_what_to_do(log)}")
-        return SENSOR if status.error or isinstance(error, WriteFailed) else UNREADABLE
+        return SENSOR if status.error or isinstance(error, WriteFailed) else UNREADABLE, None
     for line in report.describe():
         console.line(line)
     if not report.log_removed:
         console.line(f"{log}: the log stays")
     if console.terminal:
         console.line(f"next: springmass analyse {shlex.quote(str(report.runs[0].path))}")
-    return _exit_code(ended, report, session, console)
+    return _exit_code(ended, report, session, console), report.runs[0].path
 
 
 def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: Console) -> int:
@@ -167,8 +178,8 @@ def _fill_standard_streams() -> None:
 
 def _demand_sense(options: argparse.Namespace) -> None:
     """Refuse options that would do nothing without another."""
-    for name, needed in (("ruler", "still"), ("pre", "trigger")):
-        if getattr(options, name) not in (None, []) and getattr(options, needed) is None:
+    for name, needed in (("ruler", "still"), ("pre", "trigger"), ("ready", "page"), ("lan", "page")):
+        if getattr(options, name) not in (None, [], False) and getattr(options, needed) in (None, False):
             raise ProgramError(f"--{name} does nothing without --{needed}; name both or neither", USAGE)
     for name, least, greatest, unit in (("roll_mb", 1.0, 1e9, "MB"), ("roll_hours", 1e-4, 1e5, "h")):
         value, option = getattr(options, name), name.replace("_", "-")
@@ -182,40 +193,82 @@ def _record(
     log: Path,
     console: Console,
     bench: Release,
-    beside: contextlib.ExitStack,
+    page: PageProcess | None,
 ) -> Ended:
-    """Run the session; what goes on beside it until the run file is built is entered into ``beside``."""
+    """Run the session, with a page from before its beginning to its end."""
     session.listen(console.line)
-    rest = None if options.still is None else _rest(session, options.still, options.ruler, console)
-    trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
-    bench.after(0.0 if trigger is None else trigger.keep_s + 0.5)
-    look = look_of(sys.stderr)
-    with marks_by_keys(watched=look.terminal) as typed:
-        marks: queue.SimpleQueue[str] | None = typed
-        page = None
-        if options.page:
-            marks = queue.SimpleQueue() if marks is None else marks
-            process = PageProcess(log, _page_options(options), marks, session.stops, session.failures)
-            page = beside.enter_context(process)
-        show = ProgressLine(console, look, trace=not options.no_trace, keys=typed is not None)
-        try:
-            return session.record(
+    operator = None if page is None else Operator(session, page, log)
+    try:
+        if operator is not None:
+            operator.begin()
+        rest = None if options.still is None else _rest(session, options.still, options.ruler, console)
+        trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
+        bench.after(0.0 if trigger is None else trigger.keep_s + 0.5)
+        look = look_of(sys.stderr)
+        with marks_by_keys(watched=look.terminal) as typed:
+            marks = page.marks if page is not None and typed is None else typed
+            if page is not None and typed is not None:
+                page.marks = typed
+            show = ProgressLine(console, look, trace=not options.no_trace, keys=typed is not None)
+            record = partial(
+                session.record,
                 log,
                 seconds=options.seconds,
-                trigger=trigger,
-                rest=rest,
                 progress=show,
                 marks=marks,
                 roll=_roll(options),
             )
-        finally:
-            show.end()
-            if page is not None:
-                page.ended()
+            try:
+                ended = _operated(record, operator, rest, trigger, console, bench, ready=options.ready)
+            finally:
+                show.end()
+    finally:
+        if operator is not None:
+            operator.end()
+    if page is not None:
+        page.tell("ended", by=ended.by)
+        if ended.by != PAGE:
+            page.ended()
+    return ended
+
+
+def _operated(
+    record: Callable[..., Ended],
+    operator: Operator | None,
+    rest: StillPoint | None,
+    trigger: Trigger | None,
+    console: Console,
+    bench: Release,
+    *,
+    ready: bool,
+) -> Ended:
+    """Record at once, or as is asked for on the page."""
+    if operator is None:
+        return record(trigger=trigger, rest=rest)
+    operator.rest = rest
+    if ready:
+        console.line("ready: the recording begins on the page")
+    while True:
+        if ready:
+            trigger = operator.prepare()
+            bench.after(0.0 if trigger is None else trigger.keep_s + 0.5)
+        changed = (lambda: False) if trigger is None else operator.armed(trigger)
+        try:
+            return record(trigger=trigger, rest=operator.rest, begun=operator.recording, changed=changed)
+        except Disarmed:
+            ready = True  # a trigger of the command line, too, is given up on the page
+
+
+def _page(options: argparse.Namespace, log: Path, session: Session, beside: contextlib.ExitStack) -> PageProcess:
+    """Start the page beside the recording."""
+    marks: queue.SimpleQueue[str] = queue.SimpleQueue()
+    return beside.enter_context(PageProcess(_page_options(options), log, marks, session.stops, session.failures))
 
 
 def _page_options(options: argparse.Namespace) -> list[str]:
-    given = ["--page-port", str(options.page_port), "--want-us", str(options.want_us)]
+    given = ["--page-port", str(options.page_port)]
+    given += [] if options.want_us is None else ["--want-us", str(options.want_us)]
+    given += ["--lan"] if options.lan else []
     return [*given, "--no-browser"] if options.no_browser else given
 
 
@@ -303,8 +356,11 @@ def _simulated(
     if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):
         got = ", ".join(f"{each:g}" for each in options.ruler)
         raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that", USAGE)
+    waits = options.still is not None or options.ready
     position = bench_position(
-        read_scene(options.simulate), where=str(options.simulate), release=None if options.still is None else bench
+        read_scene(options.simulate),
+        where=str(options.simulate),
+        release=bench if waits else None,
     )
     rate = options.rate_hz or family.rate_hz
     model = VirtualSensor(rate_hz=rate, crystal_ppm=options.crystal_ppm)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from acquisition.block import Block
+from acquisition.live.calibration import Calibration
 from springmass.page.view import View
 from springmass.runs.loading import Loaded
 from storage.errors import StorageError
@@ -46,6 +49,7 @@ class LogFeed:
             chains[0].timebase.rate_hz,
             [f"{sensor.channel}: {sensor.family}" for sensor in header.sensors],
             simulated=header.kind == "simulated",
+            calibration=_calibration(header.sensors[0].calibration),
         )
         self.scene = header.scene
         self._late: list[Record] = []
@@ -81,6 +85,15 @@ class LogFeed:
     def _mark(self, record: Record) -> None:
         t = self.view.series[0].time_of(record.mono_ns)
         self.view.marks.append((0.0 if math.isnan(t) else t, record.text()))
+
+
+def _calibration(numbers: Mapping[str, Any] | None) -> str:
+    """Return in words how the first sensor's distances are calibrated."""
+    found = Calibration.from_mapping(numbers or {})
+    if not (found.u_scale or found.u_offset_m):
+        return "not calibrated"
+    offset = f"offset {found.offset_m * 1e3:.1f} mm"
+    return f"by ruler: {offset}, scale {found.scale:.4f}" if found.u_scale else f"by ruler: {offset}"
 
 
 def view_of(loaded: Loaded) -> View:

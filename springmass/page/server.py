@@ -6,57 +6,86 @@ import asyncio
 import json
 import math
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from springmass.page.security import Gate
+from springmass.page.desk import Desk
+from springmass.page.security import ROLE, Gate
+from springmass.page.sharing import code_svg
 from springmass.page.view import View
-from springmass.page.watching import Watcher
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
     from starlette.websockets import WebSocket
 
-__all__ = ["Controls", "application", "serve"]
+__all__ = ["Opening", "application", "serve"]
 
 STATIC = Path(__file__).parent / "static"
-FRAME_S = 1 / 30
-MANY, MANY_FRAME_S = 4, 0.1
-"""More viewers than these get their samples ten times a second."""
+TURN_S = 0.016
+"""Between two looks at the log: a sample waits no longer than a screen's frame."""
+MANY, EVERY = 4, 6
+"""More viewers than these get their samples at every sixth look, ten times a second."""
 STATE_S = 0.5
 LAST_S = 1.5
 """So much longer it serves when it shall end: whoever looks sees that the run has."""
+ALONE_S = 30.0
+"""So long a page whose run is built waits for somebody to look at it again."""
 MOST_VIEWERS = 32
 LONGEST_MESSAGE = 4096
 """Bytes that a browser may send at a time."""
-LONGEST_MARK = 500
+LONGEST_TEXT = 500
+LIMITS = {"known_m": (0.01, 20.0), "threshold_m": (1e-4, 1.0), "keep_s": (0.0, 60.0)}
+"""Of the numbers that may be asked with, m and s."""
 
-Controls = Callable[[str, str], None]
-"""Takes "mark" with its text, or "stop" with none: to the recording, which acknowledges through its log."""
+
+@dataclass
+class Opening:
+    """Where and to whom the page opens.
+
+    Parameters
+    ----------
+    port : int
+        0 for any that is free.
+    network : str
+        This computer's address in the local network, for viewers; empty: for nobody but this computer.
+    secret, used
+        As of :class:`springmass.page.security.Gate`.
+    opened : callable
+        Takes the port, the address to open (None where it was used before), and that for viewers: the page answers.
+    was_used : callable
+        Called when the controller's link is.
+    """
+
+    port: int = 0
+    network: str = ""
+    secret: str = ""
+    used: bool = False
+    opened: Callable[[int, str | None, str], None] = lambda _port, _address, _network: None
+    was_used: Callable[[], None] = lambda: None
 
 
-def application(view: View, watcher: Watcher, poll: Callable[[], None], controls: Controls | None) -> Starlette:
+def application(desk: Desk, share: Callable[[], str] = lambda: "", polled: Callable[[int], None] = print) -> Starlette:
     """Return the page as an ASGI application, without its gate.
 
     Parameters
     ----------
-    view : View
-    watcher : Watcher
-    poll : callable
-        Brings the view up to date; called thirty times a second, also while nobody looks.
-    controls : callable or None
-        None where there is nothing to control.
+    desk : Desk
+    share : callable
+        Returns the address for viewers; empty where there is none.
+    polled : callable
+        Called after every look at the log, with how many look at the page.
     """
     import contextlib
     from collections.abc import AsyncIterator
 
     from starlette.applications import Starlette
-    from starlette.responses import FileResponse
+    from starlette.responses import FileResponse, PlainTextResponse, Response
     from starlette.routing import Mount, Route, WebSocketRoute
     from starlette.staticfiles import StaticFiles
 
-    server = _Server(view, watcher, poll, controls)
+    server = _Server(desk, share, polled)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -68,11 +97,24 @@ def application(view: View, watcher: Watcher, poll: Callable[[], None], controls
             with contextlib.suppress(asyncio.CancelledError):
                 await polling
 
-    async def page(_: Any) -> FileResponse:
+    async def page(_: Any) -> Response:
         return FileResponse(STATIC / "page.html")
+
+    async def report(_: Any) -> Response:
+        made = None if desk.after is None else desk.after.report
+        if made is None:
+            return PlainTextResponse("springmass: no report has been made; the page makes one on O\n", 404)
+        return FileResponse(made, media_type="text/html")
+
+    async def code(_: Any) -> Response:
+        if not share():
+            return PlainTextResponse("springmass: the page is not open to viewers; --lan opens it\n", 404)
+        return Response(code_svg(share()), media_type="image/svg+xml")
 
     routes = [
         Route("/", page),
+        Route("/v1/report", report),
+        Route("/v1/code.svg", code),
         WebSocketRoute("/v1/run", server.attend),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
@@ -80,25 +122,35 @@ def application(view: View, watcher: Watcher, poll: Callable[[], None], controls
 
 
 class _Server:
-    def __init__(self, view: View, watcher: Watcher, poll: Callable[[], None], controls: Controls | None) -> None:
-        self._view, self._watcher, self._poll, self._controls = view, watcher, poll, controls
+    def __init__(self, desk: Desk, share: Callable[[], str], polled: Callable[[int], None]) -> None:
+        self._desk, self._share, self._polled = desk, share, polled
         self._viewers = 0
+        self._turn = 0
+        self._turned = asyncio.Event()
         self._motion: dict[str, Any] = {}
         self._motion_text = self._state_text = ""
+        self._frames: dict[tuple[int, int, int], bytes] = {}
 
     async def poll_often(self) -> None:
-        """Bring the view up to date as long as the page is served; texts are made once for all who look."""
-        due_s = 0.0
+        """Bring the view up to date as long as the page is served; texts and frames are made once for all who look."""
+        due_s, bench = 0.0, None
         while True:
-            self._poll()
-            if self._watcher.message is not self._motion:
-                self._motion = self._watcher.message
+            self._desk.poll()
+            watcher = self._desk.watcher
+            if watcher is not None and watcher.message is not self._motion:
+                self._motion = watcher.message
                 self._motion_text = _json(self._motion)
-            if due_s <= 0.0:
-                due_s = STATE_S
-                self._state_text = _json(self._view.state())
-            due_s -= FRAME_S
-            await asyncio.sleep(FRAME_S)
+            if due_s <= 0.0 or bench is not self._desk.bench:
+                due_s, bench = STATE_S, self._desk.bench
+                self._state_text = _json({"type": "state", **self._desk.state()})
+            due_s -= TURN_S
+            self._frames.clear()
+            self._turn += 1
+            if self._viewers <= MANY or self._turn % EVERY == 0:
+                turned, self._turned = self._turned, asyncio.Event()
+                turned.set()
+            self._polled(self._viewers)
+            await asyncio.sleep(TURN_S)
 
     async def attend(self, socket_: WebSocket) -> None:
         """Serve one browser: what it has not seen yet is taken from the view whenever it has taken the last."""
@@ -120,39 +172,101 @@ class _Server:
             sending.cancel()
 
     async def _send(self, socket_: WebSocket) -> None:
-        view = self._view
-        await socket_.send_text(_json(view.hello(controls=self._controls is not None)))
-        sent, state, motion = [0] * len(view.series), "", ""
+        view: View | None = None
+        sent, state, motion = [0], "", ""
         while True:
-            for number, series in enumerate(view.series):
-                while sent[number] < len(series):
-                    message = series.message(number, sent[number])
+            if self._desk.view is not None and view is not self._desk.view:
+                view, sent, motion = self._desk.view, [0] * len(self._desk.view.series), ""
+                await socket_.send_text(_json(self._hello(view, socket_.scope[ROLE])))
+            for number in range(0 if view is None else len(sent)):
+                while view is not None and sent[number] < len(view.series[number]):
+                    message = self._frame(view, number, sent[number])
                     sent[number] += (len(message) - 16) // 16
                     await socket_.send_bytes(message)
-            if state is not self._state_text and state != self._state_text:
+            if state is not self._state_text and state != self._state_text and view is not None:
                 state = self._state_text
                 await socket_.send_text(state)
-            if motion is not self._motion_text:
+            if motion is not self._motion_text and view is self._desk.view:
                 motion = self._motion_text
                 await socket_.send_text(motion)
-            await asyncio.sleep(FRAME_S if self._viewers <= MANY else MANY_FRAME_S)
+            await self._turned.wait()
+
+    def _frame(self, view: View, number: int, first: int) -> bytes:
+        key = (id(view), number, first)
+        if key not in self._frames:
+            self._frames[key] = view.series[number].message(number, first)
+        return self._frames[key]
+
+    def _hello(self, view: View, role: str) -> dict[str, Any]:
+        controls = role == "controller" and self._desk.controls is not None
+        share = self._share()
+        return {**view.hello(controls=controls), "role": role, "share": share}
 
     async def _take(self, socket_: WebSocket, text: str) -> None:
         """Do what a browser asks for; what it may not ask for closes the connection."""
         try:
             asked = json.loads(text)
-            kind = asked["type"]
-            if kind == "region":
-                low, high = float(asked["from"]), float(asked["to"])
-                if not (math.isfinite(low) and math.isfinite(high)):
-                    raise ValueError(text)
-                await socket_.send_text(_json(await asyncio.to_thread(self._watcher.region, low, high)))
-            elif kind in ("mark", "stop") and self._controls is not None:
-                self._controls(kind, " ".join(str(asked.get("text", "")).split())[:LONGEST_MARK])
+            if asked["type"] == "region":
+                low, high = _number(asked, "from"), _number(asked, "to")
+                watcher = self._desk.watcher
+                if watcher is not None:
+                    await socket_.send_text(_json(await asyncio.to_thread(watcher.region, low, high)))
+            elif socket_.scope[ROLE] == "controller":
+                self._act(asked)
             else:
                 raise ValueError(text)
         except (ValueError, KeyError, TypeError, AttributeError):
             await socket_.close(1003)
+
+    def _act(self, asked: Mapping[str, Any]) -> None:
+        """Hand on what may be asked now; what may be asked at another time is passed over: the page shows the state."""
+        kind, desk = str(asked["type"]), self._desk
+        if kind not in KINDS:
+            raise ValueError(kind)
+        checked: dict[str, Any] = {"type": kind}
+        for name in KINDS[kind]:
+            checked[name] = _text(asked) if name == "text" else _number(asked, name)
+        if not desk.may(kind):
+            return
+        if desk.after is None:
+            if desk.controls is not None:
+                desk.controls(checked)
+        elif kind == "report":
+            desk.after.make_report()
+        elif kind == "note":
+            desk.after.note(checked["text"])
+        elif kind == "discard":
+            desk.after.discard()
+        elif kind == "close":
+            desk.closed = True
+
+
+KINDS: dict[str, tuple[str, ...]] = {
+    "zero": (),
+    "ruler": ("known_m",),
+    "arm": ("threshold_m", "keep_s"),
+    "disarm": (),
+    "record": (),
+    "mark": ("text",),
+    "note": ("text",),
+    "stop": (),
+    "report": (),
+    "discard": (),
+    "close": (),
+}
+"""What the controller may ask for, and with what."""
+
+
+def _number(asked: Mapping[str, Any], name: str) -> float:
+    value = float(asked[name])
+    low, high = LIMITS.get(name, (-1e12, 1e12))
+    if not (math.isfinite(value) and low <= value <= high):
+        raise ValueError(name)
+    return value
+
+
+def _text(asked: Mapping[str, Any]) -> str:
+    return " ".join(str(asked.get("text", "")).split())[:LONGEST_TEXT]
 
 
 def _json(content: Any) -> str:
@@ -168,28 +282,15 @@ def _finite(content: Any) -> Any:
     return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
-def serve(
-    view: View,
-    watcher: Watcher,
-    poll: Callable[[], None],
-    controls: Controls | None,
-    *,
-    port: int,
-    ready: Callable[[str], None],
-    until: Callable[[], bool],
-) -> None:
-    """Serve the page on this computer until somebody ends it.
+def serve(desk: Desk, opening: Opening, *, until: Callable[[], bool]) -> None:
+    """Serve the page until somebody ends it.
 
     Parameters
     ----------
-    view, watcher, poll, controls
-        As of :func:`application`.
-    port : int
-        0 for any that is free.
-    ready : callable
-        Takes the address to open, with its token, once the page answers.
+    desk : Desk
+    opening : Opening
     until : callable
-        Whether it shall end; asked as often as the view is brought up to date.
+        Whether it shall end; asked at every look at the log.
 
     Raises
     ------
@@ -198,28 +299,37 @@ def serve(
     """
     import uvicorn
 
-    with socket.create_server(("127.0.0.1", port)) as listener:
+    with socket.create_server(("0.0.0.0" if opening.network else "127.0.0.1", opening.port)) as listener:
         port = listener.getsockname()[1]
-        gate = Gate(application(view, watcher, lambda: polled(), controls), port)
+        hosts = frozenset({opening.network} if opening.network else ())
+        gate: Gate
+        network = ""
+        told, left_s, alone_s = False, LAST_S, ALONE_S
+
+        def polled(viewers: int) -> None:
+            nonlocal told, left_s, alone_s
+            if not told:
+                told = True
+                token = gate.token
+                opening.opened(port, None if token is None else f"http://127.0.0.1:{port}/?token={token}", network)
+            if gate.token is None and not opening.used:
+                opening.used = True
+                opening.was_used()
+            left_s -= TURN_S if until() else 0.0
+            after = desk.after is not None and desk.after.ours
+            alone_s = alone_s - TURN_S if after and not viewers else ALONE_S
+            server.should_exit = server.should_exit or desk.closed or left_s <= 0.0 or alone_s <= 0.0
+
+        gate = Gate(application(desk, lambda: network, polled), port, opening.secret, hosts, used=opening.used)
+        network = f"http://{opening.network}:{port}/?token={gate.viewers_token}" if opening.network else ""
         config = uvicorn.Config(
             gate,
             log_level="error",
             access_log=False,
             ws_max_size=LONGEST_MESSAGE,
             ws_ping_interval=20,
+            ws_per_message_deflate=False,  # a few samples are no shorter for it, and it costs more than all the rest
             timeout_graceful_shutdown=2,
         )
         server = uvicorn.Server(config)
-        told, left_s = False, LAST_S
-
-        def polled() -> None:
-            nonlocal told, left_s
-            poll()
-            if not told:
-                told = True
-                ready(f"http://127.0.0.1:{port}/?token={gate.token}")
-            if until():
-                left_s -= FRAME_S
-            server.should_exit = server.should_exit or left_s <= 0.0
-
         server.run(sockets=[listener])

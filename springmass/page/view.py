@@ -83,6 +83,8 @@ class View:
         Where the times come from.
     simulated : bool
         Simulated data never pass for measured ones.
+    calibration : str
+        How distances were calibrated, in words; empty where nobody says.
     series : list of Series
         One a sensor.
     session : str
@@ -105,6 +107,7 @@ class View:
     unit: str = "m"
     clock: ClockKind = "device"
     simulated: bool = False
+    calibration: str = ""
     series: list[Series] = field(default_factory=list)
     session: str = field(default_factory=lambda: secrets.token_hex(8))
     marks: list[tuple[float, str]] = field(default_factory=list)
@@ -117,9 +120,10 @@ class View:
 
     def hello(self, *, controls: bool) -> dict[str, Any]:
         """Return the first message to whoever looks."""
-        names = ("session", "source", "name", "title", "rate_hz", "sensors", "quantity", "unit", "simulated")
+        names = ("session", "source", "name", "title", "rate_hz", "sensors", "quantity", "unit", "simulated", "clock")
         told = {name: getattr(self, name) for name in names}
-        return {"type": "hello", "version": VERSION, **told, "controls": controls}
+        more = {"calibration": self.calibration, "controls": controls}
+        return {"type": "hello", "version": VERSION, **told, **more}
 
     def state(self) -> dict[str, Any]:
         """Return where the run stands, as the log has it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
 from pipeline.track import F8, Track
 from springmass.page.stopping import ALPHA, more_seconds, widening
+from springmass.page.telling import Need, seconds_to_tell
 from springmass.page.view import View
 
 __all__ = ["Watcher", "motion_of"]
@@ -29,19 +31,23 @@ CURVE_POINTS = 200
 LAST_WINDOWS = 4
 U_CLOCK_REACH = 2.0
 """So many u of a fixed, unknown rate of the clock: nobody stops on it."""
+WANTED = 4e-5
+"""Of the period: a little more than a crystal's 50 ppm leave, so that it can be reached."""
+MOST_POINTS = 600
+"""Amplitudes of a long record are told so many."""
 SPECTRUM_SAMPLES = 1 << 13
 SPECTRUM_POINTS = 1024
 
 
-def motion_of(track: Track, scene: Scene, wanted_u_s: float) -> dict[str, Any]:
+def motion_of(track: Track, scene: Scene, wanted_u_s: float | None = None) -> dict[str, Any]:
     """Analyse a record and return the message on its motion.
 
     Parameters
     ----------
     track : Track
     scene : Scene
-    wanted_u_s : float
-        Standard uncertainty of the period that is aimed at, s.
+    wanted_u_s : float, optional
+        Standard uncertainty of the period that is aimed at, s; left out, 40 ppm of it.
     """
     message: dict[str, Any] = {"type": "motion", "why": "", "spectrum": spectrum(track)}
     try:
@@ -59,15 +65,17 @@ def motion_of(track: Track, scene: Scene, wanted_u_s: float) -> dict[str, Any]:
     return {**message, **_oscillation(analysis, motion, wanted_u_s)}
 
 
-def _oscillation(analysis: Analysis, motion: Oscillation, wanted_u_s: float) -> dict[str, Any]:
+def _oscillation(analysis: Analysis, motion: Oscillation, aim_s: float | None) -> dict[str, Any]:
     damping, windows = motion.damping, motion.demodulated
     kept = np.flatnonzero(damping.scatter.kept)
+    told = kept[:: -(-kept.size // MOST_POINTS)]
     start, end = damping.t0, float(np.nanmax(analysis.track.t))
     times = np.linspace(start, end, CURVE_POINTS)
     estimates = {name: analysis.estimates[name] for name in NAMES if name in analysis.estimates}
     if (now := _now(windows.amplitude[kept], damping.scatter.u[kept])) is not None:
         estimates["amplitude_now"] = now
     period, frequency = analysis.estimates["period"], motion.phase.angular_frequency
+    wanted_u_s = WANTED * period.value if aim_s is None else aim_s
     # What the samples leave open shrinks with the recording; what the sensor's clock may be off does not.
     u_samples = min(period.value * frequency.u / frequency.value, period.u)
     u_clock = math.sqrt(period.u**2 - u_samples**2)
@@ -79,9 +87,9 @@ def _oscillation(analysis: Analysis, motion: Oscillation, wanted_u_s: float) -> 
     return {
         "estimates": {name: _told(each) for name, each in estimates.items()},
         "amplitude": {
-            "t": windows.t[kept].tolist(),
-            "value": windows.amplitude[kept].tolist(),
-            "u": damping.scatter.u[kept].tolist(),
+            "t": windows.t[told].tolist(),
+            "value": windows.amplitude[told].tolist(),
+            "u": damping.scatter.u[told].tolist(),
         },
         "laws": [
             {"name": name, "t": times.tolist(), "value": fit.amplitude(times - damping.t0).tolist()}
@@ -95,13 +103,19 @@ def _oscillation(analysis: Analysis, motion: Oscillation, wanted_u_s: float) -> 
         "stop": {
             "wanted_u_s": wanted_u_s,
             "u_s": period.u,
+            "u_samples_s": u_samples,
             "u_clock_s": u_clock,
             "covers": 1.0 - ALPHA,
             "low": period.value - reach,
             "high": period.value + reach,
             "more_s": need if math.isfinite(need) else None,
+            "laws": _need(seconds_to_tell(damping, end)),
         },
     }
+
+
+def _need(need: Need | None) -> dict[str, Any] | None:
+    return None if need is None else asdict(need)
 
 
 def _now(amplitude: F8, u: F8) -> Estimate | None:
@@ -159,8 +173,8 @@ class Watcher:
     scene : mapping or None
         What the recording says of its bench.
     clock : Clock
-    wanted_u_s : float
-        Of the period, s.
+    wanted_u_s : float or None
+        Of the period, s; None: 40 ppm of it.
 
     Attributes
     ----------
@@ -168,7 +182,7 @@ class Watcher:
         The latest; its ``count`` tells one from the one before.
     """
 
-    def __init__(self, view: View, scene: Mapping[str, Any] | None, clock: Clock, wanted_u_s: float) -> None:
+    def __init__(self, view: View, scene: Mapping[str, Any] | None, clock: Clock, wanted_u_s: float | None) -> None:
         self._view = view
         self._scene = Scene.from_mapping(scene or {}, where="the recording's scene")
         self._clock = clock

@@ -120,6 +120,11 @@ class Tee:
         with self._lock:
             self._kept = deque()
 
+    def let_go(self) -> None:
+        """Keep reads no longer."""
+        with self._lock:
+            self._kept = None
+
     def forget(self, before_ns: int) -> None:
         """Keep no reads that are older."""
         with self._lock:

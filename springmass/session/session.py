@@ -21,7 +21,7 @@ import numpy as np
 
 from acquisition.block import Block
 from acquisition.clock import Clock
-from acquisition.live.calibration import StillPoint, against_ruler, from_still
+from acquisition.live.calibration import Calibration, StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortReader
 from springmass import __version__
 from springmass.errors import SENSOR, USAGE, ProgramError
@@ -31,8 +31,8 @@ from springmass.session.progress import SECOND_NS, Progress, Shown, progress_of
 from springmass.session.reads import Tee
 from springmass.session.sensors import Sensor
 from springmass.session.stops import Stops
-from springmass.session.trigger import Trigger, Watch
-from storage.errors import WriteFailed
+from springmass.session.trigger import Disarmed, Trigger, Watch
+from storage.errors import StorageError, WriteFailed
 from storage.recorder import Recorder, RecorderStatus
 from storage.wire_log.appending import Roll
 from storage.wire_log.records import LogHeader
@@ -157,11 +157,33 @@ class Session:
         One known distance sets the offset, two or more the scale as well.
         """
         before = self.sensors[0].calibration
-        calibration = against_ruler(tuple(points), tuple(known_m), u_known_m, before)
+        self.calibrated(against_ruler(tuple(points), tuple(known_m), u_known_m, before))
+        return self.sensors[0].calibration.restated(points[-1], before)
+
+    def calibrated(self, calibration: Calibration) -> None:
+        """State the first sensor's distances by another calibration from here on."""
         self.sensors[0] = replace(self.sensors[0], calibration=calibration)
         self._chains[0].calibration = calibration
         self.poll(0.0)  # what was decoded with the calibration before
-        return calibration.restated(points[-1], before)
+
+    def now_ns(self) -> int:
+        """Return the clock's time, ns."""
+        return self._clock.now_ns()
+
+    def preview(self, log: Path) -> Recorder | None:
+        """Write what comes from here on to a log that is only looked at; None, and a failure, where none can be begun.
+
+        The next preview, or the recording, takes its place.
+        """
+        chains = [sensor.chain() for sensor in self.sensors]
+        try:
+            recorder = Recorder(log, self._header(), self._clock)
+        except StorageError as error:
+            self.failures.note("preview", error)
+            return None
+        self._chains = chains
+        self._tee.start(recorder, chains, self._clock.now_ns())
+        return recorder
 
     def record(
         self,
@@ -173,6 +195,8 @@ class Session:
         progress: Callable[[Progress], None] = lambda _: None,
         marks: queue.SimpleQueue[str] | None = None,
         roll: Roll = Roll(),  # noqa: B008, it is frozen
+        begun: Callable[[Path], None] = lambda _: None,
+        changed: Callable[[], bool] = lambda: False,
     ) -> Ended:
         """Record until the seconds are over, the user ends it or the disk takes nothing more.
 
@@ -192,9 +216,15 @@ class Session:
             Marks to put into the run.
         roll : Roll
             When a long log goes on in another file.
+        begun : callable
+            Called with the log's path once reads go there.
+        changed : callable
+            Whether it shall wait for the trigger no longer; asked while it does.
 
         Raises
         ------
+        Disarmed
+            If ``changed`` said so.
         storage.errors.WriteFailed
             If the log cannot be begun.
         KeyboardInterrupt
@@ -206,7 +236,7 @@ class Session:
                 "leave --option temperature_every out",
                 USAGE,
             )
-        since_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, progress)
+        since_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, progress, changed)
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
         self._chains = [sensor.chain() for sensor in self.sensors]
         recorder = Recorder(log, self._header(), self._clock, roll=roll)
@@ -216,6 +246,7 @@ class Session:
             self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
             try:
                 self._tee.start(recorder, self._chains, since_ns)
+                begun(recorder.path)
                 if rest is not None:
                     recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
                 if trigger is not None:
@@ -284,7 +315,13 @@ class Session:
         self._ring(display, self._tee.blocks, start_ns, recorder)
         return "seconds"
 
-    def _wait_for(self, trigger: Trigger, rest: StillPoint | None, progress: Callable[[Progress], None]) -> int:
+    def _wait_for(
+        self,
+        trigger: Trigger,
+        rest: StillPoint | None,
+        progress: Callable[[Progress], None],
+        changed: Callable[[], bool],
+    ) -> int:
         """Wait until the bob moves; return the host's time from which on reads belong to the run."""
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
         keep_ns, start_ns = int(trigger.keep_s * 1e9), self._clock.now_ns()
@@ -298,6 +335,9 @@ class Session:
                     moment_ns = watch.moment_ns(block) if channel == 0 else None
                     if moment_ns is not None:
                         return moment_ns - keep_ns
+                if changed():
+                    self._tee.let_go()
+                    raise Disarmed
                 # A second more than asked for: samples may lie a moment before they are looked at.
                 self._tee.forget(self._clock.now_ns() - keep_ns - SECOND_NS)
                 if self._clock.now_ns() >= tick_ns:

@@ -9,7 +9,11 @@ import numpy as np
 
 from acquisition.block import Block
 
-__all__ = ["Trigger", "Watch"]
+__all__ = ["Disarmed", "Trigger", "Watch"]
+
+
+class Disarmed(Exception):
+    """Somebody would not wait for the trigger any longer."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -128,10 +128,11 @@ def _add_page_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--want-us",
         type=_positive,
-        default=20.0,
         metavar="U",
-        help="uncertainty of the period to record for, in microseconds: the page says how much longer (default 20)",
+        help="uncertainty of the period to record for, in microseconds: the page says how much longer "
+        "(default: 40 ppm of the period)",
     )
+    parser.add_argument("--lan", action="store_true", help="let viewers in the local network look, and not act")
 
 
 def _add_page(parser: argparse.ArgumentParser) -> None:
@@ -222,6 +223,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seconds", type=_positive, metavar="N", help="how long (default: until Ctrl-C)")
     parser.add_argument("--page", action="store_true", help="show the recording in a browser, with marks and stop")
+    parser.add_argument("--ready", action="store_true", help="zero, calibrate, arm, record on the page; needs --page")
     _add_page_options(parser)
     parser.add_argument(
         "--scene", metavar="FILE", help="scene file stored with the run; its air sets the speed of sound"

@@ -27,9 +27,19 @@ SEEN = "() => samples.length && samples[0].count > {count}"
 MOVES = "() => motion && motion.estimates && motion.estimates.period"
 
 
-def answer(page: Page, text: str) -> None:
-    """Have the page's next question answered."""
-    page.once("dialog", lambda dialog: dialog.accept(text))
+def answer(page: Page, *texts: str) -> None:
+    """Answer the page's question."""
+    page.wait_for_selector("#ask[open]")
+    for field, text in zip(page.locator("#ask input").all(), texts, strict=True):
+        field.fill(text)
+    page.keyboard.press("Enter")
+
+
+def act(page: Page, key: str, then: str) -> None:
+    """Press a key once its button is there, and wait for what the recorder says of it."""
+    page.wait_for_selector(f"#actions button[data-key='{key}']:not([hidden])")
+    page.keyboard.press(key)
+    page.wait_for_function(f"() => bench().phase === '{then}'")
 
 
 def cookie_of(address: str) -> str:
@@ -49,18 +59,22 @@ def test_from_opening_to_the_run_file(record: Callable[..., Any], context: Brows
     program = record()
     page = context.new_page()
     page.goto(program.address)
+    page.wait_for_function("() => bench().phase === 'recording'")
     page.wait_for_function(SEEN.format(count=300))
     assert page.inner_text("#source") == "SIMULATED"
     page.wait_for_function(MOVES)
     period = page.evaluate("motion.estimates.period")
     assert period["value"] == pytest.approx(0.7573, abs=0.005)
     assert "Whenever you stop" in page.inner_text("#stopping")
-    answer(page, "lamp on")
     page.keyboard.press("m")
+    answer(page, "lamp on")
     page.wait_for_function("() => state.marks.length === 1")
     assert "lamp on" in page.inner_text("#marks")
-    answer(page, "")
     page.keyboard.press("s")
+    answer(page)
+    page.wait_for_function("() => bench().phase === 'built'")
+    page.keyboard.press("q")
+    answer(page)
     assert program.ended() == 0
     page.wait_for_function("() => !document.getElementById('trouble').hidden")
     assert "has ended" in page.inner_text("#trouble")

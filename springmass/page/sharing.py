@@ -1,0 +1,49 @@
+"""The page on the local network: by which address others reach this computer, and that address as a QR code."""
+
+from __future__ import annotations
+
+import io
+import socket
+
+from springmass.errors import SENSOR, ProgramError
+
+__all__ = ["address_in_network", "code_for_terminal", "code_svg"]
+
+ELSEWHERE = ("192.0.2.1", 9)
+"""An address for documentation (RFC 5737): nothing is sent there, the system only says by which way it would go."""
+
+
+def address_in_network() -> str:
+    """Return this computer's address in the network that it would send by.
+
+    Raises
+    ------
+    ProgramError
+        If it is in none.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+        try:
+            asked.connect(ELSEWHERE)
+        except OSError as error:
+            raise ProgramError(
+                f"--lan: a network was demanded, got none ({error.strerror}); join one, or leave --lan out", SENSOR
+            ) from error
+        return str(asked.getsockname()[0])
+
+
+def code_svg(address: str) -> bytes:
+    """Return an address as a QR code, dark on light with its quiet zone, SVG."""
+    import segno
+
+    made = io.BytesIO()
+    segno.make(address, micro=False).save(made, kind="svg", scale=5, border=4, light="#ffffff", dark="#000000")
+    return made.getvalue()
+
+
+def code_for_terminal(address: str) -> str:
+    """Return an address as a QR code of block characters."""
+    import segno
+
+    made = io.StringIO()
+    segno.make(address, micro=False).terminal(made, compact=True)
+    return made.getvalue()

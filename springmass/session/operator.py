@@ -1,0 +1,178 @@
+"""What somebody does at the bench before a run, asked for on the page: zero, ruler, trigger, record.
+
+It works on the session's own thread, between whose waits it looks what was asked; the reading of the sensors is another
+thread, which none of this can delay. What was done is told to the page after it was done.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from acquisition.errors import CalibrationError
+from acquisition.live.calibration import Calibration, StillPoint, against_ruler
+from springmass.session.session import Session, Trigger
+from storage.errors import WriteFailed
+from storage.recorder import Recorder
+
+__all__ = ["Closed", "Operator", "Page"]
+
+LOOK_S = 0.05
+PREVIEW_NS = 600_000_000_000
+"""So long a log of what is only looked at; then another takes its place, and the first is gone."""
+STILL_S = 3.0
+U_RULER_M = 0.5e-3
+SAME_M = 0.002
+"""Ruler distances that are nearer to one another are the same, measured again."""
+LONGEST_KEEP_S = 60.0
+
+
+class Page(Protocol):
+    """The page, as far as the operator speaks with it."""
+
+    asked: queue.SimpleQueue[dict[str, Any]]
+
+    def tell(self, phase: str, **facts: Any) -> None:
+        """Say where the recording stands."""
+
+
+class Closed(Exception):
+    """The page was closed before anything was recorded."""
+
+
+@dataclass(slots=True)
+class Operator:
+    """Does what is asked on the page until a run begins.
+
+    Parameters
+    ----------
+    session : Session
+        Listening.
+    page : Page
+    log : Path
+        Of the run to come.
+    rest : StillPoint or None
+        Measured before.
+    """
+
+    session: Session
+    page: Page
+    log: Path
+    rest: StillPoint | None = None
+    _folder: Path | None = None
+    _preview: Recorder | None = None
+    _number: int = 0
+    _points: list[StillPoint] = field(default_factory=list)
+    _known_m: list[float] = field(default_factory=list)
+    _base: Calibration | None = None
+
+    def begin(self) -> None:
+        """Let the page see the bench before there is a run: by a log that is only looked at."""
+        if self._folder is None:
+            self._folder = Path(tempfile.mkdtemp(prefix="springmass-"))
+        before, self._number = self._preview, self._number + 1
+        self._preview = self.session.preview(self._folder / f"{self.log.stem}-{self._number}.wire")
+        self._drop(before)
+
+    def end(self) -> None:
+        """Drop what was only looked at; the run has begun, or will not."""
+        self._drop(self._preview)
+        self._preview = None
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder = None
+
+    def prepare(self) -> Trigger | None:
+        """Return when "record" was asked for, with the trigger where it is to wait for one.
+
+        Raises
+        ------
+        Closed
+            If the page was closed.
+        """
+        self._tell("ready")
+        since_ns = self.session.now_ns()
+        while True:
+            self.session.poll(LOOK_S)
+            if self.session.now_ns() - since_ns > PREVIEW_NS:
+                self.begin()
+                self._tell("ready")
+                since_ns = self.session.now_ns()
+            if self.page.asked.empty():
+                continue
+            asked = self.page.asked.get()
+            kind = asked.get("type")
+            if kind == "record":
+                return None
+            if kind == "arm":
+                return Trigger(float(asked["threshold_m"]), min(float(asked["keep_s"]), LONGEST_KEEP_S))
+            if kind == "close":
+                raise Closed
+            if kind in ("zero", "ruler"):
+                self._measure(asked)
+
+    def armed(self, trigger: Trigger) -> Callable[[], bool]:
+        """Say that the trigger is armed; return what tells whether it shall wait no longer."""
+        self._tell("armed", threshold_m=trigger.threshold_m, keep_s=trigger.keep_s)
+
+        def changed() -> bool:
+            while not self.page.asked.empty():
+                kind = self.page.asked.get().get("type")
+                if kind == "close":
+                    raise Closed
+                if kind in ("disarm", "arm", "record"):
+                    return True
+            return False
+
+        return changed
+
+    def recording(self, log: Path) -> None:
+        """Say that the run has begun."""
+        self._tell("recording", log=str(log))
+        self.end()
+
+    def _measure(self, asked: Mapping[str, Any]) -> None:
+        self._tell("still", seconds=STILL_S)
+        try:
+            point = self.session.still(STILL_S)
+            if asked["type"] == "ruler":
+                point = self._against(point, float(asked["known_m"]))
+                self.begin()  # what is looked at begins anew, as it is now stated
+            self.rest = point
+        except CalibrationError as error:
+            self._tell("ready", failed=str(error))
+        else:
+            self._tell("ready")
+
+    def _against(self, point: StillPoint, known_m: float) -> StillPoint:
+        """Calibrate by all distances known so far; each is carried back to what the sensor was before the first."""
+        now = self.session.sensors[0].calibration
+        base = self._base or now
+        measured = base.restated(point, now)
+        kept = [(p, k) for p, k in zip(self._points, self._known_m, strict=True) if abs(k - known_m) >= SAME_M]
+        points, known = (tuple(each) for each in zip(*kept, (measured, known_m), strict=True))
+        calibration = against_ruler(points, known, U_RULER_M, base)
+        self.session.calibrated(calibration)
+        self._base, self._points, self._known_m = base, list(points), list(known)
+        return calibration.restated(measured, base)
+
+    def _tell(self, phase: str, **facts: Any) -> None:
+        log = "" if self._preview is None else str(self._preview.path)
+        told: dict[str, Any] = {"log": log, "run": str(self.log.with_suffix(".h5"))}
+        if self.rest is not None:
+            told |= {"rest_m": self.rest.rest_m, "noise_m": self.rest.noise_m}
+        if self._known_m:
+            told |= {"ruler_m": self._known_m}
+        self.page.tell(phase, **(told | facts))
+
+    @staticmethod
+    def _drop(recorder: Recorder | None) -> None:
+        if recorder is not None:
+            with contextlib.suppress(WriteFailed):  # nobody is to keep it
+                recorder.close()
