@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pipeline.results.compare import SpringRun, compare_springs
     from pipeline.track import Track
     from springmass.api.analysis import Analysis
+    from springmass.api.live import live
     from springmass.api.opening import Run, open_run
     from springmass.api.sources import Comparison, analyse, compare
     from springmass.runs.loading import Loaded, load, sample_data
@@ -53,6 +54,7 @@ __all__ = [
     "classic",
     "compare",
     "compare_springs",
+    "live",
     "load",
     "make_law",
     "open_run",
@@ -78,6 +80,7 @@ _WHERE = {
     "classic": "pipeline.results.classic",
     "compare": "springmass.api.sources",
     "compare_springs": "pipeline.results.compare",
+    "live": "springmass.api.live",
     "load": "springmass.runs.loading",
     "make_law": "pipeline.damping.laws.of_function",
     "open_run": "springmass.api.opening",

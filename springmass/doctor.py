@@ -20,6 +20,7 @@ PACKAGES = ("acquisition", "pipeline", "storage")
 LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2"),
     *("serial", "nptdms", "python_calamine", "rich", "shtab", "starlette", "uvicorn", "websockets"),
+    "segno",
 )
 DISTRIBUTIONS = {"serial": "pyserial"}
 

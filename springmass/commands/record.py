@@ -203,7 +203,8 @@ def _record(
             operator.begin()
         rest = None if options.still is None else _rest(session, options.still, options.ruler, console)
         trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
-        bench.after(0.0 if trigger is None else trigger.keep_s + 0.5)
+        if not options.ready:
+            bench.after(0.0 if trigger is None else trigger.keep_s + 0.5)
         look = look_of(sys.stderr)
         with marks_by_keys(watched=look.terminal) as typed:
             marks = page.marks if page is not None and typed is None else typed
