@@ -156,6 +156,11 @@ class Operator:
         base = self._base or now
         measured = base.restated(point, now)
         kept = [(p, k) for p, k in zip(self._points, self._known_m, strict=True) if abs(k - known_m) >= SAME_M]
+        if same := [k for p, k in kept if abs(p.rest_m - measured.rest_m) < SAME_M]:
+            raise CalibrationError(
+                f"{known_m:g} m by the ruler was demanded of a target that stands where {same[0]:g} m was said before; "
+                "move the target, or give one distance"
+            )
         points, known = (tuple(each) for each in zip(*kept, (measured, known_m), strict=True))
         calibration = against_ruler(points, known, U_RULER_M, base)
         self.session.calibrated(calibration)

@@ -123,9 +123,9 @@ def test_a_ruler_moves_the_zero_of_the_distances(bench: tuple[Any, Page]) -> Non
     page.wait_for_function("() => run.calibration.startsWith('by ruler: offset')")
     assert page.evaluate("bench().rest_m") == pytest.approx(0.26, abs=1e-3)
     press(page, "k")
-    answer(page, "900")  # a scale of more than three is no calibration
+    answer(page, "900")  # the bob hangs where it hung: two distances for one place
     page.wait_for_function("() => bench().failed")
-    assert "wrong unit" in page.inner_text("#told")
+    assert "move the target" in page.inner_text("#told")
     press(page, "r")
     page.wait_for_function(PHASE.format(phase="recording"))
     page.wait_for_function(SEEN.format(count=50))
