@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pipeline.results.compare import SpringRun, compare_springs
     from pipeline.track import Track
     from springmass.api.analysis import Analysis
+    from springmass.api.course import results
     from springmass.api.live import live
     from springmass.api.opening import Run, open_run
     from springmass.api.sources import Comparison, analyse, compare
@@ -59,6 +60,7 @@ __all__ = [
     "make_law",
     "open_run",
     "read_scene",
+    "results",
     "sample_data",
     "write_run",
 ]
@@ -85,6 +87,7 @@ _WHERE = {
     "make_law": "pipeline.damping.laws.of_function",
     "open_run": "springmass.api.opening",
     "read_scene": "springmass.runs.scenes",
+    "results": "springmass.api.course",
     "sample_data": "springmass.runs.loading",
     "write_run": "storage.run_file.writing",
 }

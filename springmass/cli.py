@@ -126,10 +126,10 @@ def _exit_code(error: Exception) -> int | None:
     from acquisition.errors import AcquisitionError, CalibrationError, PortError, SensorError
     from pipeline.errors import DynamicsError, PipelineError, SceneError
     from storage.disk import DiskNearlyFull
-    from storage.errors import StorageError, WriteFailed
+    from storage.errors import QueryRefused, StorageError, WriteFailed
 
     if isinstance(error, PortError | CalibrationError | DiskNearlyFull):
         return SENSOR
-    if isinstance(error, SceneError | DynamicsError | WriteFailed | SensorError):
+    if isinstance(error, SceneError | DynamicsError | WriteFailed | SensorError | QueryRefused):
         return USAGE
     return UNREADABLE if isinstance(error, AcquisitionError | PipelineError | StorageError) else None

@@ -16,6 +16,10 @@ from __future__ import annotations
 import contextlib
 import sys
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 __all__ = [
     "INTERRUPTED",
     "OK",
@@ -27,6 +31,7 @@ __all__ = [
     "ProgramError",
     "complain",
     "hush",
+    "hushed",
     "suggest",
     "tell",
 ]
@@ -66,6 +71,17 @@ def hush() -> None:
     """Write from here on what is wrong, and nothing else."""
     global _quiet
     _quiet = True
+
+
+@contextlib.contextmanager
+def hushed() -> Iterator[None]:
+    """Say nothing but what is wrong until the ``with`` ends."""
+    global _quiet
+    before, _quiet = _quiet, True
+    try:
+        yield
+    finally:
+        _quiet = before
 
 
 def suggest(command: str) -> None:

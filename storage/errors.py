@@ -6,6 +6,7 @@
     |-- NotARun        nothing there, not HDF5, or HDF5 of another layout     springmass exits with 3
     |-- RunDamaged     a run file whose content is not what was written       springmass exits with 3
     |-- RunClosed      a run used outside its ``with``
+    |-- QueryRefused   a question to a catalog that is none, or would change it
     |-- NotALog        nothing there, or no wire log                          springmass exits with 3
     |-- OutOfMemory    the machine has too little memory; no word against the file   springmass exits with 3
     `-- WriteFailed    a file could not be written; what stood there before stands
@@ -26,6 +27,7 @@ __all__ = [
     "HDF5_ERRORS",
     "NotARun",
     "OutOfMemory",
+    "QueryRefused",
     "RunClosed",
     "RunDamaged",
     "RunExists",
@@ -82,6 +84,10 @@ class NotARun(StorageError):
 
 class RunDamaged(StorageError):
     """A run file whose content is not what was written: a flipped bit, a cut end, an edited attribute."""
+
+
+class QueryRefused(StorageError):
+    """A question to a catalog that is none, names what is not there, or would do anything but read."""
 
 
 class RunClosed(StorageError):

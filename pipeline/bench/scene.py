@@ -11,7 +11,7 @@ from pipeline.bench.air import saturation_pressure
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
 
-__all__ = ["Scene"]
+__all__ = ["PLACES", "Scene"]
 
 POSITIONS = ("below", "above")
 
@@ -69,6 +69,9 @@ _QUANTITIES: dict[tuple[str, str], _Quantity] = {
     ("damping", "beta_per_m_s"): _Quantity("beta_per_m_s", "1/(m s)", 0.0, 1e6, (0.0, 1e3)),
     ("damping", "mu_m_per_s"): _Quantity("mu_m_per_s", "m/s", 0.0, 1e6, (0.0, 1.0), _SPEEDS),
 }
+
+PLACES = {quantity.attribute: place for place, quantity in _QUANTITIES.items()}
+"""Table and key in a scene file of every quantity, by the attribute that it becomes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,6 +6,7 @@ import argparse
 import json
 
 from acquisition.errors import visible
+from springmass.batch.tables import is_course
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
@@ -20,7 +21,11 @@ PARAMETERS = ("accuracy", "mass_correlation", "channel", "run", "rate_hz", "unit
 
 
 def run(options: argparse.Namespace) -> int:
-    """Analyse every run, compare them, print or write what was found."""
+    """Analyse every run, compare them, print or write what was found; of courses take the results that are there."""
+    if all(is_course(path) for path in options.input):
+        return _run_courses(options)
+    if options.where or options.bench:
+        raise ProgramError("--where and --bench choose among the results of courses; name folders of batch", USAGE)
     if len(options.input) < 2:
         raise ProgramError(
             f"compare needs two runs at least, got {len(options.input)}; springmass analyse takes a single one", USAGE
@@ -54,6 +59,25 @@ def run(options: argparse.Namespace) -> int:
         complain(f"rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK
+
+
+def _run_courses(options: argparse.Namespace) -> int:
+    from springmass.batch.comparing import compare_rows, compared_json, compared_text
+    from springmass.batch.search import search
+
+    if options.out is not None or options.scene:
+        raise ProgramError("--out and --scene go with single runs; a course has its page and its scenes", USAGE)
+    found = compare_rows(search(options.input, where=options.where).rows, bench=options.bench)
+    print(json.dumps(compared_json(found), allow_nan=False) if options.json else visible_lines(compared_text(found)))
+    if options.strict and found.suspects:
+        complain(f"rejected under --strict: {len(found.suspects)} runs differ from their course")
+        return REJECTED
+    return OK
+
+
+def visible_lines(text: str) -> str:
+    """Return text whose names may hold control characters, lines kept."""
+    return "\n".join(map(visible, text.splitlines()))
 
 
 def _print_text(compared: Compared, runs: list[Analysed]) -> None:

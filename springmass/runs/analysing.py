@@ -114,13 +114,16 @@ def distinct_names(paths: Sequence[str]) -> list[str]:
     >>> distinct_names(["a/bob.txt", "b/bob.txt", "disc.h5"])
     ['bob', 'bob-2', 'disc']
     """
-    names: list[str] = []
+    counts: dict[str, int] = {}
+    names: dict[str, None] = {}
     for path in paths:
-        stem, count = Path(path).stem, 1
+        stem = Path(path).stem
+        count = counts.get(stem, 0) + 1
         while (name := stem if count == 1 else f"{stem}-{count}") in names:
             count += 1
-        names.append(name)
-    return names
+        counts[stem] = count
+        names[name] = None
+    return list(names)
 
 
 def in_a_name(name: str, suffix: str) -> str:

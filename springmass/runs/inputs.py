@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,13 +37,21 @@ class Found:
     of: int = 0
 
 
-def files_of(inputs: Sequence[str]) -> tuple[list[Found], list[str]]:
+def files_of(
+    inputs: Sequence[str], *, deep: bool = False, known: Collection[str] = (), but: Collection[str] = ()
+) -> tuple[list[Found], list[str]]:
     """Return the files that inputs name, and what to say of folders: what in them is no recording.
 
     Parameters
     ----------
     inputs : sequence of str
-        Files, and folders, of which every recording is taken, by name; folders in them are not looked into.
+        Files, and folders, of which every recording is taken, by name.
+    deep : bool
+        Whether folders in folders are looked into too.
+    known : collection of str
+        Paths of files that are recordings, as somebody saw before: they are not opened to find that out.
+    but : collection of str
+        Absolute paths of files and folders that are none of the inputs, wherever they lie.
 
     Raises
     ------
@@ -59,7 +68,12 @@ def files_of(inputs: Sequence[str]) -> tuple[list[Found], list[str]]:
         if not Path(text).is_dir():
             found.append(Found(text, None, number))
             continue
-        taken, others = _in_folder(Path(text), number)
+        taken: list[Found] = []
+        others: list[str] = []
+        for folder in _folders(Path(text), but) if deep else (Path(text),):
+            in_it, not_in_it = _in_folder(folder, number, known, but)
+            taken += in_it
+            others += [str((folder / name).relative_to(text)) for name in not_in_it]
         if not taken:
             raise ProgramError(
                 f"{text}: a folder with recordings was demanded, got none in it{_named(others)}", UNREADABLE
@@ -77,9 +91,28 @@ def _named(others: Sequence[str]) -> str:
     return f": {', '.join(others[:NAMED])}{more}"
 
 
-def _in_folder(folder: Path, number: int) -> tuple[list[Found], list[str]]:
+def _folders(top: Path, but: Collection[str]) -> Iterator[Path]:
+    """Yield a folder and all in it, by name, without hidden ones and without the results of analyses."""
+    for here, inner, _ in os.walk(top):
+        inner[:] = sorted(
+            name
+            for name in inner
+            if not name.startswith(".")
+            and not name.endswith(".results")
+            and os.path.abspath(os.path.join(here, name)) not in but
+        )
+        yield Path(here)
+
+
+def _in_folder(
+    folder: Path, number: int, known: Collection[str], but: Collection[str]
+) -> tuple[list[Found], list[str]]:
     try:
-        files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+        files = sorted(
+            path
+            for path in folder.iterdir()
+            if path.is_file() and not path.name.startswith(".") and not (but and os.path.abspath(path) in but)
+        )
     except OSError as error:
         raise ProgramError(
             f"{folder}: a folder to read was demanded, {error.strerror}; name another", UNREADABLE
@@ -87,7 +120,7 @@ def _in_folder(folder: Path, number: int) -> tuple[list[Found], list[str]]:
     names = {path.name for path in files}
     pairs = {path.name: name for path in files if (name := _velocity_of(path)) in names}
     parts = set(_parts(files)) | set(pairs.values())
-    taken = [path for path in files if path.name not in parts and _is_recording(path)]
+    taken = [path for path in files if path.name not in parts and (str(path) in known or _is_recording(path))]
     kept = {path.name for path in taken} | parts
     return (
         [Found(str(path), str(folder / pairs[path.name]) if path.name in pairs else None, number) for path in taken],

@@ -91,7 +91,16 @@ def _add_accuracy(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_compare(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("input", nargs="+", metavar="RUN", help="two recordings or run files and more, of one spring")
+    parser.add_argument(
+        "input",
+        nargs="+",
+        metavar="RUN",
+        help="two recordings or run files and more, of one spring; or folders of batch",
+    )
+    _add_where(parser)
+    parser.add_argument(
+        "--bench", metavar="NAME", help="column of a course that tells benches apart (default: bench, group or section)"
+    )
     parser.add_argument(
         "--scene",
         action="append",
@@ -114,6 +123,61 @@ def _add_compare(parser: argparse.ArgumentParser) -> None:
     _add_pdf(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     parser.add_argument("--strict", action="store_true", help="exit with 5 where a finding is an error")
+
+
+def _add_batch(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "input", nargs="*", metavar="INPUT", help="recordings, folders with all in them, patterns, @FILE with a list"
+    )
+    parser.add_argument("-o", "--output", metavar="DIR", help="folder for table, page and reports; go on in it")
+    parser.add_argument("--runs", dest="runs", metavar="FILE", help="table (CSV): what is known of each run")
+    parser.add_argument("--template", action="store_true", help="print such a table to fill in")
+    parser.add_argument("--scene", metavar="FILE", help="scene file for all runs, under what the table says")
+    _add_accuracy(parser)
+    parser.add_argument("--jobs", type=_count, metavar="N", help="processes (default: one a core)")
+    parser.add_argument(
+        "--shard", type=_shard, metavar="I/N", help="do the I-th of N parts alone; without it all is put together"
+    )
+    parser.add_argument("--dask", metavar="ADDRESS", help="let the workers of this dask scheduler do it")
+    parser.add_argument("--rehash", action="store_true", help="read every file to see whether it has changed")
+    parser.add_argument(
+        "--reports", type=_whole, default=20, metavar="N", help="full reports of so many that need a look (default 20)"
+    )
+    _add_completions(parser)
+    parser.add_argument("--from", dest="from_s", type=_finite, metavar="S", help="use samples from this second on")
+    parser.add_argument("--to", dest="to_s", type=_finite, metavar="S", help="use samples up to this second")
+    _add_clock(parser)
+
+
+def _shard(text: str) -> tuple[int, int]:
+    first, slash, last = text.partition("/")
+    if not (slash and first.isdecimal() and last.isdecimal() and 1 <= int(first) <= int(last)):
+        raise argparse.ArgumentTypeError(f"must be I/N with 1 <= I <= N, got {text!r}")
+    return int(first), int(last)
+
+
+def _add_report(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", metavar="DIR", help="folder that batch made")
+    parser.add_argument("name", metavar="RUN", help="name of a run in its table, or the path of its recording")
+
+
+def _add_catalog(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="+", metavar="DIR", help="folders that batch made")
+    _add_where(parser)
+    parser.add_argument("--columns", metavar="A,B", help="columns to list")
+    parser.add_argument("--sort", metavar="NAME", help="by this column; after a minus, --sort=-NAME, from above")
+    parser.add_argument("--limit", type=_count, metavar="N", help="runs at most")
+    parser.add_argument("--rebuild", action="store_true", help="build the index from the results again")
+    parser.add_argument("--json", action="store_true", help="one JSON object a run on stdout, instead of CSV")
+
+
+def _add_where(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--where",
+        default="",
+        metavar="EXPR",
+        help="expression over the columns, as \"section = 'A' and period_u < 1e-4\"",
+    )
 
 
 def _add_demo(parser: argparse.ArgumentParser) -> None:
@@ -339,6 +403,13 @@ def _count(text: str) -> int:
     return value
 
 
+def _whole(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"must be 0 or more, got {text!r}")
+    return value
+
+
 def _speed(text: str) -> float:
     return math.inf if text == "max" else _positive(text)
 
@@ -356,6 +427,9 @@ COMMANDS = {
     "demo": (_add_demo, "replay, analyse and compare the bundled recordings: Table 1 in one command"),
     "analyse": (_add_analyse, "turn recordings into Table 1, findings and a report"),
     "compare": (_add_compare, "compare several runs of one spring: do they agree, and does one damping law hold"),
+    "batch": (_add_batch, "turn a course of runs into one table and a page, resumable, on one machine or many"),
+    "report": (_add_report, "write the full report of one run of a course"),
+    "catalog": (_add_catalog, "search, filter and list the runs of courses"),
     "record": (_add_record, "record a run from the bench, so that nothing is lost"),
     "page": (_add_page, "look at a recording in a browser, as it happens or as it was"),
     "recover": (_add_recover, "build a run file from a wire log, however torn"),

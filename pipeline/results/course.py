@@ -1,0 +1,354 @@
+"""Many runs of a course: one spring, one disc, one drag across them, and which runs were noted down wrongly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from pipeline.errors import AnalysisError
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.robust import mad_sigma
+from pipeline.track import F8
+
+__all__ = ["Agreement", "Cause", "CourseRun", "Suspect", "agreement", "suspects"]
+
+Cause = Literal[
+    "masses exchanged", "unit of the mass", "unit of the distance", "clipped", "wrong disc", "wrong spring", "unknown"
+]
+"""What makes a run differ from its course."""
+FAR = 5.0  # standard deviations from the middle: none of 200 good runs
+NEAR = 4.0  # within which a run with its fault mended must come
+FEW = 4  # runs that make no middle
+POWERS = (-3, -2, -1, 1, 2, 3)  # of ten, between units
+LEAST_SCATTER = {"spring": 2e-4, "drag": 0.02}  # relative, of a middle of runs that agree too well
+WITHIN = 0.06  # of a power of ten, in its logarithm
+SPREAD_OF_KC = 0.5  # in the logarithm, from which a slope over it is sought
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CourseRun:
+    """What a run says of its bench, and what was noted of it.
+
+    Parameters
+    ----------
+    name, spring, disc, bench : str
+        Labels; runs of one spring, disc or bench have the same.
+    spring_constant : Estimate or None
+        N/m, with what the run does not share with the others.
+    bob_mass_kg : float
+        As noted; NaN where nothing is.
+    natural_angular_frequency : float
+        Of the undamped motion, rad/s; NaN where the run has none.
+    amplitude_m, offset_m, noise_m : float
+        As recorded.
+    diameter_m : float
+        Of the disc as noted; NaN without one.
+    drag : Estimate or None
+        Drag coefficient in the middle of the run's amplitudes.
+    keulegan_carpenter : float
+        There.
+    clipped : bool
+        Whether its record has the finding.
+    """
+
+    name: str
+    spring: str = ""
+    disc: str = ""
+    bench: str = ""
+    spring_constant: Estimate | None = None
+    bob_mass_kg: float = math.nan
+    natural_angular_frequency: float = math.nan
+    amplitude_m: float = math.nan
+    offset_m: float = math.nan
+    noise_m: float = math.nan
+    diameter_m: float = math.nan
+    drag: Estimate | None = None
+    keulegan_carpenter: float = math.nan
+    clipped: bool = False
+
+    def constant_with(self, bob_mass_kg: float) -> float:
+        """Return the spring constant that another bob would give, N/m: the spring's and the air's shares stay."""
+        assert self.spring_constant is not None
+        squared = self.natural_angular_frequency**2
+        return self.spring_constant.value + squared * (bob_mass_kg - self.bob_mass_kg)
+
+
+@dataclass(frozen=True, slots=True)
+class Suspect:
+    """A run that differs from its course.
+
+    Parameters
+    ----------
+    name : str
+    cause : str
+        The likeliest, one of :data:`Cause`.
+    message : str
+    other : str
+        The run, spring or disc that it was taken for; empty where there is none.
+    """
+
+    name: str
+    cause: Cause
+    message: str
+    other: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """One quantity of many runs.
+
+    Parameters
+    ----------
+    quantity, group : str
+    mean : Estimate
+        Over benches, with the scatter between them.
+    within, between : float
+        Standard deviation of runs of one bench, and of benches beyond it; NaN where there is one of them.
+    stated : float
+        Root mean square of the runs' own standard uncertainties.
+    runs, benches : int
+    chi2, dof : float
+        Of the benches' means about the mean, by the scatter within.
+    """
+
+    quantity: str
+    group: str
+    mean: Estimate
+    within: float
+    between: float
+    stated: float
+    runs: int
+    benches: int
+    chi2: float = math.nan
+    dof: int = 0
+
+
+def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Sequence[str]) -> Agreement:
+    """Return how far runs of several benches agree on one quantity.
+
+    Parameters
+    ----------
+    quantity, group : str
+        Names.
+    values : sequence of Estimate
+        One a run, one at least; u is what the run does not share.
+    benches : sequence of str
+        Of the runs.
+
+    Raises
+    ------
+    AnalysisError
+        If there is no run.
+
+    Notes
+    -----
+    The one-way layout with random effects :math:`x_{ij} = \\mu + b_j + e_{ij}` by its moments [1]_: the variance
+    within is that of the runs about their bench's mean, pooled; the variance between is that of the means less what
+    the scatter within makes of them, by DerSimonian and Laird's moments. A bench's mean has the larger of
+    the scatter within and what its runs state.
+
+    References
+    ----------
+    .. [1] R. DerSimonian, N. Laird, Controlled Clinical Trials 7 (1986) 177.
+
+    Examples
+    --------
+    >>> runs = [Estimate(x, 0.01, "N/m") for x in (14.00, 14.02, 14.10, 14.12)]
+    >>> found = agreement("spring_constant", "A", runs, ["1", "1", "2", "2"])
+    >>> print(found.mean, f"{found.within:.3f} {found.between:.3f}")
+    14.060 +- 0.050 N/m 0.014 0.070
+    """
+    if not values:
+        raise AnalysisError(f"{quantity} of {group}: a run that gives it was demanded, got none")
+    x = np.array([value.value for value in values])
+    stated = math.sqrt(float(np.mean([value.u**2 for value in values])))
+    names = list(dict.fromkeys(benches))
+    parts = [x[[bench == name for bench in benches]] for name in names]
+    free = x.size - len(parts)
+    within = math.sqrt(sum(float(np.sum((part - part.mean()) ** 2)) for part in parts) / free) if free else math.nan
+    scatter = stated if math.isnan(within) else max(within, stated)
+    means = np.array([part.mean() for part in parts])
+    variances = np.array([scatter**2 / part.size for part in parts])
+    between, chi2, dof = math.nan, math.nan, len(parts) - 1
+    weights = 1.0 / np.maximum(variances, 1e-300)
+    if dof:
+        middle = float(weights @ means / weights.sum())
+        chi2 = float(weights @ (means - middle) ** 2)
+        excess = (chi2 - dof) / float(weights.sum() - (weights @ weights) / weights.sum())
+        between = math.sqrt(max(excess, 0.0))
+        weights = 1.0 / np.maximum(variances + between**2, 1e-300)
+    mean = Estimate(float(weights @ means / weights.sum()), float(weights.sum() ** -0.5), values[0].unit)
+    return Agreement(quantity, group, mean, within, between, stated, x.size, len(parts), chi2, dof)
+
+
+def suspects(runs: Sequence[CourseRun]) -> tuple[Suspect, ...]:
+    """Return the runs that differ from their course, each with its likeliest cause, in the order of the runs.
+
+    Parameters
+    ----------
+    runs : sequence of CourseRun
+
+    Notes
+    -----
+    A middle is a median, its scatter the median deviation. A record that was clipped says so itself. Where noise, rest
+    and amplitude together lie a power of ten beside the course's, it is the unit of the distance. A spring constant
+    :data:`FAR` from those of its spring is a mass in another unit (a power of ten), a mass exchanged with that of
+    another such run (both come near with the masses exchanged), another spring (it lies near that one's), or unknown.
+    A drag coefficient far from those of its disc at the same Keulegan-Carpenter number is another disc, where it comes
+    near that one's with its diameter: :math:`C \\propto D^{-2}`.
+    """
+    found: dict[str, Suspect] = {}
+    for one in (*_clipped(runs), *_in_other_units(runs), *_springs(runs)):
+        found.setdefault(one.name, one)
+    # A drag coefficient goes by length, mass and amplitude: a run with one of these wrong says nothing of its disc. But
+    # another disc carries other air along, which k tells where nothing else explains it.
+    for one in _discs([run for run in runs if run.name not in found or found[run.name].cause == "unknown"]):
+        found[one.name] = one
+    return tuple(found[run.name] for run in runs if run.name in found)
+
+
+def _clipped(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
+    for run in runs:
+        if run.clipped:
+            yield Suspect(run.name, "clipped", "its record is cut off at an end: the amplitude went beyond the range")
+
+
+def _in_other_units(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
+    """Yield runs of which everything with a length is a power of ten off."""
+    logs = np.log10(
+        [[max(abs(x), 1e-300) for x in (r.noise_m, r.offset_m, r.amplitude_m)] for r in runs] or [[0.0] * 3]
+    )
+    if np.isfinite(logs).all(axis=1).sum() < FEW:
+        return
+    middle = np.nanmedian(logs, axis=0)
+    for run, log in zip(runs, logs, strict=True):
+        away = log - middle
+        for power in POWERS:
+            # Noise is the sensor's and the rest position the bench's, more or less; amplitudes are as one pulls.
+            if np.all(np.abs(away - power) < (0.3, 0.35, 0.5)):
+                message = (
+                    f"noise, rest position and amplitude are 10^{power:+d} of the course's: the unit of its distances"
+                )
+                yield Suspect(run.name, "unit of the distance", message)
+
+
+@dataclass(frozen=True, slots=True)
+class _Middle:
+    """Where the logarithms of a group lie: a median, over ln KC a line, and the scatter about it."""
+
+    centre: float
+    scatter: float
+    slope: float = 0.0
+    label: str = field(default="", compare=False)
+
+    def away(self, y: float, u: float, x: float = 0.0) -> float:
+        return (y - self.centre - self.slope * x) / math.hypot(self.scatter, u)
+
+
+def _middle(y: F8, least: float, x: F8 | None = None, label: str = "") -> _Middle:
+    slope = 0.0
+    if x is not None and np.ptp(np.quantile(x, (0.1, 0.9))) > SPREAD_OF_KC:
+        first, second = np.triu_indices(x.size, 1)
+        apart = np.abs(x[second] - x[first]) > 0.2 * SPREAD_OF_KC
+        slope = float(np.median(((y[second] - y[first])[apart]) / (x[second] - x[first])[apart]))
+    rest = y if x is None else y - slope * x
+    centre = float(np.median(rest))
+    return _Middle(centre, max(mad_sigma(rest - centre), least), slope, label)
+
+
+def _springs(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
+    known = [run for run in runs if run.spring_constant is not None and run.spring_constant.value > 0]
+    middles = {
+        spring: _middle(np.array([_log(run.spring_constant) for run in group]), LEAST_SCATTER["spring"], label=spring)
+        for spring, group in _groups(known, "spring").items()
+        if len(group) >= FEW
+    }
+    known = [run for run in known if run.spring in middles]
+    far = [run for run in known if abs(_away(run, middles)) > FAR]
+    partners = _exchanged(far, middles)
+    for run in far:
+        middle = middles[run.spring]
+        off = _log(run.spring_constant) - middle.centre
+        told = f"k is {100 * math.expm1(off):+.3g} % off the {middle.label or 'course'}'s"
+        power = round(off / math.log(10))
+        if run.name in partners:
+            other = partners[run.name]
+            message = f"{told}; with the mass of {other} it is not, nor is that run with this one's"
+            yield Suspect(run.name, "masses exchanged", message, other)
+        elif power in POWERS and abs(off / math.log(10) - power) < WITHIN:
+            yield Suspect(run.name, "unit of the mass", f"k is 10^{power:+d} of its spring's: the unit of its mass")
+        elif near := [m.label for s, m in middles.items() if s != run.spring and abs(_away(run, middles, m)) < NEAR]:
+            yield Suspect(run.name, "wrong spring", f"{told}, and that of spring {near[0]}", near[0])
+        else:
+            yield Suspect(run.name, "unknown", f"{told}: look at its mass and its spring")
+
+
+def _away(
+    run: CourseRun, middles: Mapping[str, _Middle], middle: _Middle | None = None, mass: float | None = None
+) -> float:
+    """Return how far a run's spring constant is from a middle, with another mass where one is given."""
+    k = run.spring_constant
+    assert k is not None
+    value = k.value if mass is None else run.constant_with(mass)
+    if not value > 0:
+        return math.inf
+    return (middle or middles[run.spring]).away(math.log(value), k.u / k.value)
+
+
+def _exchanged(far: Sequence[CourseRun], middles: Mapping[str, _Middle]) -> dict[str, str]:
+    """Return pairs of runs that come near with their masses exchanged, those of one bench first, the nearest first."""
+    pairs = []
+    for i, one in enumerate(far):
+        for other in far[i + 1 :]:
+            away = max(
+                abs(_away(one, middles, mass=other.bob_mass_kg)), abs(_away(other, middles, mass=one.bob_mass_kg))
+            )
+            if away < NEAR:
+                pairs.append((one.bench != other.bench, away, one.name, other.name))
+    partners: dict[str, str] = {}
+    for _, _, one_name, other_name in sorted(pairs):
+        if one_name not in partners and other_name not in partners:
+            partners |= {one_name: other_name, other_name: one_name}
+    return partners
+
+
+def _discs(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
+    known = [
+        r for r in runs if r.drag is not None and r.drag.value > 0 and r.keulegan_carpenter > 0 and r.diameter_m > 0
+    ]
+    groups = {disc: group for disc, group in _groups(known, "disc").items() if len(group) >= FEW}
+    middles, diameters = {}, {}
+    for disc, group in groups.items():
+        logs = np.array([(_log(r.drag), math.log(r.keulegan_carpenter)) for r in group])
+        middles[disc] = _middle(logs[:, 0], LEAST_SCATTER["drag"], logs[:, 1], disc)
+        diameters[disc] = float(np.median([r.diameter_m for r in group]))
+    for disc, group in groups.items():
+        for run in group:
+            y, x, u = _log(run.drag), math.log(run.keulegan_carpenter), run.drag.u / run.drag.value  # type: ignore[union-attr]
+            if abs(away := middles[disc].away(y, u, x)) <= FAR:
+                continue
+            told = f"its drag coefficient is {away:+.0f} standard deviations off that of its disc"
+            step = {d: math.log(run.diameter_m / diameters[d]) for d in groups if d != disc}
+            sizes = [(abs(middles[d].away(y + 2 * s, u, x + s)), d) for d, s in step.items()]
+            if sizes and min(sizes)[0] < NEAR:
+                near = min(sizes)[1]
+                message = f"{told}; with the diameter of {near}, {diameters[near]:.4g} m, it is that of {near}"
+                yield Suspect(run.name, "wrong disc", message, near)
+            else:
+                yield Suspect(run.name, "unknown", f"{told}: look at its disc and its mass")
+
+
+def _groups(runs: Sequence[CourseRun], by: Literal["spring", "disc"]) -> dict[str, list[CourseRun]]:
+    groups: dict[str, list[CourseRun]] = {}
+    for run in runs:
+        groups.setdefault(getattr(run, by), []).append(run)
+    return groups
+
+
+def _log(x: Estimate | None) -> float:
+    assert x is not None
+    return math.log(x.value)

@@ -1,0 +1,153 @@
+"""What the runs of a course say together: springs, discs, scatter between and within benches, runs noted wrongly."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipeline.numerics.estimate import Estimate, format_value
+from pipeline.results.course import Agreement, CourseRun, Suspect, agreement, suspects
+from springmass.batch.search import COURSE
+from springmass.errors import UNREADABLE, USAGE, ProgramError
+
+__all__ = ["CourseCompared", "compare_rows", "compared_json", "compared_text"]
+
+BENCHES = ("bench", "group", "section", COURSE)
+"""Columns that tell benches apart, the first that the course has."""
+
+
+@dataclass(frozen=True, slots=True)
+class CourseCompared:
+    """What many runs say together.
+
+    Parameters
+    ----------
+    runs : int
+        That took part.
+    bench : str
+        The column by which benches are told apart.
+    agreements : tuple of Agreement
+        Spring constants by spring, drag coefficients by disc; without the suspects.
+    suspects : tuple of Suspect
+    laws : mapping of str to int
+        How many runs each damping law was selected for.
+    """
+
+    runs: int
+    bench: str
+    agreements: tuple[Agreement, ...]
+    suspects: tuple[Suspect, ...]
+    laws: Mapping[str, int]
+
+
+def compare_rows(rows: Sequence[Mapping[str, Any]], *, bench: str | None = None) -> CourseCompared:
+    """Compare the runs of a course.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table, by column. Springs and discs are told apart by the columns ``spring`` and ``disc`` where the
+        course has them, else by the spring's mass and the disc's diameter.
+    bench : str, optional
+        The column that tells benches apart; left out, the first of :data:`BENCHES` that is there.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if there is no such column, 3 if fewer than two runs have a period.
+    """
+    moving = [row for row in rows if row["status"] == "ok"]
+    if len(moving) < 2:
+        raise ProgramError(f"a comparison needs two runs with a period, got {len(moving)}; see --where", UNREADABLE)
+    if bench is not None and bench not in moving[0]:
+        raise ProgramError(f"--bench: a column of the course was demanded, there is no {bench!r}", USAGE)
+    by = bench or next(name for name in BENCHES if name in moving[0])
+    courses = {row[COURSE] for row in moving}
+    runs = [_run(row, by, alone=len(courses) == 1) for row in moving]
+    wrong = suspects(runs)
+    named = {one.name for one in wrong}
+    good = [run for run in runs if run.name not in named]
+    found = []
+    for quantity, label in (("spring_constant", "spring"), ("drag", "disc")):
+        groups: dict[str, list[CourseRun]] = {}
+        for run in good:
+            if getattr(run, quantity) is not None:
+                groups.setdefault(getattr(run, label), []).append(run)
+        for name, group in sorted(groups.items()):
+            values = [getattr(run, quantity) for run in group]
+            found.append(agreement(_NAMES[quantity], name, values, [run.bench for run in group]))
+    counts: dict[str, int] = {}
+    for row in moving:
+        if row["law"]:
+            counts[row["law"]] = counts.get(row["law"], 0) + 1
+    laws = dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+    return CourseCompared(len(runs), by, tuple(found), wrong, laws)
+
+
+_NAMES = {"spring_constant": "spring_constant", "drag": "drag_coefficient"}
+
+
+def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
+    k, omega, mass = (_number(row, name) for name in ("spring_constant", "natural_angular_frequency", "own_mass_kg"))
+    own = math.hypot(2.0 * _number(row, "natural_angular_frequency_u") / omega, _number(row, "own_mass_kg_u") / mass)
+    length = row["unit"] == "m"
+    points = np.array(json.loads(row["drag_points"] or "[]"))
+    middle = points[len(points) // 2] if len(points) else None
+    diameter = _number(row, "disc_diameter_m")
+    return CourseRun(
+        name=row["run"] if alone else f"{row[COURSE]}: {row['run']}",
+        spring=_label(row, "spring", "spring_mass_kg"),
+        disc=_label(row, "disc", "disc_diameter_m"),
+        bench=str(row[bench] or ""),
+        spring_constant=Estimate(k, k * own, "N/m") if math.isfinite(k * own) else None,
+        bob_mass_kg=_number(row, "bob_mass_kg"),
+        natural_angular_frequency=omega,
+        amplitude_m=_number(row, "amplitude") if length else math.nan,
+        offset_m=_number(row, "offset") if length else math.nan,
+        noise_m=_number(row, "noise") if length else math.nan,
+        diameter_m=diameter,
+        drag=None if middle is None else Estimate(float(middle[2]), float(middle[3])),
+        keulegan_carpenter=math.nan if middle is None else float(middle[1]),
+        clipped="clipped" in json.loads(row["findings"] or "[]"),
+    )
+
+
+def _label(row: Mapping[str, Any], tag: str, scene: str) -> str:
+    told = row.get(tag)
+    if told is None:
+        told = row[scene]
+    return "" if told is None else str(told)
+
+
+def _number(row: Mapping[str, Any], name: str) -> float:
+    value = row[name]
+    return math.nan if value is None else float(value)
+
+
+def compared_json(found: CourseCompared) -> dict[str, Any]:
+    """Return a comparison as JSON-able mapping."""
+    from springmass.runs.json_results import SCHEMA, plain
+
+    told: dict[str, Any] = plain(found)
+    return {"schema": SCHEMA, **told}
+
+
+def compared_text(found: CourseCompared) -> str:
+    """Return a comparison in lines."""
+    lines = [f"{found.runs} runs; benches told apart by {found.bench}", ""]
+    for one in found.agreements:
+        of = f" of {one.group}" if one.group else ""
+        lines.append(f"{one.quantity}{of}: {format_value(one.mean.value, one.mean.u, one.mean.unit)}")
+        within = "one run a bench" if math.isnan(one.within) else f"{one.within:.2g} within a bench"
+        between = "one bench" if math.isnan(one.between) else f"{one.between:.2g} between {one.benches} benches"
+        lines.append(f"  {one.runs} runs; scatter {within} (stated {one.stated:.2g}), {between}")
+    laws = ", ".join(f"{law} {count}" for law, count in found.laws.items())
+    lines += ["", f"damping laws selected: {laws}"] if laws else []
+    lines += ["", f"{len(found.suspects)} runs differ from their course"] if found.suspects else []
+    lines += [f"  {one.name}: {one.cause}: {one.message}" for one in found.suspects]
+    return "\n".join(lines)

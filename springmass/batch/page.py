@@ -1,0 +1,85 @@
+"""The page of a course: every run in a table that sorts, those that need a look first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from acquisition.errors import visible
+from pipeline.numerics.estimate import Estimate
+from springmass.batch.reports import REPORTS, need_of, report_name
+from springmass.batch.rows import FAILED
+from storage.atomic import write_whole
+
+__all__ = ["PAGE", "write_page"]
+
+PAGE = "index.html"
+SHOWN = (
+    ("period", "T", "s"),
+    ("spring_constant", "k", "N/m"),
+    ("amplitude", "A₀", ""),
+    ("damping_rate", "λ", "1/s"),
+    ("drag_coefficient", "C_d", ""),
+)
+"""Estimates with a column of their own."""
+
+
+def write_page(
+    folder: Path, runs: Iterable[tuple[str, Mapping[str, Any]]], tags: Sequence[str], reports: set[str]
+) -> Path:
+    """Write ``index.html``.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the course.
+    runs : iterable of (str, mapping)
+        Names and rows.
+    tags : sequence of str
+        Columns of the course's own.
+    reports : set of str
+        Folders of reports that can be linked.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    lines = [_line(name, row, tags, reports) for name, row in runs]
+    lines.sort(key=lambda line: (*(-x for x in line["need"]), line["name"]))
+    told = {kind: sum(line["look"] == kind for line in lines) for kind in ("failed", "error", "warning", "fine")}
+    environment = Environment(
+        loader=PackageLoader("springmass.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, finalize=lambda value: visible(value) if type(value) is str else value,
+    )  # fmt: skip
+    page = environment.get_template("course.html.j2").render(
+        title=folder.resolve().name, lines=lines, tags=tags, quantities=SHOWN, told=told
+    )
+    return write_whole(folder / PAGE, page.encode("utf-8", "backslashreplace"))
+
+
+def _line(name: str, row: Mapping[str, Any], tags: Sequence[str], reports: set[str]) -> dict[str, Any]:
+    report = report_name(name)
+    failed = row["status"] in FAILED
+    look = "failed" if failed else "error" if row["errors"] else "warning" if row["warnings"] else "fine"
+    return {
+        "name": name,
+        "link": f"{REPORTS}/{quote(report)}/report.html" if report in reports else "",
+        "look": look,
+        "need": need_of(row),
+        "why": row["error"] if failed else "; ".join(message for _, message in row["messages"][:2]),
+        "codes": "" if failed else ", ".join(row["findings"]),
+        "tags": [row["job"]["tags"].get(tag, "") for tag in tags],
+        "cells": [_cell(row, quantity, unit) for quantity, _, unit in SHOWN],
+        "law": row.get("law") or "",
+        "thumbnail": row["thumbnail"],
+    }
+
+
+def _cell(row: Mapping[str, Any], quantity: str, unit: str) -> tuple[str, str, str]:
+    """Return an estimate's label, as printed, and as it sorts."""
+    value, u = row["estimates"].get(quantity, (None, None))
+    label = next(symbol for name, symbol, _ in SHOWN if name == quantity)
+    if value is None or u is None:
+        return label, "", ""
+    unit = unit or (row["unit"] if quantity == "amplitude" else "")
+    return label, repr(Estimate(value, u, unit)), repr(value)

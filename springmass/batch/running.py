@@ -1,0 +1,213 @@
+"""One pass over a course: what has to be done is done, and when all is there, tables and page are made of it."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from springmass.batch.engines import by_dask, by_processes, cores, here
+from springmass.batch.page import PAGE, write_page
+from springmass.batch.plan import Job, Plan, code_sha256, names_of, shard_of
+from springmass.batch.reports import linked, worst, write_reports
+from springmass.batch.rows import FAILED, dumped, flat
+from springmass.batch.store import Store
+from springmass.batch.tables import CSV, PARQUET, write_csv, write_parquet
+from springmass.batch.worker import unchanged
+from springmass.errors import USAGE, ProgramError
+
+__all__ = ["LOG", "Options", "Outcome", "make", "run_pass"]
+
+LOG = "batch.log"
+FEW = 3  # runs, for which a second process would take longer to begin than to help
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """How a pass is made.
+
+    Parameters
+    ----------
+    jobs : int or None
+        Processes; None: one a core.
+    shard : (int, int) or None
+        Which of how many parts; None: all, and then the tables.
+    dask : str or None
+        Address of a scheduler.
+    rehash : bool
+        Whether files are read to see that they are unchanged.
+    reports : int
+        Full reports of so many of those that need a look most.
+    """
+
+    jobs: int | None = None
+    shard: tuple[int, int] | None = None
+    dask: str | None = None
+    rehash: bool = False
+    reports: int = 20
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What a pass did.
+
+    Parameters
+    ----------
+    runs, kept, done : int
+        In the pass, unchanged, analysed.
+    failures : list of str
+        One line a run that gave no period.
+    made : bool
+        Whether tables and page were written, and not as they stand.
+    """
+
+    runs: int = 0
+    kept: int = 0
+    done: int = 0
+    failures: list[str] = field(default_factory=list)
+    made: bool = False
+
+
+def run_pass(
+    plan: Plan,
+    store: Store,
+    folder: Path,
+    options: Options,
+    *,
+    told: Callable[[Sequence[Mapping[str, Any]], int, int], None] | None = None,
+) -> Outcome:
+    """Do what is left of a course, and make tables and page where this pass is the whole of it.
+
+    Parameters
+    ----------
+    plan : Plan
+    store : Store
+        Read.
+    folder : Path
+        For the results.
+    options : Options
+    told : callable, optional
+        Of rows that were just made, how many there are by now and how many there will be.
+    """
+    jobs = shard_of(plan.jobs, options.shard)
+    todo, touched = [], []
+    outcome = Outcome(runs=len(jobs))
+    for job in jobs:
+        row, stamps = _kept(job, store, rehash=options.rehash)
+        if row is None:
+            todo.append(job)
+            continue
+        if row["stamps"] != stamps or row["job"] != job.told():
+            touched.append({**row, "stamps": stamps, "job": job.told()})
+        if row["status"] in FAILED:
+            outcome.failures.append(row["error"])
+    outcome.kept = len(jobs) - len(todo)
+    if touched:
+        store.add(touched)
+    _log(folder, f"{_words(options)}: {len(jobs)} runs, {outcome.kept} unchanged")
+    if todo:
+        store.unmark()
+    began = time.monotonic()
+    for rows in _engine(todo, options):
+        if any(row["code_sha256"] != code_sha256() for row in rows):
+            demand = "one springmass with the same libraries was demanded, of workers and of this process, got another"
+            raise ProgramError(f"{folder}: {demand}; start again, with the same versions everywhere", USAGE)
+        store.add(rows)
+        outcome.done += len(rows)
+        outcome.failures += [row["error"] for row in rows if row["status"] in FAILED]
+        if told is not None:
+            told(rows, outcome.done, len(todo))
+    _log(folder, f"{outcome.done} runs analysed in {time.monotonic() - began:.1f} s")
+    if options.shard is None:
+        outcome.made = make(plan, store, folder, reports=options.reports, jobs=options.jobs)
+        _log(folder, "tables and page written" if outcome.made else "tables and page stand")
+    return outcome
+
+
+def _kept(job: Job, store: Store, *, rehash: bool) -> tuple[dict[str, Any] | None, list[list[Any]] | None]:
+    """Return a run's row where one still holds, and the stamps of its files."""
+    for row in store.rows(job.key):
+        if (stamps := unchanged(job, row, rehash=rehash)) is not None:
+            return row, stamps
+    return None, None
+
+
+def _engine(todo: Sequence[Job], options: Options) -> Iterator[list[dict[str, Any]]]:
+    if not todo:
+        return iter(())
+    if options.dask is not None:
+        return by_dask(todo, options.dask)
+    processes = min(options.jobs or cores(), len(todo))
+    return here(todo) if processes == 1 or len(todo) <= FEW else by_processes(todo, processes)
+
+
+def make(plan: Plan, store: Store, folder: Path, *, reports: int, jobs: int | None) -> bool:
+    """Make of the rows one file, the tables, the reports and the page; False where they stand already.
+
+    The order is that of the paths, so that it does not matter in which order rows came.
+    """
+    names = names_of(plan.jobs)
+    made_of = {
+        "jobs": hashlib.sha256(dumped([[job.told(), n] for job, n in zip(plan.jobs, names, strict=True)]).encode(
+            "utf-8", "backslashreplace")).hexdigest(),
+        "tags": list(plan.tags),
+        "code": code_sha256(),
+        "reports": reports,
+        "program": _program_sha256(),
+    }  # fmt: skip
+    outputs = (CSV, PAGE, *((PARQUET,) if _parquet() else ()))
+    if store.marked() == made_of and all((folder / name).is_file() for name in outputs):
+        return False
+    store.unmark()
+
+    def stored() -> Iterator[dict[str, Any]]:
+        for job in plan.jobs:
+            row, _ = _kept(job, store, rehash=False)
+            assert row is not None, job.path
+            yield row
+
+    # The rows of this plan in its order; from here on they are read from this file alone.
+    store.put_together({**row, "job": job.told()} for row, job in zip(stored(), plan.jobs, strict=True))
+    store.drop_parts()
+    store.read()
+
+    def rows() -> Iterator[dict[str, Any]]:
+        return (flat(row, name, plan.tags) for row, name in zip(stored(), names, strict=True))
+
+    write_csv(folder, rows(), plan.tags)
+    if write_parquet(folder, rows(), plan.tags) is None:
+        (folder / PARQUET).unlink(missing_ok=True)  # one of an earlier pass would tell other numbers
+    chosen = worst(rows(), reports)
+    write_reports(folder, [(name, job) for name, job in zip(names, plan.jobs, strict=True) if name in chosen], jobs)
+    write_page(folder, zip(names, stored(), strict=True), plan.tags, linked(folder))
+    store.mark(made_of)
+    return True
+
+
+def _parquet() -> bool:
+    from importlib.util import find_spec
+
+    return find_spec("pyarrow") is not None
+
+
+def _program_sha256() -> str:
+    """Digest of what tables and page are made by, beside what rows are."""
+    here_ = Path(__file__).resolve().parent.parent / "report"
+    files = sorted(file for file in here_.rglob("*") if file.suffix in (".py", ".j2", ".css"))
+    return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def _words(options: Options) -> str:
+    part = "all" if options.shard is None else "shard {}/{}".format(*options.shard)
+    return f"{part}, process {os.getpid()}"
+
+
+def _log(folder: Path, line: str) -> None:
+    """Append a line with the time of day to the log, the one file of a course that has such."""
+    with (folder / LOG).open("a", encoding="utf-8") as log:
+        log.write(f"{datetime.now(UTC).isoformat(timespec='seconds')} {line}\n")

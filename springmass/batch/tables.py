@@ -1,0 +1,131 @@
+"""The table of a course: CSV for everybody, Parquet where pyarrow is installed; written whole, read back."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from springmass.batch.rows import COLUMNS, NUMBERS, WHOLE, columns_of
+from springmass.errors import USAGE, ProgramError
+from storage.atomic import whole_file
+
+__all__ = ["CSV", "PARQUET", "is_course", "read_rows", "tags_in", "text_of", "write_csv", "write_parquet"]
+
+CSV, PARQUET = "results.csv", "results.parquet"
+GROUP = 5000  # rows of a row group
+_WHOLE, _NUMBERS = frozenset(WHOLE), frozenset(NUMBERS)
+_FORMULA = ("=", "+", "-", "@", "\t")
+
+
+def write_csv(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> Path:
+    """Write the table as CSV in UTF-8: numbers keep all their digits, what is not known is empty."""
+    columns = columns_of(tags)
+    with whole_file(folder / CSV) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([_cell(row[name]) for name in columns] for row in rows)
+    return folder / CSV
+
+
+def _cell(value: Any) -> Any:
+    if value is None:
+        return ""
+    # A name that begins as a formula does would be one in a spreadsheet.
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+
+
+def write_parquet(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> Path | None:
+    """Write the table as Parquet, the same bytes for the same rows; None where pyarrow is not installed."""
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        return None
+    schema = pa.schema([(name, _type(name, pa)) for name in columns_of(tags)])
+    with (
+        whole_file(folder / PARQUET) as temporary,
+        temporary.open("wb") as file,
+        pq.ParquetWriter(file, schema, compression="zstd") as writer,
+    ):
+        each = iter(rows)
+        while group := list(islice(each, GROUP)):
+            writer.write_table(pa.Table.from_pylist(group, schema=schema))
+    return folder / PARQUET
+
+
+def _type(name: str, pa: Any) -> Any:
+    return pa.float64() if name in _NUMBERS else pa.int64() if name in _WHOLE else pa.string()
+
+
+def is_course(folder: str | os.PathLike[str]) -> bool:
+    """Tell a folder with the table of a course."""
+    return any(os.path.isfile(os.path.join(folder, name)) for name in (PARQUET, CSV))
+
+
+def read_rows(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield the rows of a course's table: of the Parquet where it can be read, else of the CSV.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 2 if there is no table.
+    """
+    if (folder / PARQUET).is_file():
+        try:
+            import pyarrow.parquet as pq
+        except ImportError:
+            pass
+        else:
+            with pq.ParquetFile(folder / PARQUET) as file:
+                for batch in file.iter_batches(GROUP):
+                    yield from batch.to_pylist()
+            return
+    yield from _read_csv(folder / CSV)
+
+
+def _read_csv(path: Path) -> Iterator[dict[str, Any]]:
+    try:
+        text = path.open(encoding="utf-8", newline="")
+    except OSError as error:
+        demand = "a folder with results.csv was demanded, as springmass batch makes one"
+        raise ProgramError(f"{path.parent}: {demand} ({error.strerror}); name that of its -o", USAGE) from error
+    with text as file:
+        try:
+            table = csv.DictReader(file, strict=True)
+            if lacking := [name for name in COLUMNS if name not in (table.fieldnames or ())]:
+                raise ValueError(f"it has no column {lacking[0]}")
+            for row in table:
+                yield {name: _value(name, cell) for name, cell in row.items()}
+        except (csv.Error, ValueError, TypeError, AttributeError) as error:
+            demand = f"a table as springmass batch writes it was demanded ({error}); run batch again"
+            raise ProgramError(f"{path}: {demand}", USAGE) from error
+
+
+def _value(name: str, cell: str) -> Any:
+    if cell == "":
+        return None
+    if name in _NUMBERS:
+        return float(cell)
+    if name in _WHOLE:
+        return int(cell)
+    return cell[1:] if cell.startswith("'") and cell[1:].startswith(_FORMULA) else cell
+
+
+def tags_in(columns: Iterable[str]) -> tuple[str, ...]:
+    """Return the columns that are the course's own."""
+    usual = frozenset(columns_of(()))
+    return tuple(name for name in columns if name not in usual)
+
+
+def text_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
+    """Return some columns of rows as CSV text."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_cell(row[name]) for name in columns] for row in rows)
+    return out.getvalue()

@@ -1,0 +1,277 @@
+"""``springmass batch``: one table of many runs, made the same on every way."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import springmass
+from tests.courses import contents, short_course, write_recording
+
+LIMIT_S = 120
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        print(cluster.scheduler_address, *(worker.pid for worker in cluster.workers.values()), flush=True)
+        sys.stdin.read()
+"""
+QUICK = ("--reports", "0", "--accuracy", "fast")
+
+
+@pytest.fixture
+def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Six recordings; the test stands beside their folder."""
+    monkeypatch.chdir(tmp_path)
+    return Path(short_course(tmp_path / "runs", 6).name)
+
+
+def rows(folder: str | Path) -> list[dict[str, str]]:
+    """Return the table's rows."""
+    with (Path(folder) / "results.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_folder_becomes_a_table_a_page_and_reports(runs, cli):
+    """One row a run in CSV and Parquet, equal to an analysis of the run alone; reports of the worst."""
+    done = cli("batch", runs, "-o", "out", "--jobs", "1", "--reports", "1")
+    assert done.code == 0
+    table = rows("out")
+    assert [row["run"] for row in table] == [f"run{i:03d}" for i in range(6)]
+    (alone,) = cli("analyse", "--json", "runs/run003.txt").results
+    assert float(table[3]["period"]) == alone["estimates"]["period"]["value"]
+    assert float(table[3]["period_u"]) == alone["estimates"]["period"]["u"]
+    assert table[3]["input_sha256"] == alone["input"]["sha256"]
+    assert json.loads(table[3]["correlations"]) == alone["correlations"]
+    assert json.loads(table[3]["findings"]) == [finding["code"] for finding in alone["findings"]]
+    (report,) = Path("out/reports").glob("*/report.html")
+    page = Path("out/index.html").read_text()
+    assert f'href="{report.relative_to("out").as_posix()}"' in page
+    assert page.count("<svg") == 6
+    assert "unchanged" in Path("out/batch.log").read_text()
+
+
+def test_csv_parquet_duckdb_and_the_facade_read_the_same(runs, cli):
+    """Pandas, DuckDB and springmass.results agree to the last bit."""
+    import duckdb
+
+    assert cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK).code == 0
+    frame = springmass.results("out")
+    by_csv = pd.read_csv("out/results.csv")
+    assert (by_csv["period"] == frame["period"]).all()
+    assert (pd.read_parquet("out/results.parquet")["period"] == frame["period"]).all()
+    told = duckdb.sql("select run, period from 'out/results.parquet' order by run").fetchall()
+    assert told == list(zip(frame["run"], frame["period"], strict=True))
+    data = springmass.results("out", form="dataset")
+    assert data["period"].dims == ("run",)
+    assert data["period"].sel(run="run002").item() == frame["period"][2]
+    assert data["period"].attrs["units"] == "s"
+
+
+def test_a_second_pass_analyses_nothing_and_a_change_only_what_changed(runs, cli):
+    """What was touched is read, and kept; another content, scene or accuracy is analysed."""
+    command = ("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
+    cli(*command)
+    before = contents(Path("out"))
+    assert "6 unchanged, 0 analysed" in cli(*command).err
+    assert contents(Path("out")) == before
+    assert "6 unchanged, 0 analysed" in cli(*command, "--rehash").err
+    os.utime(runs / "run001.txt", ns=(1, 1))
+    assert "6 unchanged, 0 analysed" in cli(*command).err
+    shutil.copy(runs / "run000.txt", runs / "run005.txt")
+    assert "5 unchanged, 1 analysed" in cli(*command).err
+    table = rows("out")
+    assert table[5]["period"] == table[0]["period"]
+    assert "0 unchanged, 6 analysed" in cli(*command[:-1], "standard").err
+    (runs / "run003.about.toml").write_text("[scene.bob]\nmass_kg = 0.2\n")
+    assert "5 unchanged, 1 analysed" in cli(*command[:-1], "standard").err
+    assert rows("out")[3]["bob_mass_kg"] == "0.2"
+
+
+def test_processes_and_shards_give_the_bytes_of_one_process(runs, cli):
+    """One process, two, shards in any order with the last left out: the same files, bit for bit."""
+    Path("a").mkdir()
+    folders = []
+    for name, ways in {
+        "one": [("--jobs", "1")],
+        "two": [("--jobs", "2")],
+        "shards": [("--shard", "3/3", "--jobs", "1"), ("--shard", "1/3", "--jobs", "1"), ("--jobs", "1")],
+    }.items():
+        out = Path("a") / name / "out"
+        out.parent.mkdir()
+        for way in ways:
+            assert cli("batch", runs, "-o", out, *way, "--reports", "1", "--accuracy", "fast").code == 0
+        folders.append(contents(out))
+    assert folders[0] == folders[1] == folders[2]
+    assert any(name.endswith("report.html") for name in folders[0])
+
+
+@pytest.fixture
+def cluster() -> Iterator[tuple[str, list[int]]]:
+    """A dask cluster of two processes: its address and their numbers."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", CLUSTER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    address, *pids = process.stdout.readline().decode().split()
+    yield address, [int(pid) for pid in pids]
+    process.stdin.close()
+    process.wait(LIMIT_S)
+    process.stdout.close()
+
+
+def test_dask_gives_the_bytes_of_one_process(runs, cli, cluster):
+    """The workers of a cluster make the same files."""
+    cli("batch", runs, "-o", "here", "--jobs", "1", *QUICK)
+    command = [sys.executable, "-m", "springmass", "batch", str(runs), "-o", "there", "--dask", cluster[0], *QUICK]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
+    assert done.returncode == 0, done.stderr
+    ours, theirs = contents(Path("here")), contents(Path("there"))
+    ours.pop("index.html"), theirs.pop("index.html")  # its title is the folder's name
+    assert ours == theirs
+
+
+def test_no_scheduler_and_no_folder_are_one_line(runs, cli):
+    """An address where nobody answers, options that do not go together, a folder that is none."""
+    done = cli("batch", runs, "-o", "out", "--dask", "nonsense://x", *QUICK)
+    assert done.code == 2
+    assert "a dask scheduler was demanded" in done.err
+    assert "leave out --jobs" in cli("batch", runs, "-o", "out", "--dask", "tcp://x", "--jobs", "2").complaint
+    assert "name it with -o" in cli("batch", runs).complaint
+    assert "that springmass batch made" in cli("report", runs, "run001").complaint
+
+
+def test_bad_files_fail_alone(runs, cli):
+    """Exit code 1; each failure is one line and a row; the others are equal to those of a pass without it."""
+    cli("batch", runs, "-o", "good", "--jobs", "1", *QUICK)
+    (runs / "bad1.txt").write_bytes(b"Motion Sensor Data File\r\nTime (s)\tDistance (cm)\r\n0.0\tx\r\n")
+    (runs / "bad2.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + b"\0" * 600)
+    done = cli("batch", runs, "-o", "bad", "--jobs", "1", *QUICK)
+    assert done.code == 1
+    assert "8 runs: 0 unchanged, 8 analysed, 2 failed" in done.err
+    table = rows("bad")
+    failed = [row for row in table if row["status"] == "failed"]
+    assert [row["run"] for row in failed] == ["bad1", "bad2"]
+    assert all(row["error"] in done.err for row in failed)
+    assert [row for row in table if row["status"] == "ok"] == rows("good")
+    assert cli("batch", runs, "-o", "bad", "--jobs", "1", *QUICK).code == 1  # still
+
+
+def test_a_run_without_oscillation_is_named(runs, cli):
+    """A bob at rest is a row without a period, a failure in words."""
+    import numpy as np
+
+    write_recording(runs / "still.txt", 0.2 + 3e-4 * np.random.default_rng(1).standard_normal(800))
+    done = cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
+    assert done.code == 1
+    assert rows("out")[-1]["status"] == "no_oscillation"
+    assert "still.txt: no oscillation" in done.err
+
+
+def test_lists_patterns_and_folders_in_folders_are_inputs(runs, cli):
+    """A list names files, a pattern finds them, folders are looked into; a file that several name is one run."""
+    (runs / "late").mkdir()
+    shutil.copy(runs / "run000.txt", runs / "late" / "run000.txt")
+    Path("list.txt").write_text("# three\nruns/run001.txt\nruns/run002.txt\nruns/late/run000.txt\n")
+    cli("batch", "@list.txt", "runs/run00[12].txt", "-o", "some", *QUICK)
+    assert [row["run"] for row in rows("some")] == ["late/run000", "run001", "run002"]
+    cli("batch", runs, "-o", "out", *QUICK)
+    assert len(rows("out")) == 7
+    assert "nothing matches it" in cli("batch", "*.nothing", "-o", "out").complaint
+
+
+def test_runs_csv_gives_scenes_and_tags(runs, cli):
+    """Values by path and by pattern; what fits nothing on either side is named before work begins."""
+    Path("runs.csv").write_text(
+        "path;bob_mass_kg;bob_mass_kg_u;spring_mass_kg;group\n"
+        "run*.txt;;;0,010;\nruns/run001.txt;0,2176;0,00005;;A\nruns/run002.txt;0,2000;;;B\ngone.txt;0,2;;;\n"
+    )
+    done = cli("batch", runs, "--runs", "runs.csv", "-o", "out", "--jobs", "1", *QUICK)
+    assert done.code == 0
+    assert "runs.csv, line 5: gone.txt: no file of the inputs belongs to this row" in done.err
+    table = rows("out")
+    assert [row["group"] for row in table][:3] == ["", "A", "B"]
+    assert table[1]["bob_mass_kg_u"] == "5e-05"
+    assert {row["spring_mass_kg"] for row in table} == {"0.01"}
+    (alone,) = cli(
+        "analyse", "--json", "runs/run001.txt", "--accuracy", "fast", "--mass-kg", "0.2176", "--mass-u-kg", "0.00005",
+        "--spring-mass-kg", "0.01",
+    ).results  # fmt: skip
+    assert float(table[1]["spring_constant"]) == alone["estimates"]["spring_constant"]["value"]
+
+
+def test_the_template_is_a_table_of_runs(runs, cli):
+    """Printed, saved and given back it says nothing and is taken."""
+    Path("runs.csv").write_text(cli("batch", "--template", runs).out)
+    done = cli("batch", "--runs", "runs.csv", "-o", "out", "--jobs", "1", *QUICK)
+    assert done.code == 0
+    assert len(rows("out")) == 6
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ("path,bob_mas_kg\n", "did you mean bob_mass_kg?"),
+        ("path,bob_mass_g\n", "unknown column 'bob_mass_g'"),
+        ("file,group\n", "a column path was demanded"),
+        ("path,period\n", "that is no column of the results"),
+        ("path,bob_mass_kg\nruns/run001.txt,heavy\n", "line 2: bob_mass_kg must be a finite number, got 'heavy'"),
+        ("path,bob_mass_kg\nruns/run001.txt,-1\n", "[bob] mass_kg must be"),
+        ("path,bob_mass_kg_u\nruns/run001.txt,1\n", "bob_mass_kg_u does nothing without"),
+        ("path,group\nrun*,A\n*1.txt,B\n", "both match"),
+        ("path,group\nruns/run001.txt,A\nruns/run001.txt,B\n", "leave one out"),
+        ("path,group\nruns/run001.txt,A,B\n", "2 columns were demanded, got 3"),
+    ],
+)
+def test_a_wrong_table_is_one_line(runs, cli, table, told):
+    """File, line, column and value, and nothing is analysed."""
+    Path("runs.csv").write_text(table)
+    done = cli("batch", runs, "--runs", "runs.csv", "-o", "out")
+    assert done.code == 2
+    assert told in done.err
+    assert not Path("out/results.csv").exists()
+
+
+def test_a_report_on_demand_is_linked(runs, cli):
+    """By the run's name or its path; a wrong name is answered with the nearest."""
+    cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
+    done = cli("report", "out", "runs/run004.txt")
+    assert done.code == 0
+    assert Path("out/reports/run004.results/report.html").is_file()
+    assert 'href="reports/run004.results/report.html"' in Path("out/index.html").read_text()
+    assert "did you mean run004?" in cli("report", "out", "run04").complaint
+
+
+def test_two_passes_do_not_share_a_folder(runs, cli):
+    """The second is told to wait; two shards may run beside each other."""
+    from springmass.batch.store import Store
+
+    with Store(Path("out")).held("alone"):
+        assert "another is at work on it" in cli("batch", runs, "-o", "out").complaint
+    with Store(Path("out")).held("with others"):
+        assert cli("batch", runs, "-o", "out", "--shard", "1/2", *QUICK).code == 0
+
+
+def test_a_damaged_part_costs_its_runs_alone(runs, cli):
+    """A line that is none is said and its run analysed again; the results are those of a clean pass."""
+    command: tuple[str | Path, ...] = ("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
+    cli(*command)
+    before = contents(Path("out"))
+    whole = Path("out/parts/whole.jsonl")
+    lines = whole.read_bytes().splitlines(keepends=True)
+    whole.write_bytes(b"".join([*lines[:2], b"{torn\n", *lines[3:]]))
+    done = cli(*command)
+    assert "1 lines of parts are damaged" in done.err
+    assert "5 unchanged, 1 analysed" in done.err
+    assert contents(Path("out")) == before
