@@ -277,7 +277,7 @@ def _springs(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
         power = round(off / math.log(10))
         if run.name in partners:
             other = partners[run.name]
-            message = f"{told}; with the mass of {other} it is not, nor is that run with this one's"
+            message = f"{told}; with its mass and that of {other} exchanged both agree with their springs"
             yield Suspect(run.name, "masses exchanged", message, other)
         elif power in POWERS and abs(off / math.log(10) - power) < WITHIN:
             yield Suspect(run.name, "unit of the mass", f"k is 10^{power:+d} of its spring's: the unit of its mass")

@@ -44,7 +44,9 @@ def write_page(
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    lines = [_line(name, row, tags, reports) for name, row in runs]
+    every = [_line(name, row, tags, reports) for name, row in runs]
+    there = [i for i in range(len(SHOWN)) if any(line["cells"][i][1] for line in every)]  # no column without a number
+    lines = [{**line, "cells": [line["cells"][i] for i in there]} for line in every]
     lines.sort(key=lambda line: (*(-x for x in line["need"]), line["name"]))
     told = {kind: sum(line["look"] == kind for line in lines) for kind in ("failed", "error", "warning", "fine")}
     environment = Environment(
@@ -52,7 +54,7 @@ def write_page(
         lstrip_blocks=True, finalize=lambda value: visible(value) if type(value) is str else value,
     )  # fmt: skip
     page = environment.get_template("course.html.j2").render(
-        title=folder.resolve().name, lines=lines, tags=tags, quantities=SHOWN, told=told
+        title=folder.resolve().name, lines=lines, tags=tags, quantities=[SHOWN[i] for i in there], told=told
     )
     return write_whole(folder / PAGE, page.encode("utf-8", "backslashreplace"))
 

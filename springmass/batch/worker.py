@@ -28,7 +28,7 @@ from storage.errors import StorageError
 
 __all__ = ["analyse_many", "blank_row", "stamps_of", "unchanged"]
 
-BINS = 60  # of a thumbnail
+BINS, FEWEST_BINS = 60, 8  # of a thumbnail
 DRAG_POINTS = 8
 DIGITS = 6  # of a correlation
 
@@ -143,7 +143,7 @@ def _fill(row: dict[str, Any], loaded: Loaded, analysis: Analysis) -> None:
         warnings=sum(f.severity == "warning" for f in findings),
         findings=[f.code for f in findings],
         messages=[[f.severity, f.message] for f in findings if f.severity != "info"],
-        thumbnail=_thumbnail(track.t, track.y),
+        thumbnail=_thumbnail(track.t, track.y, _period_s(analysis)),
     )
     if isinstance(motion, Oscillation):
         damping, derived = motion.damping, motion.derived
@@ -193,21 +193,27 @@ def _drag_points(analysis: Analysis, motion: Oscillation) -> list[list[float]]:
     return [[float(f"{x:.6g}") for x in point] for point in points.tolist() if np.isfinite(point).all()]
 
 
-def _thumbnail(t: F8, y: F8) -> str:
-    """Return an outline of the record in a box of 120 by 30 as the path of an SVG; empty where nothing was measured."""
+def _period_s(analysis: Analysis) -> float:
+    """Return the period, or so short a time that it limits nothing."""
+    return analysis.estimates["period"].value if "period" in analysis.estimates else 1e-9
+
+
+def _thumbnail(t: F8, y: F8, period_s: float) -> str:
+    """Return an outline of the record, an SVG path in a box of 120 by 30; empty where nothing was measured."""
     there = np.isfinite(t) & np.isfinite(y)
     t, y = t[there], y[there]
     if t.size < 2 or not np.ptp(t) > 0:
         return ""
-    bins = np.minimum(((t - t.min()) / np.ptp(t) * BINS).astype(int), BINS - 1)
-    low, high = np.full(BINS, np.inf), np.full(BINS, -np.inf)
+    count = int(np.clip(np.ptp(t) / period_s, FEWEST_BINS, BINS))  # a bin without a whole period is no outline
+    bins = np.minimum(((t - t.min()) / np.ptp(t) * count).astype(int), count - 1)
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
     np.minimum.at(low, bins, y)
     np.maximum.at(high, bins, y)
     filled = np.flatnonzero(np.isfinite(low))
     bottom, top = np.quantile(y, (0.005, 0.995))  # a false echo does not flatten the motion
     scale = 28.0 / max(top - bottom, 1e-300)
     above, below = (np.clip(29.0 - (edge[filled] - bottom) * scale, 0.0, 30.0).round() for edge in (high, low))
-    x = (2 * filled + 1).tolist()
+    x = ((filled + 0.5) * 120.0 / count).round(1).tolist()
     edge = [*zip(x, above.tolist(), strict=True), *reversed([*zip(x, below.tolist(), strict=True)])]
     return "M" + "L".join(f"{a:g} {b:g}" for a, b in edge) + "Z"
 

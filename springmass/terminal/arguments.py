@@ -180,6 +180,14 @@ def _add_where(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_map(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", nargs="+", metavar="DIR", help="folders that batch made")
+    _add_where(parser)
+    parser.add_argument(
+        "--out", default=".", metavar="DIR", help="folder for drag-map.svg, .pdf and .csv (default: here)"
+    )
+
+
 def _add_demo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="DIR", default="springmass-demo", help="folder for what it makes (default %(default)s)"
@@ -430,6 +438,7 @@ COMMANDS = {
     "batch": (_add_batch, "turn a course of runs into one table and a page, resumable, on one machine or many"),
     "report": (_add_report, "write the full report of one run of a course"),
     "catalog": (_add_catalog, "search, filter and list the runs of courses"),
+    "map": (_add_map, "draw the drag coefficients of a course against Reynolds and Keulegan-Carpenter number"),
     "record": (_add_record, "record a run from the bench, so that nothing is lost"),
     "page": (_add_page, "look at a recording in a browser, as it happens or as it was"),
     "recover": (_add_recover, "build a run file from a wire log, however torn"),

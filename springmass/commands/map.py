@@ -1,0 +1,48 @@
+"""``springmass map``: drag coefficients of a course against Re and KC, beside the literature's lines."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import json
+
+import numpy as np
+
+from springmass.batch.search import search
+from springmass.errors import OK, UNREADABLE, ProgramError, tell
+from springmass.runs.analysing import make_folder
+
+__all__ = ["run"]
+
+COLUMNS = ("run", "disc", "reynolds_number", "keulegan_carpenter_number", "drag_coefficient", "drag_coefficient_u")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Draw the map of every run for which an expression holds; write it as SVG and PDF, its numbers as CSV."""
+    from springmass.report.figures.canvas import save
+    from springmass.report.figures.drag_map import DragRun, drag_map_figure
+    from storage.atomic import write_whole
+
+    found = search(options.input, where=options.where).rows
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(COLUMNS)
+    runs = []
+    for row in found:
+        points = json.loads(row["drag_points"] or "[]")
+        if not points:
+            continue
+        label = row.get("disc") or f"{1e3 * row['disc_diameter_m']:.4g} mm"
+        runs.append(DragRun(label, np.array(points)))
+        table.writerows([row["run"], label, *point] for point in points)
+    if not any((one.points[:, 2] > 0).any() for one in runs):
+        demand = "a run with a drag coefficient was demanded"
+        raise ProgramError(
+            f"{demand}, got none among {len(found)}: it needs bob, disc and air in the scene, see --where", UNREADABLE
+        )
+    folder = make_folder(options.out)
+    save(drag_map_figure(runs), folder, "drag-map")
+    write_whole(folder / "drag-map.csv", out.getvalue())
+    tell(f"{len(runs)} of {len(found)} runs give a drag coefficient; written: {folder / 'drag-map.svg'}")
+    return OK

@@ -1,0 +1,163 @@
+"""Drag coefficients of many runs against Reynolds and Keulegan-Carpenter number, beside lines from the literature."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline.track import F8
+from springmass.report.figures.canvas import (
+    BLUE,
+    BOTTOM,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    RASTER_POINTS,
+    SKY,
+    VERMILLION,
+    blank,
+    escaped,
+    style,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["DragRun", "drag_map_figure", "drag_of_disc_at_rest", "drag_of_plate"]
+
+COLOURS = ((BLUE, "-"), (VERMILLION, "--"), (GREEN, "-."), (PURPLE, ":"), (ORANGE, "-"), (SKY, "--"))
+STEADY = 1.17
+WIDTH, HEIGHT, LEFT, GAP, RIGHT = 7.2, 3.6, 0.62, 0.45, 0.12  # inches
+NARROW = 5.0  # inches, below which the panels stand under each other
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DragRun:
+    """One run's drag coefficient at several of its amplitudes.
+
+    Parameters
+    ----------
+    disc : str
+        Label.
+    points : (n, 4) float64
+        Re, KC, drag coefficient, its standard uncertainty.
+    """
+
+    disc: str
+    points: F8
+
+
+def drag_of_disc_at_rest(reynolds: F8) -> F8:
+    """Return the drag coefficient of a disc broadside on in a steady stream at Reynolds numbers (n,).
+
+    Notes
+    -----
+    :math:`64/(\\pi Re)` of creeping flow [1]_ up to where it meets 1.17 of high Reynolds numbers [2]_: the two limits,
+    not what lies between them.
+
+    References
+    ----------
+    .. [1] A. Oberbeck, J. reine angew. Math. 81 (1876) 62; H. Lamb, Hydrodynamics, art. 339.
+    .. [2] S. F. Hoerner, Fluid-Dynamic Drag, 1965, section III.
+    """
+    return np.maximum(64.0 / (np.pi * reynolds), STEADY)
+
+
+def drag_of_plate(keulegan_carpenter: F8) -> F8:
+    """Return the drag coefficient of a long flat plate that oscillates broadside on, at KC numbers (n,).
+
+    Notes
+    -----
+    :math:`8.0\\,KC^{-1/3}` at low KC [1]_: a disc sheds less at its rim, its values lie below with about that slope.
+
+    References
+    ----------
+    .. [1] J. M. R. Graham, J. Fluid Mech. 97 (1980) 331.
+    """
+    return 8.0 * keulegan_carpenter ** (-1.0 / 3.0)
+
+
+def drag_map_figure(runs: Sequence[DragRun], *, width: float = WIDTH) -> Figure:
+    """Draw the map: a line a run with a band of one standard uncertainty, a colour and a dash a disc.
+
+    Parameters
+    ----------
+    runs : sequence of DragRun
+        One at least.
+    width : float
+        Inches; narrow ones have the panels under each other.
+
+    Raises
+    ------
+    ValueError
+        If no run has a positive drag coefficient.
+    """
+    if not any((run.points[:, 2] > 0).any() for run in runs):
+        raise ValueError("a map of drag needs a run with a positive drag coefficient")
+    discs = list(dict.fromkeys(run.disc for run in runs))
+    with style():
+        side = width >= NARROW
+        figure = blank(width, HEIGHT if side else 2 * HEIGHT)
+        tall = figure.get_figheight()
+        span = (width - LEFT - RIGHT - (GAP if side else 0.0)) / (2 if side else 1)
+        high = (tall - 0.5 - BOTTOM) if side else (tall - 0.95 - 2 * BOTTOM) / 2
+        places = (
+            [(LEFT, BOTTOM), (LEFT + span + GAP, BOTTOM)] if side else [(LEFT, high + 2 * BOTTOM + 0.2), (LEFT, BOTTOM)]
+        )
+        panels = [figure.add_axes((x / width, y / tall, span / width, high / tall)) for x, y in places]
+        for column, panel in enumerate(panels):
+            _draw(panel, runs, discs, column)
+            panel.set_ylabel("drag coefficient" if column == 0 or not side else "")
+            panel.set_xlabel(("Reynolds number", "Keulegan-Carpenter number")[column])
+        low, top = np.log([np.min([p.get_ylim()[0] for p in panels]), np.max([p.get_ylim()[1] for p in panels])])
+        for panel in panels:
+            panel.set_ylim(math.exp(low), math.exp(top))
+        handles = {label: h for p in panels for h, label in zip(*p.get_legend_handles_labels(), strict=True)}
+        figure.legend(
+            handles.values(), handles.keys(), loc="upper left", ncols=3 if side else 1,
+            bbox_to_anchor=(LEFT / width, 1.0), fontsize=8, borderaxespad=0.2, columnspacing=1.2,
+        )  # fmt: skip
+        return figure
+
+
+def _draw(panel: Axes, runs: Sequence[DragRun], discs: Sequence[str], column: int) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    flat = len(runs) * 8 > 8 * RASTER_POINTS  # thousands of lines are pixels
+    seen: set[str] = set()
+    ends, heights = [], []
+    for run in runs:
+        points = run.points[run.points[:, 2] > 0]
+        if not len(points):
+            continue
+        colour, dashes = COLOURS[discs.index(run.disc) % len(COLOURS)]
+        x, c, u = points[:, column], points[:, 2], points[:, 3]
+        label = None if run.disc in seen else f"disc {escaped(run.disc)}" if run.disc else "runs"
+        seen.add(run.disc)
+        panel.fill_between(x, np.maximum(c - u, 1e-3 * c), c + u, color=colour, alpha=0.12, lw=0, rasterized=flat)
+        panel.plot(x, c, color=colour, ls=dashes, lw=0.8, alpha=0.8, label=label, rasterized=flat)
+        ends += [x.min(), x.max()]
+        heights += [c.min(), c.max()]
+    low, high = 0.8 * min(ends), 1.25 * max(ends)
+    grid = np.geomspace(low, high, 200)
+    if column == 0:
+        line, words = drag_of_disc_at_rest(grid), "disc, steady stream (limits)"
+    else:
+        line, words = drag_of_plate(grid), "flat plate, Graham 1980"
+    panel.plot(grid, line, color="#000000" if column else GREY, lw=1.1, ls=(0, (5, 2)), label=words)
+    panel.set_xlim(low, high)
+    panel.set_ylim(
+        0.7 * min(*np.quantile(heights, (0.01,)), line.min()), 1.4 * max(*np.quantile(heights, (0.99,)), STEADY)
+    )
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
