@@ -1,7 +1,8 @@
-"""What the page costs: processor time of its process, and the time from a reading to a viewer, while a bench records.
+"""What the page costs while a bench records: processor time, memory, and the time from a reading to a viewer.
 
-Prints one line. The recording is a simulated bench at 100 Hz behind a pseudo-terminal; the viewers are sockets that
-read all they are sent, in this process.
+Prints a line for each figure. The recording is a simulated bench at 100 Hz behind a pseudo-terminal; viewers are
+sockets that read all they are sent, in this process, or a browser (``--browser``), whose screen is drawn.
+``--suspend S`` lets one viewer read nothing for so long; ``--slip`` compares the sampler with and without the page.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import http.client
 import json
 import os
 import re
+import shutil
 import signal
 import struct
 import subprocess
@@ -18,10 +20,15 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
+
+from storage.run_file.reading import open_run
 
 SCENE = """
 [bob]
@@ -32,52 +39,101 @@ mass_kg = 0.01
 [start]
 displacement_m = 0.05
 """
+SETTLED_S = 6.0
+"""So long the history and what the first analysis loads take."""
+BROWSER = "--no-sandbox --disable-gpu --disable-background-networking --disable-dev-shm-usage"
+DRAWN = """() => {
+  window.drawn = [];
+  let seen = samples[0].count;
+  const look = () => {
+    if (samples[0].count > seen) {
+      const now = (performance.timeOrigin + performance.now()) / 1e3;
+      for (let i = seen; i < samples[0].count; i++) drawn.push([now, samples[0].t[i]]);
+      seen = samples[0].count;
+    }
+    requestAnimationFrame(look);
+  };
+  requestAnimationFrame(look);
+}"""
 
 
-def measure(seconds: float, viewers: int) -> dict[str, float]:
-    """Return the share of a core that the page takes, and the lag of its samples at their viewers, s."""
-    with tempfile.TemporaryDirectory() as folder:
-        scene = Path(folder) / "bench.toml"
-        scene.write_text(SCENE)
-        command = ["record", "--simulate", str(scene), "-o", str(Path(folder) / "run.h5"), "--page", "--no-browser"]
-        with subprocess.Popen(
-            [sys.executable, "-m", "springmass", *command], stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True
-        ) as recording:
-            assert recording.stderr is not None
-            address = next(found[1] for line in recording.stderr if (found := re.search(r"page: (http\S+)", line)))
-            drain = threading.Thread(target=recording.stderr.read)
-            drain.start()
-            page = _child(recording.pid)
-            lags = _watch(address, seconds, viewers, page)
-            recording.send_signal(signal.SIGINT)
+@dataclass(frozen=True)
+class Bench:
+    """A recording that runs."""
+
+    address: str
+    page: int
+
+    def cpu_s(self, thread: str = "") -> float:
+        """Return the processor time of the page, or of its serving thread, s."""
+        task = f"task/{self.page}/" if thread == "serving" else ""
+        fields = Path(f"/proc/{self.page}/{task}stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def memory_mb(self) -> float:
+        """Return the page's resident memory, MB."""
+        pages = int(Path(f"/proc/{self.page}/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@contextmanager
+def recording(folder: Path, *, page: bool = True, seconds: float | None = None) -> Iterator[Bench | None]:
+    """Record a simulated bench, with its page or without."""
+    scene = folder / "bench.toml"
+    scene.write_text(SCENE)
+    command = ["record", "--simulate", str(scene), "-o", str(folder / "run.h5")]
+    command += ["--page", "--no-browser"] if page else []
+    command += [] if seconds is None else ["--seconds", str(seconds)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "springmass", *command], stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True
+    ) as process:
+        assert process.stderr is not None
+        found = None
+        if page:
+            address = next(m[1] for line in process.stderr if (m := re.search(r"page: (http\S+)", line)))
+            listed = subprocess.run(["pgrep", "-P", str(process.pid)], capture_output=True, text=True, check=True)
+            found = Bench(address, int(listed.stdout.split()[0]))
+        drain = threading.Thread(target=process.stderr.read)
+        drain.start()
+        try:
+            yield found
+        finally:
+            if seconds is None:
+                process.send_signal(signal.SIGINT)
             drain.join()
-    return lags
 
 
-def _child(parent: int) -> int:
-    listed = subprocess.run(["pgrep", "-P", str(parent)], capture_output=True, text=True, check=True)
-    return int(listed.stdout.split()[0])
-
-
-def _cpu_s(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def _watch(address: str, seconds: float, viewers: int, page: int) -> dict[str, float]:
-    from websockets.sync.client import connect
-
-    parts = urlsplit(address)
+def _sockets(bench: Bench) -> dict[str, object]:
+    """Return how to open a socket of the page."""
+    parts = urlsplit(bench.address)
     connection = http.client.HTTPConnection(parts.netloc)
     connection.request("GET", f"/?{parts.query}")
-    headers = {"Cookie": str(connection.getresponse().headers["Set-Cookie"]).split(";")[0]}
+    cookie = str(connection.getresponse().headers["Set-Cookie"]).split(";")[0]
     connection.close()
-    url, origin = f"ws://{parts.netloc}/v1/run", f"http://{parts.netloc}"
+    return {
+        "uri": f"ws://{parts.netloc}/v1/run",
+        "origin": f"http://{parts.netloc}",
+        "additional_headers": {"Cookie": cookie},
+        "max_size": None,
+    }
+
+
+def measure(seconds: float, viewers: int, suspended_s: float = 0.0) -> dict[str, float]:
+    """Return shares of a core, the lag of samples at their viewers, s, and what a suspended viewer costs, MB and s."""
+    with tempfile.TemporaryDirectory() as folder, recording(Path(folder)) as bench:
+        assert bench is not None
+        return _watch(bench, seconds, viewers, suspended_s)
+
+
+def _watch(bench: Bench, seconds: float, viewers: int, suspended_s: float) -> dict[str, float]:
+    from websockets.sync.client import connect
+
+    opened = _sockets(bench)
     arrivals: list[tuple[float, float]] = []
     over = threading.Event()
 
     def view(number: int) -> None:
-        with connect(url, origin=origin, additional_headers=headers, max_size=None) as run:  # type: ignore[arg-type]
+        with connect(**opened) as run:  # type: ignore[arg-type]
             while not over.is_set():
                 message = run.recv()
                 if number == 0 and isinstance(message, bytes):
@@ -90,18 +146,79 @@ def _watch(address: str, seconds: float, viewers: int, page: int) -> dict[str, f
     threads = [threading.Thread(target=view, args=(number,)) for number in range(viewers)]
     for thread in threads:
         thread.start()
-    over.wait(5.0)  # the history, and what the first analysis loads
-    before, start = _cpu_s(page), time.perf_counter()
+    over.wait(SETTLED_S)
+    before, serving, start = bench.cpu_s(), bench.cpu_s("serving"), time.perf_counter()
     seen = len(arrivals)
     over.wait(seconds)
-    share = (_cpu_s(page) - before) / (time.perf_counter() - start)
+    passed = time.perf_counter() - start
+    found = {"cpu": (bench.cpu_s() - before) / passed, "serving": (bench.cpu_s("serving") - serving) / passed}
+    came, taken = np.array(arrivals[seen:]).T
+    if suspended_s:
+        with connect(**opened) as run:  # type: ignore[arg-type]
+            run.recv()
+            memory = bench.memory_mb()
+            over.wait(suspended_s)
+            found["memory_mb"] = bench.memory_mb() - memory
+            start, newest, latest = time.perf_counter(), -1.0, arrivals[-1][1]
+            while newest < latest:
+                message = run.recv()
+                if isinstance(message, bytes):
+                    newest = float(np.frombuffer(message, "<f8", struct.unpack_from("<4I", message)[3], 16)[-1])
+            found["current_s"] = time.perf_counter() - start
     over.set()
     for thread in threads:
         thread.join()
-    came, taken = np.array(arrivals[seen:]).T
     lag = came - taken
     lag -= lag.min()  # the earliest is taken for at once: clocks of two processes have no common zero
-    return {"cpu": share, "p50_s": float(np.median(lag)), "p95_s": float(np.quantile(lag, 0.95))}
+    return {**found, "p50_s": float(np.median(lag)), "p95_s": float(np.quantile(lag, 0.95))}
+
+
+def screen(seconds: float) -> dict[str, float]:
+    """Return the time from the host's stamp of a sample to the frame that shows it, in headless Chromium, s."""
+    from playwright.sync_api import sync_playwright
+
+    chromium = shutil.which("chromium")
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        with recording(Path(folder)) as bench:
+            assert bench is not None
+            browser = playwright.chromium.launch(executable_path=chromium, args=BROWSER.split())
+            page = browser.new_page(viewport={"width": 1366, "height": 900})
+            page.goto(bench.address)
+            page.wait_for_function("() => samples.length && samples[0].count > 600")
+            before, serving, start = bench.cpu_s(), bench.cpu_s("serving"), time.perf_counter()
+            page.evaluate(DRAWN)
+            page.wait_for_timeout(1e3 * seconds)
+            drawn = np.array(page.evaluate("drawn"))
+            passed = time.perf_counter() - start
+            cpu, serve = (bench.cpu_s() - before) / passed, (bench.cpu_s("serving") - serving) / passed
+            browser.close()
+        with open_run(Path(folder) / "run.h5") as run:
+            samples = run.samples()
+    assert samples.host_ns is not None
+    offset_s = time.time() - time.monotonic()  # the stamps' clock is the monotonic one
+    stamped = np.interp(drawn[:, 1], samples.t, samples.host_ns * 1e-9 + offset_s)
+    lag = drawn[:, 0] - stamped
+    return {"cpu": cpu, "serving": serve, "p50_s": float(np.median(lag)), "p95_s": float(np.quantile(lag, 0.95))}
+
+
+def slip(seconds: float, *, page: bool) -> float:
+    """Return by how much the sampler's stamps slip against the sensor's clock, 99th percentile, s."""
+    with tempfile.TemporaryDirectory() as folder:
+        with recording(Path(folder), page=page, seconds=seconds) as bench:
+            if bench is not None:
+                _watch(bench, seconds - SETTLED_S - 1.0, 2, 0.0)
+        with open_run(Path(folder) / "run.h5") as run:
+            samples = run.samples()
+    assert samples.host_ns is not None
+    late = samples.host_ns * 1e-9 - samples.t
+    return float(np.quantile(late - late.min(), 0.99))
+
+
+def _told(found: dict[str, float]) -> str:
+    return (
+        f"{100 * found['serving']:.1f} % of a core to serve, {100 * found['cpu']:.1f} % with the analysis; "
+        f"p50 {1e3 * found['p50_s']:.0f} ms, p95 {1e3 * found['p95_s']:.0f} ms"
+    )
 
 
 def main() -> None:
@@ -109,12 +226,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--viewers", type=int, default=1)
+    parser.add_argument("--suspend", type=float, default=0.0, metavar="S")
+    parser.add_argument("--browser", action="store_true")
+    parser.add_argument("--slip", action="store_true")
     options = parser.parse_args()
-    found = measure(options.seconds, options.viewers)
-    print(
-        f"page, {options.viewers} viewers: {100 * found['cpu']:.1f} % of a core with its analysis, "
-        f"sample to socket p50 {1e3 * found['p50_s']:.0f} ms, p95 {1e3 * found['p95_s']:.0f} ms"
-    )
+    if options.browser:
+        print(f"page in a browser, sample to screen: {_told(screen(options.seconds))}")
+    elif options.slip:
+        without, beside = (slip(options.seconds, page=page) for page in (False, True))
+        print(f"sampler's slip, p99: {1e3 * without:.1f} ms without the page, {1e3 * beside:.1f} ms with two viewers")
+    else:
+        found = measure(options.seconds, options.viewers, options.suspend)
+        print(f"page, {options.viewers} viewers, sample to socket: {_told(found)}")
+        if options.suspend:
+            grown, current = found["memory_mb"], 1e3 * found["current_s"]
+            print(f"a viewer suspended {options.suspend:g} s: {grown:+.1f} MB, current after {current:.0f} ms")
 
 
 if __name__ == "__main__":

@@ -64,6 +64,11 @@ def test_the_first_minute(bench: tuple[Any, Page]) -> None:
     press(page, "r")
     page.wait_for_function(PHASE.format(phase="recording"))
     page.wait_for_function("() => motion && motion.estimates && motion.estimates.period && motion.estimates.period.u")
+    page.wait_for_function("() => phase.plot.data[0].length > 50 && spectrum.plot.data[0].length > 50")
+    for chart in ("position", "amplitude", "phase", "spectrum"):
+        assert page.locator(f"div#{chart} canvas").count() == 1
+    ids = page.evaluate("[...document.querySelectorAll('[id]')].map((e) => e.id)")
+    assert len(set(ids)) == len(ids)
     press(page, "s")
     answer(page)
     page.wait_for_function(PHASE.format(phase="built"))
@@ -88,7 +93,7 @@ def test_the_trigger_keeps_what_came_before(bench: tuple[Any, Page]) -> None:
     press(page, "t")
     answer(page, "10", "1.5")
     page.wait_for_function(PHASE.format(phase="armed"))
-    assert page.inner_text("#phase") == "ARMED: 10 mm, 1.5 s kept from before"
+    assert page.inner_text("#stage") == "ARMED: 10 mm, 1.5 s kept from before"
     page.wait_for_function(PHASE.format(phase="recording"))
     page.wait_for_function(SEEN.format(count=300))
     program.end()

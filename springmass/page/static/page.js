@@ -73,8 +73,8 @@ function show_state() {
   const now = bench(), moment = performance.now();
   came = came.filter(([at]) => moment - at < 2000);
   const rate = came.reduce((sum, [, count]) => sum + count, 0) / 2, live = run.source !== "REPLAY" && !state.ended;
-  chip("phase", now.phase === "armed" ? `ARMED: ${(now.threshold_m * 1e3).toFixed(0)} mm, ${now.keep_s} s kept from before` : PHASES[now.phase] || "");
-  $("phase").className = `chip ${now.phase}`;
+  chip("stage", now.phase === "armed" ? `ARMED: ${(now.threshold_m * 1e3).toFixed(0)} mm, ${now.keep_s} s kept from before` : PHASES[now.phase] || "");
+  $("stage").className = `chip ${now.phase}`;
   chip("clock", live ? `${rate.toFixed(0)} Hz, ${CLOCKS[run.clock]}` : CLOCKS[run.clock]);
   chip("counts", `${state.samples[0].toLocaleString("en")} samples, ${state.missing} missing`);
   chip("calibration", calibration(now));
