@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 __all__ = ["Opening", "application", "serve"]
 
 STATIC = Path(__file__).parent / "static"
-TURN_S = 0.016
-"""Between two looks at the log: a sample waits no longer than a screen's frame."""
-MANY, EVERY = 4, 6
-"""More viewers than these get their samples at every sixth look, ten times a second."""
+TURN_S = 0.02
+"""Between two looks at the log: little longer than a screen's frame."""
+MANY, EVERY = 4, 5
+"""More viewers than these get their samples at every fifth look, ten times a second."""
 STATE_S = 0.5
 LAST_S = 1.5
 """So much longer it serves when it shall end: whoever looks sees that the run has."""

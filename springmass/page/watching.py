@@ -23,8 +23,8 @@ from springmass.page.view import View
 
 __all__ = ["Watcher", "motion_of"]
 
-SHARE = 0.08
-"""Of a core that the analysis takes at most: it waits twelve times as long as it worked."""
+SHARE = 0.05
+"""Of a core that the analysis takes at most: it waits twenty times as long as it worked."""
 LEAST_WAIT_S = 1.0
 NAMES = ("period", "spring_constant", "damping_rate", "noise", "offset", "quality_factor")
 CURVE_POINTS = 200

@@ -172,6 +172,24 @@ def test_everybody_can_read_it(replay: Page, width: int, scheme: Any) -> None:
     assert found.violations_count == 0, found.generate_report()
     assert replay.evaluate("document.documentElement.scrollWidth") <= width
     assert replay.locator("#freeze kbd").is_visible() == (width > 700)
+    if folder := os.environ.get("SPRINGMASS_SCREENSHOTS"):
+        replay.screenshot(path=Path(folder) / f"bench-page-{width}-{scheme}.png", full_page=True)
+
+
+def test_two_hours_are_drawn_by_least_and_greatest(replay: Page) -> None:
+    """720,000 samples become as many points as the screen can show, and no spike among them is lost."""
+    points, least, greatest, gaps = replay.evaluate("""() => {
+      const all = new Samples(), n = 720000, t = new Float64Array(n), y = new Float64Array(n);
+      for (let i = 0; i < n; i++) { t[i] = i / 100; y[i] = Math.sin(i / 12); }
+      y[123456] = 7; y[654321] = -9; y.fill(NaN, 300000, 310000);
+      all.take(0, t, y);
+      const [times, shown] = all.between(0, 7200, 1000);
+      const known = shown.filter((v) => v !== null);
+      return [times.length, Math.min(...known), Math.max(...known), shown.length - known.length];
+    }""")
+    assert points <= 2100
+    assert (least, greatest) == (-9, 7)
+    assert gaps > 10
 
 
 def test_every_key_has_its_button(replay: Page) -> None:
