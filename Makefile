@@ -5,7 +5,7 @@ BIN = $(VENV)/bin
 WORKERS ?= 2
 PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
 
-.PHONY: help demo test trials accuracy bench lint docs docs-figures docs-trade clean
+.PHONY: help demo test trials accuracy bench lint docs docs-figures docs-trade firmware clean
 
 help:
 	@echo "make demo     from two old recordings to Table 1 and a report"
@@ -13,6 +13,7 @@ help:
 	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
 	@echo "make bench    speed, as ratios to named references"
 	@echo "make lint     ruff, mypy, import contracts"
+	@echo "make firmware the rangefinder's hex, as it travels in the package (Debian: gcc-avr avr-libc arduino-core-avr)"
 	@echo "make docs     the pages and the reference of the Python API as a site, docs/_build/index.html"
 
 $(BIN)/python:
@@ -62,5 +63,12 @@ docs-figures: $(VENV)/.installed
 docs-trade: $(VENV)/.installed-dev
 	$(BIN)/python docs/figures/trade.py
 
+# Needs no network and no .venv. The tests build it anew and compare it with the one that travels.
+firmware:
+	@command -v avr-g++ >/dev/null && test -d /usr/share/arduino/hardware/arduino/avr || \
+	  { echo "make firmware needs avr-g++ and Arduino's core; Debian: apt-get install gcc-avr avr-libc arduino-core-avr" >&2; exit 1; }
+	$(MAKE) --no-print-directory -C firmware hex size
+	cp firmware/build/springmass_rangefinder.hex springmass/firmware/
+
 clean:
-	rm -rf $(VENV) demo-output dist build docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf firmware/build $(VENV) demo-output dist build docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -9,10 +9,57 @@ from typing import Any, Protocol
 from acquisition.errors import SensorError
 from acquisition.readings import Readings
 
-__all__ = ["RESONATOR_PPM", "Decoder", "Encoder", "Family", "Poll", "Polled"]
+__all__ = ["RESONATOR_PPM", "Decoder", "Encoder", "Family", "Identity", "Poll", "Polled", "Told"]
 
 RESONATOR_PPM = 10_000.0
 """What a ceramic resonator may be off, ppm: 5000 when new, 3000 with temperature, 3000 with age (Murata P16E)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a device says that it is.
+
+    Parameters
+    ----------
+    model, version : str
+    name : str
+        What its owner calls it; empty where nobody named it.
+    settings : mapping of str to int
+        What it is set to, with units in the names.
+    """
+
+    model: str
+    version: str
+    name: str = ""
+    settings: Mapping[str, int] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return f"{self.model} {self.version}{f' named {self.name}' if self.name else ''}"
+
+
+@dataclass(slots=True)
+class Told:
+    """What a device says besides readings; a decoder whose device does so keeps it as its attribute ``told``.
+
+    Parameters
+    ----------
+    identity : Identity or None
+        What it last said that it is.
+    conditions : dict of str to int
+        Counts of readings that measured nothing, by the reason that it gave.
+    complaint : str
+        What it says is wrong with it now, and what to check; empty where nothing is.
+    """
+
+    identity: Identity | None = None
+    conditions: dict[str, int] = field(default_factory=dict)
+    complaint: str = ""
+
+    @staticmethod
+    def by(decoder: Decoder) -> Told:
+        """Return what the device behind a decoder told so far; nothing where it cannot tell."""
+        told = getattr(decoder, "told", None)
+        return told if isinstance(told, Told) else Told()
 
 
 class Decoder(Protocol):
@@ -115,6 +162,8 @@ class Family:
     clock_ppm : float
         What the device's clock may be off at most, with temperature and age, ppm: 200 with a crystal, 10 000 with a
         ceramic resonator, as common boards have it. A comparison with the host that says more is not believed.
+    identify : bytes
+        Makes the device say what it is; empty where it does not know such a request.
     self_framing : bool
         Whether a mark or checksum tells a frame from noise; without one, bytes alone never show the family.
     source : str
@@ -134,6 +183,7 @@ class Family:
     options: Mapping[str, str] = field(default_factory=dict)
     has_device_time: bool = False
     clock_ppm: float = RESONATOR_PPM
+    identify: bytes = b""
     self_framing: bool = True
     source: str = ""
 
@@ -152,5 +202,5 @@ class Family:
 
     def describe(self) -> dict[str, Any]:
         """Return what ``springmass sensors --json`` prints."""
-        shown = (item.name for item in fields(self) if item.name not in ("decoder", "encoder", "poll"))
+        shown = (item.name for item in fields(self) if item.name not in ("decoder", "encoder", "poll", "identify"))
         return {name: getattr(self, name) for name in shown} | {"polled": self.poll is not None}

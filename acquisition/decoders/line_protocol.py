@@ -2,7 +2,7 @@
 
 ``$R1,sequence,device_us,echo_us,temperature,status*CRC`` and a line feed: see docs/reference/line-protocol.md, and
 firmware/springmass_rangefinder for a device that speaks it. The echo's time is sent, not a distance: the speed of
-sound is the host's affair and can be applied again later.
+sound is the host's affair and can be applied again later. Lines ``$I1,...`` say what the device is.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 import re
 from binascii import crc_hqx
 
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Family, Identity, Told
 from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
 from acquisition.readings import NAN, Reading
@@ -21,11 +21,36 @@ __all__ = ["FAMILY", "LineProtocolDecoder", "LineProtocolEncoder", "checksum", "
 LONGEST = 96
 """Longest line without its line feed, bytes."""
 
+SETTINGS = ("rate_hz", "near_us", "far_us", "spread_us", "thermometer")
+"""What a device says of itself behind model, version and name: rate, gate, spread of the pings, thermometer or none."""
+
 _WRAP = 1 << 32
 _row = tuple.__new__
 _FIELDS = rb"R1,([0-9]{1,10}),([0-9]{1,10}),([0-9]{1,6}\.[0-9]{2})?,(-?[0-9]{1,5})?,([A-Z])"
 _LINE = re.compile(rb"\A\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?\Z")
 _fields_of = _LINE.findall  # matches and gives the fields in one call
+_IDENTITY = re.compile(
+    rb"I1,([a-z0-9-]{1,32}),([0-9]{1,3}\.[0-9]{1,3}\.[0-9]{1,3}),([A-Za-z0-9._-]{0,12}),"
+    rb"([0-9]{1,3}),([0-9]{1,5}),([0-9]{1,5}),([0-9]{1,4}),([01])"
+)
+_FIRST_GREETING = b"# springmass rangefinder, line protocol R1"
+_FIRST = Identity("springmass-rangefinder", "1.0.0")
+
+CONDITIONS = {
+    b"N": "no_echo",
+    b"B": "busy",
+    b"C": "too_close",
+    b"F": "too_far",
+    b"A": "no_answer",
+    b"S": "stuck",
+}
+"""What a status other than ``E`` is counted as; a letter of a later version as ``other``."""
+
+COMPLAINTS = {
+    b"A": "the transducer does not answer its trigger: check its 5 V and ground, TRIG on D9 and ECHO on D8",
+    b"S": "ECHO stays high: check its wire on D8, and switch the transducer off and on",
+}
+"""Statuses that are a fault of the wiring or the transducer, and what to check."""
 _ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable, neither $ nor * within
 
 
@@ -51,25 +76,50 @@ class LineProtocolDecoder(FramedDecoder):
     Notes
     -----
     The CRC finds every change of one or two bits and every burst of up to 16 within the body, and all but one in
-    65536 of the rest. Comment lines (``#``) are counted as ``comment``, and sound lines of a later version as
-    ``unknown_record``.
+    65536 of the rest. Comment lines (``#``) are counted as ``comment``, commands that the device did not understand
+    as ``refused_command``, and sound lines of a later version as ``unknown_record``.
     """
 
     def __init__(self) -> None:
-        faults = {"garbage_bytes": 0, "bad_checksum": 0, "bad_frame": 0, "unknown_record": 0, "comment": 0}
+        faults = dict.fromkeys(
+            ("garbage_bytes", "bad_checksum", "bad_frame", "unknown_record", "refused_command", "comment"), 0
+        )
         super().__init__(LineSplitter(b"\n", LONGEST, faults))
+        self.told = Told()
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
         """Return what a line carries, or count why it carries nothing."""
-        return _reading(host_ns, frame) or self._behind_noise(host_ns, frame)
+        row = _reading(host_ns, frame)
+        if row is None:
+            return self._behind_noise(host_ns, frame)
+        if row[3] != row[3]:  # no echo: the letter says why
+            self._silent(frame)
+        elif self.told.complaint:
+            self.told.complaint = ""
+        return row
+
+    def _silent(self, frame: bytes) -> None:
+        """Count why nothing was measured."""
+        letter = frame[frame.rindex(b"*") - 1 :][:1]
+        name = CONDITIONS.get(letter, "other")
+        self.told.conditions[name] = self.told.conditions.get(name, 0) + 1
+        self.told.complaint = COMPLAINTS.get(letter, "")
 
     def _behind_noise(self, host_ns: int, line: bytes) -> Reading | None:
         """Return what a line that is not sound from its beginning carries, and count what is wrong with it."""
         # What stands before the last $ is noise, or a line whose end was lost; the rest may be whole.
         start = max(line.rfind(b"$"), 0)
         reading = _reading(host_ns, line[start:]) if start else None
-        self._count("bad_frame" if reading else _fault(line, start), start if reading else len(line) + 1)
-        return reading
+        identity = _identity(line, start)
+        if reading or identity:
+            self.told.identity = identity or self.told.identity
+            if start:
+                self._count("bad_frame", start)
+            return reading
+        if line.startswith(_FIRST_GREETING):
+            self.told.identity = _FIRST
+        self._count(_fault(line, start), len(line) + 1)
+        return None
 
 
 def _reading(host_ns: int, line: bytes) -> Reading | None:
@@ -88,12 +138,26 @@ def _reading(host_ns: int, line: bytes) -> Reading | None:
     return _row(Reading, (host_ns, count, clock_us, echo_us or NAN, NAN, celsius))
 
 
+def _identity(line: bytes, start: int) -> Identity | None:
+    """Return what a line says of the device, None where it is no such line."""
+    sealed = _ENVELOPE.fullmatch(line, start)
+    if sealed is None or checksum(sealed[1]) != int(sealed[2], 16):
+        return None
+    said = _IDENTITY.fullmatch(sealed[1])
+    if said is None:
+        return None
+    model, version, name, *numbers = (field.decode("ascii") for field in said.groups())
+    return Identity(model, version, name, dict(zip(SETTINGS, map(int, numbers), strict=True)))
+
+
 def _fault(line: bytes, start: int) -> str:
     """Return the name of what is wrong with a line that carries no reading."""
     sealed = _ENVELOPE.fullmatch(line, start)
     if sealed is None:
         return "comment" if line.startswith(b"#") else "bad_frame"
-    return "unknown_record" if checksum(sealed[1]) == int(sealed[2], 16) else "bad_checksum"
+    if checksum(sealed[1]) != int(sealed[2], 16):
+        return "bad_checksum"
+    return "refused_command" if sealed[1] == b"X1,command" else "unknown_record"
 
 
 class LineProtocolEncoder:
@@ -116,10 +180,11 @@ FAMILY = Family(
     baud=115200,
     rate_hz=100.0,
     resolution_m=43e-6,
-    range_m=(0.02, 1.7),
-    limits="At 100 Hz an echo from beyond 1.7 m arrives after the next ping.",
+    range_m=(0.02, 1.6),
+    limits="At 100 Hz an echo from beyond 1.6 m arrives after the next ping.",
     decoder=LineProtocolDecoder,
     encoder=LineProtocolEncoder,
     has_device_time=True,
+    identify=b"?\n",
     source="docs/reference/line-protocol.md",
 )

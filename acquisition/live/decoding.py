@@ -6,12 +6,13 @@ Live view, recording, recovery and replay from wire bytes all use this one chain
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from acquisition.block import F8, I8, Block, Flag
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Family, Told
 from acquisition.decoders.framed import FramedDecoder
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM, fit_clock
@@ -123,6 +124,11 @@ class SensorChain:
             return self._clock_ppm
         return COUNTER_PPM if self.timebase.counts else self.family.clock_ppm
 
+    @property
+    def told(self) -> Told:
+        """What the device said besides its readings."""
+        return Told.by(self.decoder)
+
     def info(self, name: str, kind: str = "live") -> SourceInfo:
         """Return what is known of the source; the clock's kind once a reading came."""
         if kind not in ("live", "simulated", "replay"):
@@ -137,10 +143,12 @@ class SensorChain:
 
     def report(self, t: F8, host_ns: I8) -> dict[str, Any]:
         """Return faults, gaps and the clock's rate error as plain numbers, for the run's provenance."""
-        clock = fit_clock(t, host_ns)
+        clock, told = fit_clock(t, host_ns), self.told
         known, left_out = np.isfinite(clock.rate_error_ppm), self.timebase.gaps_left_out
         return {
             "faults": dict(self.decoder.faults),
+            **({"conditions": dict(told.conditions)} if told.conditions else {}),
+            **({"identity": asdict(told.identity)} if told.identity else {}),
             "gaps": [{"index": g.index, "length_s": g.length_s, "lost": g.lost} for g in self.timebase.gaps],
             **({"gaps_left_out": dict(left_out)} if left_out["count"] else {}),
             "restarts": self.timebase.restarts,

@@ -98,6 +98,8 @@ class Line:
         that says what to ask next, and a reply that came short counts as timed out before the next request.
     proof : callable or None
         Returns what a port that came back has to prove before its bytes are the sensor's again; None: nothing.
+    greeting : bytes
+        Sent to a port that came back: makes the device say what it is.
     """
 
     transport: Transport
@@ -105,6 +107,7 @@ class Line:
     poll: Poll | None = None
     decoder: Callable[[], Polled] | None = None
     proof: Callable[[], Proof | None] | None = None
+    greeting: bytes = b""
     _lost_ns: int | None = field(default=None, init=False)
     """Since when its readings are missing."""
     _closed: bool = field(default=False, init=False)

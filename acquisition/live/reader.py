@@ -236,7 +236,10 @@ class PortReader:
             return False
         try:
             line.transport.reopen()
+            if line.greeting:
+                line.transport.write(line.greeting)
         except PortError:
+            line.transport.close()
             line._retry_ns = now + REOPEN_EVERY_NS
             return False
         line._closed, line._ask_ns = False, 0

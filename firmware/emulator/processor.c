@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <avr_extint.h>
 #include <avr_timer.h>
 #include <sim_elf.h>
 #include <sim_io.h>
@@ -66,9 +67,12 @@ avr_t *processor_start(const char *elf)
     exit(1);
   }
   avr_init(avr);
+  avr->run_cycle_limit = 1000; /* instructions go on without a look at the events while none is due */
   avr->frequency = (uint32_t)CPU_HZ;
   avr_load_firmware(avr, &firmware);
-  avr->run_cycle_limit = 1000;
+  /* Levels at the two interrupt pins, which are not used, would be looked at in each cycle. */
+  avr_extint_set_strict_lvl_trig(avr, EXTINT_IRQ_OUT_INT0, 0);
+  avr_extint_set_strict_lvl_trig(avr, EXTINT_IRQ_OUT_INT1, 0);
   avr->sleep = asleep;
   avr->io[AVR_DATA_TO_IO(TIFR1)].w.c = flags_written;
   avr->io[AVR_DATA_TO_IO(TIFR1)].w.param = timer_1(avr);

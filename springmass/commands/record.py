@@ -197,6 +197,8 @@ def _record(
 ) -> Ended:
     """Run the session, with a page from before its beginning to its end."""
     session.listen(console.line)
+    for line in session.meet():
+        console.line(line)
     operator = None if page is None else Operator(session, page, log)
     try:
         if operator is not None:

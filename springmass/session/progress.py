@@ -245,6 +245,8 @@ def _trouble(shown: Shown, chains: Sequence[SensorChain], *, waiting: bool) -> s
     """Return what is wrong with the first sensor that something is wrong with."""
     for channel, useful in sorted(shown.useful.items()):
         told = useful.trouble(chains[channel].family)
+        if told and (complaint := chains[channel].told.complaint):
+            told = complaint
         # A bob that the trigger waits for hangs still.
         if told and not (waiting and "unchanged" in told):
             return told if len(chains) == 1 else f"sensor {channel}: {told}"

@@ -61,10 +61,15 @@ class Tee:
         self.readings = [0 for _ in chains]
         self.unshown = 0
 
-    def line(self, channel: int, sensor: Sensor) -> Line:
-        """Return how the reader speaks to a sensor; a polled one is asked as its chain's decoder says."""
-        decoder = None if sensor.family.poll is None else partial(self._polled, channel)
-        return Line(sensor.transport, channel, sensor.family.poll, decoder, sensor.proof)
+    def line(self, channel: int, sensors: Sequence[Sensor]) -> Line:
+        """Return how the reader speaks to a sensor; a polled one is asked as its chain's decoder says.
+
+        What it has to prove when it comes back is asked of the sensors as they are then.
+        """
+        family = sensors[channel].family
+        decoder = None if family.poll is None else partial(self._polled, channel)
+        transport = sensors[channel].transport
+        return Line(transport, channel, family.poll, decoder, lambda: sensors[channel].proof(), family.identify)
 
     def _polled(self, channel: int) -> Polled:
         return cast(Polled, self._chains[channel].decoder)

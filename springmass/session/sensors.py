@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from acquisition.decoders.family import Decoder, Family
+from acquisition.decoders.family import Decoder, Family, Identity, Told
 from acquisition.decoders.registry import describe_bytes
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
@@ -29,10 +29,13 @@ class Proof:
         A fresh one.
     readings : int
         So many readings prove it, where they are at least half of the bytes since the first of them.
+    identity : Identity or None
+        What the sensor said that it is, where it did: then that and its name have to be said again.
     """
 
-    def __init__(self, decoder: Decoder, readings: int) -> None:
+    def __init__(self, decoder: Decoder, readings: int, identity: Identity | None = None) -> None:
         self._decoder = decoder
+        self._identity = identity
         self._wanted = readings
         self._readings = self._bytes = self._since_first = self._garbage_before = 0
 
@@ -46,7 +49,10 @@ class Proof:
         self._bytes += len(data)
         self._since_first += len(data) if self._readings else 0
         garbage = self._decoder.faults.get("garbage_bytes", 0) - self._garbage_before
-        if self._readings >= self._wanted and 2 * garbage <= self._since_first:
+        said = Told.by(self._decoder).identity
+        if self._identity is not None and said is not None:
+            return (said.model, said.name) == (self._identity.model, self._identity.name)
+        if self._identity is None and self._readings >= self._wanted and 2 * garbage <= self._since_first:
             return True
         return False if self._bytes >= PROOF_BYTES else None
 
@@ -68,6 +74,8 @@ class Sensor:
     baud : int
     clock_ppm : float or None
         What its clock may be off at most, ppm; None: the family's.
+    identity : Identity or None
+        What it said that it is, where it did.
     """
 
     family: Family
@@ -77,6 +85,7 @@ class Sensor:
     calibration: Calibration = field(default_factory=Calibration)
     baud: int = 0
     clock_ppm: float | None = None
+    identity: Identity | None = None
 
     def chain(self) -> SensorChain:
         """Return a fresh chain."""
@@ -93,7 +102,8 @@ class Sensor:
         if not self.family.self_framing:
             return None
         # One that is asked is asked once: its decoder sees the reply only afterwards, and says then what to ask next.
-        return Proof(self.family.decoder(**self.options), PROOF_READINGS if self.family.poll is None else 1)
+        wanted = PROOF_READINGS if self.family.poll is None else 1
+        return Proof(self.family.decoder(**self.options), wanted, self.identity)
 
     def entry(self, channel: int) -> SensorEntry:
         """Return what the log's header says of it."""

@@ -27,6 +27,7 @@ from springmass import __version__
 from springmass.errors import SENSOR, USAGE, ProgramError
 from springmass.session.display import Display, Samples
 from springmass.session.failures import Failures
+from springmass.session.identity import meeting
 from springmass.session.progress import SECOND_NS, Progress, Shown, progress_of
 from springmass.session.reads import Tee
 from springmass.session.sensors import Sensor
@@ -124,7 +125,10 @@ class Session:
         ProgramError
             With exit code 4 after three seconds: silence, or bytes of another kind (it says what they look like).
         """
-        lines = [self._tee.line(channel, sensor) for channel, sensor in enumerate(self.sensors)]
+        lines = [self._tee.line(channel, self.sensors) for channel in range(len(self.sensors))]
+        for line in lines:
+            if line.greeting:
+                line.transport.write(line.greeting)
         self._reader = PortReader(lines, self._tee, self._clock)
         self._reader.start()
         # A slow sensor takes several of its own periods to be distinguished from silence.
@@ -141,6 +145,18 @@ class Session:
                 self.stop()
                 raise ProgramError(self._not_heard(mute), SENSOR)
             self._wait_until(self._clock.now_ns() + 50_000_000)
+
+    def meet(self) -> list[str]:
+        """Keep what the sensors said that they are, take the rate that one is set to, and return lines on it."""
+        said = []
+        for channel, sensor in enumerate(self.sensors):
+            identity = self._chains[channel].told.identity
+            if identity is None:
+                continue
+            said += meeting(sensor, identity)
+            rate_hz = sensor.rate_hz or identity.settings.get("rate_hz")
+            self.sensors[channel] = replace(sensor, identity=identity, rate_hz=rate_hz)
+        return said
 
     def still(self, seconds: float = 3.0) -> StillPoint:
         """Return rest position and noise of the first sensor's next seconds, the bob hanging still."""

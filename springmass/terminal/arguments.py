@@ -339,6 +339,23 @@ def _add_ports(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="as JSON on stdout")
 
 
+def _add_firmware(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--port", metavar="P", help="the board's port; it is asked what it is")
+    parser.add_argument("--flash", action="store_true", help="write the firmware that comes with this program")
+    settings = parser.add_argument_group("settings, which the board keeps")
+    settings.add_argument("--rate", type=int, metavar="R", help="pings per second, 10 to 125")
+    settings.add_argument("--gate", type=_gate, metavar="NEAR,FAR", help="times of flight that count, us, from 116")
+    settings.add_argument("--spread", type=int, metavar="US", help="each ping comes up to so much later, 0 to 2000 us")
+    settings.add_argument("--name", metavar="NAME", help="to tell it from others, 12 letters, digits, . _ or - at most")
+
+
+def _gate(text: str) -> tuple[int, int]:
+    near, comma, far = text.partition(",")
+    if not (comma and near.isdecimal() and far.isdecimal()):
+        raise argparse.ArgumentTypeError(f"must be NEAR,FAR in whole us, got {text!r}")
+    return int(near), int(far)
+
+
 def _add_help(parser: argparse.ArgumentParser) -> None:
     topics = sorted(COMMANDS)
     parser.add_argument("topic", nargs="?", choices=topics, metavar="COMMAND", help=f"one of {', '.join(topics)}")
@@ -452,6 +469,7 @@ COMMANDS = {
     "formats": (_add_formats, "list the families of recordings, or say what a file is"),
     "sensors": (_add_json, "list the families of rangefinders with their rate, resolution, range and limits"),
     "ports": (_add_ports, "list the serial ports and what speaks on them"),
+    "firmware": (_add_firmware, "wire, flash and set the 100 Hz rangefinder for a few euros"),
     "scene": (_add_scene, "print a scene to fill in, check one, or note scene and marks beside a recording"),
     "completion": (_add_completion, "print what a shell needs to complete commands and options"),
     "help": (_add_help, "say what a command does"),

@@ -1,0 +1,143 @@
+"""``springmass firmware``: wiring, flashing and settings of the rangefinder that this project builds."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import shlex
+import shutil
+import subprocess
+
+from acquisition.clock import SystemClock
+from acquisition.decoders.family import Identity
+from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
+from acquisition.live.serial_port import SerialPort
+from springmass.errors import OK, SENSOR, USAGE, ProgramError, tell
+from springmass.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
+from springmass.session.identity import outdated, settings_of
+
+__all__ = ["run"]
+
+ANSWER_S = 5.0
+"""So long a board takes to answer at most: opening the port restarts it, and its bootloader waits for two seconds."""
+ASK_EVERY_S = 0.5
+FLASH_S = 120.0
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show wiring and how to flash; with a port what the board says, set it, or flash it."""
+    commands = _commands(options)
+    if options.port is None and (options.flash or commands):
+        raise ProgramError("--port must name the board's port; `springmass ports` lists them", USAGE)
+    if options.flash:
+        _flash(options.port)
+    elif options.port is None:
+        _show()
+        return OK
+    identity = _converse(options.port, commands)
+    print(f"{options.port}: {identity}{settings_of(identity)}")
+    if outdated(identity):
+        print(f"{VERSION} comes with this program; `springmass firmware --port {options.port} --flash` updates it")
+    return OK
+
+
+def _show() -> None:
+    print(WIRING)
+    print(f"firmware {VERSION}: {HEX}")
+    print("`springmass firmware --port PORT --flash` writes it, which runs one of these:")
+    for baud, boards in zip(BAUDS, ("Uno, Nano", "Nano with the old bootloader"), strict=True):
+        print(f"  {shlex.join(avrdude_arguments('PORT', baud))}    # {boards}")
+
+
+def _commands(options: argparse.Namespace) -> list[str]:
+    """Return the settings asked for as the device takes them."""
+    asked = []
+    if options.rate is not None:
+        asked.append(f"R{options.rate}")
+    if options.gate is not None:
+        asked.append("G{},{}".format(*options.gate))
+    if options.spread is not None:
+        asked.append(f"J{options.spread}")
+    if options.name is not None:
+        asked.append(f"N{options.name}")
+    return asked
+
+
+def _flash(port: str) -> None:
+    """Write the firmware at the speed that the board's bootloader takes."""
+    if shutil.which("avrdude") is None:
+        raise ProgramError(
+            f"avrdude is needed to write {HEX}, and was not found; install it (Debian: apt install avrdude, macOS: "
+            "brew install avrdude), or open firmware/springmass_rangefinder in the Arduino IDE and press Upload",
+            SENSOR,
+        )
+    with contextlib.closing(SerialPort(port, FAMILY.baud)):
+        pass  # absent, busy or without permission: said in one line of ours
+    said = ""
+    for baud in BAUDS:
+        command = avrdude_arguments(port, baud)
+        tell(shlex.join(command))
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=FLASH_S)
+        except subprocess.TimeoutExpired:
+            said = f"no end after {FLASH_S:g} s"
+            continue
+        if done.returncode == 0:
+            tell("written and verified")
+            return
+        said = next((line.strip() for line in done.stderr.splitlines() if "error" in line.lower()), "")
+    raise ProgramError(
+        f"{port}: no bootloader answered at {' or '.join(map(str, BAUDS))} baud ({said or 'avrdude gave no reason'}); "
+        "is it an Uno or a Nano, and nothing else using the port?",
+        SENSOR,
+    )
+
+
+def _converse(address: str, commands: list[str]) -> Identity:
+    """Send commands, and return what the device then says of itself.
+
+    Raises
+    ------
+    ProgramError
+        With exit code 4 where nothing answers, or the device does not take a command.
+    """
+    clock, decoder = SystemClock(), LineProtocolDecoder()
+    with contextlib.closing(SerialPort(address, FAMILY.baud)) as port:
+        end_ns = clock.now_ns() + int(ANSWER_S * 1e9)
+        _ask(port, decoder, clock, end_ns)
+        for command in commands:
+            refused = decoder.faults["refused_command"]
+            decoder.told.identity = None
+            port.write(f"{command}\n".encode("ascii", "replace"))
+            while decoder.told.identity is None and decoder.faults["refused_command"] == refused:
+                if clock.now_ns() > end_ns:
+                    raise ProgramError(f"{address}: no answer to {command!r}; try again", SENSOR)
+                decoder.feed(0, _heard(port, clock, 0.05))
+            if decoder.faults["refused_command"] > refused:
+                raise ProgramError(
+                    f"{address}: the device does not take {command!r}; docs/reference/line-protocol.md has the ranges",
+                    SENSOR,
+                )
+        assert decoder.told.identity is not None
+        return decoder.told.identity
+
+
+def _ask(port: SerialPort, decoder: LineProtocolDecoder, clock: SystemClock, end_ns: int) -> None:
+    """Ask what it is until it says so."""
+    heard = 0
+    while decoder.told.identity is None:
+        if clock.now_ns() > end_ns:
+            what = "readings, but not what it is; flash it with --flash" if heard else "nothing; is it the right port?"
+            raise ProgramError(f"{port.name}: the device was asked what it is and said {what}", SENSOR)
+        port.write(FAMILY.identify)
+        until_ns = clock.now_ns() + int(ASK_EVERY_S * 1e9)
+        while decoder.told.identity is None and clock.now_ns() < until_ns:
+            heard += len(decoder.feed(0, _heard(port, clock, 0.05)))
+
+
+def _heard(port: SerialPort, clock: SystemClock, wait_s: float) -> bytes:
+    """Return what came; after so long where nothing did."""
+    data = port.read(wait_s)
+    if not data:
+        clock.sleep_until_ns(clock.now_ns() + 1_000_000)
+    return data

@@ -1,0 +1,36 @@
+"""The rangefinder's firmware as it travels with this program: built from firmware/springmass_rangefinder.
+
+In: nothing. Out: the path of the hex file, its version, its wiring in words. ``make firmware`` builds the hex, and a
+test compares it with the one here, byte for byte.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["BAUDS", "HEX", "MODEL", "VERSION", "WIRING", "avrdude_arguments"]
+
+MODEL = "springmass-rangefinder"
+VERSION = "2.0.0"
+HEX = Path(__file__).with_name("springmass_rangefinder.hex")
+BAUDS = (115200, 57600)
+"""Speeds of the bootloaders: of the Uno and of Nanos since 2018, and of Nanos before that and of most copies."""
+
+WIRING = """\
+Arduino Uno or Nano (ATmega328P, 16 MHz, 5 V)     HC-SR04
+  5V  ------------------------------------------  VCC
+  GND ------------------------------------------  GND
+  D9  ------------------------------------------  TRIG
+  D8  ------------------------------------------  ECHO
+
+If wanted, a DS18B20 thermometer, flat side towards you:
+  GND ------------------------------------------  left
+  D2  --------------+---------------------------  middle
+  5V  -- 4.7 kOhm --+
+  5V  ------------------------------------------  right
+"""
+
+
+def avrdude_arguments(port: str, baud: int) -> list[str]:
+    """Return the words of the command that writes the firmware through a board's bootloader."""
+    return ["avrdude", "-p", "atmega328p", "-c", "arduino", "-P", port, "-b", str(baud), "-D", "-U", f"flash:w:{HEX}:i"]

@@ -1,0 +1,45 @@
+"""What a sensor says that it is, in words: what it is set to, and whether it wants an update."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from acquisition.decoders.family import Identity
+from springmass.firmware import MODEL, VERSION
+from springmass.session.sensors import Sensor
+
+__all__ = ["meeting", "outdated", "settings_of"]
+
+
+def meeting(sensor: Sensor, identity: Identity) -> Iterator[str]:
+    """Yield lines on a sensor that said what it is."""
+    port, rate_hz = sensor.transport.name, identity.settings.get("rate_hz")
+    yield f"{port}: {identity}{settings_of(identity)}"
+    if outdated(identity):
+        yield (
+            f"{port}: its firmware {identity.version} is older than {VERSION}, which comes with this program; "
+            f"`springmass firmware --port {port} --flash` updates it"
+        )
+    if sensor.rate_hz is not None and rate_hz is not None and sensor.rate_hz != rate_hz:
+        yield (
+            f"{port}: it is set to {rate_hz} Hz, and --rate-hz says {sensor.rate_hz:g}; leave --rate-hz out, "
+            f"or set it with `springmass firmware --port {port} --rate {sensor.rate_hz:g}`"
+        )
+
+
+def outdated(identity: Identity) -> bool:
+    """Tell whether it is this project's firmware, of an earlier version than the one that travels here."""
+    return identity.model == MODEL and _numbers(identity.version) < _numbers(VERSION)
+
+
+def settings_of(identity: Identity) -> str:
+    """Return what it is set to, for people; empty where it does not say."""
+    if not (said := identity.settings):
+        return ""
+    spread = f", pings spread over {said['spread_us']} us" if said["spread_us"] else ""
+    thermometer = "with a thermometer" if said["thermometer"] else "no thermometer"
+    return f": {said['rate_hz']} Hz, echoes of {said['near_us']} to {said['far_us']} us{spread}, {thermometer}"
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in version.split("."))
