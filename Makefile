@@ -59,6 +59,7 @@ docs: $(VENV)/.installed-dev
 
 docs-figures: $(VENV)/.installed
 	$(BIN)/python docs/figures/draw.py
+	$(BIN)/python docs/figures/wiring.py
 
 docs-trade: $(VENV)/.installed-dev
 	$(BIN)/python docs/figures/trade.py

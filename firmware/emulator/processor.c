@@ -3,11 +3,15 @@
  * Debian's simavr 1.6 clears every flag of a timer on any write to its flag register. A program that clears the capture
  * flag then loses an overflow that waits, and with it 4096 us, about every 15 s. The chip clears the flags that are
  * written as ones and no others: flags_written() does that in its place.
+ *
+ * It also drives a compare output at the timer's overflow, as PWM would, where the chip in this mode does nothing:
+ * compared() passes on what a match does and nothing else.
  */
 #include <stdlib.h>
 #include <string.h>
 
 #include <avr_extint.h>
+#include <avr_ioport.h>
 #include <avr_timer.h>
 #include <sim_elf.h>
 #include <sim_io.h>
@@ -36,6 +40,19 @@ static void flags_written(avr_t *avr, avr_io_addr_t address, uint8_t value, void
   for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
     if (value & (1 << vectors[i]->raised.bit))
       avr_clear_interrupt(avr, vectors[i]);
+}
+
+#define MATCH_LATE 32 /* cycles by which simavr may come to an event: an instruction, an interrupt */
+
+static void compared(struct avr_irq_t *irq, uint32_t value, void *parameter)
+{
+  (void)irq;
+  avr_t *avr = parameter;
+  avr_timer_t *t = timer_1(avr);
+  uint16_t count = (uint16_t)(avr->cycle - t->tov_base);
+  uint16_t match = (uint16_t)(avr->data[t->comp[AVR_TIMER_COMPA].r_ocr] | avr->data[t->comp[AVR_TIMER_COMPA].r_ocrh] << 8);
+  if ((uint16_t)(count - match) < MATCH_LATE)
+    avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 1), value);
 }
 
 /* The pace is kept elsewhere; a processor that sleeps is moved on to its next event at once. */
@@ -76,6 +93,9 @@ avr_t *processor_start(const char *elf)
   avr->sleep = asleep;
   avr->io[AVR_DATA_TO_IO(TIFR1)].w.c = flags_written;
   avr->io[AVR_DATA_TO_IO(TIFR1)].w.param = timer_1(avr);
+  avr_irq_t *compare = avr_io_getirq(avr, AVR_IOCTL_TIMER_GETIRQ('1'), TIMER_IRQ_OUT_COMP + AVR_TIMER_COMPA);
+  avr_unconnect_irq(compare, avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 1));
+  avr_irq_register_notify(compare, compared, avr);
   memset(avr->data + RAM_START, PAINT, avr->ramend + 1u - RAM_START);
   return avr;
 }

@@ -17,7 +17,7 @@
 static struct bench *bench;
 static avr_irq_t *dq_irq;
 static avr_cycle_count_t low_since;
-static int master_low;
+static int master_low, held_low;
 static uint8_t scratch[9], byte, bits, out_at, out_bit;
 static enum { NOBODY, ROM, FUNCTION, SENDING } state;
 static double celsius;
@@ -33,12 +33,16 @@ static uint8_t crc8(const uint8_t *data, int count)
   return crc;
 }
 
+/* The line as the processor sees it: its own port forgets the pull-up while it holds the line low. */
+static void set_line(void) { avr_raise_irq(dq_irq, !master_low && !held_low); }
+
 static avr_cycle_count_t let_go(avr_t *avr, avr_cycle_count_t when, void *parameter)
 {
   (void)avr;
   (void)when;
   (void)parameter;
-  avr_raise_irq(dq_irq, 1);
+  held_low = 0;
+  set_line();
   return 0;
 }
 
@@ -46,7 +50,8 @@ static avr_cycle_count_t be_present(avr_t *avr, avr_cycle_count_t when, void *pa
 {
   (void)when;
   (void)parameter;
-  avr_raise_irq(dq_irq, 0);
+  held_low = 1;
+  set_line();
   avr_cycle_timer_register(avr, cycles_of(bench, 120e-6), let_go, NULL);
   return 0;
 }
@@ -80,7 +85,7 @@ static void went_low(void)
   low_since = bench->avr->cycle;
   if (state == SENDING && out_at < sizeof scratch) {
     if (!((scratch[out_at] >> out_bit) & 1)) {
-      avr_raise_irq(dq_irq, 0);
+      held_low = 1;
       avr_cycle_timer_register(bench->avr, cycles_of(bench, HOLD_S), let_go, NULL);
     }
     if (++out_bit == 8) {
@@ -119,6 +124,7 @@ static void direction_changed(struct avr_irq_t *irq, uint32_t value, void *param
     went_low();
   else
     was_freed();
+  set_line();
 }
 
 void thermometer_attach(struct bench *at, double temperature)
@@ -129,7 +135,7 @@ void thermometer_attach(struct bench *at, double temperature)
   scratch[5] = 0xFF;
   scratch[8] = crc8(scratch, 8);
   dq_irq = avr_io_getirq(at->avr, AVR_IOCTL_IOPORT_GETIRQ('D'), DQ_PIN);
-  avr_raise_irq(dq_irq, 1); /* its pull-up */
+  set_line(); /* its pull-up */
   avr_irq_register_notify(avr_io_getirq(at->avr, AVR_IOCTL_IOPORT_GETIRQ('D'), IOPORT_IRQ_DIRECTION_ALL),
                           direction_changed, NULL);
 }

@@ -89,7 +89,7 @@ static void choose_echo(double t)
   } else if ((draw -= how.late) < how.ghost && ghost > 0.0 && ghost < flight) {
     latest.kind = "ghost"; /* sound of the ping before, on a longer way, comes first */
     flight = ghost;
-  } else if ((draw -= how.ghost) < how.slip) {
+  } else if ((draw -= how.ghost) >= 0.0 && draw < how.slip) {
     latest.kind = side < 0.5 ? "early-wave" : "late-wave";
     flight += side < 0.5 ? -WAVE_S : WAVE_S;
   }

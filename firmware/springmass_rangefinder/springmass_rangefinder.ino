@@ -250,13 +250,12 @@ static void plan_ping(void)
   }
 }
 
-/* Whether a line is due, and for which ping: one that has its echo, or one that the next has ended. */
+/* Whether a line is due: for a ping that the next one has ended. Not as soon as the echo is there, for then a bob that
+   comes to rest would make lines later and later, and the host take that for the clock's. */
 static uint8_t take_closed(struct ping *taken)
 {
   uint8_t took = 0;
   cli();
-  if (!closed_waits && ping.state == DONE)
-    close_ping();
   if (closed_waits) {
     taken->sequence = closed.sequence;
     taken->at_us = closed.at_us;
@@ -287,7 +286,8 @@ static char status_of(const struct ping *p)
 
 /* ---- Serial out: lines wait in a ring while pings are timed. ---- */
 
-#define LINE_ROOM 100 /* more than the longest line */
+#define LINE_ROOM 100           /* more than the longest line */
+#define ANSWER_ROOM (2 * LINE_ROOM) /* an answer never takes a reading's */
 
 static volatile char ring[256]; /* its indices wrap by themselves */
 static volatile uint8_t ring_head, ring_tail;
@@ -343,6 +343,18 @@ static void put_field(uint32_t value)
 {
   put_checked(',');
   put_number(value);
+}
+
+/* Ten digits always: lines that grow with their numbers would end later and later, which a host that compares the
+   clocks takes for 17 ppm in half a minute. */
+static void put_wide(uint32_t value)
+{
+  char digits[11];
+  ultoa(value, digits, 10);
+  put_checked(',');
+  for (uint8_t zeros = 10 - strlen(digits); zeros; zeros--)
+    put_checked('0');
+  put_text(digits);
 }
 
 static void put_hex(uint8_t nibble) { put(nibble < 10 ? '0' + nibble : 'A' + nibble - 10); }
@@ -497,8 +509,8 @@ static void send_reading(const struct ping *p)
     return; /* never so at 115200 baud; the sequence would tell */
   begin_line();
   put_flash(PSTR("R1"));
-  put_field(p->sequence);
-  put_field(p->at_us);
+  put_wide(p->sequence);
+  put_wide(p->at_us);
   put_checked(',');
   if (status == 'E') {
     uint32_t steps = (p->echo_ticks + TICKS_PER_STEP / 2) / TICKS_PER_STEP;
@@ -580,10 +592,8 @@ ISR(USART_RX_vect)
   if (command_waits)
     return; /* one at a time */
   if (c == '\n' || c == '\r') {
-    if (command_length > 0 && command_length < COMMAND_BYTES) {
-      command[command_length] = 0;
-      command_waits = 1;
-    }
+    command[command_length < COMMAND_BYTES ? command_length : 0] = 0; /* one that was too long is none */
+    command_waits = command_length > 0;
     command_length = 0;
   } else if (command_length < COMMAND_BYTES - 1) {
     command[command_length++] = c;
@@ -663,7 +673,7 @@ static uint8_t obey(const char *text)
 
 static void commands(void)
 {
-  if (!command_waits || room() < LINE_ROOM)
+  if (!command_waits || room() < ANSWER_ROOM)
     return;
   char text[COMMAND_BYTES];
   for (uint8_t i = 0; i < COMMAND_BYTES; i++)
@@ -711,8 +721,8 @@ void setup(void)
 /* With interrupts off: whether something waits that no interrupt will announce. */
 static uint8_t has_work(void)
 {
-  return trigger_state == RESTING || closed_waits || ping.state == DONE || (command_waits && room() >= LINE_ROOM) ||
-         (identify && room() >= LINE_ROOM);
+  return trigger_state == RESTING || closed_waits || (command_waits && room() >= ANSWER_ROOM) ||
+         (identify && room() >= ANSWER_ROOM);
 }
 
 void loop(void)
@@ -725,7 +735,7 @@ void loop(void)
   commands();
   if (now_us() - identified_us >= IDENTIFY_US)
     identify = 1;
-  if (identify && room() >= LINE_ROOM)
+  if (identify && room() >= ANSWER_ROOM)
     send_identity();
   save_settings();
   if (trigger_state == WAITING && (int32_t)(next_us - now_us()) > 1500)

@@ -148,7 +148,7 @@ class Session:
 
     def meet(self) -> list[str]:
         """Keep what the sensors said that they are, take the rate that one is set to, and return lines on it."""
-        said = []
+        said: list[str] = []
         for channel, sensor in enumerate(self.sensors):
             identity = self._chains[channel].told.identity
             if identity is None:

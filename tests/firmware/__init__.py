@@ -1,0 +1,1 @@
+"""The rangefinder's firmware under an emulator."""
