@@ -521,7 +521,7 @@ def test_useless_readings_are_said_at_once(cli: Callable, tmp_path: Path, away: 
     first = done.err.splitlines()[0]
     if away < 0.02:
         assert done.code == 4
-        assert "no target for 1 s: check that the bob hangs over the sensor, 0.02 to 1.7 m away" in first
+        assert "no target for 1 s: check that the bob hangs over the sensor, 0.02 to 1.6 m away" in first
         assert "no usable distance was recorded" in done.err.splitlines()[-1]
     else:
         assert done.code == 0

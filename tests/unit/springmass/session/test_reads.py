@@ -143,7 +143,7 @@ def test_a_polled_sensor_is_asked_by_the_decoder_that_hears_its_replies() -> Non
     first, second = (SensorChain(family, options={"temperature_every": 1}) for _ in range(2))
     tee = Tee([first, chain()])
     sensor = Sensor(family, cast(Transport, SimpleNamespace(name="port")))
-    line = tee.line(0, sensor)
+    line = tee.line(0, [sensor])
     assert line.poll is family.poll
     assert line.decoder is not None
     assert line.decoder() is first.decoder
@@ -152,7 +152,7 @@ def test_a_polled_sensor_is_asked_by_the_decoder_that_hears_its_replies() -> Non
     started(tee, [second, chain()], 0)
     assert line.decoder() is second.decoder
     assert line.decoder().request == b"\x55"
-    assert tee.line(1, replace(sensor, family=get_family("ffhls"))).decoder is None
+    assert tee.line(0, [replace(sensor, family=get_family("ffhls"))]).decoder is None
 
 
 def test_a_run_begins_with_the_reads_kept_from_before() -> None:
