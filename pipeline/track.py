@@ -86,6 +86,8 @@ class Track:
         Standard uncertainty of their zero from a calibration, m; 0 where none was made.
     quantity, unit : str
         What ``y`` holds, of :data:`UNITS`. Only what :meth:`demand_length` guards needs a length.
+    trigger_s : float or None
+        Moment at which the bob was seen to leave its rest, which began the recording, s; None where nothing waited.
 
     Raises
     ------
@@ -114,6 +116,7 @@ class Track:
     u_offset_m: float = 0.0
     quantity: str = "length"
     unit: str = "m"
+    trigger_s: float | None = None
 
     def __post_init__(self) -> None:
         if UNITS.get(self.quantity) != self.unit:

@@ -40,6 +40,7 @@ ALIKE = 0.25  # of the residual's variance: what periods that are alike may diff
 WANDERING = 0.3  # of the amplitude: what a sinusoid may leave beyond white noise
 FEWEST, ASTRAY = 4, 0.8  # windows, and how far astray they may be over their amplitudes, to be one oscillation
 ALONE, SEEN = 1e-6, 0.5  # chance of a line in white noise, and the share of its evidence that the fit has to keep
+LEAST_AFTER, HANGING = 64, 0.25  # samples after a trigger, and the share of their range within which a bob hangs still
 ROUNDS = 4  # most times that a part is looked for within the part that was found
 
 
@@ -139,8 +140,10 @@ def see_windows(
             "interleaved_records",
         )
     segments = None
+    if (waiting := _waiting(conditioned)) is not None:
+        conditioned, segments = condition(waiting.flagged(conditioned.track), conditioning), waiting
     if (rest := _at_rest(conditioned)) is not None:
-        conditioned, segments = condition(rest.flagged(conditioned.track), conditioning), rest
+        conditioned, segments = condition(rest.flagged(conditioned.track), conditioning), rest.within(segments)
     seen, stopped = _see_cycles(conditioned, cycles, 0.25 if rest is None else 0.75)
     if isinstance(seen, NoOscillation):
         return seen
@@ -177,6 +180,21 @@ def _start_s(conditioned: Conditioned, omega: float) -> float:
     rows = ((conditioned.flags & np.uint8(out)) == 0) & (track.t <= first)
     begin = float(np.min(track.t[rows], initial=first))
     return begin if first - begin < 2.0 * math.pi / omega else first
+
+
+def _waiting(conditioned: Conditioned) -> Segments | None:
+    """Return what to leave out of a record that began while its bob hung still: all before its own trigger."""
+    t, y, moment_s = conditioned.track.t, conditioned.track.y, conditioned.track.trigger_s
+    if moment_s is None:
+        return None
+    before, after = conditioned.used & (t < moment_s), conditioned.used & (t >= moment_s)
+    if not before.any() or np.count_nonzero(after) < LEAST_AFTER:
+        return None
+    # A bob that swung already triggers at once: then there is nothing still to leave out.
+    ranges = [float(np.ptp(np.quantile(y[rows], (0.05, 0.95)))) for rows in (before, after)]
+    if ranges[0] > HANGING * ranges[1]:
+        return None
+    return Segments(moment_s, math.inf, (Span("waiting", float(t[before][0]), moment_s),))
 
 
 def _at_rest(conditioned: Conditioned) -> Segments | None:

@@ -68,7 +68,8 @@ class Span:
     Parameters
     ----------
     kind : str
-        "at_rest": nothing but noise; "handled": neither still nor free; "free": another free oscillation.
+        "at_rest": nothing but noise; "waiting": that, up to the recording's own trigger; "handled": neither still nor
+        free; "free": another free oscillation.
     first_s, last_s : float
     """
 
@@ -129,7 +130,8 @@ class Segments:
             return self
         spans = sorted((*before.left_out, *self.left_out), key=lambda span: span.first_s)
         breaks = sorted((*before.breaks, *self.breaks), key=lambda one: one.time_s)
-        return replace(self, left_out=tuple(spans), breaks=tuple(breaks))
+        first_s, last_s = max(self.first_s, before.first_s), min(self.last_s, before.last_s)
+        return Segments(first_s, last_s, tuple(spans), tuple(breaks))
 
 
 def find_segments(

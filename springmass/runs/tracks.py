@@ -51,9 +51,16 @@ def to_track(
         velocity=samples.velocity,
         quantity=samples.quantity,
         unit=samples.unit,
+        trigger_s=_trigger_s(provenance or {}),
         **_clock_comparison(samples, info, provenance or {}),
         **_scale(recorded_format, (provenance or {}).get("sensor") or {}),
     )
+
+
+def _trigger_s(provenance: Mapping[str, Any]) -> float | None:
+    """When the bob left its rest, by the first trigger that the recording noted, s."""
+    moments = [event["t_s"] for event in provenance.get("events", ()) if event.get("kind") == "trigger"]
+    return float(moments[0]) if moments else None
 
 
 def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:

@@ -252,7 +252,8 @@ class Session:
                 "leave --option temperature_every out",
                 USAGE,
             )
-        since_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, progress, changed)
+        moment_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, progress, changed)
+        since_ns = moment_ns if trigger is None else moment_ns - int(trigger.keep_s * 1e9)
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
         self._chains = [sensor.chain() for sensor in self.sensors]
         recorder = Recorder(log, self._header(), self._clock, roll=roll)
@@ -267,7 +268,8 @@ class Session:
                     recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
                 if trigger is not None:
                     facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
-                    recorder.event(0, start_ns, "trigger", facts)
+                    # The sample's own moment: an analysis leaves out what was still before it.
+                    recorder.event(0, moment_ns, "trigger", facts)
                 by = self._loop(recorder, display, start_ns, seconds, marks)
             finally:
                 self._tee.stop()
@@ -338,7 +340,7 @@ class Session:
         progress: Callable[[Progress], None],
         changed: Callable[[], bool],
     ) -> int:
-        """Wait until the bob moves; return the host's time from which on reads belong to the run."""
+        """Wait until the bob moves; return the host's time of the first sample that shows it."""
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
         keep_ns, start_ns = int(trigger.keep_s * 1e9), self._clock.now_ns()
         self._tee.keep()
@@ -350,7 +352,7 @@ class Session:
                     seen.append((channel, block))
                     moment_ns = watch.moment_ns(block) if channel == 0 else None
                     if moment_ns is not None:
-                        return moment_ns - keep_ns
+                        return moment_ns
                 if changed():
                     self._tee.let_go()
                     raise Disarmed

@@ -50,6 +50,14 @@ def judge_segments(segments: Segments | None) -> Iterator[Finding]:
             f"the bob does not move freely in {_spans(handled)}: left out; amplitude, phase and damping rate are those "
             f"at the start of what was analysed{_part(segments)}",
         )
+    for span in segments.left_out:
+        if span.kind == "waiting":
+            yield Finding(
+                "at_rest",
+                "info",
+                f"the bob hangs still until {span.last_s:.2f} s, the moment that triggered the recording: "
+                f"{_spans([span])} is left out",
+            )
     still = [span for span in segments.left_out if span.kind == "at_rest"]
     if still:
         yield Finding("at_rest", "info", f"nothing but noise moves in {_spans(still)}: left out")

@@ -431,3 +431,32 @@ def test_drag_of_a_power_between_linear_and_quadratic_is_physics(synthetic: Modu
         abs(result.estimates["damping_rate"].value - 0.07 * math.sqrt(0.05)) < 4.0 * result.estimates["damping_rate"].u
     )
     assert {finding.severity for finding in result.findings} <= {"info"}
+
+
+@pytest.mark.parametrize("held_s", [0.0, 0.3])
+def test_a_still_start_ends_at_the_recordings_own_trigger(held_s: float) -> None:
+    """What hangs still before the trigger is left out at that moment, the pull of a hand after it as ever."""
+    rng, t, trigger_s = np.random.default_rng(5), np.arange(3000) / 100.0, 2.0
+    released_s = trigger_s + (0.6 + held_s if held_s else 0.0)
+    pulled = np.clip((t - trigger_s) / 0.6, 0.0, 1.0) if held_s else np.zeros(t.size)
+    since = np.maximum(t - released_s, 0.0)
+    free = 0.05 * np.exp(-0.012 * since) * np.cos(8.3 * since)
+    y = 0.3 + np.where(t < released_s, 0.025 * (1.0 - np.cos(np.pi * pulled)), free)
+    track = Track.from_arrays(t, y + 3e-4 * rng.standard_normal(t.size))
+    result = analyse(replace(track, trigger_s=trigger_s))
+    still = [finding.message for finding in result.findings if finding.code == "at_rest"]
+    assert len(still) == 1
+    assert "hangs still until 2.00 s, the moment that triggered" in still[0]
+    begun_s, amplitude = motion_of(result).phase.t0, result.estimates["amplitude"]
+    assert begun_s == trigger_s if not held_s else begun_s >= released_s
+    assert abs(amplitude.value - 0.05 * math.exp(-0.012 * (begun_s - released_s))) < 4.0 * amplitude.u
+    assert {finding.code for finding in result.findings if finding.severity != "info"} <= {"handled"}
+
+
+def test_a_trigger_in_a_swing_leaves_nothing_out(synthetic: ModuleType) -> None:
+    """A bob that swung before the recording triggers at once; nothing of its motion is lost for that."""
+    t = synthetic.times(20.0)
+    track = Track.from_arrays(t, synthetic.noisy(synthetic.Truth(), t, 3e-4, 3))
+    result = analyse(replace(track, trigger_s=2.0))
+    assert motion_of(result).phase.t0 == 0.0
+    assert not any(finding.code == "at_rest" for finding in result.findings)
