@@ -23,7 +23,8 @@ __all__ = ["Weighted", "average_over_laws"]
 MIXED = "linear+quadratic"
 FAMILY = (*LAWS[MIXED].cases, MIXED)
 SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0 and quadratic drag's 2 are well inside
-OTHER_LAW = 0.12  # prior odds of each law beyond linear and quadratic drag, five of them, against these two
+OTHER_LAW = 0.2  # prior odds of each law beyond linear and quadratic drag, against these two
+FREE_POWER = 0.5  # the same of a free power: boundary layers and edges shed drag that no two terms describe
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,27 +65,60 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
 
     the exponential's where the record knows no curvature, and with an uncertainty that covers every drag from
     friction to quadratic; those of the fit where it does. The other admissible laws weigh
-    :math:`0.12\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it. Where linear and quadratic drag is out of reach, the
-    admissible laws are weighed by their BIC.
+    :math:`p\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it, with p of 0.5 for a free power and 0.2 for those with
+    friction; so do laws that are not rejected and no longer admissible, for a small weight counts where the rates lie
+    far apart. Laws that only add a term to the selected one are not among these. Where linear and quadratic drag is
+    out of reach, the laws are weighed by their BIC.
+
+    Covariances are multiplied by the reduced chi-square where that is above 1, the scale factor of [1]_: a law between
+    two that were fitted is seen in what they leave before it rejects them.
+
+    References
+    ----------
+    .. [1] Particle Data Group, "Review of Particle Physics", Phys. Rev. D 110 (2024) 030001, section 5.2.2.
     """
     names = damping.admissible or (damping.selected,)
     mixed = damping.fits.get(MIXED)
-    reach = mixed is not None and not mixed.rejected and (damping.selected in FAMILY or MIXED in names)
-    if mixed is None or not reach:
+    if mixed is not None and mixed.rejected:
+        mixed = None
+    stands = mixed is not None and (damping.selected in FAMILY or MIXED in names)
+    if damping.admissible:
+        names = (*names, *_far(damping, names))
+    if mixed is None or not (stands or (damping.admissible and damping.selected == "power")):
         odds = {name: math.exp(-0.5 * (damping.fits[name].bic - damping.best.bic)) for name in names}
-        weighted = [(damping.fits[name], x) for name, x in odds.items()]
+        weighted = [(_scaled(damping.fits[name]), x) for name, x in odds.items()]
     else:
         share, fit = _with_prior(mixed, damping.fits.get("linear"), amplitude_m)
-        weighted = [(fit, 1.0)]
+        least = min(damping.fits[name].bic for name in (*names, MIXED))
+        weighted = [(_scaled(fit), math.exp(-0.5 * (mixed.bic - least)))]
         for name in names:
             if name not in FAMILY:
+                odd = share * (FREE_POWER if name == "power" else OTHER_LAW) if stands else share
                 other = damping.fits[name]
-                weighted.append((other, OTHER_LAW * share * math.exp(-0.5 * (other.bic - mixed.bic))))
+                weighted.append((_scaled(other), odd * math.exp(-0.5 * (other.bic - least))))
     # The coefficients of a power or of a function are stated where it is selected; else both drags', within reach.
-    first = MIXED if reach and isinstance(damping.best.law, Drag) else damping.selected
+    first = MIXED if stands and isinstance(damping.best.law, Drag) else damping.selected
     weighted.sort(key=lambda one: one[0].name != first)
     total = sum(odd for _, odd in weighted)
     return tuple(Weighted(fit, odd / total) for fit, odd in weighted)
+
+
+def _far(damping: Damping, names: tuple[str, ...]) -> list[str]:
+    """Laws that stand beside the admissible ones: neither rejected nor the selected one with a term more.
+
+    Nor any with a coefficient below zero, whose evidence is that of one of its cases.
+    """
+    others = {name: fit for name, fit in damping.fits.items() if name not in names and not fit.rejected}
+    return [
+        name for name, fit in others.items() if damping.selected not in fit.law.cases and fit.joint.values.min() >= 0.0
+    ]
+
+
+def _scaled(fit: LawFit) -> LawFit:
+    """Return a fit with its covariance times the reduced chi-square where that exceeds 1 and is not in it already."""
+    if not fit.reduced_chi2 > 1.0 or fit.widening != 1.0:
+        return fit
+    return replace(fit, joint=replace(fit.joint, covariance=fit.reduced_chi2 * fit.joint.covariance))
 
 
 def _with_prior(mixed: LawFit, linear: LawFit | None, amplitude_m: float) -> tuple[float, LawFit]:

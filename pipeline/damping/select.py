@@ -12,7 +12,7 @@ from pipeline.damping.evidence import choose, least_chi2, weigh
 from pipeline.damping.law_fit import LawFit, Minimum, mean_squared_rate, minimum_of
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError
-from pipeline.numerics.regression import Scatter, correlation_length, scatter
+from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
@@ -20,6 +20,8 @@ from pipeline.track import F8
 __all__ = ["Damping", "LawFit", "Params", "fit_damping"]
 
 TINY = 1e-100  # stands for zero where something is divided by an uncertainty
+DOUBTED = 0.95  # share of records in which a law that holds leaves less
+MIXED, BENT = "linear+quadratic", 2.0  # standard uncertainties below zero at which a term stands for another law
 LOOSEST_POWER = 3.0  # standard uncertainty of a power that still says anything: known ones lie between 0 and 2
 
 
@@ -37,8 +39,9 @@ class Params:
         The laws to try: names of :data:`pipeline.damping.laws.LAWS`, or laws of one's own, such as
         :func:`pipeline.damping.laws.of_function.make_law` makes.
     otherwise : tuple of str or Law
-        The laws to try where the record rejects all of ``laws``: where few are tried to save time, a wrong
-        one must not be stated.
+        The laws to try where the record rejects all of ``laws``, or knows a curvature of the decay that none of them
+        with one term makes, or leaves more than 19 in 20 do: where few are tried to save time, a wrong one must not be
+        stated.
 
     References
     ----------
@@ -148,7 +151,18 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     noise = np.maximum(noise, 1e-12 * float(np.max(amplitude)) + TINY)
     points = _Points(t0, t, amplitude, noise, scatter(t, amplitude, noise))
     found = _fit_laws(points, params.laws, params)
-    return found if found.admissible or not params.otherwise else _fit_laws(points, params.otherwise, params)
+    enough = not params.otherwise or (found.admissible and not _curved(found))
+    return found if enough else _fit_laws(points, params.otherwise, params)
+
+
+def _curved(damping: Damping) -> bool:
+    """Whether the decay bends as neither linear nor quadratic drag alone makes it: other laws may do so too."""
+    mixed, best = damping.fits.get(MIXED), damping.best
+    if damping.selected == MIXED or (best.dof > 0 and best.reduced_chi2 * best.dof > chi2_quantile(DOUBTED, best.dof)):
+        return True
+    return mixed is not None and any(
+        mixed.joint[name].value < -BENT * mixed.joint[name].u for name in ("gamma", "beta")
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -215,8 +215,35 @@ def _area(record: Record, fit: LawFit, phase: PhaseFit, theta: F8) -> tuple[F8, 
 def _solve(record: Record, state: State, rows: Rows, params: Params) -> _Solved:
     model = WaveformModel(record, state, rows)
     options = least_squares.Params(precision=PRECISION, steps=params.steps, again=False)
-    fit = least_squares.minimise(model.residuals, state.values, model.jacobian, options)
+    if state.law.units[-1] != "":
+        fit = least_squares.minimise(model.residuals, state.values, model.jacobian, options)
+    else:
+        fit = _solve_by_amplitude(model, state, options)
     return _Solved(record, replace(state, values=fit.values), model, rows, fit)
+
+
+def _solve_by_amplitude(model: WaveformModel, state: State, options: least_squares.Params) -> least_squares.Fit:
+    """Fit with the law's lengths in units of the first amplitude: a factor and a power of metres are nearly one."""
+    own, count = state.law, state.theta.size
+    length = abs(float(state.theta[0])) or 1.0
+
+    def in_units(values: F8, unit_m: float) -> F8:
+        return np.concatenate([own.rescaled(values[:count], unit_m), values[count:]])
+
+    def in_metres(values: F8) -> F8:
+        return in_units(values, 1.0 / length)
+
+    def turn(values: F8) -> F8:
+        return least_squares.central_differences(in_metres, values)
+
+    fit = least_squares.minimise(
+        lambda at: model.residuals(in_metres(at)),
+        in_units(state.values, length),
+        lambda at: model.jacobian(in_metres(at)) @ turn(at),
+        options,
+    )
+    covariance = turn(fit.values) @ fit.covariance @ turn(fit.values).T
+    return replace(fit, values=in_metres(fit.values), covariance=covariance)
 
 
 def _settled(

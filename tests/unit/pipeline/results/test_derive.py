@@ -200,6 +200,7 @@ def test_keulegan_carpenter_number_with_its_formula(bench: Bench) -> None:
 def test_drag_coefficient_with_its_formula(bench: Bench) -> None:
     """C = 3 pi m beta / (2 omega rho S) = 2.65 for beta = 0.2; the diameter enters area and mass alike."""
     beta = bench.damping.best.joint["beta"]
+    u_beta = beta.u * math.sqrt(max(bench.damping.best.reduced_chi2, 1.0))  # its scale factor
     omega = bench.phase.angular_frequency
     diameter, celsius = ufloat(0.102, 0.0005), ufloat(20.0, 0.3)
     density = air_density(20.0) * 293.15 / (celsius + 273.15)
@@ -212,7 +213,7 @@ def test_drag_coefficient_with_its_formula(bench: Bench) -> None:
         3
         * math.pi
         * mass
-        * ufloat(beta.value, beta.u)
+        * ufloat(beta.value, u_beta)
         / (2 * ufloat(omega.value, omega.u) * density * ufloat(1.0, 2e-4) * math.pi * diameter**2 / 4)
         / scale
     )
