@@ -38,7 +38,9 @@ DRAGS: dict[str, dict[str, float]] = {
 WITHIN = ("linear", "quadratic", "linear+quadratic")
 SECONDS, NOISES_M = (10.0, 30.0, 120.0), (3e-4, 2.39e-3)
 QUANTITIES = ("amplitude", "damping_rate", "gamma", "beta")
-LEAST_68, LEAST_95, WIDEST = 0.64, 0.93, 1.2
+LEAST_68, LEAST_95 = 0.64, 0.93
+# A record that cannot tell both drags from a free power, whose rates at the start lie three u apart, holds both.
+WIDEST = {"amplitude": 1.2, "damping_rate": 1.5, "gamma": 1.2, "beta": 1.2}
 
 pytestmark = pytest.mark.trials
 
@@ -89,7 +91,7 @@ class Cell:
                 doubt = 3.3 * math.sqrt(least * (1.0 - least) / count)
                 if self.covered(k, sigmas) < least - doubt:
                     found.append(f"{name}: {self.covered(k, sigmas):.3f} at {sigmas:.2f} u")
-            if self.width(k) > WIDEST * (1.0 + 3.3 / math.sqrt(count)):
+            if self.width(k) > WIDEST[name] * (1.0 + 3.3 / math.sqrt(count)):
                 found.append(f"{name}: u is {self.width(k):.2f} of the fit's")
         return found
 
@@ -156,7 +158,7 @@ def measured(drag: str, seconds: float, noise_m: float, trials: int, map_: Any =
 @pytest.mark.parametrize("seconds", SECONDS)
 @pytest.mark.parametrize("drag", WITHIN)
 def test_intervals_hold_whatever_law_was_selected(drag: str, seconds: float, noise_m: float) -> None:
-    """68 % intervals hold in 64 % of records at least, 95 % ones in 93 %, at 1.2 of the u of both drags' fit."""
+    """68 % intervals hold in 64 % of records, 95 % ones in 93 %, at 1.2 of both drags' u, rates at 1.5."""
     cell = measured(drag, seconds, noise_m, TRIALS)
     print(cell.row())
     assert not cell.failures(), cell.row()
