@@ -289,7 +289,7 @@ def _oscillation(
     clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]))
     findings = by_severity(
         judge_segments(windows.segments),
-        judge(cycles, demodulated, damping, phase, rest, waveform, disturbances),
+        judge(cycles, demodulated, damping, phase, rest, waveform, disturbances, derived.coefficients),
         checked.findings,
         () if bent else judge_halves(demodulated, damping, phase, whole=fitted.full is not None),
         judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from pipeline.motion.overdamped import Overdamped
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_fit import FullFit
+from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import amount
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated, model_error
@@ -119,6 +120,7 @@ def judge(
     rest: Rest,
     waveform: Waveform,
     disturbances: Disturbances | None = None,
+    stated: Mapping[str, Estimate] | None = None,
 ) -> tuple[Finding, ...]:
     """Return what is said of a motion that oscillates and of its laws of damping, the gravest first.
 
@@ -126,16 +128,18 @@ def judge(
     ----------
     cycles, demodulated, damping, phase, rest, waveform, disturbances
         Outputs of the stages of those names.
+    stated : mapping of str to Estimate, optional
+        The coefficients that the results give, with all that they are uncertain by.
     """
     findings = [
-        *_damping_findings(damping),
+        *_damping_findings(damping, stated or {}),
         *_motion_findings(cycles, demodulated, phase, rest, waveform),
         *_mode_findings(demodulated, phase, disturbances, rest.mean.unit),
     ]
     return by_severity(findings)
 
 
-def _damping_findings(damping: Damping) -> Iterator[Finding]:
+def _damping_findings(damping: Damping, stated: Mapping[str, Estimate]) -> Iterator[Finding]:
     rejected = [name for name, fit in damping.fits.items() if fit.rejected]
     if damping.fits and len(rejected) == len(damping.fits):
         yield Finding(
@@ -147,7 +151,7 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
         )
     yield from _rejections(damping)
     if (mixed := find_mixed(damping)) is not None:
-        yield Finding("mixed_drag", "info", _words_on_mixed(mixed, damping))
+        yield Finding("mixed_drag", "info", _words_on_mixed(mixed, damping, stated))
     drags = [name for name in damping.admissible if name != "none"]
     if len(damping.admissible) > 1:
         names = ", ".join(damping.admissible)
@@ -155,9 +159,11 @@ def _damping_findings(damping: Damping) -> Iterator[Finding]:
         yield Finding("laws_not_separable", "info", f"the record cannot tell these damping laws apart: {names}{tail}")
 
 
-def _words_on_mixed(mixed: MixedDrag, damping: Damping) -> str:
+def _words_on_mixed(mixed: MixedDrag, damping: Damping, stated: Mapping[str, Estimate]) -> str:
     fit = mixed.fit
-    terms = " and ".join(f"{name} = {fit.joint[name]}" for name in fit.law.parameters[1:])
+    # One number has one uncertainty wherever it stands.
+    told = stated if set(stated) == set(fit.law.parameters[1:]) else fit.joint.estimates()
+    terms = " and ".join(f"{name} = {told[name]}" for name in fit.law.parameters[1:])
     alone = ", ".join(f"{damping.fits[name].law.words} by {_number(excess)}" for name, excess in mixed.against.items())
     words = f"{fit.law.words}: {terms}; the BIC of one term alone is higher, of {alone}"
     if not fit.rejected:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from pipeline.analyse import Analysis, Oscillation, Overdamped, Still
 from pipeline.damping.select import Damping
@@ -63,11 +63,11 @@ def verdict(analysis: Analysis) -> tuple[str, ...]:
     measured = f"The bob swings with the period T\u00a0=\u00a0{kept(found['period'])}"
     if "spring_constant" in found:
         measured += f", which makes the spring constant k\u00a0=\u00a0{kept(found['spring_constant'])}"
-    return (f"{measured}.", _damped(analysis.motion.damping))
+    return (f"{measured}.", _damped(analysis.motion.damping, analysis.motion.derived.coefficients))
 
 
-def _damped(damping: Damping) -> str:
-    """Return what became of the damping laws, in a sentence."""
+def _damped(damping: Damping, stated: Mapping[str, Estimate]) -> str:
+    """Return what became of the damping laws, in a sentence, with the numbers of Table 1."""
     chosen = damping.best.law.words
     if damping.best.rejected:
         return (
@@ -79,13 +79,11 @@ def _damped(damping: Damping) -> str:
     else:
         text = f"Its amplitude falls by {chosen}"
     parameters = [
-        f"{LETTERS.get(name, name)}\u00a0=\u00a0{kept(x)}"
-        for name, x in damping.best.joint.estimates().items()
-        if name != "A0"
+        f"{LETTERS.get(name, name)}\u00a0=\u00a0{kept(stated[name])}"
+        for name in damping.best.joint.names
+        if name in stated
     ]
     text += f", {', '.join(parameters)}" if parameters else ""
-    # A term that does not show is not zero; Table 1 has what holds then.
-    text += " if nothing else damps" if len(parameters) == 1 else ""
     others = [damping.fits[name].law.words for name in damping.admissible if name != damping.selected]
     if others:
         return f"{text}; as far as this record can tell, as good: {'; '.join(others)}."

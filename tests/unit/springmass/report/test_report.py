@@ -11,6 +11,7 @@ import itertools
 import json
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from springmass.report.latex import budget_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.recorded import Note
 from springmass.report.tables import law_status, pretty, pretty_number, results_csv
-from springmass.report.words import caption, verdict
+from springmass.report.words import caption, kept, verdict
 from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
@@ -224,10 +225,16 @@ def test_rejected_laws_are_named_in_words() -> None:
     assert re.search(r'linear<br><span class="sub">rejected', table)
 
 
-def test_a_lone_term_is_stated_with_its_condition() -> None:
-    """Of a record that shows one term the sentence says that gamma holds if nothing else damps; of two it does not."""
-    assert re.search(r"γ\s=\s[^;]*if nothing else damps", verdict(bare())[1])
-    assert "if nothing else damps" not in verdict(damped())[1]
+@pytest.mark.parametrize("make", [bare, damped])
+def test_what_holds_states_the_numbers_of_table_1(make: Callable[[], Analysis]) -> None:
+    """A coefficient has one value and one uncertainty: the sentence, the finding and Table 1 agree."""
+    analysis = make()
+    assert isinstance(analysis.motion, Oscillation)
+    stated = analysis.motion.derived.coefficients
+    assert f"γ\u00a0=\u00a0{kept(stated['gamma'])}" in verdict(analysis)[1]
+    for finding in analysis.findings:
+        if finding.code == "mixed_drag":
+            assert f"beta = {stated['beta']}" in finding.message
 
 
 def test_simulated_data_cannot_pass_for_measured() -> None:
