@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
+from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.damping import select as dampings
 from pipeline.errors import AnalysisError
 from pipeline.motion import equation_fit as equations
@@ -269,9 +270,12 @@ def _oscillation(
     u_amplitude = damping.best.joint["A0"].u
     # Strong damping bends every period: its own solution holds what would look like harmonics.
     bent = isinstance(solved, EquationFit)
+    smoothing = SensorFilter.of(scene, track.rate_hz)
     checked = Checked.together(
         judge_rows(windows.conditioned, waveform.rms_m),
-        Checked() if bent else check_residuals(windows.conditioned, demodulated, disturbances, phase, u_amplitude),
+        Checked()
+        if bent
+        else check_residuals(windows.conditioned, demodulated, disturbances, phase, u_amplitude, smoothing),
         judge_plausibility(windows.conditioned, demodulated, phase),
         Checked() if bent else judge_modulation(demodulated, damping, phase, track.unit),
     )
@@ -285,6 +289,7 @@ def _oscillation(
         instrument=instrument,
         params=params.derive,
         misfits=checked.misfits,
+        smoothing=smoothing,
     )
     clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]))
     findings = by_severity(

@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.bench.added_mass import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
+from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.damping.average import Weighted, average_over_laws
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
@@ -162,6 +163,7 @@ def derive(
     instrument: Instrument,
     params: Params | None = None,
     misfits: tuple[Misfit, ...] = (),
+    smoothing: SensorFilter | None = None,
 ) -> Derived:
     """Propagate uncertainties to everything that is asked of a run.
 
@@ -178,6 +180,8 @@ def derive(
     params : Params, optional
     misfits : tuple of Misfit
         What the record says against its own model: inputs of kind B, uncertain about nothing.
+    smoothing : SensorFilter, optional
+        What the scene says of the sensor's filter, for which amplitude and phase are corrected.
 
     Returns
     -------
@@ -216,7 +220,8 @@ def derive(
     free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
     omega = slope * rate
-    lengths = scale * amiss.over("amplitude", laws.values[0])
+    filtered = _Filtered(smoothing, omega, inputs)
+    lengths = scale * amiss.over("amplitude", laws.values[0]) / filtered.gain
     rates = rate * amiss.over("damping_rate", laws.values[1])
     start = laws.start * lengths
     lam = laws.rate_at_start * rates
@@ -232,7 +237,7 @@ def derive(
         "angular_frequency": (omega, "rad/s"),
         "amplitude": (start, unit),
         "offset": (offset + zero + amiss["offset"], unit),
-        "phase": (_start_phase(phase, slope, inputs, free) + amiss["phase"], "rad"),
+        "phase": (_start_phase(phase, slope, inputs, free) + amiss["phase"] + filtered.delay, "rad"),
         "noise": (noise, unit),
         "damping_rate": (lam, "1/s"),
     }
@@ -250,7 +255,7 @@ def derive(
     parts: dict[str, tuple[Any, str]] = {}
     if displacement is not None:
         parts["displacement"] = displacement, "" if unit == "m" else "s^2"
-        energy = 0.5 * (omega * scale * displacement) ** 2 * (1.0 if mass is None else mass)
+        energy = 0.5 * (omega * scale / filtered.gain * displacement) ** 2 * (1.0 if mass is None else mass)
         parts["half_stiffness"] = energy, "N/m" if unit == "m" else "J s^4/m^2"
     for name, x in (("mass", mass), ("own_mass", own)):
         if x is not None:
@@ -266,7 +271,7 @@ def derive(
         if ambient.known and mass is not None:
             # C over beta; the area, the mass and the density are in it once.
             over_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
-            parts["drag_length"] = over_beta * rate / scale, unit
+            parts["drag_length"] = over_beta * rate / scale * filtered.gain, unit
             if damping.settled and "beta" in damping.best.joint.names:
                 found["drag_coefficient"] = (over_beta * coefficients["beta"][0], "")
     budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
@@ -302,6 +307,24 @@ class _Amiss:
     def over(self, name: str, value: float) -> Any:
         """Return the factor that makes an estimate of this value as uncertain as the misfits do."""
         return 1.0 + self[name] / float(value) if value else 1.0
+
+
+class _Filtered:
+    """What the sensor's filter does: the size of an oscillation of 1 behind it, and by how much it is late, rad."""
+
+    def __init__(self, smoothing: SensorFilter | None, omega: Any, inputs: Inputs) -> None:
+        self.gain: Any = 1.0
+        self.delay: Any = 0.0
+        if smoothing is None:
+            return
+        names = ("sensor_mean_samples", "sensor_median_samples", "sensor_lag")
+        sizes = [
+            inputs.add(name, size, "B") if size.u > 0.0 else size.value
+            for name, size in zip(names, smoothing.sizes, strict=True)
+        ]
+        cut = inputs.add("sensor_median_cut", Estimate(0.0, smoothing.u_cut(float(omega.nominal_value)), ""), "B")
+        self.gain = function_of(smoothing.gain, omega, *sizes) + cut
+        self.delay = function_of(smoothing.delay, omega, *sizes)
 
 
 class _Laws:

@@ -36,6 +36,10 @@ INPUTS = {
     "sensor_zero": "calibration of the zero",
     "model_misfit": "what differs from a sinusoid in every period",
     "sensor_smoothing": "smoothing by the sensor",
+    "sensor_mean_samples": "running mean of the sensor",
+    "sensor_median_samples": "running median of the sensor",
+    "sensor_median_cut": "crests cut by a running median",
+    "sensor_lag": "lag of the sensor",
     "held_samples": "distances held by the sensor",
 }
 """Every input of :mod:`pipeline.results.derive` in words."""

@@ -198,7 +198,7 @@ def test_every_key_of_a_scene_is_documented() -> None:
     attributes = set(Scene.__dataclass_fields__)
     assert len(documented) == len(attributes)
     for table, key in documented:
-        value: object = "below" if key == "position" else 0.5
+        value: object = {"position": "below", "mean_samples": 5, "median_samples": 5}.get(key, 0.5)
         assert Scene.from_mapping({table: {key: value}}) != Scene()
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.quantity import amount, noun, plural
 from pipeline.oscillation.condition import Conditioned
@@ -26,11 +27,17 @@ LIKELY_CHANCE = 1e-6  # of a harmonic by chance in white noise
 FALL = 1.3  # ratio of the first correlations' distances from 1
 UNLIKE = 0.08  # root mean square by which correlations may differ from a filter's
 TOLD = 0.002  # of the amplitude: what is smaller enters the uncertainties without a word
+ROUGHLY = 0.5  # share by which the loss told by the noise may differ from that of the filter that the scene states
 REACH = 0.4  # correlation of neighbours from which on they were smoothed, or noise remembers
 
 
 def check_residuals(
-    conditioned: Conditioned, demodulated: Demodulated, disturbances: Disturbances, phase: PhaseFit, u_amplitude: float
+    conditioned: Conditioned,
+    demodulated: Demodulated,
+    disturbances: Disturbances,
+    phase: PhaseFit,
+    u_amplitude: float,
+    smoothing: SensorFilter | None = None,
 ) -> Checked:
     """Return what the residuals say: waves locked to the oscillation, and neighbours that know of each other.
 
@@ -42,6 +49,8 @@ def check_residuals(
         Outputs of the stages of those names.
     u_amplitude : float
         Standard uncertainty of the amplitude by scatter, m: a smoothing sensor that changes less is no matter.
+    smoothing : SensorFilter, optional
+        What the scene says of the sensor's filter: of that no warning is due, unless the noise shows another.
 
     Notes
     -----
@@ -85,9 +94,20 @@ def check_residuals(
         whole = np.zeros(t.size)
         whole[rows] = residual
         smoothed = _smoothed(whole, used, rows.size // demodulated.t.size, step, turn, amplitude, unit)
-        if smoothed is not None and smoothed.misfits[0].amplitude_m > 0.5 * u_amplitude:
+        if smoothed is not None and not _as_stated(smoothed, smoothing, phase, amplitude, 0.5 * u_amplitude):
             found.append(smoothed)
     return Checked.together(*found)
+
+
+def _as_stated(
+    smoothed: Checked, stated: SensorFilter | None, phase: PhaseFit, amplitude: float, least_m: float
+) -> bool:
+    """Whether what the noise shows of a filter is what the scene states of it, or is no matter without."""
+    loss = smoothed.misfits[0].amplitude_m
+    if stated is None:
+        return loss <= least_m
+    told = amplitude * stated.shown(phase.angular_frequency.value)
+    return abs(loss - told) <= max(ROUGHLY * max(loss, told), least_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +273,8 @@ def _smoothed(
         "warning",
         f"neighbouring {plural(unit)} know of each other (correlation {first:.2f}) as behind {what}: a sensor or a "
         f"program that smooths like that makes the amplitude too small by {1.0 - gain:.1%} and the motion late by "
-        f"{late:.2g} s, which the uncertainties hold; switch the smoothing off, and record at the sensor's own rate",
+        f"{late:.2g} s, which the uncertainties hold; switch the smoothing off, or state it in the "
+        "scene ([sensor] mean_samples, median_samples or lag_s), and the numbers are corrected for it",
     )
     return Checked((finding,), (misfit,))
 

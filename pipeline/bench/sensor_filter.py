@@ -1,0 +1,115 @@
+"""Sensor filter: what a running mean, a running median or a lag of the sensor does to an oscillation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.bench.scene import Scene
+from pipeline.numerics.estimate import Estimate
+
+__all__ = ["SensorFilter"]
+
+PLACES = 1024  # of a cosine, at which a median is taken
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFilter:
+    """The filters that a scene states, one behind the other.
+
+    Parameters
+    ----------
+    mean_samples, median_samples : Estimate or None
+        The last samples of which the sensor gives the mean, or the median.
+    lag_s : Estimate or None
+        Time constant of a first-order lag, s.
+    step_s : float
+        Time from sample to sample, s.
+
+    Notes
+    -----
+    Behind the mean of the last n samples, h apart, an oscillation :math:`\\cos\\omega t` has the size
+    :math:`\\sin(n\\omega h/2)/(n\\sin(\\omega h/2))` and is late by :math:`(n-1)\\omega h/2`; behind a lag
+    :math:`1/(1 + i\\omega\\tau)` it has :math:`(1 + \\omega^2\\tau^2)^{-1/2}` and is late by
+    :math:`\\arctan\\omega\\tau`. A median passes slopes as they are, late by :math:`(n-1)\\omega h/2`, and cuts the
+    crests: its first harmonic is taken from cosines at every place between two samples; of many samples it loses
+    :math:`(2/\\pi)(c - \\sin c\\cos c)` with :math:`c = (n-1)\\omega h/4`. Damping that is weak over the filter's
+    length changes none of that.
+    """
+
+    mean_samples: Estimate | None
+    median_samples: Estimate | None
+    lag_s: Estimate | None
+    step_s: float
+
+    @classmethod
+    def of(cls, scene: Scene, rate_hz: float) -> SensorFilter | None:
+        """Return the filter that a scene states of a sensor with so many samples a second; None where it states none.
+
+        Examples
+        --------
+        >>> scene = Scene.from_mapping({"sensor": {"lag_s": 0.1}})
+        >>> round(SensorFilter.of(scene, 100.0).gain(10.0), 4)
+        0.7071
+        """
+        stages = scene.sensor_mean_samples, scene.sensor_median_samples, scene.sensor_lag_s
+        return None if all(stage is None for stage in stages) else cls(*stages, 1.0 / rate_hz)
+
+    @property
+    def sizes(self) -> tuple[Estimate, Estimate, Estimate]:
+        """The three sizes, those of filters that are not there at which they do nothing."""
+        one, nothing = Estimate(1.0, 0.0, ""), Estimate(0.0, 0.0, "s")
+        return self.mean_samples or one, self.median_samples or one, self.lag_s or nothing
+
+    def gain(
+        self, omega: float, mean: float | None = None, median: float | None = None, lag_s: float | None = None
+    ) -> float:
+        """Return the size of what was an oscillation of 1 with the angular frequency omega, rad/s.
+
+        Parameters
+        ----------
+        omega : float
+        mean, median, lag_s : float, optional
+            Sizes other than those stated: uncertainties are propagated by them.
+        """
+        n, m, tau = self._sizes(mean, median, lag_s)
+        turn = 0.5 * omega * self.step_s
+        averaged = 1.0 if n == 1.0 else math.sin(n * turn) / (n * math.sin(turn))
+        return averaged * self._passed(omega, m) / math.hypot(1.0, omega * tau)
+
+    def delay(
+        self, omega: float, mean: float | None = None, median: float | None = None, lag_s: float | None = None
+    ) -> float:
+        """Return by how much of its phase the oscillation is late, rad; parameters as of :meth:`gain`."""
+        n, m, tau = self._sizes(mean, median, lag_s)
+        return (n + m - 2.0) * 0.5 * omega * self.step_s + math.atan(omega * tau)
+
+    def shown(self, omega: float) -> float:
+        """Return what the filter would take by the memory that it leaves in the noise, of an oscillation of 1.
+
+        There a median looks like a mean of as many samples.
+        """
+        n, m, tau = (size.value for size in self.sizes)
+        turn = 0.5 * omega * self.step_s
+        means = [1.0 if k == 1.0 else abs(math.sin(k * turn) / (k * math.sin(turn))) for k in (n, m)]
+        return math.hypot(1.0, omega * tau) / max(means[0] * means[1], 0.01) - 1.0
+
+    def u_cut(self, omega: float) -> float:
+        """Return by how much the loss of a median is uncertain: cut crests may have been left out as plateaus."""
+        return (1.0 - self._passed(omega, self.sizes[1].value)) / math.sqrt(3.0)
+
+    def _passed(self, omega: float, samples: float) -> float:
+        """First harmonic of a cosine behind a running median, late by half its length."""
+        count = round(samples)
+        if count < 3:  # the median of two is their mean
+            return math.cos(0.5 * (count - 1) * omega * self.step_s)
+        angle = np.linspace(0.0, 2.0 * math.pi, PLACES, endpoint=False)
+        window = (np.arange(count) - 0.5 * (count - 1)) * omega * self.step_s
+        return float(2.0 * np.mean(np.median(np.cos(angle[:, None] + window), axis=1) * np.cos(angle)))
+
+    def _sizes(self, mean: float | None, median: float | None, lag_s: float | None) -> tuple[float, float, float]:
+        given = (mean, median, lag_s)
+        n, m, tau = (own.value if x is None else x for own, x in zip(self.sizes, given, strict=True))
+        return n, m, tau

@@ -1,0 +1,117 @@
+"""What a sensor's filter does to an oscillation, against scipy's filters, and that analyses undo it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.signal import freqz, lfilter
+
+from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.bench.scene import Scene
+from pipeline.bench.sensor_filter import SensorFilter
+from pipeline.track import Track
+
+OMEGA, STEP = 8.3, 0.01
+BEFORE = 400  # samples by which a filter's memory is full
+SIGNAL = complex(-0.012, OMEGA)
+
+
+def filter_of(**sensor: Any) -> SensorFilter:
+    """Return the filter of a scene."""
+    found = SensorFilter.of(Scene.from_mapping({"sensor": sensor}), 1.0 / STEP)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("n", [1, 2, 9, 31])
+def test_a_running_mean_has_the_response_of_its_coefficients(n: int) -> None:
+    """Size and delay are those that freqz gives for n equal coefficients."""
+    _, (response,) = freqz(np.ones(n) / n, 1.0, [OMEGA * STEP])
+    found = filter_of(mean_samples=n)
+    assert found.gain(OMEGA) == pytest.approx(abs(response), rel=1e-12)
+    assert found.delay(OMEGA) == pytest.approx(-np.angle(response), abs=1e-12)
+
+
+@pytest.mark.parametrize("n", [5, 9, 25])
+def test_a_running_median_cuts_the_crests(n: int) -> None:
+    """The first harmonic of a cosine behind scipy's median filter, whatever the place of its samples."""
+    angle = 2.0 * math.pi * 1321 / 100_000 * np.arange(100_000)  # whole turns, at places that never come again
+    omega = float(angle[1]) / STEP
+    whole = 2.0 * np.mean(median_filter(np.cos(angle), n, mode="wrap") * np.exp(-1j * angle))
+    found = filter_of(median_samples=n)
+    assert found.gain(omega) == pytest.approx(abs(whole), abs=2e-6)
+    assert found.delay(omega) == pytest.approx(0.5 * (n - 1) * omega * STEP)
+
+
+def test_filters_behind_one_another_multiply_and_add() -> None:
+    """A lag behind a mean has the product of the sizes and the sum of the delays."""
+    both, mean, lag = filter_of(mean_samples=7, lag_s=0.05), filter_of(mean_samples=7), filter_of(lag_s=0.05)
+    assert both.gain(OMEGA) == pytest.approx(mean.gain(OMEGA) * lag.gain(OMEGA))
+    assert both.delay(OMEGA) == pytest.approx(mean.delay(OMEGA) + lag.delay(OMEGA))
+    assert lag.gain(OMEGA) == pytest.approx(abs(1.0 / (1.0 + 0.05j * OMEGA)))
+
+
+def recorded(kind: str, size: float, seed: int = 1) -> NDArray[np.float64]:
+    """Return a minute of a bob of 50 mm behind a sensor that smooths what it measures, noise included."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(-BEFORE, 6000) * STEP
+    noise = 3e-4 * rng.standard_normal(t.size)
+    y = 0.3 + np.real(0.05 * np.exp(1j + SIGNAL * t))
+    if kind == "mean_samples":
+        y = lfilter(np.ones(int(size)) / size, 1.0, y + noise)
+    elif kind == "median_samples":
+        y = np.roll(median_filter(y + noise, int(size), mode="nearest"), int(size) // 2)
+    else:  # an exact lag of the motion, and one of the samples' noise
+        fall = math.exp(-STEP / size)
+        y = 0.3 + np.real(0.05 * np.exp(1j + SIGNAL * t) / (1.0 + SIGNAL * size))
+        y = y + lfilter([1.0 - fall], [1.0, -fall], noise)
+    return np.asarray(y[BEFORE:])
+
+
+def analysed(y: NDArray[np.float64], **sensor: Any) -> Analysis:
+    """Return the analysis in a scene that states the sensor alone."""
+    return analyse(Track.from_arrays(np.arange(y.size) * STEP, y), Scene.from_mapping({"sensor": sensor}))
+
+
+@pytest.mark.parametrize(("kind", "size"), [("mean_samples", 9), ("median_samples", 9), ("lag_s", 0.1)])
+def test_a_stated_filter_is_undone(kind: str, size: float) -> None:
+    """Amplitude and phase are the bob's within 3 u where the scene states the filter, with its u in their budgets."""
+    u = 0.02 * size
+    found = analysed(recorded(kind, size), **{kind: {"value": size, "u": u}})
+    assert "smoothed_sensor" not in {finding.code for finding in found.findings}
+    amplitude, phase = found.estimates["amplitude"], found.estimates["phase"]
+    assert abs(amplitude.value - 0.05) < 3.0 * amplitude.u
+    assert abs(phase.value - 1.0) < 3.0 * phase.u
+    assert amplitude.u < 7e-4
+    assert isinstance(found.motion, Oscillation)
+    inputs = {one.name: one.u for one in found.motion.derived.budgets["phase"].contributions}
+    name = "sensor_lag" if kind == "lag_s" else f"sensor_{kind}"
+    late = filter_of(**{kind: size * 1.001}).delay(OMEGA) - filter_of(**{kind: size * 0.999}).delay(OMEGA)
+    assert abs(inputs[name]) == pytest.approx(late / 0.002 / size * u, rel=1e-3)
+
+
+def test_a_filter_that_is_not_stated_is_warned_of_and_so_is_a_wrong_one() -> None:
+    """Neighbours tell of a mean of 9: without a scene, and against one that states 3, the finding stands."""
+    y = recorded("mean_samples", 9)
+    for sensor in ({}, {"mean_samples": 3}):
+        found = analysed(y, **sensor)
+        assert "smoothed_sensor" in {f.code for f in found.findings if f.severity == "warning"}, sensor
+        assert abs(found.estimates["amplitude"].value - 0.05) < 3.0 * found.estimates["amplitude"].u
+
+
+def test_velocity_and_quadratic_drag_follow_the_amplitude() -> None:
+    """Behind a lag velocity grows with the amplitude that is put right, beta falls; period and rate do not change."""
+    y = recorded("lag_s", 0.1)
+    bare, stated = analysed(y), analysed(y, lag_s=0.1)
+    gain = filter_of(lag_s=0.1).gain(bare.estimates["angular_frequency"].value)
+    for name, factor in (("velocity_rms", 1.0 / gain), ("period", 1.0), ("damping_rate", 1.0)):
+        assert stated.estimates[name].value == pytest.approx(factor * bare.estimates[name].value, rel=1e-9), name
+    assert isinstance(bare.motion, Oscillation)
+    assert isinstance(stated.motion, Oscillation)
+    one, other = (a.motion.derived.coefficients["beta"].value for a in (bare, stated))  # type: ignore[union-attr]
+    assert other == pytest.approx(gain * one, rel=1e-9)
