@@ -507,10 +507,9 @@ def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable,
     assert distance.max() > 0.3
     loaded = load(tmp_path / "run.h5")
     assert loaded.track.trigger_s is not None
-    # Host stamps come a few milliseconds late or early: two samples either way.
-    at = int(np.searchsorted(loaded.track.t, loaded.track.trigger_s))
-    assert np.nanmax(np.abs(loaded.track.y[: at - 2] - 0.26)) < 0.01
-    assert np.nanmax(np.abs(loaded.track.y[at - 2 : at + 3] - 0.26)) > 0.01
+    # The moment is a host's stamp, which a busy machine gives late.
+    t, moved = loaded.track.t, np.abs(loaded.track.y - 0.26) > 0.01
+    assert abs(loaded.track.trigger_s - t[int(np.argmax(moved))]) < 0.15
     assert cli("record", "--simulate", scene, "--still", "1", "--ruler", "0.5", "-o", tmp_path / "b.h5").code == 2
 
 
