@@ -80,6 +80,7 @@ function stopping(stop) {
 
 function telling(need) {
   const pair = `${need.law} from ${need.rival} drag`;
+  if (need.told && !["linear", "quadratic"].includes(motion.law)) return `Neither linear nor quadratic drag alone: ${motion.law}.`;
   if (need.told) return `The record tells ${pair}.`;
   if (need.median_s === null) return `To tell ${pair} takes more than twenty times as long as so far.`;
   return `About ${seconds(need.median_s)} s more to tell ${pair} (${seconds(need.low_s)} to ${need.high_s === null ? "much more" : `${seconds(need.high_s)} s`}, 8 times in 10).`;
