@@ -110,6 +110,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
     except Exception as error:
+        if isinstance(error, RuntimeError) and "start new thread" in str(error):
+            complain("no memory for another thread; end other programs, or raise the limit")
+            return UNREADABLE
         code = _exit_code(error)
         if code is None:
             raise

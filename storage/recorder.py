@@ -139,8 +139,14 @@ class Recorder:
         self._stop_sync = threading.Event()
         self._appender = threading.Thread(target=self._append_all, name="springmass-log", daemon=True)
         self._syncer = threading.Thread(target=self._sync_often, name="springmass-sync", daemon=True)
-        self._appender.start()
-        self._syncer.start()
+        try:
+            self._syncer.start()
+            self._appender.start()
+        except RuntimeError as error:
+            self._stop_sync.set()
+            self._log.close()
+            self.path.unlink()
+            raise MemoryError("no memory for the threads that write the log") from error
 
     def __enter__(self) -> Self:
         return self

@@ -43,7 +43,10 @@ class Display:
             queue.SimpleQueue()
         )
         self._thread = threading.Thread(target=self._turns, name="springmass-display", daemon=True)
-        self._thread.start()
+        try:
+            self._thread.start()
+        except RuntimeError as error:  # no memory for a thread
+            failures.note("display", error)
 
     def ring(self, take: Callable[[], Samples], look: Callable[[Shown], Progress]) -> None:
         """Ask for a turn: take samples, look at where the recording stands, show it. Never waits."""
@@ -52,6 +55,8 @@ class Display:
 
     def close(self) -> None:
         """Ask for no more turns; return when the last has ended, or hangs, which is a failure too."""
+        if self._thread.ident is None:
+            return
         self._rings.put(None)
         self._thread.join(LAST_S)
         if self._thread.is_alive():

@@ -19,6 +19,7 @@ from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
 from pipeline.track import F8
 from springmass.session.failures import Failures
 from springmass.session.reads import Tee
+from springmass.session.room import demand_room
 from storage.recorder import Recorder, RecorderStatus
 
 __all__ = ["Progress", "Shown", "progress_of"]
@@ -145,6 +146,7 @@ class Shown:
         self._motion = MotionAccumulator(rate_hz, params=params_for("fast"))
         self._found: LiveMotion | NotYet = NotYet("no samples so far")
         self._found_ns = 0
+        self._has_room = False
         self.useful: dict[int, Usefulness] = {}
         self._recent: deque[tuple[F8, F8]] = deque()
         self._missing_share = 0.0
@@ -170,6 +172,9 @@ class Shown:
 
     def motion(self, now_ns: int) -> LiveMotion | NotYet:
         """Return the first sensor's motion, found anew where the last is old enough."""
+        if not self._has_room:
+            demand_room()
+            self._has_room = True
         if isinstance(self._found, NotYet) or now_ns - self._found_ns >= MOTION_EVERY_NS:
             self._found, self._found_ns = self._motion.value(), now_ns
         return self._found

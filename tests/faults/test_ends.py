@@ -71,6 +71,9 @@ def failing(display: str) -> Iterator[dict[str, Any]]:
             os.close(master)
             stack.callback(os.close, slave)
             yield {"stderr": slave}
+        elif display == "no room for the analysis":
+            # The libraries of linear algebra would try for ever to get what there is not.
+            yield {"prepare": lambda: resource.setrlimit(resource.RLIMIT_DATA, (300 << 20, 300 << 20))}
         else:
             assert display == "none"
             yield {}
@@ -83,6 +86,7 @@ DISPLAYS = [
     "stderr on a full disk",
     "stderr closed",
     "terminal closed",
+    "no room for the analysis",
 ]
 
 
