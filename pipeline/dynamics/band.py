@@ -1,20 +1,21 @@
-"""The band that a scene's uncertainties make around its motion: an ensemble drawn from them, solved, and its quantiles.
+"""The band that a scene's uncertainties make around its motion: the quantiles of members drawn from them.
 
-An ensemble, as no derivative holds far enough: after a hundred periods an uncertain frequency turns the phase by more
-than a radian, and friction stops each bob elsewhere.
+Where amplitude and phase change in proportion to each input the members are moved by linear propagation; where they do
+not, as friction stops each bob elsewhere, each is solved.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from pipeline.bench.scene import Scene
-from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.problem import Problem, effective_mass_kg
+from pipeline.dynamics.sensitivity import STRETCH, Sensitivity, sensitivity, solved
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
@@ -25,8 +26,9 @@ LEVELS = ("low_95", "low_68", "high_68", "high_95")
 SHARES = (0.025, 0.158655, 0.841345, 0.975)  # of the members below each
 MEMBERS = 300  # the edges of 68 % then scatter by a fifteenth of sigma, those of 95 % by a seventh
 RADIANS = 0.2  # a step of Strang splitting: its error is that of all members alike, and leaves their differences
-STRETCH = 2000  # steps held in memory
 MOST_STEPS = 50_000
+MEMBERS_MOVED = 1000  # where sensitivities move them, which costs next to nothing
+REACH = 4.0  # uncertainties
 TURNS_COST = 5  # times as long a step takes where friction asks for every turning point
 SIGNED = ("start_displacement_m", "start_velocity_m_per_s", "spring_cubic_n_per_m3", "air_temperature_c")
 POSITIVE = ("bob_mass_kg", "spring_constant_n_per_m")
@@ -45,8 +47,12 @@ class Band:
     t : (n,) float64, s
     amplitude : (n,) float64, m
         :math:`\\sqrt{y^2 + (v/\\omega_0)^2}` of the scene's values.
-    of_displacement, of_amplitude : (4, n) float64, m
+    of_displacement, of_amplitude, of_phase : (4, n) float64, m, m and rad
         The quantiles of :data:`LEVELS` less what the scene's values give.
+    sensitivity : Sensitivity
+        What each quantity contributes.
+    linear : bool
+        Whether the members are moved by these sensitivities; else each is solved.
     """
 
     quantities: tuple[str, ...]
@@ -56,6 +62,21 @@ class Band:
     amplitude: F8
     of_displacement: F8
     of_amplitude: F8
+    of_phase: F8
+    sensitivity: Sensitivity
+    linear: bool
+
+    @property
+    def relative_u(self) -> float:
+        """Largest half width of the 68 % of the displacement over the starting amplitude; 0 where that is 0."""
+        half = 0.5 * float(np.max(self.of_displacement[2] - self.of_displacement[1]))
+        return half / float(self.amplitude[0]) if self.amplitude[0] > 0.0 else 0.0
+
+    @property
+    def words(self) -> str:
+        """How it was made, of what."""
+        how = "by linear propagation of" if self.linear else f"{self.members} motions drawn from"
+        return f"{how} the uncertainties of {', '.join(self.quantities)}"
 
     def displacement_at(self, t: F8) -> F8:
         """Return the quantiles (4, k) of the displacement less that of the scene's values, m, at times (k,), s."""
@@ -65,6 +86,10 @@ class Band:
         """Return the amplitude (k,) of the scene's values and its quantiles (4, k), m, at times (k,), s."""
         middle: F8 = np.interp(t, self.t, self.amplitude)
         return middle, middle + np.array([np.interp(t, self.t, each) for each in self.of_amplitude])
+
+    def phase_at(self, t: F8) -> F8:
+        """Return the quantiles (4, k) of the phase less that of the scene's values, rad, at times (k,), s."""
+        return np.array([np.interp(t, self.t, each) for each in self.of_phase])
 
 
 def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
@@ -122,32 +147,50 @@ def draw(scene: Scene, measured: Joint | None = None, *, members: int = MEMBERS,
     ----------
     .. [1] M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239, doi:10.1080/00401706.1979.10489755.
     """
-    from scipy.special import ndtri
-
     joint = uncertain(scene, measured)
     u = np.sqrt(np.diag(joint.covariance))
-    safe = np.where(u > 0.0, u, 1.0)
-    # A correlation of 1 is as good as its square root without rounding.
-    correlation = joint.covariance / np.outer(safe, safe) + 1e-12 * np.eye(u.size)
-    correlation[u == 0.0, u == 0.0] = 1.0
+    drawn = joint.values + u * _normal(joint, members, seed)
+    return [Problem.from_scene(scene), *(_member(scene, joint, measured, values) for values in drawn.tolist())]
+
+
+def _normal(joint: Joint, members: int, seed: int) -> F8:
+    """Standard normal numbers (members, k) with the correlations of a joint, on a Latin hypercube."""
+    from scipy.special import ndtri
+
+    u = np.sqrt(np.diag(joint.covariance))
+    correlation = _correlation(joint) + 1e-12 * np.eye(u.size)  # of 1 is as good as its square root without rounding
     shares = np.tile((np.arange(members) + 0.5) / members, (u.size, 1))
     normal = ndtri(np.random.default_rng(seed).permuted(shares, axis=1))
-    drawn = joint.values + (u[:, None] * (np.linalg.cholesky(correlation) @ normal)).T
-    with_mass = measured is not None and "spring_constant_n_per_m" in measured.names
-    problems = [Problem.from_scene(scene)]
-    for values in drawn.tolist():
-        member = replace(scene, **_limited(joint, values))
-        if with_mass:
-            constant = member.spring_constant_n_per_m
-            assert constant is not None
-            share = effective_mass_kg(member) / effective_mass_kg(scene)
-            member = replace(member, spring_constant_n_per_m=replace(constant, value=constant.value * share))
-        problems.append(Problem.from_scene(member))
-    return problems
+    return np.asarray((np.linalg.cholesky(correlation) @ normal).T)
+
+
+def _correlation(joint: Joint) -> F8:
+    u = np.sqrt(np.diag(joint.covariance))
+    safe = np.where(u > 0.0, u, 1.0)
+    correlation = joint.covariance / np.outer(safe, safe)
+    correlation[u == 0.0, u == 0.0] = 1.0
+    return np.asarray(correlation)
+
+
+def _member(scene: Scene, joint: Joint, measured: Joint | None, values: list[float]) -> Problem:
+    """One member, its uncertain quantities as drawn."""
+    member = replace(scene, **_limited(joint, values))
+    if measured is not None and "spring_constant_n_per_m" in measured.names:
+        constant = member.spring_constant_n_per_m
+        assert constant is not None
+        share = effective_mass_kg(member) / effective_mass_kg(scene)
+        member = replace(member, spring_constant_n_per_m=replace(constant, value=constant.value * share))
+    return Problem.from_scene(member)
 
 
 def spread(
-    scene: Scene, seconds: float, measured: Joint | None = None, *, members: int = MEMBERS, seed: int = 0
+    scene: Scene,
+    seconds: float,
+    measured: Joint | None = None,
+    *,
+    members: int = MEMBERS,
+    seed: int = 0,
+    ensemble: bool = False,
 ) -> Band:
     """Return the band around the motion of a scene.
 
@@ -157,37 +200,86 @@ def spread(
         As in :func:`draw`.
     seconds : float
         How long, s.
+    ensemble : bool
+        Solve every member, even where linear propagation holds.
 
     Raises
     ------
     SceneError, DynamicsError
         As :func:`draw`; and if the run is longer than 50,000 steps of a fifth of a radian, with friction 10,000.
     """
-    ensemble = draw(scene, measured, members=members, seed=seed)
-    omegas = np.array([one.equation.angular_frequency_per_s for one in ensemble])
-    step_s = RADIANS / float(omegas[0])
+    joint = uncertain(scene, measured)
+    middle = Problem.from_scene(scene)
+    step_s = RADIANS / middle.equation.angular_frequency_per_s
     steps = max(1, math.ceil(seconds / step_s))
-    most = MOST_STEPS // TURNS_COST if any(one.equation.friction_m_per_s2 for one in ensemble) else MOST_STEPS
+    most = MOST_STEPS // TURNS_COST if middle.equation.friction_m_per_s2 else MOST_STEPS
     if steps > most:
         raise DynamicsError(
             f"a band of {seconds:g} s takes {steps} steps, more than {most}; ask for at most {most * step_s:.3g} s"
         )
-    parts = []
-    for start in range(0, steps, STRETCH):
-        runs = [STRANG.run(one, step_s, min(STRETCH, steps - start)) for one in ensemble]
-        rows = slice(0 if start == 0 else 1, None)  # a stretch begins where the last one ended
-        y, v = (np.array([getattr(run, name)[rows] for run in runs]) for name in ("y", "v"))
-        amplitude = np.hypot(y, v / omegas[:, None])
-        parts.append([amplitude[:1], _quantiles(y), _quantiles(amplitude)])
-        ensemble = [Problem(run.problem.equation, run.y[-1], run.v[-1]) for run in runs]
-    middle, of_displacement, of_amplitude = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
-    names = uncertain(scene, measured).names
-    return Band(names, members, seed, step_s * np.arange(steps + 1.0), middle[0], of_displacement, of_amplitude)
+    found = sensitivity(joint.names, middle, _shifted(scene, joint, measured), step_s, steps)
+    linear = found.holds and not ensemble and not _reaches_zero(joint)
+    if linear:
+        members = max(members, MEMBERS_MOVED)
+        parts = list(_moved(found, _normal(joint, members, seed)))
+    else:
+        parts = list(_solved(draw(scene, measured, members=members, seed=seed), step_s, steps))
+    of_displacement, of_amplitude, of_phase = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
+    amplitude = np.abs(found.middle)
+    return Band(joint.names, members, seed, found.t, amplitude, of_displacement, of_amplitude, of_phase, found, linear)
 
 
-def _quantiles(states: F8) -> F8:
-    """Quantiles (4, n) of all members but the first, less the first; the hypercube's shares begin as Hazen's do."""
-    return np.asarray(np.quantile(states[1:], SHARES, axis=0, method="hazen") - states[0])
+def _shifted(scene: Scene, joint: Joint, measured: Joint | None) -> list[Problem]:
+    """For each quantity the problems with it larger and smaller by its uncertainty, the others where they are."""
+    found = []
+    for row, u in enumerate(np.sqrt(np.diag(joint.covariance)).tolist()):
+        for sign in (1.0, -1.0):
+            values = joint.values.copy()
+            values[row] += sign * u
+            found.append(_member(scene, joint, measured, values.tolist()))
+    return found
+
+
+def _reaches_zero(joint: Joint) -> bool:
+    """Whether what cannot be negative is drawn as 0 now and then."""
+    u = np.sqrt(np.diag(joint.covariance))
+    return any(
+        name not in SIGNED and value < REACH * each
+        for name, value, each in zip(joint.names, joint.values, u, strict=True)
+    )
+
+
+def _moved(found: Sensitivity, normal: F8) -> Iterator[tuple[F8, F8, F8]]:
+    """Quantiles of members that the sensitivities move, a stretch at a time."""
+    for start in range(0, found.t.size, STRETCH):
+        columns = slice(start, start + STRETCH)
+        middle = found.middle[columns]
+        logs = normal @ found.of_log[:, columns]
+        states = middle * np.exp(logs)
+        yield (
+            _quantiles(states.real, middle.real),
+            _quantiles(np.abs(states), np.abs(middle)),
+            _quantiles(logs.imag, np.zeros(middle.size)),
+        )
+
+
+def _solved(ensemble: list[Problem], step_s: float, steps: int) -> Iterator[tuple[F8, F8, F8]]:
+    """Quantiles of members that are solved, a stretch at a time."""
+    last: F8 = np.zeros((len(ensemble) - 1, 1))
+    for states in solved(ensemble, step_s, steps):
+        turned = np.angle(states[1:] * np.conj(states[0]))
+        phase = np.unwrap(np.concatenate([last, turned], axis=1), axis=1)[:, 1:]
+        last = phase[:, -1:]
+        yield (
+            _quantiles(states[1:].real, states[0].real),
+            _quantiles(np.abs(states[1:]), np.abs(states[0])),
+            _quantiles(phase, np.zeros(states.shape[1])),
+        )
+
+
+def _quantiles(members: F8, middle: F8) -> F8:
+    """Quantiles (4, n) of members less the middle; the hypercube's shares begin as Hazen's do."""
+    return np.asarray(np.quantile(members, SHARES, axis=0, method="hazen") - middle)
 
 
 def _limited(joint: Joint, values: list[float]) -> dict[str, Any]:

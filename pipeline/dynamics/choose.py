@@ -14,7 +14,7 @@ from pipeline.dynamics.integrators.runge_kutta import RK4
 from pipeline.dynamics.integrators.solve_ivp import SolveIvp
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
-from pipeline.dynamics.predict import fine_step, in_own_units, predicted_by_pilot, rounding_error
+from pipeline.dynamics.prediction.pilot import fine_step, in_own_units, predicted_by_pilot, rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
@@ -61,12 +61,14 @@ class Choice:
     step_s : float
         s.
     predicted_error : float
-        Largest error of the displacement over the starting amplitude.
+        Largest error of the displacement over the starting amplitude, with what the terms left out may change.
     cost_ns : float
         Of the run, as :func:`cost_ns` has it.
     problem : Problem
         What is solved: the terms that the tolerance requires.
     terms : tuple of Term
+    predicted_velocity_error : float
+        Largest error of the velocity over the starting amplitude times the angular frequency.
     """
 
     integrator: Integrator
@@ -76,6 +78,7 @@ class Choice:
     cost_ns: float
     problem: Problem
     terms: tuple[Term, ...] = ()
+    predicted_velocity_error: float = math.inf
 
     def run(self, count: int) -> Trajectory:
         """Solve the problem for so many spacings."""
@@ -125,7 +128,8 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     demand_times(spacing_s, seconds)
     demand_tolerance(problem, seconds, tolerance)
     reduced, terms = required(problem, seconds, tolerance)
-    room = tolerance - sum(term.size for term in terms if not term.included)
+    left_out = sum(term.size for term in terms if not term.included)
+    room = tolerance - left_out
     best: Choice | None = None
     # First those whose error is known without a pilot, then by what each costs at least: the dear need no prediction.
     for integrator in sorted(AUTO, key=lambda each: (each not in KNOWN, cost_ns(each, reduced, 1, count, seconds))):
@@ -139,7 +143,13 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
             f"no integrator keeps a tolerance of {tolerance:g} for {seconds:g} s of this scene; "
             "ask for a larger tolerance or a shorter run"
         )
-    return replace(best, terms=terms)
+    velocity = best.integrator.predicted_velocity_error(reduced, best.step_s, seconds)
+    return replace(
+        best,
+        terms=terms,
+        predicted_error=best.predicted_error + left_out,
+        predicted_velocity_error=velocity + left_out,
+    )
 
 
 def _may_pay(problem: Problem, spacing_s: float, count: int, tolerance: float, most_ns: float) -> bool:

@@ -57,6 +57,10 @@ class Integrator(ABC):
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the expected largest error of the displacement over the starting amplitude."""
 
+    def predicted_velocity_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return the same of the velocity, over the amplitude times the angular frequency."""
+        return self.predicted_error(problem, step_s, seconds)
+
     @abstractmethod
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Return displacements and velocities (n,) of a problem in units of its amplitude, every so many steps."""
@@ -108,7 +112,7 @@ class Integrator(ABC):
     def _remedy(self, problem: Problem) -> str:
         limit = self.stable_step(problem)
         if 0 < limit < np.inf:
-            return f"take a step of at most {limit:.3g} s, or strang"
+            return f"take a step of at most {limit:.3g} s, or {'auto' if self.name == 'strang' else 'strang'}"
         return "take a shorter run, or strang or auto"
 
 

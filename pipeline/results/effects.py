@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
 from pipeline.bench.air import air_viscosity, speed_of_sound
+from pipeline.bench.drag import STEADY_DISC_DRAG
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
@@ -26,7 +27,6 @@ __all__ = ["Effect", "tabulate"]
 SHARE = 0.1  # of the uncertainty that an effect would disturb
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
 STEEL_KG_PER_M3 = 7850.0
-STEADY_DISC_DRAG = 1.17  # drag coefficient of a disc broadside on in steady flow, Re > 1000
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,195 +1,210 @@
-"""``springmass simulate``: the equation of motion of a scene, solved, with the error that was expected and made."""
+"""``springmass simulate``: the motion that a scene predicts, how sure it is, and what it costs."""
 
 from __future__ import annotations
 
 import argparse
-import io
 import json
 import math
 import shlex
 import sys
+import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from acquisition.block import Block
 from acquisition.errors import visible
-from acquisition.source import SourceInfo
-from pipeline.bench.scene import Scene
-from pipeline.dynamics import Problem, effective_mass_kg
-from pipeline.dynamics.band import LEVELS, Band, spread, uncertain
+from pipeline.dynamics.band import Band, spread
 from pipeline.dynamics.choose import Choice
 from pipeline.errors import DynamicsError
-from pipeline.numerics.estimate import Joint
-from pipeline.track import F8
+from pipeline.results.effects import Effect
+from pipeline.results.simulated_effects import simulated_effects
 from springmass.commands import completions
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.runs.analysing import in_a_name, made_now, make_folder
 from springmass.runs.loading import load
 from springmass.runs.scenes import ask_about, read_scene
-from springmass.runs.simulation import (
-    Against,
+from springmass.runs.simulating.prepared import Prepared, prepare
+from springmass.runs.simulating.simulation import (
     Simulation,
-    band_columns,
     count_of,
+    default_tolerance,
     demand_stable,
     plan,
     simulate,
-    summary,
 )
-from springmass.session.simulated_bench import REST_M
+from springmass.runs.simulating.told import summary
+from springmass.terminal.printing import wrapped
 
 __all__ = ["run"]
 
+FAR_BELOW = 0.01  # of the band: a tolerance below it buys nothing
+OF_OUTPUT = ("sensor", "noise_m", "echoes")
+
 
 def run(options: argparse.Namespace) -> int:
-    """Plan, tell what error to expect, run, tell what it was, and write what was made."""
-    if options.dt <= 0:
-        raise ProgramError(f"--dt must be more than 0 s, got {options.dt:g}", USAGE)
+    """Say what the scene implies, how sure it is and what it costs, solve it, and write what was asked for."""
+    _demand(options)
     count = count_of(options.seconds, options.dt)
-    scene, analysis, measured = read_scene(options.scene), None, None
+    scene, analysis = read_scene(options.scene), None
     ask_about(scene, options.scene)
     seconds = options.seconds
     if options.against is not None:
         from pipeline.analyse import analyse
-        from springmass.runs.against import completed, duration_s, lay_over
+        from springmass.runs.simulating.against import duration_s
 
         analysis = analyse(load(options.against, **completions(options)).track, scene)
-        scene, measured = completed(scene, analysis)
         seconds = max(seconds, duration_s(analysis))
-        tell(f"from {options.against}: {', '.join(measured.names)}")
-    problem = Problem.from_scene(scene, where=options.scene)
+    ready = prepare(scene, seconds, analysis=analysis, without=options.without, where=options.scene)
+    if ready.from_run:
+        tell(f"from {options.against}: {', '.join(ready.from_run)}")
+    if options.trade:
+        from springmass.commands.trade import trade_of_scene
+
+        return trade_of_scene(ready, options.scene, options.dt, count, options.tolerance, options.out, options.json)
+    say = sys.stderr if options.json else sys.stdout
+    band, of_band = _band(ready, seconds)
+    tolerance, words = _tolerance(options, band)
+    effects: list[Effect] = []
+
+    def planned(choice: Choice) -> None:
+        if not options.force:
+            demand_stable(choice, where=options.scene)
+        effects.extend(
+            simulated_effects(
+                ready.stated, ready.problem, choice.terms, options.dt * count, ready.drag, options.without
+            )
+        )
+        print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
+        print(_before(choice, count, words, effects), file=say, flush=True)
+
     try:
-        choice = plan(problem, options.method, options.dt, count, options.tolerance)
+        simulation = simulate(
+            ready.problem,
+            lambda: plan(ready.problem, options.method, options.dt, count, tolerance),
+            options.dt,
+            count,
+            check=options.check,
+            timer=time.perf_counter,
+            planned=planned,
+        )
     except DynamicsError as error:
         raise ProgramError(f"{options.scene}: {error}", USAGE) from error
-    if not options.force:
-        demand_stable(choice, where=options.scene)
-    say = sys.stderr if options.json else sys.stdout
-    print(_before(choice, count), file=say, flush=True)
-    simulation = simulate(problem, choice, options.dt, count)
-    print(f"measured error   {simulation.measured_error:.2g} of the amplitude", file=say)
-    band = _band(scene, seconds, measured)
+    print(_after(simulation, count), file=say)
     against = None
     if analysis is not None:
-        against = lay_over(analysis, problem, options.method, options.dt, options.tolerance, band)
-        print(
-            f"against the run  rms {against.rms_m * 1e3:.3g} mm, noise of a sample {against.noise_m * 1e3:.3g} mm",
-            file=say,
-        )
-    if options.out is not None or not options.json:
-        folder = _write(simulation, against, band, scene, options)
+        from springmass.runs.simulating.against import deviation_text, lay_over
+
+        against = lay_over(analysis, ready.problem, options.method, options.dt, tolerance, band, ready.values())
+        left = f"rms {against.rms_m * 1e3:.3g} mm, noise of a sample {against.noise_m * 1e3:.3g} mm"
+        print("\n".join([f"against the run  {left}", *deviation_text(against)]), file=say)
+    told = summary(simulation, against, band, effects, tolerance)
+    if options.output is not None:
+        _write_readings(ready, options, told)
+    if options.out is not None or not (options.json or options.output is not None):
+        from springmass.runs.simulating.written import write_folder
+
+        folder = write_folder(simulation, against, band, ready.solved, options.scene, options.out or ".", told)
         print(f"written          {visible(str(folder))}", file=say)
         suggest(f"springmass analyse {shlex.quote(str(folder / 'run.h5'))} --scene {shlex.quote(options.scene)}")
     if options.json:
-        print(json.dumps(summary(simulation, against, band)))
+        print(json.dumps(told))
     return OK
 
 
-def _band(scene: Scene, seconds: float, measured: Joint | None) -> Band | None:
-    """The band of what is uncertain; where there is none, say why."""
-    names = uncertain(scene, measured).names
-    if not names:
-        print("band             none: the scene states no uncertainties", file=sys.stderr)
-        return None
+def _demand(options: argparse.Namespace) -> None:
+    """Refuse what cannot be meant."""
+    if options.dt <= 0:
+        raise ProgramError(f"--dt must be more than 0 s, got {options.dt:g}", USAGE)
+    given = [f"--{name.replace('_', '-')}" for name in OF_OUTPUT if getattr(options, name) is not None]
+    if given and options.output is None:
+        raise ProgramError(f"{', '.join(given)}: of the readings in a run file, got none; add -o RUN.h5", USAGE)
+    if options.sensor == "ideal" and len(given) > 1:
+        raise ProgramError(f"--sensor ideal has neither noise nor echoes, got {', '.join(given[1:])}", USAGE)
+
+
+def _band(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
+    """The band of what is uncertain and how it was made; where there is none, why."""
+    if not ready.values():
+        return None, "none: the scene states no uncertainties"
     try:
-        band = spread(scene, seconds, measured)
+        band = spread(ready.solved, seconds, ready.measured)
     except DynamicsError as error:
-        print(f"band             none: {error}", file=sys.stderr)
-        return None
-    print(
-        f"band             {band.members} motions drawn from the uncertainties of {', '.join(names)}", file=sys.stderr
-    )
-    return band
+        return None, f"none: {error}"
+    return band, band.words
 
 
-def _before(choice: Choice, count: int) -> str:
-    """What is about to run, and what to expect of it."""
-    error = (
-        f"{choice.predicted_error:.2g} of the amplitude"
-        if math.isfinite(choice.predicted_error)
-        else "beyond all bounds"
-    )
-    lines = [f"method           {choice.integrator.words}"]
+def _tolerance(options: argparse.Namespace, band: Band | None) -> tuple[float | None, str]:
+    """The tolerance, and in words where it comes from or that it is far below the band."""
+    if options.tolerance is None:
+        if options.method != "auto":
+            return None, ""
+        found = default_tolerance(band)
+        whence = "the default" if band is None else f"a hundredth of the band, {band.relative_u:.1g} of the amplitude"
+        return found, f"tolerance        {found:.1g} of the amplitude: {whence}"
+    found = float(options.tolerance)
+    words = f"tolerance        {found:g} of the amplitude"
+    if band is not None and 0.0 < found < 0.1 * FAR_BELOW * band.relative_u:
+        turns = band.sensitivity.phase_at_end()
+        name = max(turns, key=lambda each: turns[each])
+        words += (
+            f", far below the band: u({name}) alone is {turns[name]:.1g} rad after {band.t[-1]:.3g} s; "
+            f"{default_tolerance(band):.0e} is enough here"
+        )
+    return found, words
+
+
+def _before(choice: Choice, count: int, tolerance: str, effects: Sequence[Effect]) -> str:
+    """What acts, what is about to run, and what to expect of it."""
+    lines = ["effects          change of the motion, of the amplitude"]
+    for effect in effects:
+        size = "" if effect.predicted is None else f"{effect.predicted:.2g}"
+        mark = "in " if effect.included else "out"
+        lines.append(wrapped(f"  {mark}  {effect.name:<30} {size:>8}  {effect.why}", " " * 48))
+    if tolerance:
+        lines.append(wrapped(tolerance, " " * 17))
+    lines.append(f"method           {choice.integrator.words}")
     if choice.integrator.order:
         lines.append(f"step             {choice.step_s:.6g} s, {choice.parts * count} steps")
-    lines += [
-        f"left out         {term.name}: {term.why}" for term in choice.terms if term.size > 0 and not term.included
-    ]
-    return "\n".join([*lines, f"predicted error  {error}"])
+    return "\n".join([*lines, f"predicted error  {_errors(choice.predicted_error, choice.predicted_velocity_error)}"])
 
 
-def _write(
-    simulation: Simulation, against: Against | None, band: Band | None, scene: Scene, options: argparse.Namespace
-) -> Path:
-    """Write run file, figures, tables and JSON into NAME.simulated; return the folder."""
-    from springmass.report.figures import save
-    from springmass.report.figures.simulation import against_figure, band_figure, draw_simulation
-    from storage.atomic import write_whole
-    from storage.folder import whole_folder
-
-    name = Path(options.scene).name.removesuffix(".toml").removesuffix(".scene")
-    target = make_folder(options.out or ".") / in_a_name(name, ".simulated")
-    told = summary(simulation, against, band)
-    figures, tables = draw_simulation(simulation, effective_mass_kg(scene)), {}
-    if band is not None:
-        t, y = simulation.trajectory.t, simulation.trajectory.y
-        figures["band"] = band_figure(simulation, band)
-        tables["band"] = {"t_s": t, "displacement_m": y, **band_columns(band, t, y)}
-    if against is not None:
-        figures["against"] = against_figure(against)
-        tables["against"] = {"t_s": against.t, "measured_m": against.measured, "predicted_m": against.predicted}
-        if against.band is not None:
-            around = against.predicted + against.band
-            tables["against"] |= {f"predicted_{level}_m": each for level, each in zip(LEVELS, around, strict=True)}
-    with whole_folder(target, FILES, "simulation.json") as folder:
-        _write_run(folder / "run.h5", simulation, scene, options, told)
-        pictures = make_folder(folder / "figures")
-        for title, figure in figures.items():
-            save(figure, pictures, title)
-        for title, columns in tables.items():
-            write_whole(folder / f"{title}.csv", _table(columns))
-        write_whole(folder / "simulation.json", json.dumps(told, indent=2) + "\n")
-    return target
+def _after(simulation: Simulation, count: int) -> str:
+    """Time, steps and error beside each other."""
+    choice, check = simulation.choice, simulation.check
+    steps = f"{choice.parts * count} steps" if choice.integrator.order else f"{count} states"
+    lines = []
+    if check is not None:
+        lines.append(f"measured error   {_errors(check.error, check.velocity_error)}, against {check.words}")
+    error = choice.predicted_error if check is None else check.error
+    took = f"{simulation.choosing_s * 1e3:.2g} ms to choose, {simulation.running_s * 1e3:.2g} ms to run"
+    lines.append(f"price            {took}, {steps}, error {error:.2g}")
+    return "\n".join(lines)
 
 
-FIGURES = ("position", "velocity", "energy", "phase", "error", "band", "against")
-FILES = frozenset(
-    {"run.h5", "simulation.json", "band.csv", "against.csv"}
-    | {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf")}
-)
+def _errors(position: float, velocity: float) -> str:
+    if not math.isfinite(position):
+        return "beyond all bounds"
+    return f"{position:.2g} of the amplitude, {velocity:.2g} of the greatest velocity"
 
 
-def _table(columns: dict[str, F8]) -> str:
-    """Columns of equal length as text, their names above."""
-    text = io.StringIO()
-    np.savetxt(
-        text, np.stack(list(columns.values()), axis=1), "%.9g", delimiter=",", header=",".join(columns), comments=""
-    )
-    return text.getvalue()
+def _write_readings(ready: Prepared, options: argparse.Namespace, told: dict[str, object]) -> None:
+    """Write what a rangefinder would have read, as a run of kind simulated."""
+    from springmass.runs.simulating.written import write_readings
 
-
-def _write_run(
-    path: Path, simulation: Simulation, scene: Scene, options: argparse.Namespace, told: dict[str, Any]
-) -> None:
-    """Write the trajectory as a run of kind ``simulated``: a sensor without noise, as far away as the bob needs."""
-    from storage.run_file.writing import write_run
-
-    trajectory = simulation.trajectory
-    rest = max(REST_M, 2.0 * float(np.max(np.abs(trajectory.y))))
-    block = Block(
-        0, trajectory.t, rest + trajectory.y, np.zeros(len(trajectory.y), np.uint8), velocity=trajectory.v.copy()
-    )
-    write_run(
+    path = Path(options.output)
+    if path.exists() and not options.overwrite:
+        raise ProgramError(f"{visible(str(path))}: exists; take another name, or --overwrite", USAGE)
+    write_readings(
         path,
-        [block],
-        SourceInfo("simulated", Path(options.scene).name, 1.0 / trajectory.spacing_s),
-        scene=scene.to_mapping(),
-        title=f"{Path(options.scene).name} by {simulation.choice.integrator.name}",
-        provenance={
-            **made_now(),
-            "configuration": {"rest_m": rest, **told},
-        },
-        overwrite=True,
+        ready,
+        method=options.method,
+        seconds=options.seconds,
+        spacing_s=options.dt,
+        sensor=options.sensor or "rangefinder",
+        noise_m=options.noise_m,
+        echoes_hz=options.echoes,
+        seed=options.seed,
+        where=options.scene,
+        told=told,
     )
+    say = sys.stderr if options.json else sys.stdout
+    print(f"written          {visible(str(path))}", file=say)
+    suggest(f"springmass analyse {shlex.quote(str(path))} --scene {shlex.quote(options.scene)}")

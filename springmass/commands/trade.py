@@ -10,17 +10,22 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipeline.errors import DynamicsError
 from springmass import __version__
 from springmass.commands import completions
 from springmass.errors import OK, USAGE, ProgramError
 from springmass.runs.analysing import make_folder
+from springmass.runs.scenes import read_scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["run"]
+    from springmass.runs.simulating.prepared import Prepared
+
+__all__ = ["run", "trade_of_scene"]
 
 SIMULATED = ("seeds", "noise_m", "seconds", "damping", "echoes", "out")
+SPACING_S, LONG_S = 0.01, 120.0  # of the samples of a scene's motion, and how long it is unless it is said
 LABELS = {
     "frequency": "frequency: error / bound",
     "amplitude": "amplitude: error / bound",
@@ -32,6 +37,8 @@ def run(options: argparse.Namespace) -> int:
     """Measure estimators on simulated records, or put one record before all of them."""
     if options.integrators:
         return _integrators(options)
+    if given := _given(options, ("scene", "tolerance")):
+        raise ProgramError(f"{', '.join(given)}: of --integrators, which was not asked for; add it", USAGE)
     if options.hostile:
         return _hostile(options)
     if options.input is None:
@@ -98,7 +105,20 @@ def _hostile(options: argparse.Namespace) -> int:
 
 
 def _integrators(options: argparse.Namespace) -> int:
-    if given := _given(options, ("input", *SIMULATED[:-1])):
+    if options.scene is not None:
+        if given := _given(options, ("input", *(name for name in SIMULATED if name not in ("seconds", "out")))):
+            raise ProgramError(
+                f"--integrators --scene takes only --seconds, --tolerance, --out and --json; got {', '.join(given)}",
+                USAGE,
+            )
+        from springmass.runs.simulating.prepared import prepare
+        from springmass.runs.simulating.simulation import count_of
+
+        seconds = LONG_S if options.seconds is None else options.seconds
+        count = count_of(seconds, SPACING_S)
+        ready = prepare(read_scene(options.scene), seconds, where=options.scene)
+        return trade_of_scene(ready, options.scene, SPACING_S, count, options.tolerance, options.out, options.json)
+    if given := _given(options, ("input", *SIMULATED[:-1], "tolerance")):
         names = ", ".join(given)
         raise ProgramError(f"--integrators measures trajectories and takes only --out and --json; got {names}", USAGE)
     from springmass.trade.integrators import integrators_figure, integrators_json, integrators_text, measure_integrators
@@ -109,6 +129,51 @@ def _integrators(options: argparse.Namespace) -> int:
     if out is not None:
         _write(out, "integrators", integrators_figure(rows), content)
     print(json.dumps(content) if options.json else integrators_text(rows))
+    return OK
+
+
+def trade_of_scene(
+    ready: Prepared, where: str, spacing_s: float, count: int, tolerance: float | None, out: str | None, as_json: bool
+) -> int:
+    """Measure error against time of every method on one scene, and recommend one."""
+    from springmass.runs.simulating.recommend import wanted_error
+    from springmass.trade.integrators import (
+        integrators_figure,
+        integrators_json,
+        integrators_text,
+        measure_scene,
+        recommended,
+    )
+
+    folder = None if out is None else make_folder(out)
+    name = Path(where).name.removesuffix(".toml")
+    try:
+        rows = measure_scene(name, ready.problem, spacing_s, count, time.perf_counter)
+    except DynamicsError as error:
+        raise ProgramError(f"{where}: {error}", USAGE) from error
+    wanted, whence = wanted_error(ready, spacing_s * count, tolerance)
+    best = recommended(rows, wanted)
+    way = f"{best.method}, {best.setting}" if best.tolerance is None else f"auto --tolerance {best.tolerance:g}"
+    kept = "" if best.error <= wanted else "; none keeps it, this comes nearest"
+    words = f"{way}: error {best.error:.1e} in {best.seconds * 1e3:.3g} ms, for {wanted:.1e}, {whence}{kept}"
+    content = integrators_json(rows, __version__)
+    content["recommended"] = {
+        "method": best.method,
+        "setting": best.setting,
+        "auto_tolerance": best.tolerance,
+        "error": best.error,
+        "seconds": best.seconds,
+        "wanted": wanted,
+        "why": whence,
+    }
+    if folder is not None:
+        label = f"time for {spacing_s * count:g} s at {1.0 / spacing_s:g} Hz / ms"
+        _write(folder, "integrators", integrators_figure(rows, label), content)
+    if as_json:
+        print(json.dumps(content))
+    else:
+        print(integrators_text(rows))
+        print(f"\nrecommended: {words}")
     return OK
 
 

@@ -234,12 +234,41 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seconds", type=_positive, default=10.0, metavar="N", help="how long (default 10)")
     parser.add_argument(
-        "--tolerance", type=_finite, metavar="E", help="largest error over the amplitude (auto: default 1e-6)"
+        "--tolerance",
+        type=_finite,
+        metavar="E",
+        help="largest error over the amplitude (auto: default a hundredth of the band, 1e-6 to 1e-3)",
+    )
+    parser.add_argument("--check", action="store_true", help="measure the error too, which costs more than the run")
+    parser.add_argument("--trade", action="store_true", help="measure error against time of every method on this scene")
+    parser.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        choices=("drag", "disc", "spring-mass"),
+        metavar="EFFECT",
+        help="leave an effect out that the scene implies: drag, disc or spring-mass; may be repeated",
     )
     parser.add_argument("--force", action="store_true", help="run a step that is unstable")
     parser.add_argument("--against", metavar="RUN", help="measured run to lay the prediction over")
     _add_unverified(parser)
-    parser.add_argument("--out", metavar="DIR", help="folder for NAME.simulated (default: here; with --json: none)")
+    parser.add_argument(
+        "-o", "--output", metavar="RUN.h5", help="write what a rangefinder would have read to a run file"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace RUN.h5 where it exists")
+    parser.add_argument(
+        "--sensor",
+        choices=("ideal", "rangefinder"),
+        help="of RUN.h5: ideal reads the motion itself, rangefinder has ticks, noise and echoes (default rangefinder)",
+    )
+    parser.add_argument(
+        "--noise-m", type=_not_negative, metavar="S", help="its noise, m (default the scene's, or 8e-5)"
+    )
+    parser.add_argument("--echoes", type=_not_negative, metavar="HZ", help="its false echoes a second (default 0.1)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of its noise (default 0)")
+    parser.add_argument(
+        "--out", metavar="DIR", help="folder for NAME.simulated (default: here; with --json or -o: none)"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
 
 
@@ -266,6 +295,10 @@ def _add_trade(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--echoes", type=_echo_share, metavar="X", help="share of false echoes, 0 to 0.4 (default 0)")
     parser.add_argument("--hostile", action="store_true", help="measure the accuracies on records that are not simple")
     parser.add_argument("--integrators", action="store_true", help="measure trajectories instead: error against time")
+    parser.add_argument(
+        "--scene", metavar="S.toml", help="of --integrators: this scene's motion instead of the usual three"
+    )
+    parser.add_argument("--tolerance", type=_positive, metavar="E", help="of --scene: to recommend for")
     parser.add_argument("--out", metavar="DIR", help="folder for trade.svg, trade.pdf and trade.json")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     _add_input_options(parser)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem
-from pipeline.dynamics.choose import choose
+from pipeline.dynamics.choose import choose, least_tolerance
 from pipeline.dynamics.integrators.solve_ivp import SolveIvp
 from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
 from pipeline.errors import DynamicsError
@@ -23,13 +23,25 @@ from springmass.trade.front import Point
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["SCENES", "Work", "integrators_figure", "integrators_json", "integrators_text", "measure_integrators"]
+__all__ = [
+    "SCENES",
+    "Work",
+    "integrators_figure",
+    "integrators_json",
+    "integrators_text",
+    "measure_integrators",
+    "measure_scene",
+    "recommended",
+]
 
 SPACING_S, COUNT = 0.01, 12_000
 ROUNDS = 3
 PARTS = (1, 2, 4, 8, 16)
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 ROUNDING = 1e-13
+REFERENCE, FINEST = 1e-16, 1e-9  # tolerances of what errors are measured against, by Taylor series and else
+LONG_RADIANS, LONG_S = 2e4, 1.0  # of a run that adaptive methods are not put to; of one that is run once
+GROWN = 1e3  # times the amplitude: what has grown so far is no solution
 SCENES = {
     "linear": Equation.from_laws(8.66, gamma_per_s=0.0073),
     "mixed drag": Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235),
@@ -120,6 +132,61 @@ def measure_integrators(
     return rows
 
 
+def measure_scene(
+    name: str, problem: Problem, spacing_s: float, count: int, timer: Callable[[], float], *, rounds: int = ROUNDS
+) -> list[Work]:
+    """Measure every integrator on one problem, and what ``auto`` takes at each tolerance, choosing included.
+
+    Parameters
+    ----------
+    name : str
+        Of the scene.
+    problem : Problem
+    spacing_s, count
+        Of the samples.
+    timer : callable
+        To seconds.
+    rounds : int
+        Runs of which the quickest counts; of what takes more than a second, one.
+
+    Raises
+    ------
+    DynamicsError
+        If nothing solves the problem well enough to measure errors against.
+    """
+    best = replace(TAYLOR, tolerance=REFERENCE, longest=0.5 * TAYLOR.longest)
+    if best.refusal(problem) or not np.isfinite(best.predicted_error(problem, spacing_s, spacing_s * count)):
+        truth = choose(problem, spacing_s, count, max(FINEST, least_tolerance(problem, spacing_s * count))).run(count).y
+    else:
+        truth = best.run(problem, spacing_s, count).y
+    rows: list[Work] = []
+    for integrator, parts, setting in _settings(problem, spacing_s):
+        steps = spacing_s * count * problem.equation.angular_frequency_per_s
+        if isinstance(integrator, Taylor | SolveIvp) and steps > LONG_RADIANS:
+            continue
+        found = _measured(integrator, problem, parts, count, truth, timer, rounds, spacing_s)
+        if found is not None and found[0] < GROWN:
+            rows.append(Work(name, integrator.name, setting, *found))
+    for tolerance in TOLERANCES:
+        try:
+            start = timer()
+            choice = choose(replace(problem), spacing_s, count, tolerance)
+            chosen = timer() - start
+        except DynamicsError:
+            continue  # beyond what double precision reaches in this time
+        found = _measured(choice.integrator, choice.problem, choice.parts, count, truth, timer, rounds, spacing_s)
+        if found is not None:
+            setting = f"step {choice.step_s:.3g} s"
+            rows.append(Work(name, choice.integrator.name, setting, found[0], found[1] + chosen, tolerance))
+    return rows
+
+
+def recommended(rows: Sequence[Work], tolerance: float) -> Work:
+    """Return the cheapest measured way whose error is within a tolerance; the most exact where none is."""
+    good = [row for row in rows if row.error <= tolerance]
+    return min(good, key=lambda row: row.seconds) if good else min(rows, key=lambda row: row.error)
+
+
 def integrators_text(rows: Sequence[Work]) -> str:
     """Return the measurement as a table, the choices of auto beneath each scene."""
     lines: list[str] = []
@@ -139,7 +206,7 @@ def integrators_json(rows: Sequence[Work], version: str) -> dict[str, Any]:
     return {"schema": 1, "version": version, "integrators": [{key: getattr(row, key) for key in keys} for row in rows]}
 
 
-def integrators_figure(rows: Sequence[Work]) -> Figure:
+def integrators_figure(rows: Sequence[Work], label: str = "time for 120 s at 100 Hz / ms") -> Figure:
     """Draw error against time of every integrator, a panel a scene, and a ring around what auto takes."""
     scenes = list(dict.fromkeys(row.scene for row in rows))
     with style():
@@ -164,7 +231,7 @@ def integrators_figure(rows: Sequence[Work]) -> Figure:
             axis.set_ylim(ROUNDING / 100.0, 1e3)
         for axis in axes[:-1]:
             axis.tick_params(labelbottom=False)
-        axes[-1].set_xlabel("time for 120 s at 100 Hz / ms")
+        axes[-1].set_xlabel(label)
         known: dict[str, Any] = {}
         for axis in axes:
             for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
@@ -190,13 +257,13 @@ def _within(error: float) -> float:
     return min(max(error, ROUNDING / 30.0), 5e2)
 
 
-def _settings(problem: Problem) -> list[tuple[Integrator, int, str]]:
+def _settings(problem: Problem, spacing_s: float = SPACING_S) -> list[tuple[Integrator, int, str]]:
     found: list[tuple[Integrator, int, str]] = []
     for integrator in INTEGRATORS.values():
         if integrator.refusal(problem):  # of another kind of scene
             continue
         if integrator.order:
-            found += [(integrator, parts, f"step {SPACING_S / parts:.3g} s") for parts in PARTS]
+            found += [(integrator, parts, f"step {spacing_s / parts:.3g} s") for parts in PARTS]
         elif isinstance(integrator, Taylor | SolveIvp):
             aims = (1e-3, 1e-6, 1e-9) if isinstance(integrator, SolveIvp) else (1e-4, 1e-8, 1e-13)
             found += [(replace(integrator, tolerance=aim), 1, f"tolerance {aim:g}") for aim in aims]
@@ -213,14 +280,18 @@ def _measured(
     truth: np.ndarray[Any, np.dtype[np.float64]],
     timer: Callable[[], float],
     rounds: int,
+    spacing_s: float = SPACING_S,
 ) -> tuple[float, float] | None:
     """Return error and least time; None where the method ran away."""
     least = float("inf")
     for _ in range(rounds):
         start = timer()
         try:
-            run = integrator.run(problem, SPACING_S / parts, count * parts, every=parts)
+            run = integrator.run(problem, spacing_s / parts, count * parts, every=parts)
         except DynamicsError:
             return None
         least = min(least, timer() - start)
-    return float(np.max(np.abs(run.y - truth))) / START_M, least
+        if least > LONG_S:
+            break
+    size = problem.amplitude_m()
+    return float(np.max(np.abs(run.y - truth))) / size if size > 0.0 else 0.0, least

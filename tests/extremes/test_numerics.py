@@ -12,7 +12,7 @@ import pytest
 from pipeline.dynamics import INTEGRATORS, Equation, Problem, get_integrator
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrators.one_step import OneStep
-from pipeline.dynamics.stability import step_matrix
+from pipeline.dynamics.prediction.stability import step_matrix
 from pipeline.errors import DynamicsError
 
 STORED = json.loads((Path(__file__).resolve().parents[1] / "reference" / "dynamics.json").read_text())["cases"]

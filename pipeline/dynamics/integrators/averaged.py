@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.dynamics.amplitude import amplitude
 from pipeline.dynamics.integrator import Integrator, demand_times
 from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.predict import bounded, predicted_by_pilot
+from pipeline.dynamics.prediction.pilot import bounded, predicted_by_pilot
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 
@@ -34,16 +34,25 @@ class Averaged(Integrator):
 
     def refusal(self, problem: Problem) -> str:
         """Return why not, where a cycle changes the amplitude too much to be averaged over."""
+        if _hardness(problem) > WEAK:
+            return "its cosine is far from the motion where the cubic term is next to the spring; take strang or auto"
         if _weakness(problem) <= WEAK:
             return ""
         return f"a cycle can be averaged over where damping takes less than {WEAK:g} per radian; take strang or auto"
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what a pilot run shows."""
+        return self._predicted(problem, step_s, seconds, of_velocity=False)
+
+    def predicted_velocity_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return what the same pilot shows of the velocity."""
+        return self._predicted(problem, step_s, seconds, of_velocity=True)
+
+    def _predicted(self, problem: Problem, step_s: float, seconds: float, *, of_velocity: bool) -> float:
         demand_times(step_s, seconds)
         if self.refusal(problem):
             return math.inf
-        return bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds))
+        return bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds, of_velocity=of_velocity))
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Evaluate the model at every kept time."""
@@ -84,3 +93,9 @@ def _weakness(problem: Problem) -> float:
     start = problem.amplitude_m()
     held = mu / start if start > 0.0 else 0.0
     return float((gamma + beta * start + held) / problem.equation.angular_frequency_per_s)
+
+
+def _hardness(problem: Problem) -> float:
+    """The cubic term over the spring at the starting amplitude; products, as powers overflow with an error."""
+    reach = problem.amplitude_m() / problem.equation.angular_frequency_per_s
+    return float(abs(problem.equation.cubic_per_m2_s2) * reach * reach)

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics.flow import flows
-from pipeline.dynamics.integrator import Integrator, demand_times
-from pipeline.dynamics.predict import rounding_error
+from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
+from pipeline.dynamics.prediction.pilot import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 
-__all__ = ["EXACT", "Exact"]
+__all__ = ["EXACT", "Exact", "closed_form"]
 
 BLOCK = 128  # states of a block from its first by one matrix each; a block's first by the closed form
 
@@ -46,6 +46,40 @@ class Exact(Integrator):
 
 
 EXACT = Exact()
+
+
+def closed_form(problem: Problem, spacing_s: float, count: int) -> Trajectory:
+    """Return a linear motion by its closed form in extended precision, each state by itself: what others are held to.
+
+    Parameters
+    ----------
+    problem : Problem
+        Spring and viscous drag only.
+    spacing_s : float
+    count : int
+        Of spacings.
+    """
+    scaled, unit = problem.scaled()
+    eq = scaled.equation
+    omega, gamma, y, v = (
+        np.longdouble(each)
+        for each in (eq.angular_frequency_per_s, eq.gamma_per_s, scaled.displacement_m, scaled.velocity_m_per_s)
+    )
+    t = np.longdouble(spacing_s) * np.arange(count + 1)
+    with np.errstate(all="ignore"):
+        if gamma < omega:
+            damped = np.sqrt((omega - gamma) * (omega + gamma))
+            fall = np.exp(-gamma * t)
+            c, s = fall * np.cos(damped * t), fall * np.sin(damped * t) / damped
+        elif gamma == omega:
+            c = np.exp(-gamma * t)
+            s = t * c
+        else:
+            kappa = np.sqrt((gamma - omega) * (gamma + omega))
+            late, soon = np.exp(-omega * omega / (gamma + kappa) * t), np.exp(-(gamma + kappa) * t)
+            c, s = 0.5 * (late + soon), (late - soon) / (2.0 * kappa)
+        found = c * y + s * (v + gamma * y), c * v - s * (omega * omega * y + gamma * v)
+    return Trajectory(problem, spacing_s, *(np.asarray(each * unit, np.float64) for each in found))
 
 
 def _states(problem: Problem, apart: float, count: int) -> tuple[F8, F8]:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pipeline.dynamics.equation import Equation, Real
 from pipeline.dynamics.integrator import Integrator, StepMaker, demand_times, kept, with_start
 from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.predict import bounded, predicted_by_pilot, rounding_error
+from pipeline.dynamics.prediction.pilot import bounded, predicted_by_pilot, rounding_error
+from pipeline.dynamics.prediction.stability import limit_by_search
 from pipeline.dynamics.problem import Problem
-from pipeline.dynamics.stability import limit_by_search
 from pipeline.track import F8
 
 __all__ = ["OneStep", "acceleration"]
@@ -49,9 +49,17 @@ class OneStep(Integrator):
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what pilot runs show, and the rounding."""
+        return self._predicted(problem, step_s, seconds, of_velocity=False)
+
+    def predicted_velocity_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return what the same pilots show of the velocity."""
+        return self._predicted(problem, step_s, seconds, of_velocity=True)
+
+    def _predicted(self, problem: Problem, step_s: float, seconds: float, *, of_velocity: bool) -> float:
         demand_times(step_s, seconds)
         rounding = rounding_error(problem, seconds, seconds / step_s)
-        return rounding + bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds))
+        of = bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds, of_velocity=of_velocity))
+        return rounding + of
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Repeat the step."""

@@ -24,7 +24,7 @@ import numpy as np
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrator import Integrator, demand_times, kept, with_start
 from pipeline.dynamics.integrators.turning import Friction
-from pipeline.dynamics.predict import bounded, predicted_by_pilot, rounding_error
+from pipeline.dynamics.prediction.pilot import bounded, predicted_by_pilot, rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
@@ -53,11 +53,20 @@ class Strang(Integrator):
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what a pilot run in coarser steps shows, and the rounding."""
+        return self._predicted(problem, step_s, seconds, of_velocity=False)
+
+    def predicted_velocity_error(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return what the same pilot shows of the velocity."""
+        return self._predicted(problem, step_s, seconds, of_velocity=True)
+
+    def _predicted(self, problem: Problem, step_s: float, seconds: float, *, of_velocity: bool) -> float:
         demand_times(step_s, seconds)
         rounding = rounding_error(problem, seconds, seconds / step_s)
         if problem.equation.is_linear:
             return rounding
-        return rounding + bounded(lambda: predicted_by_pilot(self, self, problem, step_s, seconds))
+        return rounding + bounded(
+            lambda: predicted_by_pilot(self, self, problem, step_s, seconds, of_velocity=of_velocity)
+        )
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Split every step; with friction, from turning point to turning point."""

@@ -23,7 +23,7 @@ import numpy as np
 from pipeline.dynamics.amplitude import stopping_time
 from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrator import Integrator, demand_times
-from pipeline.dynamics.predict import rounding_error
+from pipeline.dynamics.prediction.pilot import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
@@ -43,12 +43,15 @@ class Taylor(Integrator):
     tolerance : float
         Error over the amplitude at the end of the run; the step passed to :meth:`run` is only the spacing of what is
         kept.
+    longest : float
+        Radians a step at most.
     """
 
     name: str = "taylor"
     words: str = "adaptive Taylor series with turning points located"
     order: int = 0
     tolerance: float = 1e-13
+    longest: float = LONGEST
 
     def refusal(self, problem: Problem) -> str:
         """Return why not, where viscous drag is so stiff that the series would take a step for nothing."""
@@ -64,17 +67,17 @@ class Taylor(Integrator):
         eq = problem.equation
         # Where drag outweighs the spring its own time is what a step has.
         stiff = math.sqrt(1.0 + eq.drag_per_m * problem.amplitude_m())
-        if (_fastest(problem) * stiff + eq.gamma_per_s) * seconds > LONGEST * MOST_STEPS:
+        if (_fastest(problem) * stiff + eq.gamma_per_s) * seconds > self.longest * MOST_STEPS:
             return math.inf
         return max(self.tolerance, rounding_error(problem, seconds))
 
     def order_of(self, problem: Problem, seconds: float) -> int:
         """Return the number of terms of its series."""
-        return _order(_local(problem, seconds, self.tolerance))
+        return _order(_local(problem, seconds, self.tolerance), self.longest)
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Solve from turning point to turning point."""
-        states = _solve(problem, step_s * every, steps // every + 1, self.tolerance)
+        states = _solve(problem, step_s * every, steps // every + 1, self.tolerance, self.longest)
         return states[:, 0], states[:, 1]
 
 
@@ -93,25 +96,25 @@ def _local(problem: Problem, seconds: float, tolerance: float) -> float:
     return max(tolerance / (1.0 + _fastest(problem) * seconds), 1e-18)
 
 
-def _order(local: float) -> int:
-    return next(p for p in range(6, 60) if LONGEST**p / math.factorial(p) < local)
+def _order(local: float, longest: float) -> int:
+    return next(p for p in range(6, 60) if longest**p / math.factorial(p) < local)
 
 
-def _solve(problem: Problem, apart: float, count: int, tolerance: float) -> F8:
+def _solve(problem: Problem, apart: float, count: int, tolerance: float, longest: float) -> F8:
     """Return the states (count, 2) at multiples of a time apart."""
     eq = problem.equation
     states = np.empty((count, 2))
     y, v = problem.displacement_m, problem.velocity_m_per_s
     states[0] = y, v
     fast, local = _fastest(problem), _local(problem, apart * count, tolerance)
-    order = _order(local)
+    order = _order(local, longest)
     kinked = eq.drag_per_m > 0 or eq.friction_m_per_s2 > 0
     too_long = DynamicsError(
         f"taylor needs more than {MOST_STEPS} steps for {apart * (count - 1):g} s; take a shorter run, strang or auto"
     )
     # Beyond critical damping friction never quite stops the bob.
     held = stopping_time(problem.amplitude_m(), *eq.laws()) if eq.gamma_per_s < eq.angular_frequency_per_s else math.inf
-    if fast * min(apart * (count - 1), held) > LONGEST * MOST_STEPS:
+    if fast * min(apart * (count - 1), held) > longest * MOST_STEPS:
         raise too_long
     row, since = 0, 0.0  # the last state kept, and the time since: a sum of short times rounds little
     for _ in range(MOST_STEPS):
@@ -125,7 +128,7 @@ def _solve(problem: Problem, apart: float, count: int, tolerance: float) -> F8:
             unit = min(unit, 1.0 / (eq.drag_per_m * (abs(v) + abs(y) * fast)) if abs(v) + abs(y) else unit)
         ys, vs = _series(eq, way, y, v, unit, order)
         size = max(abs(y), abs(v) / fast, abs(ys[2]))
-        h = min(_step(ys, vs, size, local, unit * fast), LONGEST / (unit * fast))
+        h = min(_step(ys, vs, size, local, unit * fast), longest / (unit * fast))
         end = _polynomial(vs, h)
         turned = kinked and end * way <= 0.0
         if turned:

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pipeline.dynamics import Trajectory, get_integrator
 from pipeline.dynamics.band import Band
+from pipeline.dynamics.choose import choose
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, VERMILLION, blank, legend_row, style, thinned
-from springmass.runs.simulation import Against, Simulation
+from springmass.runs.simulating.simulation import Against, Simulation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +32,8 @@ PERIODS, TURNS = 14, 6  # of a long run drawn against time once more, and in a p
 POINTS = 1500
 GROWN = 1e6  # times the starting amplitude: beyond it a curve says nothing more
 DASHED: dict[str, Any] = {"color": "#000000", "lw": 0.9, "ls": (0, (2, 1.5))}  # what is exact, or expected
-_EXACT: dict[str, Any] = {**DASHED, "lw": 0.6, "label": "exact"}
+_EXACT: dict[str, Any] = {**DASHED, "lw": 0.6}
+ROUGH, EXACT = 1e-3, 1e-9  # errors over the amplitude: a curve that shows, and one that nobody sees
 BINS = 250  # of a dense series: each gives the least and the greatest of what it holds
 WIDTH, LEFT, GAP, RIGHT, BOTTOM, TOP = 7.2, 0.68, 0.72, 0.12, 0.45, 0.62
 
@@ -44,14 +47,15 @@ def draw_simulation(simulation: Simulation, mass_kg: float | None) -> dict[str, 
     mass_kg : float or None
         For the energy; without it that of one kilogram is drawn.
     """
-    runs = [_euler(simulation, name) for name, *_ in EULERS]
+    beside = _beside(simulation)
+    runs = [_euler(simulation, beside, name) for name, *_ in EULERS]
     with style():
         return {
-            "position": _against_time(simulation, runs, "y", 1e3, "displacement / mm"),
-            "velocity": _against_time(simulation, runs, "v", 1.0, "velocity / (m/s)"),
-            "energy": _energy(simulation, runs, mass_kg),
-            "phase": _phase(simulation, runs),
-            "error": _error(simulation, runs),
+            "position": _against_time(simulation, beside, runs, "y", 1e3, "displacement / mm"),
+            "velocity": _against_time(simulation, beside, runs, "v", 1.0, "velocity / (m/s)"),
+            "energy": _energy(beside, runs, mass_kg),
+            "phase": _phase(simulation, beside, runs),
+            "error": _error(simulation, beside, runs),
         }
 
 
@@ -85,7 +89,7 @@ def against_figure(against: Against) -> Figure:
 
 
 def band_figure(simulation: Simulation, band: Band) -> Figure:
-    """Draw motion and amplitude with the band of the scene's uncertainties, and the band alone beneath them.
+    """Draw motion, amplitude and phase with the band of the scene's uncertainties, and beneath them the band alone.
 
     Parameters
     ----------
@@ -99,7 +103,9 @@ def band_figure(simulation: Simulation, band: Band) -> Figure:
     whole = band.t[band.t <= end]
     amplitude, of_amplitude = band.amplitude_at(whole)
     with style():
-        figure, (motion, course, width) = _stacked(5.6, (0.7, 0.23), (0.385, 0.23), (0.075, 0.23))
+        figure, (motion, course, turn, width) = _stacked(
+            7.0, (0.755, 0.195), (0.525, 0.165), (0.295, 0.165), (0.06, 0.165)
+        )
         middle = simulation.trajectory.at(last)
         _shade(motion, last, middle + band.displacement_at(last))
         motion.plot(last, middle * 1e3, color="#000000", lw=0.8, label="the scene's values")
@@ -108,24 +114,46 @@ def band_figure(simulation: Simulation, band: Band) -> Figure:
         _shade(course, whole, of_amplitude)
         course.plot(whole, amplitude * 1e3, color="#000000", lw=0.8)
         course.set_ylabel("amplitude / mm")
+        _shade(turn, whole, band.phase_at(whole), 1.0)
+        turn.set_ylabel("phase / rad")
         _shade(width, whole, band.displacement_at(whole))
         width.set_ylabel("band / mm")
         width.set_xlabel("time / s")
-        for panel, t in ((motion, last), (course, whole), (width, whole)):
+        for panel, t in ((motion, last), (course, whole), (turn, whole), (width, whole)):
             panel.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else float(t[0]) + 1.0)
+        figure.align_ylabels()
         return figure
 
 
-def _shade(panel: Axes, t: F8, levels: F8) -> None:
-    """Fill between the quantiles (4, n), m, of 95 and of 68 %."""
+def _shade(panel: Axes, t: F8, levels: F8, factor: float = 1e3) -> None:
+    """Fill between the quantiles (4, n) of 95 and of 68 %: of lengths, m, in millimetres."""
     for low, high, share, alpha in ((0, 3, 95, 0.25), (1, 2, 68, 0.45)):
         look: dict[str, Any] = {"color": ORANGE, "alpha": alpha, "lw": 0.0, "rasterized": t.size > POINTS}
-        panel.fill_between(t, levels[low] * 1e3, levels[high] * 1e3, label=f"{share} %", **look)
+        panel.fill_between(t, levels[low] * factor, levels[high] * factor, label=f"{share} %", **look)
 
 
-def _euler(simulation: Simulation, name: str) -> Trajectory:
+@dataclass(frozen=True, slots=True)
+class _Beside:
+    """What both Euler methods are drawn beside: a trajectory, its name in a legend, its look."""
+
+    run: Trajectory
+    words: str
+
+
+def _beside(simulation: Simulation) -> _Beside:
+    """The reference, where the error was measured; else the run, or where that is rough what auto makes of it."""
+    if simulation.check is not None:
+        return _Beside(simulation.check.reference, "exact")
+    run, error = simulation.trajectory, simulation.choice.predicted_error
+    if not error <= ROUGH:
+        found = choose(simulation.problem, run.spacing_s, len(run.y) - 1, ROUGH)
+        run, error = found.run(len(run.y) - 1), found.predicted_error
+    return _Beside(run, "exact" if error < EXACT else f"solved to {error:.0e}")
+
+
+def _euler(simulation: Simulation, beside: _Beside, name: str) -> Trajectory:
     """Run a method at the run's spacing, and if it runs away, as far as numbers go."""
-    spacing, count = simulation.truth.spacing_s, len(simulation.truth.y) - 1
+    spacing, count = beside.run.spacing_s, len(beside.run.y) - 1
     while True:
         try:
             return get_integrator(name).run(simulation.problem, spacing, count)
@@ -167,12 +195,17 @@ def _pair(height: float, labels: tuple[str, str], rows: int = 1) -> tuple[Figure
     return figure, axes
 
 
-def _against_time(simulation: Simulation, runs: Sequence[Trajectory], what: str, factor: float, label: str) -> Figure:
+def _against_time(
+    simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory], what: str, factor: float, label: str
+) -> Figure:
     """The whole run, and of a long one its first periods beneath."""
     long = any(len(run.y) > _shown(simulation, run, PERIODS).stop for run in runs)
     figure, axes = _pair(1.7 if long else 2.3, ("time / s", label), 2 if long else 1)
     for panel, run, (_, words, colour) in zip(axes[:2], runs, EULERS, strict=True):
-        for of, look in ((run, {"color": colour, "lw": 1.0, "label": words}), (simulation.truth, _EXACT)):
+        for of, look in (
+            (run, {"color": colour, "lw": 1.0, "label": words}),
+            (beside.run, {**_EXACT, "label": beside.words}),
+        ):
             value = getattr(of, what)[: len(run.y)] * factor
             rows = thinned(value, BINS)
             panel.plot(run.t[rows], value[rows], **look)
@@ -182,20 +215,20 @@ def _against_time(simulation: Simulation, runs: Sequence[Trajectory], what: str,
         first = _shown(simulation, run, PERIODS)
         t = run.t[first]
         panel.plot(t, getattr(run, what)[first] * factor, color=colour, lw=1.0)
-        panel.plot(t, getattr(simulation.truth, what)[first] * factor, **DASHED)
+        panel.plot(t, getattr(beside.run, what)[first] * factor, **DASHED)
         panel.set_xlim(float(t[0]), float(t[-1]))
     return figure
 
 
-def _energy(simulation: Simulation, runs: Sequence[Trajectory], mass_kg: float | None) -> Figure:
+def _energy(beside: _Beside, runs: Sequence[Trajectory], mass_kg: float | None) -> Figure:
     label = "energy / mJ" if mass_kg is not None else "energy per mass / (mJ/kg)"
     figure, axes = _pair(2.3, ("time / s", label))
     for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
         t, energy = _energies(run, run, mass_kg)
         panel.plot(t, energy, color=colour, lw=1.0, label=words)
         top = float(np.max(energy))
-        _, energy = _energies(simulation.truth, run, mass_kg)
-        panel.plot(t, energy, label="exact", **DASHED)
+        _, energy = _energies(beside.run, run, mass_kg)
+        panel.plot(t, energy, label=beside.words, **DASHED)
         low, high = (float(f(energy[energy > 0])) if np.any(energy > 0) else 1.0 for f in (np.min, np.max))
         if top > 20.0 * high or (low > 0 and high > 20.0 * low):
             panel.set_yscale("log")
@@ -216,29 +249,29 @@ def _energies(of: Trajectory, run: Trajectory, mass_kg: float | None) -> tuple[F
     return of.t[rows], 0.5e3 * (1.0 if mass_kg is None else mass_kg) * start * start * relative[rows]
 
 
-def _phase(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
+def _phase(simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory]) -> Figure:
     figure, axes = _pair(2.7, ("displacement / mm", "velocity / (m/s)"))
     for panel, run, (*_, colour) in zip(axes, runs, EULERS, strict=True):
         rows = _shown(simulation, run, TURNS)
-        exact = simulation.truth
+        exact = beside.run
         panel.plot(run.y[rows] * 1e3, run.v[rows], color=colour, lw=1.2, label="computed")
-        panel.plot(exact.y[rows] * 1e3, exact.v[rows], color="#000000", lw=0.6, label="exact")
+        panel.plot(exact.y[rows] * 1e3, exact.v[rows], color="#000000", lw=0.6, label=beside.words)
         panel.plot(run.y[:1] * 1e3, run.v[:1], "o", ms=3.0, color="#000000", label="start")
         legend_row(panel, 3, pad=0.15, columnspacing=1.0)
     return figure
 
 
-def _error(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
+def _error(simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory]) -> Figure:
     """Running maxima: an error crosses zero twice a period."""
     figure = blank(WIDTH, 3.2)
     panel = figure.add_axes((LEFT / WIDTH, 0.14, (WIDTH - LEFT - 2 * RIGHT) / WIDTH, 0.74))
     start = simulation.problem.amplitude_m() or 1.0
     choice = simulation.choice
     curves = [(run, words, colour) for run, (_, words, colour) in zip(runs, EULERS, strict=True)]
-    if choice.integrator.name not in [name for name, *_ in EULERS]:
+    if choice.integrator.name not in [name for name, *_ in EULERS] and simulation.trajectory is not beside.run:
         curves.append((simulation.trajectory, choice.integrator.words, GREEN))
     for run, words, colour in curves:
-        error = np.maximum.accumulate(np.abs(run.y - simulation.truth.y[: len(run.y)])) / start
+        error = np.maximum.accumulate(np.abs(run.y - beside.run.y[: len(run.y)])) / start
         drawn = np.flatnonzero((error > 0) & (error < GROWN))
         thinned = np.linspace(0, drawn.size - 1, min(drawn.size, POINTS)).astype(np.intp)
         rows = drawn[np.unique(thinned)]
@@ -246,7 +279,7 @@ def _error(simulation: Simulation, runs: Sequence[Trajectory]) -> Figure:
     if 0.0 < choice.predicted_error < GROWN:
         panel.axhline(choice.predicted_error, label="predicted", **{**DASHED, "lw": 0.8})
     panel.set_yscale("log")
-    panel.set_xlim(0.0, float(simulation.truth.t[-1]))
+    panel.set_xlim(0.0, float(beside.run.t[-1]))
     panel.set_ylabel("largest error so far / amplitude")
     panel.set_xlabel("time / s")
     legend_row(panel, 2, pad=0.15, columnspacing=1.2)

@@ -3,30 +3,37 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem
 from pipeline.dynamics.band import Band
+from pipeline.dynamics.sensitivity import C16
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.runs.simulation import Against, count_of, plan
+from springmass.runs.simulating.simulation import Against, Move, count_of, plan
 
-__all__ = ["completed", "duration_s", "lay_over"]
+__all__ = ["completed", "deviation_text", "duration_s", "lay_over"]
 
 FINE = 24.0  # states a radian between which an interpolation errs by 1e-8 of the amplitude
+WIDER = 1.96  # noise of a sample by which the band is widened: 95 % of it
+HALF = 0.5
+FURTHEST_U = 20.0  # standard uncertainties by which an input is moved
+FARTHEST = 1e300  # m: what a shift without a number leaves
 COEFFICIENTS = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
 
 
-def completed(scene: Scene, analysis: Analysis) -> tuple[Scene, Joint]:
+def completed(scene: Scene, analysis: Analysis, *, damping: bool = True) -> tuple[Scene, Joint]:
     """Return a scene in which a run's analysis stands for what is left out, and what it stands for.
 
-    The start is always the run's: nobody releases a bob at the first sample.
+    The start is always the run's: nobody releases a bob at the first sample. The damping is only where it is asked for.
 
     Returns
     -------
@@ -68,7 +75,7 @@ def completed(scene: Scene, analysis: Analysis) -> tuple[Scene, Joint]:
     if scene.spring_constant_n_per_m is None and "spring_constant" in scale:
         slopes[len(taken), 0] = 2.0 * scale["spring_constant"].value / omega
         taken["spring_constant_n_per_m"] = scale["spring_constant"]
-    if all(getattr(scene, name) is None for name in COEFFICIENTS.values()):
+    if damping and all(getattr(scene, name) is None for name in COEFFICIENTS.values()):
         for name, attribute in COEFFICIENTS.items():
             if name in law.names:
                 slopes[len(taken), 2 + law.names.index(name)] = 1.0
@@ -85,7 +92,13 @@ def completed(scene: Scene, analysis: Analysis) -> tuple[Scene, Joint]:
 
 
 def lay_over(
-    analysis: Analysis, problem: Problem, method: str, step_s: float, tolerance: float | None, band: Band | None
+    analysis: Analysis,
+    problem: Problem,
+    method: str,
+    step_s: float,
+    tolerance: float | None,
+    band: Band | None,
+    values: Mapping[str, Estimate] | None = None,
 ) -> Against:
     """Lay a prediction over a measured run, from the run's first sample on.
 
@@ -96,9 +109,12 @@ def lay_over(
     problem : Problem
         As the scene that :func:`completed` returned states it.
     method, step_s, tolerance
-        As in :func:`springmass.runs.simulation.plan`; the step of ``auto`` is one that can be interpolated between.
+        As in :func:`springmass.runs.simulating.simulation.plan`; the step of ``auto`` is one that can be interpolated
+        between.
     band : Band or None
         Around the prediction.
+    values : mapping, optional
+        The inputs of the band by name, for what each would have to be.
 
     Raises
     ------
@@ -114,8 +130,73 @@ def lay_over(
     trajectory = plan(problem, method, step_s, count, tolerance).run(count)
     predicted: F8 = motion.rest.at(t) + trajectory.at(t - t[0])
     rms = float(np.sqrt(np.mean((measured - predicted) ** 2)))
-    around = None if band is None else band.displacement_at(t - t[0])
-    return Against(t, measured, predicted, rms, analysis.estimates["noise"].value, around)
+    noise = analysis.estimates["noise"].value
+    if band is None:
+        return Against(t, measured, predicted, rms, noise)
+    around = band.displacement_at(t - t[0])
+    left = measured - predicted
+    outside = (left < around[0] - WIDER * noise) | (left > around[3] + WIDER * noise)
+    moves = _moves(band, t - t[0], left, values or {})
+    inside = 1.0 - float(np.mean(outside))
+    return Against(t, measured, predicted, rms, noise, around, inside, _leaves(t, outside, problem), moves)
+
+
+def _leaves(t: F8, outside: NDArray[np.bool_], problem: Problem) -> float | None:
+    """Return when more than half the samples of a period begin to lie outside; None where they never do."""
+    period_s = 2.0 * math.pi / problem.equation.angular_frequency_per_s
+    # Samples outside within a period from each on; the record may have gaps.
+    total = np.concatenate([[0], np.cumsum(outside)])
+    ends = np.searchsorted(t, t + period_s, side="right")
+    share = (total[ends] - total[:-1]) / (ends - np.arange(t.size))
+    whole = t + period_s <= t[-1]
+    found = np.flatnonzero(whole & (share > HALF))
+    return float(t[found[0]]) if found.size else None
+
+
+def _moves(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> tuple[Move, ...]:
+    """What each input alone would have to be for the prediction to come nearest to the record: least squares."""
+    from scipy.optimize import minimize_scalar
+
+    found, sensitivity = [], band.sensitivity
+    # At the sensitivities' own times: their states are a fifth of a radian apart.
+    rows = np.unique(np.searchsorted(sensitivity.t, since).clip(max=sensitivity.t.size - 1))
+    at = np.interp(sensitivity.t[rows], since, left)
+    middle = sensitivity.middle[rows]
+    for name, log in zip(sensitivity.names, sensitivity.of_log, strict=True):
+        if name not in values or values[name].u <= 0.0:
+            continue
+
+        def rms(shift: float, of: C16 = log[rows]) -> float:
+            with np.errstate(over="ignore", invalid="ignore"):
+                moved = (middle * np.expm1(shift * of)).real
+                size = float(np.sqrt(np.mean((at - moved) ** 2)))
+            return size if math.isfinite(size) else FARTHEST
+
+        grid = np.linspace(-FURTHEST_U, FURTHEST_U, 401)
+        best = float(grid[int(np.argmin([rms(each) for each in grid]))])
+        step = float(grid[1] - grid[0])
+        shift = float(minimize_scalar(rms, bounds=(best - step, best + step), method="bounded").x)
+        given = values[name]
+        found.append(Move(name, given.value, given.value + shift * given.u, shift, rms(shift)))
+    return tuple(sorted(found, key=lambda move: move.rms_m))
+
+
+def deviation_text(against: Against) -> list[str]:
+    """Return in words where the record leaves the band, and which input would have to move by how much."""
+    if against.inside is None:
+        return []
+    lines = [f"in the band      {against.inside:.1%} of the samples lie within 95 % and the noise"]
+    if against.leaves_s is None:
+        lines.append("                 the record never leaves it for half a period")
+        return lines
+    lines.append(f"leaves the band  from {against.leaves_s:.3g} s on more than half of a period's samples are outside")
+    for move in against.moves[:3]:
+        far = abs(move.in_u) > 0.99 * FURTHEST_U
+        lines.append(
+            f"                 {move.name} alone would have to be {move.value:.6g}, not {move.given:.6g} "
+            f"({'more than ' if far else ''}{move.in_u:+.1f} u): rms {move.rms_m * 1e3:.3g} mm would be left"
+        )
+    return lines
 
 
 def duration_s(analysis: Analysis) -> float:

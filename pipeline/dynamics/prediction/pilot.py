@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.dynamics.amplitude import stopping_time
 from pipeline.dynamics.equation import Equation
@@ -17,6 +18,8 @@ from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
+
+C16 = NDArray[np.complex128]
 
 __all__ = ["bounded", "fine_step", "in_own_units", "predicted_by_pilot", "rounding_error"]
 
@@ -52,9 +55,16 @@ def bounded(predict: Callable[[], float]) -> float:
 
 
 def predicted_by_pilot(
-    integrator: Integrator, solver: Integrator, problem: Problem, step_s: float, seconds: float, pilots: int = 3
+    integrator: Integrator,
+    solver: Integrator,
+    problem: Problem,
+    step_s: float,
+    seconds: float,
+    pilots: int = 3,
+    *,
+    of_velocity: bool = False,
 ) -> float:
-    """Return the expected largest error of the displacement over the starting amplitude.
+    """Return the expected largest error of the displacement over the starting amplitude, or of the velocity.
 
     Parameters
     ----------
@@ -67,6 +77,8 @@ def predicted_by_pilot(
         Of the run that is planned, s.
     pilots : int
         How many at most; see Notes.
+    of_velocity : bool
+        Of the velocity, over the amplitude times the angular frequency.
 
     Notes
     -----
@@ -104,7 +116,11 @@ def predicted_by_pilot(
         if max(seconds / pilot * parts, 8.0 * radians) > MOST_STEPS:
             return math.inf  # so coarse, or so long, that to see its error takes seconds
         shares = PLAIN_SHARES[:pilots] if plain and kinked and pilot > step_s else (1.0,)
-        errors = [_largest_error(integrator, solver, problem, each * pilot, parts, seconds) / start for each in shares]
+        # inf where the planned step is so coarse that a hardening spring throws even the truth beside it away.
+        errors = [
+            _largest_errors(integrator, solver, problem, each * pilot, parts, seconds)[of_velocity] / start
+            for each in shares
+        ]
         if not plain or max(errors) <= FAR or pilot <= step_s:
             break
         pilot = max(step_s, 0.25 * pilot)
@@ -155,19 +171,26 @@ def fine_step(problem: Problem) -> float:
 
 
 @functools.lru_cache(maxsize=8)
-def _largest_error(
+def _largest_errors(
     integrator: Integrator, solver: Integrator, problem: Problem, pilot: float, parts: int, seconds: float
-) -> float:
-    """Return the largest error of a run in steps of the pilot, m."""
-    coarse, truth = _truth(solver, problem, pilot, parts, seconds)
-    if integrator is solver and coarse is not None:
-        found = coarse
-    else:
-        try:
-            found = integrator.run(problem, pilot, len(truth) - 1).y
-        except DynamicsError:
-            return math.inf  # it ran away: that is its error
-    return _peak(np.abs(found - truth))
+) -> tuple[float, float]:
+    """Return the largest errors of displacement, and of velocity over the angular frequency, of a run, m."""
+    try:
+        coarse, truth = _truth(solver, problem, pilot, parts, seconds)
+        if integrator is solver and coarse is not None:
+            found = coarse
+        else:
+            found = _states(integrator, problem, pilot, len(truth) - 1, 1)
+    except DynamicsError:
+        return math.inf, math.inf  # it ran away: that is its error
+    off = found - truth
+    return _peak(np.abs(off.real)), _peak(np.abs(off.imag))
+
+
+def _states(integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int) -> C16:
+    """Displacement, and velocity over the angular frequency as the imaginary part."""
+    run = integrator.run(problem, step_s, steps, every=every)
+    return run.y + 1j * (run.v / problem.equation.angular_frequency_per_s)
 
 
 def _peak(error: F8) -> float:
@@ -181,11 +204,11 @@ def _peak(error: F8) -> float:
 
 
 @functools.lru_cache(maxsize=4)
-def _truth(solver: Integrator, problem: Problem, pilot: float, parts: int, seconds: float) -> tuple[F8 | None, F8]:
-    """Return the displacement in steps of the pilot, if these are fine, and the extrapolated one at the same times.
+def _truth(solver: Integrator, problem: Problem, pilot: float, parts: int, seconds: float) -> tuple[C16 | None, C16]:
+    """Return the states in steps of the pilot, if these are fine, and the extrapolated ones at the same times.
 
     Remembered, as every finer step and the next method ask for it again.
     """
     steps = max(1, round(seconds / pilot))
-    once, twice = (solver.run(problem, pilot / k, steps * k, every=k).y for k in (parts, 2 * parts))
+    once, twice = (_states(solver, problem, pilot / k, steps * k, k) for k in (parts, 2 * parts))
     return once if parts == 1 else None, twice + (twice - once) / 3.0

@@ -1,0 +1,43 @@
+"""What error a user of a simulation wants: the one asked for, else what sensor or scene cannot tell from none."""
+
+from __future__ import annotations
+
+from pipeline.dynamics.band import spread
+from pipeline.errors import DynamicsError
+from springmass.runs.simulating.prepared import Prepared
+from springmass.runs.simulating.simulation import DEFAULT_TOLERANCE, default_tolerance
+
+__all__ = ["wanted_error"]
+
+UNSEEN = 0.1  # of a sample's noise: an error that no record shows
+
+
+def wanted_error(ready: Prepared, seconds: float, tolerance: float | None) -> tuple[float, str]:
+    """Return the largest error over the amplitude that serves, and where it comes from.
+
+    Parameters
+    ----------
+    ready : Prepared
+    seconds : float
+        Of the run, s.
+    tolerance : float or None
+        Asked for; then that.
+    """
+    if tolerance is not None:
+        return tolerance, "the tolerance asked for"
+    start = ready.problem.amplitude_m()
+    if ready.values():
+        try:
+            band = spread(ready.solved, seconds, ready.measured)
+        except DynamicsError:
+            pass  # too vague or too long for a band: the noise decides
+        else:
+            found = default_tolerance(band)
+            return (
+                found,
+                f"a hundredth of the band, {band.relative_u:.1g} of the amplitude, at least 1e-6, at most 1e-3",
+            )
+    sigma = ready.stated.sensor_sigma_m
+    if sigma is not None and start > 0.0:
+        return UNSEEN * sigma.value / start, f"a tenth of the sensor's noise, {sigma.value:g} m"
+    return DEFAULT_TOLERANCE, "the default: the scene states neither uncertainties nor the sensor's noise"

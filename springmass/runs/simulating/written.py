@@ -1,0 +1,157 @@
+"""What a simulation writes: its folder of run file, figures, tables and JSON, and a recording of it."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.block import Block
+from acquisition.simulated.rangefinder import VirtualSensor
+from acquisition.source import SourceInfo
+from pipeline.bench.scene import Scene
+from pipeline.dynamics import Problem, Trajectory, effective_mass_kg
+from pipeline.dynamics.band import LEVELS, Band
+from pipeline.track import F8
+from springmass.runs.analysing import in_a_name, made_now, make_folder
+from springmass.runs.simulating.prepared import Prepared
+from springmass.runs.simulating.readings import plain_block, readings, rest_m
+from springmass.runs.simulating.simulation import Against, Simulation, count_of, plan
+from springmass.runs.simulating.told import band_columns
+
+__all__ = ["write_folder", "write_readings"]
+
+FIGURES = ("position", "velocity", "energy", "phase", "error", "band", "against")
+FILES = frozenset(
+    {"run.h5", "simulation.json", "band.csv", "against.csv"}
+    | {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf")}
+)
+FINE = 24.0  # states a radian between which an interpolation errs by 1e-8 of the amplitude
+
+
+def write_folder(
+    simulation: Simulation,
+    against: Against | None,
+    band: Band | None,
+    scene: Scene,
+    where: str,
+    out: str,
+    told: Mapping[str, Any],
+) -> Path:
+    """Write run file, figures, tables and JSON into NAME.simulated; return the folder."""
+    from springmass.report.figures import save
+    from springmass.report.figures.simulation import against_figure, band_figure, draw_simulation
+    from storage.atomic import write_whole
+    from storage.folder import whole_folder
+
+    name = Path(where).name.removesuffix(".toml").removesuffix(".scene")
+    target = make_folder(out) / in_a_name(name, ".simulated")
+    figures, tables = draw_simulation(simulation, effective_mass_kg(scene)), {}
+    trajectory = simulation.trajectory
+    if band is not None:
+        figures["band"] = band_figure(simulation, band)
+        columns = band_columns(band, trajectory.t, trajectory.y)
+        tables["band"] = {"t_s": trajectory.t, "displacement_m": trajectory.y, **columns}
+    if against is not None:
+        figures["against"] = against_figure(against)
+        tables["against"] = {"t_s": against.t, "measured_m": against.measured, "predicted_m": against.predicted}
+        if against.band is not None:
+            around = against.predicted + against.band
+            tables["against"] |= {f"predicted_{level}_m": each for level, each in zip(LEVELS, around, strict=True)}
+    with whole_folder(target, FILES, "simulation.json") as folder:
+        title = f"{Path(where).name} by {simulation.choice.integrator.name}"
+        configuration = {"rest_m": rest_m(trajectory), **told}
+        _write_run(folder / "run.h5", *plain_block(trajectory, Path(where).name), scene, title, configuration)
+        pictures = make_folder(folder / "figures")
+        for figure_name, figure in figures.items():
+            save(figure, pictures, figure_name)
+        for table_name, table in tables.items():
+            write_whole(folder / f"{table_name}.csv", _table(table))
+        write_whole(folder / "simulation.json", json.dumps(told, indent=2) + "\n")
+    return target
+
+
+def write_readings(
+    path: Path,
+    ready: Prepared,
+    *,
+    method: str,
+    seconds: float,
+    spacing_s: float,
+    sensor: str,
+    noise_m: float | None,
+    echoes_hz: float | None,
+    seed: int,
+    where: str,
+    told: Mapping[str, Any],
+) -> None:
+    """Write what a sensor would have read of a scene's motion, at one reading a spacing, as a run of kind simulated.
+
+    Parameters
+    ----------
+    path : Path
+    ready : Prepared
+    method : str
+        As in :func:`springmass.runs.simulating.simulation.plan`, with the spacing as its step but for "auto".
+    seconds, spacing_s : float
+    sensor : {"ideal", "rangefinder"}
+    noise_m, echoes_hz : float or None
+        None for the scene's noise, or that of the simulated bench, and its false echoes.
+    seed : int
+    where : str
+        The scene file's name.
+    told : mapping
+        Kept with the run.
+    """
+    name = Path(where).name
+    if sensor == "ideal":
+        block, info = plain_block(_fine(ready.problem, method, seconds, spacing_s, 1), name)
+    else:
+        omega = ready.problem.equation.angular_frequency_per_s
+        parts = max(1, math.ceil(FINE * omega * spacing_s)) if method == "auto" else 1
+        sigma = ready.stated.sensor_sigma_m
+        chosen = {
+            "noise_m": noise_m if noise_m is not None else (None if sigma is None else sigma.value),
+            "false_echo_rate_hz": echoes_hz,
+        }
+        virtual = VirtualSensor(
+            rate_hz=1.0 / spacing_s, **{key: value for key, value in chosen.items() if value is not None}
+        )
+        block, info = readings(_fine(ready.problem, method, seconds, spacing_s, parts), virtual, name, seed)
+    configuration = {"sensor": sensor, "seed": seed, **told}
+    _write_run(path, block, info, ready.solved, f"{name}, as a {sensor} sensor reads it", configuration)
+
+
+def _fine(problem: Problem, method: str, seconds: float, spacing_s: float, parts: int) -> Trajectory:
+    count = parts * count_of(seconds, spacing_s)
+    return plan(problem, method, spacing_s / parts, count, None).run(count)
+
+
+def _write_run(
+    path: Path, block: Block, info: SourceInfo, scene: Scene, title: str, configuration: Mapping[str, Any]
+) -> None:
+    from storage.run_file.writing import write_run
+
+    write_run(
+        path,
+        [block],
+        info,
+        scene=scene.to_mapping(),
+        title=title,
+        provenance={**made_now(), "configuration": dict(configuration)},
+        overwrite=True,
+    )
+
+
+def _table(columns: Mapping[str, F8]) -> str:
+    """Columns of equal length as text, their names above."""
+    text = io.StringIO()
+    np.savetxt(
+        text, np.stack(list(columns.values()), axis=1), "%.9g", delimiter=",", header=",".join(columns), comments=""
+    )
+    return text.getvalue()
