@@ -157,7 +157,10 @@ def _terms(problem: Problem, terms: Sequence[Term], seconds: float, drag: Derive
         from pipeline.dynamics.terms import required
 
         _, found = required(problem, seconds, 1.0)
-        terms = [replace(term, included=term.size > 0.0, why="a method by name solves all terms") for term in found]
+        terms = [
+            replace(term, included=True, why="a method by name solves all terms") if term.size > 0.0 else term
+            for term in found
+        ]
     for term in terms:
         why = term.why
         if why == "the scene has none":
