@@ -200,10 +200,10 @@ def plan(problem: Problem, method: str, spacing_s: float, count: int, tolerance:
 
 
 def default_tolerance(band: Band | None) -> float:
-    """Return a hundredth of what is uncertain anyway, within 1e-6 to 1e-3 of the amplitude; 1e-6 without a band."""
+    """Return a hundredth of what is uncertain anyway, from 1e-6 to 1e-3, in one digit; 1e-6 without a band."""
     if band is None:
         return DEFAULT_TOLERANCE
-    return min(max(BAND_SHARE * band.relative_u, DEFAULT_TOLERANCE), LARGEST_DEFAULT)
+    return float(f"{min(max(BAND_SHARE * band.relative_u, DEFAULT_TOLERANCE), LARGEST_DEFAULT):.1g}")
 
 
 def demand_stable(choice: Choice, *, where: str) -> None:
