@@ -1,0 +1,262 @@
+"""A course of runs: speed against loops of pandas and lmfit, second passes, memory, efficiency, the catalog.
+
+Run ``python benchmarks/course.py [--runs N] [--filtered N]``; the whole is ``--runs 10000``. Ratios are taken within
+one run. Recordings are made by this script: records of 12,000 samples, and variations of real ones where these are at
+hand (another clock, another scale, noise added; written as tables).
+
+- runs per second and core of ``batch --jobs 1`` over a loop of ``pandas.read_csv`` and one lmfit damped sine;
+- the same over a loop of lmfit that gives the same answer: every law of one closed form, their choice, and the
+  covariance of the best;
+- what a second pass over unchanged inputs takes of the first;
+- speed of two processes over twice that of one;
+- the largest resident memory of a worker, MB;
+- a filter over the catalog of many rows, ms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import lmfit
+import numpy as np
+import pandas
+from threadpoolctl import threadpool_limits
+
+from springmass.batch.rows import DETAILS, FILTERED, columns_of
+from springmass.cli import main
+from springmass.runs.loading import load
+from storage.catalog import build_catalog, search_catalog
+
+SAMPLES = 12_000
+REAL = (
+    ("AyushPandhi__Pandhi_Ayush_PHY224/damped position.txt", {}),
+    ("filo0509__smorzamento/molla_durissima_discopieno_14.91945_0.2016_1.csv", {"channel": "position", "unit": "m"}),
+)
+RECORDINGS = Path(__file__).resolve().parents[2] / "shared" / "recordings"
+HEAD = "Motion Sensor Data File Mar 12, 2024 2:05 PM\r\nTime (s)\tDistance (cm)\tDist Error (cm)\r\n"
+WHERE = "section = 'A' and period_u < 1e-5"
+WORKER = """
+import json, resource, sys
+from springmass.batch.plan import plan
+from springmass.batch.worker import analyse_many
+jobs = plan([sys.argv[1]], accuracy="standard").jobs
+peaks = []
+for part in (jobs[: len(jobs) // 2], jobs[len(jobs) // 2 :]):
+    analyse_many(part)
+    peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+print(json.dumps(peaks))
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What was measured.
+
+    Parameters
+    ----------
+    runs : int
+    fast, standard : float
+        Runs per second over those of read_csv and one lmfit fit.
+    same_answer : float
+        Runs per second of the standard tier over those of lmfit with every law.
+    second_pass : float
+        Of the first.
+    efficiency : float
+        Of two processes.
+    half_mb, whole_mb : float
+        Largest memory of a worker after half of the runs, and after all.
+    """
+
+    runs: int
+    fast: float
+    standard: float
+    same_answer: float
+    second_pass: float
+    efficiency: float
+    half_mb: float
+    whole_mb: float
+
+
+def recordings(folder: Path, runs: int) -> None:
+    """Write so many recordings: simulated ones, and of every 34 one that varies a real one, where these are at hand."""
+    t = np.arange(SAMPLES) / 100.0
+    real = list(_real())
+    for i in range(runs):
+        rng = np.random.default_rng(i)
+        if real and i % 34 == 33:
+            times, y = real[(i // 34) % len(real)]
+            times, y = times * (1.0 + 1e-3 * rng.standard_normal()), y * rng.uniform(0.9, 1.1)
+            y = y + 1e-4 * rng.standard_normal(y.size)
+        else:
+            times = t
+            y = 0.2 + 0.05 * np.exp(-0.01 * t) * np.cos(8.0 * (1.0 + 0.002 * (i % 50)) * t + i)
+            y = y + 3e-4 * rng.standard_normal(t.size)
+        rows = "\r\n".join(f"{a:.3f}\t{b:.4f}\t0.239" for a, b in zip(times, 100.0 * y, strict=True))
+        (folder / f"run{i:05d}.txt").write_bytes(f"{HEAD}{rows}\r\n".encode())
+
+
+def _real() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    for name, said in REAL:
+        if (RECORDINGS / name).is_file():
+            track = load(RECORDINGS / name, **said).track
+            there = np.isfinite(track.t) & np.isfinite(track.y)
+            yield track.t[there], track.y[there]
+
+
+def measure(runs: int, folder: Path) -> Measured:
+    """Measure on so many runs; the loops take every tenth of them, and 20 at least."""
+    inputs = folder / "runs"
+    inputs.mkdir()
+    recordings(inputs, runs)
+    files = sorted(inputs.iterdir())
+    some = files[:: max(1, len(files) // max(20, len(files) // 10))]
+    _passed(inputs, folder / "warm", "--jobs", "1", "--accuracy", "fast")  # imports, and the disk's cache
+    with threadpool_limits(1):
+        one_fit = _processor(lambda: [damped_sine(*_read(file)) for file in some]) / len(some)
+        every_law = _processor(lambda: [all_laws(*_read(file)) for file in some[:5]]) / len(some[:5])
+    took = {tier: _passed(inputs, folder / tier, "--jobs", "1", "--accuracy", tier) for tier in ("fast", "standard")}
+    again = _passed(inputs, folder / "standard", "--jobs", "1", "--accuracy", "standard")
+    wall = {n: _wall(lambda n=n: _passed(inputs, folder / f"jobs{n}", "--jobs", n)) for n in ("1", "2")}
+    done = subprocess.run([sys.executable, "-c", WORKER, str(inputs)], check=True, capture_output=True)
+    half_mb, whole_mb = json.loads(done.stdout)
+    return Measured(
+        runs,
+        one_fit * runs / took["fast"],
+        one_fit * runs / took["standard"],
+        every_law * runs / took["standard"],
+        again / took["standard"],
+        wall["1"] / (2.0 * wall["2"]),
+        half_mb,
+        whole_mb,
+    )
+
+
+def _passed(inputs: Path, out: Path, *options: str) -> float:
+    """Make a pass; return the seconds of processor that it took, here and in its processes."""
+
+    def call() -> None:
+        with contextlib.redirect_stderr(io.StringIO()):
+            if code := main(["batch", str(inputs), "-o", str(out), "--reports", "0", *options]):
+                raise RuntimeError(f"batch ended with {code}")
+
+    return _processor(call)
+
+
+def _processor(call: Callable[[], object]) -> float:
+    """Return seconds of processor: a neighbour on the machine does not count."""
+
+    def used() -> float:
+        each = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+        return sum(one.ru_utime + one.ru_stime for one in each)
+
+    before = used()
+    call()
+    return used() - before
+
+
+def _wall(call: Callable[[], object]) -> float:
+    before = time.perf_counter()
+    call()
+    return time.perf_counter() - before
+
+
+def _read(file: Path) -> tuple[np.ndarray, np.ndarray]:
+    table = pandas.read_csv(file, sep="\t", header=1, usecols=[0, 1])
+    return tuple(table.apply(pandas.to_numeric, errors="coerce").dropna().to_numpy().T)  # type: ignore[return-value]
+
+
+def damped_sine(t: np.ndarray, y: np.ndarray) -> object:
+    """Fit what a user would, started from a look at the spectrum."""
+
+    def model(t, amplitude, gamma, frequency, phase, offset):  # type: ignore[no-untyped-def]
+        return offset + amplitude * np.exp(-gamma * t) * np.cos(2 * np.pi * frequency * t + phase)
+
+    return lmfit.Model(model).fit(y, t=t, gamma=0.01, **_guess(t, y))
+
+
+def all_laws(t: np.ndarray, y: np.ndarray) -> object:
+    """Fit every damping law to the samples by lmfit and take that of the least BIC, with its covariance."""
+
+    def amplitude(t, a, mu, gamma, beta):  # type: ignore[no-untyped-def]
+        # dA/dt = -(mu + gamma A + beta A^2), by small steps: one form for every law.
+        grid = np.linspace(t[0], t[-1], 400)
+        values, step = np.empty_like(grid), grid[1] - grid[0]
+        values[0] = a
+        for i in range(1, grid.size):
+            half = max(values[i - 1] - 0.5 * step * (mu + gamma * values[i - 1] + beta * values[i - 1] ** 2), 0.0)
+            values[i] = max(values[i - 1] - step * (mu + gamma * half + beta * half**2), 0.0)
+        return np.interp(t, grid, values)
+
+    def model(t, amplitude_, mu, gamma, beta, frequency, phase, offset):  # type: ignore[no-untyped-def]
+        return offset + amplitude(t, amplitude_, mu, gamma, beta) * np.cos(2 * np.pi * frequency * t + phase)
+
+    found = []
+    for free in (
+        (),
+        ("gamma",),
+        ("beta",),
+        ("mu",),
+        ("gamma", "beta"),
+        ("gamma", "mu"),
+        ("beta", "mu"),
+        ("mu", "gamma", "beta"),
+    ):
+        guess = _guess(t, y)
+        parameters = lmfit.create_params(amplitude_=guess.pop("amplitude"), **guess, mu=0.0, gamma=0.0, beta=0.0)
+        for name, start in (("mu", 1e-4), ("gamma", 0.01), ("beta", 0.1)):
+            parameters[name].set(value=start if name in free else 0.0, vary=name in free)
+        found.append(lmfit.Model(model).fit(y, parameters, t=t))
+    return min(found, key=lambda fit: fit.bic).covar
+
+
+def _guess(t: np.ndarray, y: np.ndarray) -> dict[str, float]:
+    power = np.abs(np.fft.rfft(y - y.mean()))
+    frequency = float(np.argmax(power) / (t[-1] - t[0]))
+    return {"amplitude": float(np.ptp(y) / 2), "frequency": frequency, "phase": -0.7, "offset": float(y.mean())}
+
+
+def filter_ms(folder: Path, rows: int) -> tuple[float, int]:
+    """Return the least time of five filters over a catalog of so many rows, ms, and how many they find."""
+    rng = np.random.default_rng(1)
+    columns = columns_of(("section",))
+    numbers = [name for name in columns if name.endswith("_u") or f"{name}_u" in columns][:60]
+
+    def made() -> Iterator[dict[str, object]]:
+        for i in range(rows):
+            values = dict(zip(numbers, rng.random(len(numbers)).tolist(), strict=True))
+            long = dict.fromkeys(DETAILS, "x" * 400)
+            text = {"run": f"run{i}", "status": "ok", "section": "ABCDEFGH"[i % 8], "input_sha256": f"{i:064d}"}
+            yield {**values, **long, **text, "period_u": 1e-4 * float(rng.random())}
+
+    index = build_catalog(folder / "catalog.sqlite", columns, made(), long=DETAILS, indexed=("section", *FILTERED))
+    best, found = np.inf, 0
+    for _ in range(5):
+        before = time.perf_counter()
+        found = len(search_catalog(index, where=WHERE, columns=("run", "period", "spring_constant"))[1])
+        best = min(best, 1e3 * (time.perf_counter() - before))
+    return best, found
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--runs", type=int, default=200)
+    parser.add_argument("--filtered", type=int, default=100_000)
+    asked = parser.parse_args()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    with tempfile.TemporaryDirectory() as name:
+        for what, value in asdict(measure(asked.runs, Path(name))).items():
+            print(f"{what:12} {value:.4g}")
+        ms, count = filter_ms(Path(name), asked.filtered)
+        print(f"filter over {asked.filtered} rows: {ms:.1f} ms, {count} found")

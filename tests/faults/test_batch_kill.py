@@ -1,0 +1,153 @@
+"""kill -9 of a course's processes: what was killed is done again, and the results are those of a clean pass.
+
+``SPRINGMASS_KILLS`` sets the number of trials each way; 20 at least are the whole.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from springmass.cli import main
+from tests.courses import contents, short_course
+
+TRIALS = max(1, int(os.environ.get("SPRINGMASS_KILLS", "12")) // 12)
+LIMIT_S = 300.0
+RUNS = 24
+OPTIONS = ("--reports", "0", "--accuracy", "fast")
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        print(cluster.scheduler_address, *(worker.pid for worker in cluster.workers.values()), flush=True)
+        sys.stdin.read()
+"""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, bytes], float]:
+    """A course, the results of a clean pass over it, and how long a pass by two processes takes, s."""
+    top = tmp_path_factory.mktemp("course")
+    runs = short_course(top / "runs", RUNS)
+    assert main(["batch", str(runs), "-o", str(top / "clean" / "out"), "--jobs", "1", *OPTIONS]) == 0
+    began = time.monotonic()
+    assert started(runs, top / "timed" / "out").wait(LIMIT_S) == 0
+    return runs, contents(top / "clean" / "out"), time.monotonic() - began
+
+
+def started(runs: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
+    """Start a pass."""
+    command = [sys.executable, "-m", "springmass", "batch", str(runs), "-o", str(out), *(options or ("--jobs", "2"))]
+    return subprocess.Popen([*command, *OPTIONS], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes below one, as Linux lists them."""
+    try:
+        below = [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    except OSError:
+        return []
+    return [each for one in below for each in (one, *children(one))]
+
+
+def is_worker(pid: int) -> bool:
+    """Tell a process of the pool from what keeps track of its semaphores."""
+    try:
+        return b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return False
+
+
+@pytest.mark.trials
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="finds processes by /proc")
+@pytest.mark.parametrize("who", ["parent", "worker"])
+def test_a_killed_pass_is_completed(place, tmp_path, who):
+    """The parent killed, or a worker, at any moment: nothing doubled or missing, the same bytes, no process left."""
+    runs, clean, seconds = place
+    moments = random.Random(5)
+    for trial in range(TRIALS):
+        out = tmp_path / f"{trial}" / "out"
+        process = started(runs, out)
+        deadline = time.monotonic() + seconds * moments.uniform(0.1, 1.0)
+        below: list[int] = []
+        while time.monotonic() < deadline and process.poll() is None:
+            below = children(process.pid) or below
+            time.sleep(0.01)  # the moment is by the clock of the machine: what is killed is a process of it
+        victims = [process.pid] if who == "parent" else [pid for pid in below if is_worker(pid)][:1]
+        if process.poll() is None:
+            for pid in victims:
+                os.kill(pid, signal.SIGKILL)
+        code = process.wait(LIMIT_S)
+        assert code == (-signal.SIGKILL if who == "parent" and code < 0 else 0), code
+        until = time.monotonic() + LIMIT_S
+        while any(is_worker(pid) for pid in below) and time.monotonic() < until:
+            time.sleep(0.01)
+        assert not [pid for pid in below if is_worker(pid)]
+        assert started(runs, out).wait(LIMIT_S) == 0
+        assert contents(out) == clean
+        with (out / "results.csv").open(newline="") as file:
+            assert [row["run"] for row in csv.DictReader(file)] == [f"run{i:03d}" for i in range(RUNS)]
+
+
+@pytest.fixture
+def cluster() -> Iterator[tuple[str, list[int]]]:
+    """A dask cluster of two processes: its address and their numbers."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", CLUSTER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    address, *pids = process.stdout.readline().decode().split()
+    yield address, [int(pid) for pid in pids]
+    process.stdin.close()
+    process.wait(LIMIT_S)
+    process.stdout.close()
+
+
+@pytest.mark.trials
+def test_a_worker_of_dask_killed_in_the_middle_is_replaced(place, tmp_path, cluster):
+    """The task goes to another worker, and the results are the same."""
+    runs, clean, seconds = place
+    address, pids = cluster
+    process = started(runs, tmp_path / "out", "--dask", address)
+    try:
+        process.wait(0.5 * seconds)
+    except subprocess.TimeoutExpired:
+        os.kill(pids[0], signal.SIGKILL)
+    assert process.wait(LIMIT_S) == 0
+    assert contents(tmp_path / "out") == clean
+
+
+@pytest.mark.trials
+def test_an_array_of_shards_with_one_killed_is_put_together(place, tmp_path):
+    """Three shards at the same time, as a Slurm array starts them, one of them killed: the last pass does its part."""
+    runs, clean, seconds = place
+    out = tmp_path / "out"
+    line = f'exec "{sys.executable}" -m springmass batch "{runs}" -o "{out}" --jobs 1 --shard "$SLURM_ARRAY_TASK_ID/3"'
+    shards = [
+        subprocess.Popen(
+            ["sh", "-c", f"{line} {' '.join(OPTIONS)}"],
+            env={**os.environ, "SLURM_ARRAY_TASK_ID": str(i)},
+            stderr=subprocess.DEVNULL,
+        )
+        for i in (1, 2, 3)
+    ]
+    try:
+        shards[1].wait(0.5 * seconds)
+    except subprocess.TimeoutExpired:
+        shards[1].kill()
+    codes = [shard.wait(LIMIT_S) for shard in shards]
+    assert codes[0] == codes[2] == 0
+    assert not (out / "results.csv").exists()
+    assert started(runs, out, "--jobs", "1").wait(LIMIT_S) == 0
+    assert contents(out) == clean

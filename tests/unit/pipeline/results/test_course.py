@@ -1,0 +1,95 @@
+"""Many runs of a course: scatter between and within benches, and runs noted wrongly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import AnalysisError
+from pipeline.numerics.estimate import Estimate
+from pipeline.results.course import CourseRun, agreement, suspects
+
+SHARE = 0.01 / 3.0
+
+
+def course(runs: int = 40, seed: int = 0) -> list[CourseRun]:
+    """Return good runs of two springs and two discs with the scatter of a bench."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for i in range(runs):
+        spring, disc = "AB"[i % 2], ("small", "large")[(i // 2) % 2]
+        k, mass = {"A": 14.0, "B": 21.0}[spring], 0.18 + 0.005 * (i % 17)
+        measured = k * (1.0 + 3e-4 * rng.standard_normal())
+        found.append(
+            CourseRun(
+                name=f"run{i}", spring=spring, disc=disc, bench="abcd"[i % 4],
+                spring_constant=Estimate(measured, 3e-4 * k, "N/m"), bob_mass_kg=mass,
+                natural_angular_frequency=math.sqrt(measured / (mass + SHARE)),
+                amplitude_m=rng.uniform(0.03, 0.06),
+                offset_m=rng.uniform(0.2, 0.3), noise_m=rng.uniform(2.5e-4, 3.5e-4),
+                diameter_m={"small": 0.1, "large": 0.16}[disc],
+                drag=Estimate(2.0 * math.exp(0.03 * rng.standard_normal()), 0.05), keulegan_carpenter=rng.uniform(1, 3),
+            )
+        )  # fmt: skip
+    return found
+
+
+def with_mass(run: CourseRun, mass: float) -> CourseRun:
+    """Return a run as it comes out when another mass was noted."""
+    assert run.spring_constant is not None
+    k = run.natural_angular_frequency**2 * (mass + SHARE)
+    return replace(run, bob_mass_kg=mass, spring_constant=Estimate(k, run.spring_constant.u, "N/m"))
+
+
+def test_good_runs_are_not_named():
+    """None of 400 in ten courses."""
+    assert [suspects(course(seed=seed)) for seed in range(10)] == [()] * 10
+
+
+def test_each_fault_is_named_with_its_cause():
+    """Masses exchanged, in grams, distances in other units, clipped, another disc, another spring, and what is none."""
+    runs = course()
+    runs[3], runs[10] = with_mass(runs[3], runs[10].bob_mass_kg), with_mass(runs[10], runs[3].bob_mass_kg)
+    runs[5] = with_mass(runs[5], 1000.0 * runs[5].bob_mass_kg)
+    one = runs[8]
+    runs[8] = replace(one, amplitude_m=10 * one.amplitude_m, offset_m=10 * one.offset_m, noise_m=10 * one.noise_m)
+    runs[12] = replace(runs[12], clipped=True)
+    runs[14] = replace(runs[14], disc="small", diameter_m=0.1, drag=Estimate(2.0 * 1.6**2, 0.1))
+    runs[16] = replace(runs[16], spring="B")
+    runs[21] = with_mass(runs[21], 1.07 * runs[21].bob_mass_kg)
+    found = {one.name: (one.cause, one.other) for one in suspects(runs)}
+    assert found == {
+        "run3": ("masses exchanged", "run10"),
+        "run10": ("masses exchanged", "run3"),
+        "run5": ("unit of the mass", ""),
+        "run8": ("unit of the distance", ""),
+        "run12": ("clipped", ""),
+        "run14": ("wrong disc", "large"),
+        "run16": ("wrong spring", "A"),
+        "run21": ("unknown", ""),
+    }
+
+
+def test_scatter_within_and_between_is_what_was_put_in():
+    """Over 400 benches of 5 runs the moments come back within some percent, and the mean within its uncertainty."""
+    rng = np.random.default_rng(3)
+    benches = np.repeat(np.arange(400), 5)
+    values = 14.0 + 0.05 * rng.standard_normal(400)[benches] + 0.02 * rng.standard_normal(2000)
+    found = agreement("k", "", [Estimate(float(x), 0.01, "N/m") for x in values], [str(b) for b in benches])
+    assert found.within == pytest.approx(0.02, rel=0.05)
+    assert found.between == pytest.approx(0.05, rel=0.1)
+    assert abs(found.mean.value - 14.0) < 3.0 * found.mean.u
+    assert found.mean.u == pytest.approx(0.05 / 20.0, rel=0.15)
+
+
+def test_one_run_and_one_bench_state_what_they_can():
+    """No scatter from one run; of none nothing is stated."""
+    found = agreement("k", "A", [Estimate(14.0, 0.02, "N/m")], ["a"])
+    assert (found.mean.value, found.mean.u) == (14.0, 0.02)
+    assert math.isnan(found.within)
+    assert math.isnan(found.between)
+    with pytest.raises(AnalysisError, match="got none"):
+        agreement("k", "A", [], [])
