@@ -6,9 +6,12 @@ import importlib.util
 import sys
 from pathlib import Path
 
+import pytest
+
 SCRIPT = Path(__file__).with_name("day.py")
 
 
+@pytest.mark.trials
 def test_memory_is_flat_and_every_reading_is_kept() -> None:
     """After the first minutes memory grows by less than 4 MB; log and run file hold 90,000 readings, within 200 MB."""
     spec = importlib.util.spec_from_file_location("springmass_benchmark_day", SCRIPT)

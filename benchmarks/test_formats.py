@@ -23,6 +23,7 @@ def bench():
     return module
 
 
+@pytest.mark.trials
 def test_every_ratio_can_be_taken(bench, tmp_path):
     """Each reader reads its file in a process of its own and tells what it took."""
     taken = [(each.name, each.limit, each.take(1)) for each in bench.ratios(tmp_path, 1200, 2500, 300)]

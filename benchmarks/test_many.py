@@ -6,9 +6,12 @@ import importlib.util
 import sys
 from pathlib import Path
 
+import pytest
+
 MANY = Path(__file__).with_name("many.py")
 
 
+@pytest.mark.trials
 def test_many_runs_share_a_table_and_get_reports_on_request(tmp_path):
     """Three short records: one table, three reports."""
     spec = importlib.util.spec_from_file_location("many", MANY)

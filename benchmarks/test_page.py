@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 
+@pytest.mark.trials
 def test_the_page_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two viewers for two seconds: samples arrive, a suspended one gets them later, and the page's process is found."""
     spec = importlib.util.spec_from_file_location("page_benchmark", Path(__file__).with_name("page.py"))

@@ -7,9 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 SCRIPT = Path(__file__).with_name("recording.py")
 
 
+@pytest.mark.trials
 def test_a_short_measurement_keeps_every_reading():
     """Runs of one and two seconds, without and with a terminal: 200 readings, no gap, a share of CPU printed."""
     assert importlib.util.find_spec("springmass") is not None

@@ -34,6 +34,7 @@ def test_the_whole_analysis(benchmark, damped):
     assert result.motion.damping.selected == "linear+quadratic"
 
 
+@pytest.mark.trials
 def test_every_ratio_can_be_taken():
     """Each pair of the ratio table runs, so that `make bench` does not rot."""
     spec = importlib.util.spec_from_file_location("ratios", RATIOS)

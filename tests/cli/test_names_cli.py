@@ -77,6 +77,7 @@ def test_a_terminal_sees_no_escapes(cli: Cli, recording: Path, tmp_path: Path) -
     assert done.complaint.isprintable()
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("name", [ESCAPE, "=1+1", "$\\frac$", "<script>", "a & b_%", "b" * 251])
 def test_a_report_of_any_name_is_a_report(cli: Cli, data: Path, tmp_path: Path, name: str) -> None:
     """Page, tables and figures are made of whatever name, and show it as text."""

@@ -349,6 +349,7 @@ def test_being_told_to_end_closes_the_run_cleanly(tmp_path: Path, scene: Path, n
         assert len(run) >= 95
 
 
+@pytest.mark.trials
 def test_a_recording_outlives_its_terminal_where_it_was_told_to(tmp_path: Path, scene: Path) -> None:
     """Under nohup a hang-up is ignored: the recording goes on, and ends when it is asked to."""
     child = start(scene, tmp_path / "run.h5", ignoring=(signal.SIGHUP,))

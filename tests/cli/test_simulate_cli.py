@@ -115,6 +115,7 @@ def test_scipy_solves_a_scene(cli: Callable, scene: Path, name: str) -> None:
     assert found["predicted_error"] == pytest.approx(1e-6, rel=1e-3)
 
 
+@pytest.mark.trials
 def test_a_prediction_is_laid_over_a_run(cli: Callable, scene: Path, tmp_path: Path) -> None:
     """The start is the run's, what the scene leaves out its analysis's; what is left is small, and drawn."""
     assert cli("simulate", "--scene", scene, "--seconds", "20", "--out", tmp_path).code == 0
@@ -152,6 +153,7 @@ def test_the_prediction_is_that_of_the_method_and_step_asked_for(cli: Callable, 
     assert found["forward-euler", 0.001] > 1.9 * found["forward-euler", 0.0005] > 1e-3
 
 
+@pytest.mark.trials
 def test_uncertainties_of_the_scene_make_a_band(cli: Callable, tmp_path: Path) -> None:
     """Its width stands in the JSON, its quantiles in the tables and figures; without uncertainties it is said."""
     path = tmp_path / "vague.toml"

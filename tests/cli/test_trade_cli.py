@@ -47,6 +47,7 @@ def test_the_json_is_the_same_but_for_times(cli: Cli) -> None:
     assert first["truth"]["seconds"] == 8.0
 
 
+@pytest.mark.trials
 def test_figure_and_numbers_are_written(cli: Cli, tmp_path: Path) -> None:
     """--out makes the folder, a figure of each kind and the numbers."""
     done = cli(

@@ -28,6 +28,7 @@ def outputs(notebook: Any, kind: str) -> list[str]:
     return [each["data"][kind] for each in shown if kind in each.get("data", {})]
 
 
+@pytest.mark.trials
 def test_the_notebook_runs_and_shows_what_it_says(executed: Any) -> None:
     """Summaries and frames as HTML, figures as pictures, and the true spring constant."""
     pages = outputs(executed, "text/html")

@@ -40,6 +40,16 @@ PAGES = (
     "docs/explanation/a-published-report.md",
     "docs/decisions/0004-demodulation-first.md",
 )
+LONG = (
+    "docs/how-to/compare-runs.md",
+    "docs/how-to/compare-with-the-classic-method.md",
+    "docs/how-to/make-a-lab-report.md",
+    "docs/how-to/record-at-the-bench.md",
+    "docs/how-to/simulate-a-bench.md",
+    "docs/reference/command-line.md",
+    "docs/explanation/method.md",
+)
+"""Pages with many commands: they run with the trials."""
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 FENCE = re.compile(r"^```(?P<language>python|console)[ \t]*\n(?P<body>.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
 
@@ -97,7 +107,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, marks=[pytest.mark.trials] if page in LONG else []) for page in PAGES]
+)
 def test_every_block_of_a_page_does_what_it_says(page: str, folder: Path) -> None:
     """The blocks run in order and print what stands beneath them."""
     names: dict[str, object] = {"__name__": "__main__"}

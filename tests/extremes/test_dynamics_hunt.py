@@ -59,6 +59,7 @@ def attempt(call: Callable[[], Any], *, infinite: bool = False) -> Any:
     return found
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("seed", range(4))
 def test_every_number_is_answered_by_a_number_or_one_line(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """From 5e-324 to 1.7e308, zero, negative, infinite and NaN: warnings are errors, so are overflows and NaN."""

@@ -147,6 +147,7 @@ def play(bench: Any, folder: Path, display: str, end: str) -> None:
         assert sum(ended["failures"].values()) >= 1
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("display", DISPLAYS)
 def test_no_display_ends_a_recording(bench: Any, tmp_path: Path, display: str) -> None:
     """Whatever becomes of stderr or of the live analysis, the seconds end the run, with all its readings."""

@@ -506,6 +506,7 @@ def command(rng: np.random.Generator, path: Path) -> list[str]:
     return [name, *rest, str(path)] if "--against" in rest else [name, str(path), *rest]
 
 
+@pytest.mark.trials
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
 @pytest.mark.parametrize("files", FILES, ids=["few", "many"])
 def test_any_run_file_gets_an_answer(

@@ -91,6 +91,7 @@ def bench(rng: np.random.Generator) -> Bench:
     return Bench(reads_hz.tolist(), sizes.tolist())
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("seed", range(TRIALS))
 def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_path: Path) -> None:
     """Of 5 to 60 s: every read is in the log, or in the count of the one overflow event of its channel."""

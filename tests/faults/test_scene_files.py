@@ -162,6 +162,7 @@ def command(rng: np.random.Generator, scene: Path) -> list[str]:
     return [*choices[rng.integers(len(choices))], "--scene", str(scene)]
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("files", FILES, ids=["few", "many"])
 def test_any_scene_gets_an_answer(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], answer_within: Callable[[int], Any], files: range

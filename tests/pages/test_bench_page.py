@@ -54,6 +54,7 @@ def cookie_of(address: str) -> str:
     return str(response.headers["Set-Cookie"]).split(";")[0]
 
 
+@pytest.mark.trials
 def test_from_opening_to_the_run_file(record: Callable[..., Any], context: BrowserContext) -> None:
     """Open, see the motion, mark, stop: the mark is shown once the log has it, and the run file holds all of it."""
     program = record()
@@ -161,6 +162,7 @@ def test_what_is_in_view_is_saved(replay: Page, tmp_path: Path) -> None:
     np.testing.assert_array_equal([float(row[0]) for row in rows[1:]], recorded.t)
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1366, 390])
 def test_everybody_can_read_it(replay: Page, width: int, scheme: Any) -> None:

@@ -63,6 +63,7 @@ def show(page: Page, path: Path, width: str) -> None:
     page.goto(path.as_uri())
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_is_clipped(page: Page, pages: dict[str, Path], name: str, width: str) -> None:
@@ -80,6 +81,7 @@ def test_what_decides_between_laws_is_in_view(page: Page, pages: dict[str, Path]
     assert all(heads.values())
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("name", NAMES)
 def test_axe_finds_no_violation(page: Page, pages: dict[str, Path], name: str, scheme: str) -> None:

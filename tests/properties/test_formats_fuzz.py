@@ -199,6 +199,7 @@ def test_mutants_of_its_own_files_are_refused_or_read_truly(number: int) -> None
     assert len(outcomes) > 3
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("number", range(len(SEEDS)), ids=lambda i: f"{SEEDS[i][0].format}:{SEEDS[i][0].label}")
 def test_memory_stays_within_twenty_files(number: int) -> None:
     """The peak of what reading allocates, beyond the 3 MiB that a page takes, is bounded by the file's size."""
@@ -216,6 +217,7 @@ def test_memory_stays_within_twenty_files(number: int) -> None:
         assert peak < MOST_MEMORY * len(each) + BASE_MEMORY
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize(
     ("build", "name"),
     [

@@ -96,6 +96,7 @@ def double_pendulum(rng: np.random.Generator, t: F8) -> F8:
 KINDS = (ride, way, fall, weightless, switching, square, walk, remembering, white, double_pendulum)
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 def test_what_is_no_oscillation_gets_no_period(tmp_path: Path, kind: Callable[[np.random.Generator, F8], F8]) -> None:
     """Six files of each kind, of a quantity, size, rate and length at random: no period that anybody would believe."""
@@ -116,6 +117,7 @@ def test_what_is_no_oscillation_gets_no_period(tmp_path: Path, kind: Callable[[n
     assert not believed
 
 
+@pytest.mark.trials
 def test_noise_and_rides_give_hardly_any_period_at_all() -> None:
     """Not even a doubtful one: of fifteen records of each kind one at most."""
     for kind in (white, walk, switching, double_pendulum, way):
@@ -128,6 +130,7 @@ def test_noise_and_rides_give_hardly_any_period_at_all() -> None:
         assert given <= 1, kind.__name__
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("noise", [1e-3, 0.02, 0.05])
 @pytest.mark.parametrize("share", [0.2, 1.0 / 3.0])
 def test_what_rests_for_most_of_the_record_is_analysed_while_it_moves(share: float, noise: float) -> None:

@@ -73,6 +73,7 @@ def same(found: Analysis, expected: Analysis, factor: float) -> None:
     assert codes[0] == codes[1]
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("kind", records())
 def test_no_result_depends_on_the_unit(kind: str) -> None:
     """From a millionth to a million times as large nothing changes, and no time does of a length.
@@ -118,6 +119,7 @@ def test_the_unit_that_is_answered_changes_no_time_and_no_flag(tmp_path: Path, s
     assert flagged.tolist() == (list(range(300, 330)) if lost else [])
 
 
+@pytest.mark.trials
 def test_a_computed_start_that_is_no_swing_spoils_nothing() -> None:
     """A ramp, a rest of exactly nothing, then an oscillation without noise: its period, however large the numbers."""
     t = np.arange(3500) / 10.0

@@ -174,6 +174,7 @@ def read_both(oracle: ModuleType, body: str, columns: int, delimiter: str, newli
     return table
 
 
+@pytest.mark.trials
 @settings(max_examples=600, deadline=None)
 @given(drawn=bodies())
 @example(drawn=("\n", 1, "\t"))  # no row at all
@@ -257,6 +258,7 @@ def signed_columns(draw: st.DrawFn) -> tuple[list[str], int, str]:
     return lines, len(decimals), delimiter.strip(" ")
 
 
+@pytest.mark.trials
 @settings(max_examples=400, deadline=None)
 @given(drawn=signed_columns(), newline=st.sampled_from(["\n", "\r\n", "\r"]), cut=st.integers(0, 9))
 def test_short_pages_are_read_as_plain_python_reads_rows(

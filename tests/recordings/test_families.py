@@ -234,6 +234,7 @@ TABLE = [
 PER_METRE = {"cm": 100.0, "mm": 1000.0, "cm/s": 100.0}
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: f"{row.path}:{row.channel}:{row.run}")
 def test_a_real_file_is_read_as_it_was_counted(recordings: Path, row: Row) -> None:
     """Family, rate, number of samples, unit, first and last value, traps, and the bytes it came from."""

@@ -152,6 +152,7 @@ def hostile(seed: int) -> np.ndarray:
     return np.asarray(np.round(y, 3) if seed % 3 == 0 else y)
 
 
+@pytest.mark.trials
 @every
 def test_words_are_of_the_records_own_quantity(quantity: str, unit: str) -> None:
     """No finding, effect or reason of a troubled record, an overdamped one or one at rest speaks of mm or distances."""

@@ -132,6 +132,7 @@ def test_amplitude_of_a_state_is_that_of_the_curve_through_the_turning_points(ki
     assert found * math.cos(phase) == pytest.approx(y, rel=2.0 * ratio)
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize(("law", "coefficients"), CASES)
 def test_strong_damping_gives_law_spring_constant_and_coefficients(law: str, coefficients: dict[str, float]) -> None:
     """Over 8 runs the law is found and k, first amplitude, rest position and coefficients lie as their u say."""
@@ -211,6 +212,7 @@ def test_intervals_hold_under_strong_damping(law: str, coefficients: dict[str, f
         assert all(level - slack <= share <= level + slack for share in shares.values()), shares
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize(("ratio", "seed"), [(0.03, 2), (0.03, 6), (0.03, 9), (0.03, 14), (0.1, 7), (0.1, 20)])
 def test_friction_is_not_mistaken_for_a_drag_that_drives(ratio: float, seed: int) -> None:
     """Friction is found on records whose richest law ends at linear drag below zero, quadratic drag and friction."""

@@ -43,6 +43,7 @@ def relaxed(y: np.ndarray, sigma_m: float, seed: int) -> Overdamped:
     return found
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("ratio", [1.1, 1.5, 2.0])
 def test_overdamped_records_give_both_rates(ratio: float) -> None:
     """Over 25 runs both rates lie within their intervals as often as these say, and so does the spring constant."""
@@ -122,6 +123,7 @@ SHAPES = {
 }
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("sigma_m", [3e-4, 2.39e-3])
 @pytest.mark.parametrize("name", SHAPES)
 def test_other_motions_are_no_relaxation(name: str, sigma_m: float) -> None:

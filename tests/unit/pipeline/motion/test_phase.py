@@ -126,6 +126,7 @@ def test_straight_phase_by_hand(windows: Windows) -> None:
     np.testing.assert_allclose(found.residual, phase - slope * T - intercept, atol=1e-8)
 
 
+@pytest.mark.trials
 def test_intervals_of_frequency_and_phase_hold(windows: Windows) -> None:
     """Over 300 runs 68 and 95 % intervals hold the truth so often."""
     amplitude = 0.05 * np.exp(-0.01 * T)
