@@ -47,6 +47,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/dynamics.py
 	$(BIN)/python benchmarks/formats.py
 	$(BIN)/python benchmarks/many.py
+	$(BIN)/python benchmarks/course.py
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -27,6 +27,7 @@ _ALLOWED = {
 STEPS = 100_000  # of SQLite's machine between two looks at what a question has cost
 MOST_STEPS = 20_000  # such looks, a minute or so, after which a question is given up
 MOST_INDEXED = 40  # columns
+MAPPED = 1 << 30  # bytes of a catalog
 
 
 def build_catalog(
@@ -187,6 +188,7 @@ def _opened(path: str | os.PathLike[str]) -> Iterator[sqlite3.Connection]:
     """Open for reading alone, an absent file is not made."""
     name = quote(os.path.abspath(path), errors="surrogateescape")
     with contextlib.closing(sqlite3.connect(f"file:{name}?mode=ro&immutable=1", uri=True)) as base:
+        base.execute(f"PRAGMA mmap_size = {MAPPED}")  # pages are read where they lie, not copied
         # A word in double quotes that is no column is an error, and not a text.
         if hasattr(base, "setconfig"):
             base.setconfig(sqlite3.SQLITE_DBCONFIG_DQS_DML, False)  # type: ignore[attr-defined,unused-ignore]
