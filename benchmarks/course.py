@@ -214,9 +214,11 @@ def all_laws(t: np.ndarray, y: np.ndarray) -> object:
         ("mu", "gamma", "beta"),
     ):
         guess = _guess(t, y)
-        parameters = lmfit.create_params(amplitude_=guess.pop("amplitude"), **guess, mu=0.0, gamma=0.0, beta=0.0)
+        parameters = lmfit.create_params(  # coefficients below are bounded: a negative one runs away
+            amplitude_=guess.pop("amplitude"), **guess, mu=0.0, gamma=0.0, beta=0.0
+        )
         for name, start in (("mu", 1e-4), ("gamma", 0.01), ("beta", 0.1)):
-            parameters[name].set(value=start if name in free else 0.0, vary=name in free)
+            parameters[name].set(value=start if name in free else 0.0, vary=name in free, min=0.0)
         found.append(lmfit.Model(model).fit(y, parameters, t=t))
     return min(found, key=lambda fit: fit.bic).covar
 
