@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -74,6 +74,7 @@ class Params:
 
 
 STANDARD = Params()
+MOST_ROWS = 50_000  # of a record whose waveform is fitted though nobody asked for it
 BEATING = 0.3  # of the amplitude, by which periods miss the oscillation found: there may be two
 
 
@@ -278,6 +279,7 @@ def _oscillation(
         else check_residuals(windows.conditioned, demodulated, disturbances, phase, u_amplitude, smoothing),
         judge_plausibility(windows.conditioned, demodulated, phase),
         Checked() if bent else judge_modulation(demodulated, damping, phase, track.unit),
+        Checked() if bent else judge_halves(fitted, track.unit, _fit_whole(windows, fitted, params)),
     )
     derived = derive(
         demodulated,
@@ -296,7 +298,6 @@ def _oscillation(
         judge_segments(windows.segments),
         judge(cycles, demodulated, damping, phase, rest, waveform, disturbances, derived.coefficients),
         checked.findings,
-        () if bent else judge_halves(demodulated, damping, phase, whole=fitted.full is not None),
         judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters),
         judge_scene(scene, effects),
         judge_fits(fitted.full, solved),
@@ -304,6 +305,14 @@ def _oscillation(
     )
     motion = Oscillation(demodulated, disturbances, damping, phase, rest, waveform, fitted.full, cycles, derived)
     return motion, effects, findings, derived.estimates
+
+
+def _fit_whole(windows: Windows, fitted: Fitted, params: Params) -> Callable[[], Fitted] | None:
+    """Return the fit of the whole waveform, to be made where windows contradict themselves; None for long records."""
+    if fitted.full is not None or len(windows.conditioned.track) > MOST_ROWS:
+        return None
+    unit = windows.conditioned.track.unit
+    return lambda: by_windows(windows, params.phase, fullfits.Params()).in_unit(unit)
 
 
 def _overdamped(conditioned: Conditioned, scene: Scene, found: Overdamped) -> Found:

@@ -40,6 +40,7 @@ INPUTS = {
     "sensor_median_samples": "running median of the sensor",
     "sensor_median_cut": "crests cut by a running median",
     "sensor_lag": "lag of the sensor",
+    "choice_of_fit": "fit of windows against fit of the whole waveform",
     "held_samples": "distances held by the sensor",
 }
 """Every input of :mod:`pipeline.results.derive` in words."""
