@@ -93,7 +93,13 @@ def _fastest(problem: Problem) -> float:
 
 def _local(problem: Problem, seconds: float, tolerance: float) -> float:
     """What a step may err so that all of them keep the tolerance."""
-    return max(tolerance / (1.0 + _fastest(problem) * seconds), 1e-18)
+    eq, start = problem.equation, problem.amplitude_m()
+    reach = start / eq.angular_frequency_per_s
+    # Under a cubic spring an error of the amplitude shifts the frequency, and the phase for all the time that is left.
+    bend = 0.75 * abs(eq.cubic_per_m2_s2) * reach * reach
+    radians = _fastest(problem) * seconds
+    drifts = 1.0 + bend / (1.0 + bend) * radians if bend < math.inf else 1.0 + radians
+    return max(tolerance / (1.0 + radians) / drifts, 1e-18)
 
 
 def _order(local: float, longest: float) -> int:
