@@ -70,7 +70,7 @@ firmware:
 	@command -v avr-g++ >/dev/null && test -d /usr/share/arduino/hardware/arduino/avr || \
 	  { echo "make firmware needs avr-g++ and Arduino's core; Debian: apt-get install gcc-avr avr-libc arduino-core-avr" >&2; exit 1; }
 	$(MAKE) --no-print-directory -C firmware hex size
-	cp firmware/build/springmass_rangefinder.hex springmass/firmware/
+	cp firmware/build/springmass_rangefinder.hex acquisition/live/firmware/
 
 clean:
 	rm -rf firmware/build $(VENV) demo-output dist build docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,15 +1,51 @@
-"""``springmass doctor``: is this installation what it should be?"""
+"""``springmass doctor``: is this installation what it should be? Each check has broken such programs before."""
 
 from __future__ import annotations
 
 import argparse
+import importlib
+import importlib.metadata
+import importlib.util
 import json
-from dataclasses import asdict
+import platform
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
-from springmass.doctor import examine
+import springmass
 from springmass.errors import OK, SOME_FAILED
 
-__all__ = ["run"]
+__all__ = ["Check", "examine", "foreign_packages", "run"]
+
+PACKAGES = ("acquisition", "pipeline", "storage")
+LIBRARIES = (
+    *("numpy", "scipy", "threadpoolctl", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2"),
+    *("serial", "nptdms", "python_calamine", "rich", "shtab", "starlette", "uvicorn", "websockets"),
+    "segno",
+)
+DISTRIBUTIONS = {"serial": "pyserial"}
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One check.
+
+    Parameters
+    ----------
+    name : str
+    ok : bool
+    found : str
+        What was seen.
+    remedy : str
+        What to do where it is not ok.
+    """
+
+    name: str
+    ok: bool
+    found: str
+    remedy: str = ""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -23,3 +59,88 @@ def run(options: argparse.Namespace) -> int:
             if not check.ok:
                 print(f"      {check.remedy}")
     return OK if all(check.ok for check in checks) else SOME_FAILED
+
+
+def examine() -> tuple[Check, ...]:
+    """Run every check."""
+    checks = (*_interpreter(), *_packages(), *_libraries())
+    if not all(check.ok for check in checks):
+        return checks  # what follows runs these packages and libraries
+    return (*checks, _bundled(), _round_trip())
+
+
+def foreign_packages() -> dict[str, str]:
+    """Return packages that do not lie beside ``springmass``, name to where they were found.
+
+    ``acquisition``, ``pipeline`` and ``storage`` are names that other distributions use too; one found first on the
+    path would be run in place of ours.
+    """
+    home = Path(springmass.__file__).resolve().parent.parent
+    foreign: dict[str, str] = {}
+    for name in PACKAGES:
+        spec = importlib.util.find_spec(name)  # looks for it without running it
+        place = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent
+        if place != home / name:
+            foreign[name] = "nowhere" if spec is None else str(place or "a folder that is no package")
+    return foreign
+
+
+def _interpreter() -> Iterator[Check]:
+    version = platform.python_version()
+    yield Check("python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")
+    own = sys.prefix != sys.base_prefix
+    found = sys.prefix if own else "no environment of its own"
+    # Not a failure: an installation without one works until another distribution brings a package of our names.
+    yield Check("environment", True, found)
+
+
+def _packages() -> Iterator[Check]:
+    foreign = foreign_packages()
+    for name in PACKAGES:
+        found = foreign.get(name, f"of springmass {springmass.__version__}")
+        yield Check(
+            f"package {name}",
+            name not in foreign,
+            found,
+            "another distribution brings a package of this name: install springmass into an environment of its own",
+        )
+
+
+def _libraries() -> Iterator[Check]:
+    for name in LIBRARIES:
+        try:
+            importlib.import_module(name)
+            yield Check(f"library {name}", True, importlib.metadata.version(DISTRIBUTIONS.get(name, name)))
+        except ImportError as error:
+            yield Check(f"library {name}", False, str(error), "install springmass again: pip install --force-reinstall")
+
+
+def _bundled() -> Check:
+    from springmass.errors import ProgramError
+    from springmass.runs.loading import sample_data
+
+    try:
+        return Check("bundled recordings", True, str(sample_data()))
+    except ProgramError as error:
+        return Check("bundled recordings", False, str(error), "install springmass again")
+
+
+def _round_trip() -> Check:
+    """Write a run file and read it back: HDF5, its filters and the temporary folder in one."""
+    import numpy as np
+
+    from acquisition.block import Block
+    from acquisition.source import SourceInfo
+    from storage.errors import StorageError
+    from storage.run_file.reading import open_run
+    from storage.run_file.writing import write_run
+
+    block = Block(0, np.arange(8) / 100.0, np.linspace(0.2, 0.3, 8), np.zeros(8, np.uint8))
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            path = write_run(Path(folder) / "check.h5", [block], SourceInfo("simulated", "doctor", 100.0))
+            with open_run(path) as run:
+                same = bool(np.array_equal(run.samples().distance, block.distance))
+    except (StorageError, OSError) as error:
+        return Check("run file", False, str(error), "free the temporary folder, or install h5py again")
+    return Check("run file", same, "written and read back" if same else "read back other values", "install h5py again")

@@ -11,9 +11,9 @@ import subprocess
 from acquisition.clock import SystemClock
 from acquisition.decoders.family import Identity
 from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
+from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
 from springmass.errors import OK, SENSOR, USAGE, ProgramError, tell
-from springmass.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from springmass.session.identity import outdated, settings_of
 
 __all__ = ["run"]

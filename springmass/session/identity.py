@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from acquisition.decoders.family import Identity
-from springmass.firmware import MODEL, VERSION
+from acquisition.live.firmware import MODEL, VERSION
 from springmass.session.sensors import Sensor
 
 __all__ = ["meeting", "outdated", "settings_of"]

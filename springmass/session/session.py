@@ -25,10 +25,10 @@ from acquisition.live.calibration import Calibration, StillPoint, against_ruler,
 from acquisition.live.reader import PortReader
 from springmass import __version__
 from springmass.errors import SENSOR, USAGE, ProgramError
-from springmass.session.display import Display, Samples
+from springmass.session.display.progress import SECOND_NS, Progress, Shown, progress_of
+from springmass.session.display.turns import Display, Samples
 from springmass.session.failures import Failures
 from springmass.session.identity import meeting
-from springmass.session.progress import SECOND_NS, Progress, Shown, progress_of
 from springmass.session.reads import Tee
 from springmass.session.sensors import Sensor
 from springmass.session.stops import Stops

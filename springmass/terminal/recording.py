@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pipeline.streaming import LiveMotion, NotYet
 from springmass.session.console import Console
-from springmass.session.progress import Progress
+from springmass.session.display.progress import Progress
 from springmass.terminal.look import PLAIN, Look
 from springmass.terminal.quantities import concise
 from springmass.terminal.trace import trace_of

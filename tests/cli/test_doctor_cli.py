@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import springmass
-from springmass.doctor import PACKAGES, examine, foreign_packages
+from springmass.commands.doctor import PACKAGES, examine, foreign_packages
 
 Cli = Callable[..., Any]
 
@@ -75,7 +75,7 @@ def test_a_foreign_package_breaks_other_commands_in_one_line(tmp_path: Path) -> 
 
 def test_a_missing_library_is_found(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is named with the way to get it back, and no check runs that needs it."""
-    monkeypatch.setattr("springmass.doctor.LIBRARIES", ("numpy", "no_such_library_at_all"))
+    monkeypatch.setattr("springmass.commands.doctor.LIBRARIES", ("numpy", "no_such_library_at_all"))
     done = cli("doctor")
     assert (done.code, done.err) == (1, "")
     assert "FAIL  library no_such_library_at_all" in done.out

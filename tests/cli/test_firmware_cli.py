@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from springmass.firmware import HEX
+from acquisition.live.firmware import HEX
 
 FAKE = """#!/bin/sh
 echo "$@" >> {log}

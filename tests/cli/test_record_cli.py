@@ -27,7 +27,7 @@ from pipeline.analyse import Oscillation, analyse
 from pipeline.streaming import NotYet
 from springmass import load
 from springmass.session.console import Console
-from springmass.session.progress import Progress
+from springmass.session.display.progress import Progress
 from springmass.terminal.recording import ProgressLine, line_of
 from storage.run_file.reading import open_run
 

@@ -13,7 +13,7 @@ import pytest
 
 from acquisition.decoders.family import Identity
 from acquisition.decoders.line_protocol import FAMILY, LONGEST, LineProtocolDecoder
-from springmass.firmware import HEX, MODEL, VERSION, WIRING
+from acquisition.live.firmware import HEX, MODEL, VERSION, WIRING
 
 from .conftest import ROOT, Built, Emulate, Emulated
 

@@ -9,7 +9,7 @@ from acquisition.block import Block, Flag
 from acquisition.decoders.registry import get_family
 from pipeline.numerics.estimate import Estimate
 from pipeline.streaming import LiveMotion
-from springmass.session.progress import Usefulness
+from springmass.session.display.progress import Usefulness
 from springmass.terminal.recording import trust_in
 from springmass.terminal.trace import LABEL, ROWS, trace_of
 
@@ -31,7 +31,7 @@ def test_only_no_target_codes_are_said_until_a_distance_comes() -> None:
     for first in range(50, 250, 50):
         useful.push(block(first, [np.nan] * 50))
     assert useful.trouble(LINES).startswith(
-        "no target for 2 s: check that the bob hangs over the sensor, 0.02 to 1.7 m"
+        "no target for 2 s: check that the bob hangs over the sensor, 0.02 to 1.6 m"
     )
     useful.push(block(250, [np.nan, 0.3, 0.31]))
     assert useful.trouble(LINES) == ""

@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition.block import Block, Flag
 from pipeline.streaming import LiveMotion, NotYet
-from springmass.session.progress import MOTION_EVERY_NS, SECOND_NS, Shown
+from springmass.session.display.progress import MOTION_EVERY_NS, SECOND_NS, Shown
 
 
 def block(first: int, n: int = 100) -> Block:

@@ -17,9 +17,9 @@ from acquisition.live.decoding import SensorChain
 from pipeline.accuracy import params_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
 from pipeline.track import F8
+from springmass.session.display.room import demand_room
 from springmass.session.failures import Failures
 from springmass.session.reads import Tee
-from springmass.session.room import demand_room
 from storage.recorder import Recorder, RecorderStatus
 
 __all__ = ["Progress", "Shown", "progress_of"]

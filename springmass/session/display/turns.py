@@ -11,8 +11,8 @@ import threading
 from collections.abc import Callable, Sequence
 
 from acquisition.block import Block
+from springmass.session.display.progress import Progress, Shown
 from springmass.session.failures import Failures
-from springmass.session.progress import Progress, Shown
 
 __all__ = ["Display"]
 

@@ -12,9 +12,9 @@ import pytest
 
 from acquisition.block import Block
 from springmass.session import display as displayed
-from springmass.session.display import Display
+from springmass.session.display.progress import Progress, Shown
+from springmass.session.display.turns import Display
 from springmass.session.failures import KINDS, Failures
-from springmass.session.progress import Progress, Shown
 
 WAIT_S = 10.0
 
