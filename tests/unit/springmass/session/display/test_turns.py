@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from acquisition.block import Block
-from springmass.session import display as displayed
+from springmass.session.display import turns as displayed
 from springmass.session.display.progress import Progress, Shown
 from springmass.session.display.turns import Display
 from springmass.session.failures import KINDS, Failures
