@@ -5,6 +5,7 @@ which of its columns are times. What a careless reader would get wrong:
 
 - A column is a time by its name, in a dozen languages, and only if it runs forward; or, where names say nothing
   against it, because it alone runs forward. Row numbers are no times, and a period is none.
+- Thousands may be set apart; a comma that may be of thousands or of decimals is asked about.
 - Clock times (``10:04:59.812``) count from the first; midnight may lie between them.
 - Oscilloscopes write ``Start`` and ``Increment`` above a column of row numbers.
 """
@@ -17,9 +18,10 @@ from acquisition.errors import FormatError
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.contents import Channel, Contents, Formula, Heading, Sheet, numbered_apart
 from acquisition.recordings.tables.finding import Found, clock_s, find_table
+from acquisition.recordings.tables.grouped import ungrouped
 from acquisition.recordings.tables.roles import columns_of, is_aside, times_by_name, times_by_steps
 from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import Text, decode, is_text, parse_number, text_of
+from acquisition.recordings.tables.text import Text, decode, guess_delimiter, is_text, parse_number, text_of
 from acquisition.recordings.tables.wrapped import SETTINGS, begins_with_lists, unwrapped
 
 __all__ = ["FORMAT"]
@@ -33,7 +35,10 @@ _BLANKS = bytes.maketrans(b"[];", b"   ")
 def _evidence(head: bytes) -> str:
     if not is_text(head) or head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<"):
         return ""
-    _, found = _find(Text.of(head))
+    try:
+        _, found = _find(_plain("", Text.of(head)))
+    except FormatError as error:
+        return str(error)  # said again, with the file's name, when it is read
     if found is None:
         return "it holds lists of numbers with names" if begins_with_lists(decode(head)) else ""
     names = ", ".join(f'"{each.name}"' for each in found.headings if each.name)
@@ -41,7 +46,7 @@ def _evidence(head: bytes) -> str:
 
 
 def _contents(path: str, data: bytes) -> Contents:
-    text, found = _find(text_of(path, data))
+    text, found = _find(_plain(path, text_of(path, data)))
     if found is None:
         raise FormatError(path, "expected rows of numbers, three or more alike", "check that the export ended")
     columns = columns_of(found.rows)
@@ -87,6 +92,17 @@ def _contents(path: str, data: bytes) -> Contents:
         channels = [replace(each, aside=False) for each in channels]
     title = found.preamble[0] if found.preamble else ""
     return Contents(tuple(channels), title=title, traps=tuple(traps), zeros=text.zeros)
+
+
+def _plain(path: str, text: Text) -> Text:
+    """Take marks of thousands out of a text; the last line of its head says what separates cells."""
+    lines = text.head(_HEAD_LINES)
+    rows = text.data[text.start : text.stop]
+    take = ungrouped(path, rows, guess_delimiter(lines[-1].text)) if lines else None
+    if take is None or begins_with_lists(decode(rows[: 1 << 16])):  # a list's commas separate
+        return text
+    rows = take(rows)
+    return replace(text, data=text.data[: text.start] + rows + text.data[text.stop :], stop=text.start + len(rows))
 
 
 def _find(text: Text) -> tuple[Text, Found | None]:

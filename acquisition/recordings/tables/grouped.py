@@ -1,0 +1,120 @@
+"""Numbers whose thousands are set apart: ``1,234.5``, ``1.234,5``, ``1 234,5``, ``1'234.5``.
+
+They are read where the file itself says which mark is which. ``1,500`` beside ``0.01`` may be either, and is refused:
+taken for a decimal mark it would be wrong by a thousand.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from acquisition.errors import FormatError
+
+__all__ = ["ungrouped"]
+
+_REMEDY = "write the numbers without a mark of thousands"
+_BLANK = rb"(?: |'|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)"
+_SIGN, _EXPONENT = rb"[-+]?", rb"(?:[eE][-+]?\d+)?"
+_ANY = re.compile(rb"[-+]?\d(?:[\d.,'eE +-]|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)*")
+_SPACED = re.compile(_SIGN + rb"[1-9]\d{0,2}(?:" + _BLANK + rb"\d{3})+(?:[.,]\d*)?" + _EXPONENT)
+_BLANKS = re.compile(_BLANK)
+
+
+def ungrouped(path: str, rows: bytes, mark: str) -> Callable[[bytes], bytes] | None:
+    """Return what takes the marks of thousands out of rows; None where there are none.
+
+    Parameters
+    ----------
+    path : str
+        For messages.
+    rows : bytes
+    mark : str
+        What separates cells; empty for runs of white space.
+
+    Raises
+    ------
+    FormatError
+        Where a comma or a point may be of thousands as well as of decimals, or is both.
+
+    Examples
+    --------
+    >>> take = ungrouped("a.csv", b"0.01;1,234.5\\n0.02;999.5\\n", ";")
+    >>> take(b"0.01;1,234.5\\n")
+    b'0.01;1234.5\\n'
+    """
+    points, commas = b"." in rows, b"," in rows and (mark != "," or b'"' in rows)
+    blanks = bool(mark) and re.search(rb"\d" + _BLANK + rb"\d{3}", rows) is not None
+    if not blanks and not (points and commas):
+        return None
+    cell = _cell(mark)
+    found = {each[0].strip(b' "') for each in cell.finditer(rows)}
+    group = _group(path, found)
+    spaced = blanks and any(_SPACED.fullmatch(each) for each in found)
+    if not group and not spaced:
+        return None
+    grouped = re.compile(_thousands(group) + _decimals(group) + b"|" + _SPACED.pattern) if group else _SPACED
+
+    def without(match: re.Match[bytes]) -> bytes:
+        plain = match[0].strip(b' "')
+        if not grouped.fullmatch(plain):
+            return match[0]
+        return _BLANKS.sub(b"", plain.replace(group, b"") if group else plain)
+
+    return lambda lines: cell.sub(without, lines)
+
+
+def _cell(mark: str) -> re.Pattern[bytes]:
+    """Return what finds whole cells of digits and marks; where commas separate, quoted ones and ones without commas."""
+    if mark == ",":
+        return re.compile(rb'"' + _ANY.pattern + rb'"|(?<![^,\n\r"])[-+]?\d+\.\d*(?![^,\n\r"])')
+    edge = re.escape(mark.encode()) if mark else rb"\t "
+    body = _ANY.pattern if mark else rb"[-+]?\d[\d.,eE+-]*"
+    return re.compile(rb"(?<![^" + edge + rb'\n\r])"? *' + body + rb' *"?(?![^' + edge + rb"\n\r])")
+
+
+def _thousands(group: bytes) -> bytes:
+    return _SIGN + rb"[1-9]\d{0,2}(?:" + re.escape(group) + rb"\d{3})+"
+
+
+def _decimals(group: bytes) -> bytes:
+    return rb"(?:" + re.escape(_other(group)) + rb"\d*)?" + _EXPONENT
+
+
+def _other(group: bytes) -> bytes:
+    return b"." if group == b"," else b","
+
+
+def _group(path: str, cells: set[bytes]) -> bytes:
+    """Return which of comma and point sets thousands apart; empty where neither does."""
+    sure: dict[bytes, bytes] = {}
+    decimal: dict[bytes, bytes] = {}
+    unsure: dict[bytes, bytes] = {}
+    for group in (b",", b"."):
+        both = re.compile(_thousands(group) + re.escape(_other(group)) + rb"\d*" + _EXPONENT)
+        many = re.compile(_SIGN + rb"[1-9]\d{0,2}(?:" + re.escape(group) + rb"\d{3}){2,}")
+        one = re.compile(_SIGN + rb"[1-9]\d{0,2}" + re.escape(group) + rb"\d{3}")
+        mark = re.compile(_SIGN + rb"\d+" + re.escape(group) + rb"\d*" + _EXPONENT)
+        for each in cells:
+            if both.fullmatch(each) or many.fullmatch(each):
+                sure[group] = each
+            elif one.fullmatch(each):
+                unsure[group] = each
+            elif mark.fullmatch(each):
+                decimal[group] = each
+    for group, shown in sure.items():
+        against = sure.get(_other(group)) or decimal.get(group)
+        if against:
+            message = f'"{_shown(shown)}" and "{_shown(against)}" stand in one table: which mark is of thousands?'
+            raise FormatError(path, message, _REMEDY)
+        return group
+    for group, shown in unsure.items():
+        point = decimal.get(_other(group))
+        if point and group not in decimal:
+            message = f'"{_shown(shown)}" beside "{_shown(point)}" may be thousands or decimals'
+            raise FormatError(path, message, _REMEDY)
+    return b""
+
+
+def _shown(cell: bytes) -> str:
+    return cell.decode("utf-8", "replace")
