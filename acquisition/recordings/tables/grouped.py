@@ -15,8 +15,11 @@ __all__ = ["ungrouped"]
 
 _REMEDY = "write the numbers without a mark of thousands"
 _BLANK = rb"(?: |'|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)"
+_OTHER_BLANKS = b"'", b"\xa0", b"\xaf", b"\x99"
 _SIGN, _EXPONENT = rb"[-+]?", rb"(?:[eE][-+]?\d+)?"
-_ANY = re.compile(rb"[-+]?\d(?:[\d.,'eE +-]|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)*")
+_ANY = rb"[-+]?\d[-+\d.,'eE \xa0\xc2\xe2\x80\xaf\x99]*"  # a run of bytes; what it is is judged afterwards
+_APART = re.compile(rb"(?:'|\xa0|\xaf|\x99)\d{3}")  # the last byte of a blank; found without looking at each digit
+_BLANK_APART = re.compile(rb" \d{3}(?<=\d \d{3})")
 _SPACED = re.compile(_SIGN + rb"[1-9]\d{0,2}(?:" + _BLANK + rb"\d{3})+(?:[.,]\d*)?" + _EXPONENT)
 _BLANKS = re.compile(_BLANK)
 
@@ -44,7 +47,10 @@ def ungrouped(path: str, rows: bytes, mark: str) -> Callable[[bytes], bytes] | N
     b'0.01;1234.5\\n'
     """
     points, commas = b"." in rows, b"," in rows and (mark != "," or b'"' in rows)
-    blanks = bool(mark) and re.search(rb"\d" + _BLANK + rb"\d{3}", rows) is not None
+    blanks = bool(mark) and (
+        (b" " in rows and _BLANK_APART.search(rows) is not None)
+        or (any(each in rows for each in _OTHER_BLANKS) and _APART.search(rows) is not None)
+    )
     if not blanks and not (points and commas):
         return None
     cell = _cell(mark)
@@ -67,9 +73,9 @@ def ungrouped(path: str, rows: bytes, mark: str) -> Callable[[bytes], bytes] | N
 def _cell(mark: str) -> re.Pattern[bytes]:
     """Return what finds whole cells of digits and marks; where commas separate, quoted ones and ones without commas."""
     if mark == ",":
-        return re.compile(rb'"' + _ANY.pattern + rb'"|(?<![^,\n\r"])[-+]?\d+\.\d*(?![^,\n\r"])')
+        return re.compile(rb'"' + _ANY + rb'"|(?<![^,\n\r"])[-+]?\d+\.\d*(?![^,\n\r"])')
     edge = re.escape(mark.encode()) if mark else rb"\t "
-    body = _ANY.pattern if mark else rb"[-+]?\d[\d.,eE+-]*"
+    body = _ANY if mark else rb"[-+]?\d[\d.,eE+-]*"
     return re.compile(rb"(?<![^" + edge + rb'\n\r])"? *' + body + rb' *"?(?![^' + edge + rb"\n\r])")
 
 
