@@ -58,6 +58,8 @@ class Params:
         Of the stages of those names.
     full : pipeline.motion.waveform_fit.Params, optional
         Of the fit of the whole waveform; None leaves it out.
+    settle : bool
+        Whether the whole waveform is fitted where the halves of a record contradict the model of the windows.
     """
 
     condition: conditioning.Params = field(default_factory=conditioning.Params)
@@ -69,6 +71,7 @@ class Params:
     phase: phases.Params = field(default_factory=phases.Params)
     derive: derivation.Params = field(default_factory=derivation.Params)
     full: fullfits.Params | None = None
+    settle: bool = True
     relaxation: relaxations.Params = field(default_factory=relaxations.Params)
     motion: equations.Params = field(default_factory=equations.Params)
 
@@ -309,7 +312,7 @@ def _oscillation(
 
 def _fit_whole(windows: Windows, fitted: Fitted, params: Params) -> Callable[[], Fitted] | None:
     """Return the fit of the whole waveform, to be made where windows contradict themselves; None for long records."""
-    if fitted.full is not None or len(windows.conditioned.track) > MOST_ROWS:
+    if not params.settle or fitted.full is not None or len(windows.conditioned.track) > MOST_ROWS:
         return None
     unit = windows.conditioned.track.unit
     return lambda: by_windows(windows, params.phase, fullfits.Params()).in_unit(unit)

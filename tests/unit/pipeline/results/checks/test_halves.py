@@ -38,12 +38,17 @@ def test_halves_that_differ_are_told(seed: int) -> None:
     assert all("--accuracy best" not in one for one in told(seed, 0.06, "best"))
 
 
-@pytest.mark.parametrize("tier", ["fast", "standard"])
-def test_uncertainties_hold_both_fits(tier: str) -> None:
+def test_uncertainties_hold_both_fits() -> None:
     """Where windows contradict themselves the fit of the waveform lies within two of their uncertainties."""
-    windows, whole = analysed(1, 0.06, tier).estimates, analysed(1, 0.06, tier, whole=True).estimates
+    windows, whole = analysed(1, 0.06, "standard").estimates, analysed(1, 0.06, "standard", whole=True).estimates
     for name in ("period", "amplitude", "phase", "damping_rate", "offset"):
         assert abs(windows[name].value - whole[name].value) <= 2.0 * windows[name].u, name
+
+
+def test_fast_says_that_halves_differ_and_fits_no_waveform() -> None:
+    """The fast tier keeps its time: it says what it found, and leaves the second fit to the others."""
+    (message,) = told(1, 0.06, "fast")
+    assert "whole waveform" not in message
 
 
 def test_noise_alone_is_no_difference() -> None:
