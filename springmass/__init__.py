@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from pipeline.results.compare import SpringRun, compare_springs
     from pipeline.track import Track
     from springmass.api.analysis import Analysis
-    from springmass.api.course import results
     from springmass.api.live import live
     from springmass.api.opening import Run, open_run
+    from springmass.api.results import results
     from springmass.api.sources import Comparison, analyse, compare
     from springmass.runs.loading import Loaded, load, sample_data
     from springmass.runs.scenes import read_scene
@@ -87,7 +87,7 @@ _WHERE = {
     "make_law": "pipeline.damping.laws.of_function",
     "open_run": "springmass.api.opening",
     "read_scene": "springmass.runs.scenes",
-    "results": "springmass.api.course",
+    "results": "springmass.api.results",
     "sample_data": "springmass.runs.loading",
     "write_run": "storage.run_file.writing",
 }

@@ -13,7 +13,7 @@ from acquisition.errors import FormatError
 from acquisition.recordings.inspection import Survey
 from acquisition.recordings.recording import Recording
 from acquisition.recordings.tables.text import is_text
-from acquisition.regular import open_regular
+from acquisition.regular_file import open_regular
 
 __all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "dialect_folder", "read_bytes", "read_head"]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
 from pipeline.bench.air import air_viscosity, speed_of_sound
-from pipeline.bench.drag import STEADY_DISC_DRAG
+from pipeline.bench.derived_drag import STEADY_DISC_DRAG
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
-from pipeline.bench.drag import BOB_KG_PER_M3, DerivedDrag, needs_drag
+from pipeline.bench.derived_drag import BOB_KG_PER_M3, DerivedDrag, needs_drag
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.dynamics.amplitude import amplitude

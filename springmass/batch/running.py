@@ -15,9 +15,9 @@ from springmass.batch.engines import by_dask, by_processes, cores, here
 from springmass.batch.page import PAGE, write_page
 from springmass.batch.plan import Job, Plan, code_sha256, names_of, shard_of
 from springmass.batch.reports import linked, worst, write_reports
+from springmass.batch.results_table import CSV, PARQUET, write_csv, write_parquet
 from springmass.batch.rows import FAILED, dumped, flat
 from springmass.batch.store import Store
-from springmass.batch.tables import CSV, PARQUET, write_csv, write_parquet
 from springmass.batch.worker import unchanged
 from springmass.errors import USAGE, ProgramError
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from springmass import __version__
+from springmass.batch.results_table import CSV, PARQUET, read_rows, tags_in
 from springmass.batch.rows import DETAILS, FILTERED, columns_of
-from springmass.batch.tables import CSV, PARQUET, read_rows, tags_in
 from springmass.errors import USAGE, ProgramError
 from storage.atomic import remove_leftovers
 from storage.catalog import build_catalog, catalog_stamp, count_of_catalog, search_catalog

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import AcquisitionError
-from acquisition.regular import open_regular
+from acquisition.regular_file import open_regular
 from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
 from pipeline.bench.scene import PLACES, Scene

@@ -109,7 +109,7 @@ def _one(task: _Task) -> int:
 
 def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | None) -> int:
     """Analyse many inputs: one Table 1, one file of numbers."""
-    from springmass.terminal.progress import counted
+    from springmass.terminal.counting import counted
 
     everything: list[_Done] = []
     for done in counted(_worked(tasks), len(tasks), "reports" if options.report else "runs", quiet=options.quiet):
@@ -224,7 +224,7 @@ def _print_text(analysed: Analysed, *, si: bool) -> None:
     from springmass.report.words import typeset
     from springmass.terminal.look import look_of
     from springmass.terminal.printing import classic_text, findings_text, fitted
-    from springmass.terminal.tables import text_table
+    from springmass.terminal.table1 import text_table
 
     look = look_of(sys.stdout, si=si)
     print(text_table([analysed.name], [analysed.analysis], look))
@@ -240,7 +240,7 @@ def _print_together(analysed: Sequence[_Done], options: argparse.Namespace) -> N
     from springmass.report.words import typeset
     from springmass.terminal.look import look_of
     from springmass.terminal.printing import shared_findings_text
-    from springmass.terminal.tables import text_table
+    from springmass.terminal.table1 import text_table
 
     names = [done.name for done in analysed]
     look = look_of(sys.stdout, si=options.si)

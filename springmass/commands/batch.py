@@ -12,10 +12,10 @@ from typing import Any
 from springmass.batch.course import template
 from springmass.batch.page import PAGE
 from springmass.batch.plan import plan
+from springmass.batch.results_table import CSV
 from springmass.batch.rows import FAILED
 from springmass.batch.running import Options, run_pass
 from springmass.batch.store import Store
-from springmass.batch.tables import CSV
 from springmass.commands import completions
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, suggest, tell
 from springmass.runs.analysing import make_folder

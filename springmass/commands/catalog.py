@@ -16,7 +16,7 @@ SHOWN = ("run", "status", "period", "period_u", "spring_constant", "spring_const
 
 def run(options: argparse.Namespace) -> int:
     """Print the runs for which an expression holds, as CSV or as JSON lines."""
-    from springmass.batch.tables import text_of
+    from springmass.batch.results_table import text_of
 
     wanted = None if options.columns is None else [name.strip() for name in options.columns.split(",")]
     found = search(

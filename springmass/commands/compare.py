@@ -6,7 +6,7 @@ import argparse
 import json
 
 from acquisition.errors import visible
-from springmass.batch.tables import is_course
+from springmass.batch.results_table import is_course
 from springmass.commands import completions
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_courses(options: argparse.Namespace) -> int:
-    from springmass.batch.comparing import compare_rows, compared_json, compared_text
+    from springmass.batch.benches import compare_rows, compared_json, compared_text
     from springmass.batch.search import search
 
     if options.out is not None or options.scene:

@@ -17,7 +17,7 @@ from springmass.runs.loading import load, sample_data
 from springmass.runs.scenes import read_scene
 from springmass.terminal.look import look_of
 from springmass.terminal.printing import findings_text
-from springmass.terminal.tables import text_table
+from springmass.terminal.table1 import text_table
 
 __all__ = ["run"]
 

@@ -16,7 +16,7 @@ import numpy as np
 from acquisition.block import Block
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.recording import Original, Recording, Trap
-from acquisition.regular import open_regular
+from acquisition.regular_file import open_regular
 from acquisition.source import SourceInfo
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, tell

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from acquisition.regular import open_regular
+from acquisition.regular_file import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import USAGE, ProgramError, complain

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from acquisition.block import Block
 from acquisition.recordings.recording import Original, Trap
-from acquisition.regular import open_regular
+from acquisition.regular_file import open_regular
 from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunDamaged, reading
 from storage.run_file import layout

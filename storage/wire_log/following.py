@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import BinaryIO
 
-from acquisition.regular import open_regular
+from acquisition.regular_file import open_regular
 from storage.errors import one_line
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Parts, Record, part_path, unframe
 from storage.wire_log.window import LONGEST, STRETCH, NotALog

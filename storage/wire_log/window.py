@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from acquisition.regular import open_regular
+from acquisition.regular_file import open_regular
 from storage.errors import StorageError, one_line
 from storage.wire_log.records import HEAD_BYTES, MAGIC, MAX_PAYLOAD, Unframed, unframe
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springmass.batch.comparing import compare_rows
+from springmass.batch.benches import compare_rows
 from springmass.batch.search import search
 from springmass.cli import main
 from tests.courses import write_recording

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.analyse import Analysis
-from pipeline.bench.drag import DerivedDrag, derive_drag, needs_drag
+from pipeline.bench.derived_drag import DerivedDrag, derive_drag, needs_drag
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem
 from pipeline.numerics.estimate import Estimate, Joint

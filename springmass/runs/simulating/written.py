@@ -45,7 +45,7 @@ def write_folder(
 ) -> Path:
     """Write run file, figures, tables and JSON into NAME.simulated; return the folder."""
     from springmass.report.figures import save
-    from springmass.report.figures.simulation import against_figure, band_figure, draw_simulation
+    from springmass.report.figures.trajectories import against_figure, band_figure, draw_simulation
     from storage.atomic import write_whole
     from storage.folder import whole_folder
 

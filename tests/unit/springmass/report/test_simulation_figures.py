@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.dynamics import Equation, Problem
-from springmass.report.figures.simulation import draw_simulation
+from springmass.report.figures.trajectories import draw_simulation
 from springmass.runs.simulating.simulation import plan, simulate
 
 

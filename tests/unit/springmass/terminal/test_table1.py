@@ -13,7 +13,7 @@ from pipeline.track import Track
 from springmass.report.tables import table_estimates, table_rows
 from springmass.terminal.look import PLAIN, Look
 from springmass.terminal.quantities import concise, prefixed, shown
-from springmass.terminal.tables import text_table
+from springmass.terminal.table1 import text_table
 
 COLOUR = re.compile(r"\x1b\[[\d;]*m")
 

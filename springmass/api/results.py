@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from springmass.batch.results_table import read_rows
 from springmass.batch.rows import NUMBERS, UNITS, WHOLE
-from springmass.batch.tables import read_rows
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.bench.drag import derive_drag, disc_drag_coefficient, needs_drag
+from pipeline.bench.derived_drag import derive_drag, disc_drag_coefficient, needs_drag
 from pipeline.bench.scene import Scene
 from pipeline.dynamics.amplitude import amplitude
 from pipeline.errors import SceneError
