@@ -30,8 +30,9 @@ def test_the_filter_finds_what_numpy_finds(course, tmp_path):
 
 
 @pytest.mark.trials
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads what processes use from /proc")
 def test_a_course_is_measured(course, tmp_path):
     """Every ratio is there, and a worker's memory is within its bound."""
-    measured = course.measure(8, tmp_path)
+    measured = course.measure(6, tmp_path)
     assert min(measured.fast, measured.standard, measured.same_answer, measured.efficiency) > 0
     assert measured.half_mb <= measured.whole_mb < 250
