@@ -29,9 +29,12 @@ def need_of(row: Mapping[str, Any]) -> tuple[int, int, int, float]:
     return status, row.get("errors") or 0, row.get("warnings") or 0, misfit
 
 
-def worst(rows: Iterable[Mapping[str, Any]], count: int) -> set[str]:
-    """Return the names of the runs that need a look most, of those of which there is something to draw."""
-    drawn = ((need_of(row), row["run"]) for row in rows if row["status"] in ("ok", "no_oscillation"))
+def worst(runs: Iterable[tuple[tuple[int, int, int, float], str, str]], count: int) -> set[str]:
+    """Return the names of the runs that need a look most, of those of which there is something to draw.
+
+    Of each run: how much it needs one, its name, its status.
+    """
+    drawn = ((need, name) for need, name, status in runs if status in ("ok", "no_oscillation"))
     return {name for _, name in heapq.nlargest(count, drawn)}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import os
@@ -14,22 +15,40 @@ from springmass.batch.rows import COLUMNS, NUMBERS, WHOLE, columns_of
 from springmass.errors import USAGE, ProgramError
 from storage.atomic import whole_file
 
-__all__ = ["CSV", "PARQUET", "is_course", "read_rows", "tags_in", "text_of", "write_csv", "write_parquet"]
+__all__ = ["CSV", "PARQUET", "is_course", "read_rows", "tags_in", "text_of", "write_tables"]
 
 CSV, PARQUET = "results.csv", "results.parquet"
-GROUP = 5000  # rows of a row group
+GROUP = 1000  # rows of a row group: what is held at once
 _WHOLE, _NUMBERS = frozenset(WHOLE), frozenset(NUMBERS)
 _FORMULA = ("=", "+", "-", "@", "\t")
 
 
-def write_csv(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> Path:
-    """Write the table as CSV in UTF-8: numbers keep all their digits, what is not known is empty."""
+def write_tables(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> None:
+    """Write the table as CSV in UTF-8 and, where pyarrow is installed, as Parquet: the same bytes for the same rows.
+
+    In the CSV numbers keep all their digits, and what is not known is empty.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        pa = pq = None
+        (folder / PARQUET).unlink(missing_ok=True)  # one of an earlier pass would tell other numbers
     columns = columns_of(tags)
-    with whole_file(folder / CSV) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([_cell(row[name]) for name in columns] for row in rows)
-    return folder / CSV
+    with contextlib.ExitStack() as stack:
+        temporary = stack.enter_context(whole_file(folder / CSV))
+        text = csv.writer(stack.enter_context(temporary.open("w", encoding="utf-8", newline="")), lineterminator="\n")
+        text.writerow(columns)
+        table = None
+        if pq is not None:
+            file = stack.enter_context(stack.enter_context(whole_file(folder / PARQUET)).open("wb"))
+            schema = pa.schema([(name, _type(name, pa)) for name in columns])
+            table = stack.enter_context(pq.ParquetWriter(file, schema, compression="zstd"))
+        each = iter(rows)
+        while group := list(islice(each, GROUP)):
+            text.writerows([_cell(row[name]) for name in columns] for row in group)
+            if table is not None:
+                table.write_table(pa.Table.from_pylist(group, schema=schema))
 
 
 def _cell(value: Any) -> Any:
@@ -37,25 +56,6 @@ def _cell(value: Any) -> Any:
         return ""
     # A name that begins as a formula does would be one in a spreadsheet.
     return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
-
-
-def write_parquet(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> Path | None:
-    """Write the table as Parquet, the same bytes for the same rows; None where pyarrow is not installed."""
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        return None
-    schema = pa.schema([(name, _type(name, pa)) for name in columns_of(tags)])
-    with (
-        whole_file(folder / PARQUET) as temporary,
-        temporary.open("wb") as file,
-        pq.ParquetWriter(file, schema, compression="zstd") as writer,
-    ):
-        each = iter(rows)
-        while group := list(islice(each, GROUP)):
-            writer.write_table(pa.Table.from_pylist(group, schema=schema))
-    return folder / PARQUET
 
 
 def _type(name: str, pa: Any) -> Any:

@@ -14,8 +14,8 @@ from typing import Any
 from springmass.batch.engines import by_dask, by_processes, cores, here
 from springmass.batch.page import PAGE, write_page
 from springmass.batch.plan import Job, Plan, code_sha256, names_of, shard_of
-from springmass.batch.reports import linked, worst, write_reports
-from springmass.batch.results_table import CSV, PARQUET, write_csv, write_parquet
+from springmass.batch.reports import linked, need_of, worst, write_reports
+from springmass.batch.results_table import CSV, PARQUET, write_tables
 from springmass.batch.rows import FAILED, dumped, flat
 from springmass.batch.store import Store
 from springmass.batch.worker import unchanged
@@ -165,26 +165,27 @@ def make(plan: Plan, store: Store, folder: Path, *, reports: int, jobs: int | No
         return False
     store.unmark()
 
-    def stored() -> Iterator[dict[str, Any]]:
+    def kept() -> Iterator[dict[str, Any]]:
         for job in plan.jobs:
             row, _ = _kept(job, store, rehash=False)
-            assert row is not None, job.path
-            yield row
+            # A file that changed while it was analysed, or whose process was ended: the next pass does it again.
+            yield {**(row or next(store.rows(job.key))), "job": job.told()}
 
     # The rows of this plan in its order; from here on they are read from this file alone.
-    store.put_together({**row, "job": job.told()} for row, job in zip(stored(), plan.jobs, strict=True))
+    store.put_together(kept())
     store.drop_parts()
     store.read()
+    needs = []
 
     def rows() -> Iterator[dict[str, Any]]:
-        return (flat(row, name, plan.tags) for row, name in zip(stored(), names, strict=True))
+        for row, name in zip(store.all(), names, strict=True):
+            needs.append((need_of(row), name, row["status"]))
+            yield flat(row, name, plan.tags)
 
-    write_csv(folder, rows(), plan.tags)
-    if write_parquet(folder, rows(), plan.tags) is None:
-        (folder / PARQUET).unlink(missing_ok=True)  # one of an earlier pass would tell other numbers
-    chosen = worst(rows(), reports)
+    write_tables(folder, rows(), plan.tags)
+    chosen = worst(needs, reports)
     write_reports(folder, [(name, job) for name, job in zip(names, plan.jobs, strict=True) if name in chosen], jobs)
-    write_page(folder, zip(names, stored(), strict=True), plan.tags, linked(folder))
+    write_page(folder, zip(names, store.all(), strict=True), plan.tags, linked(folder))
     store.mark(made_of)
     return True
 

@@ -109,11 +109,13 @@ class Store:
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write rows as a part, whole or not at all."""
-        data = b"".join(_line(row) for row in rows)
+        lines = [_line(row) for row in rows]
+        data = b"".join(lines)
         path = write_whole(self.parts / f"part-{hashlib.sha256(data).hexdigest()[:16]}.jsonl", data)
-        for place, row in _lines(path):
-            assert row is not None
-            self._places.setdefault(key_of(row), []).append(place)
+        offset = 0
+        for row, line in zip(rows, lines, strict=True):
+            self._places.setdefault(key_of(row), []).append((path, offset, len(line)))
+            offset += len(line)
 
     def put_together(self, rows: Iterable[Mapping[str, Any]]) -> Path:
         """Write the file of all rows, in this order."""

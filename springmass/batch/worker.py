@@ -204,15 +204,17 @@ def _thumbnail(t: F8, y: F8, period_s: float) -> str:
     t, y = t[there], y[there]
     if t.size < 2 or not np.ptp(t) > 0:
         return ""
-    count = int(np.clip(np.ptp(t) / period_s, FEWEST_BINS, BINS))  # a bin without a whole period is no outline
-    bins = np.minimum(((t - t.min()) / np.ptp(t) * count).astype(int), count - 1)
-    low, high = np.full(count, np.inf), np.full(count, -np.inf)
-    np.minimum.at(low, bins, y)
-    np.maximum.at(high, bins, y)
-    filled = np.flatnonzero(np.isfinite(low))
+    if np.any(np.diff(t) < 0):
+        order = np.argsort(t, kind="stable")
+        t, y = t[order], y[order]
+    span = t[-1] - t[0]
+    count = int(np.clip(span / period_s, FEWEST_BINS, BINS))  # a bin without a whole period is no outline
+    ends = np.searchsorted(t, t[0] + span * np.arange(count + 1) / count)
+    filled = np.flatnonzero(np.diff(ends))
+    low, high = (edge.reduceat(y, ends[filled]) for edge in (np.minimum, np.maximum))
     bottom, top = np.quantile(y, (0.005, 0.995))  # a false echo does not flatten the motion
     scale = 28.0 / max(top - bottom, 1e-300)
-    above, below = (np.clip(29.0 - (edge[filled] - bottom) * scale, 0.0, 30.0).round() for edge in (high, low))
+    above, below = (np.clip(29.0 - (edge - bottom) * scale, 0.0, 30.0).round() for edge in (high, low))
     x = ((filled + 0.5) * 120.0 / count).round(1).tolist()
     edge = [*zip(x, above.tolist(), strict=True), *reversed([*zip(x, below.tolist(), strict=True)])]
     return "M" + "L".join(f"{a:g} {b:g}" for a, b in edge) + "Z"

@@ -179,6 +179,41 @@ def test_a_run_without_oscillation_is_named(runs, cli):
     assert "still.txt: no oscillation" in done.err
 
 
+def test_a_run_whose_process_was_ended_is_a_row_and_tried_again(runs, cli, monkeypatch):
+    """The table is made with it; the next pass analyses it."""
+    from springmass.batch import running, worker
+
+    def ended(jobs):
+        yield worker.analyse_many(jobs[1:])
+        yield [worker.blank_row(jobs[0], "ended", f"{jobs[0].path}: its process was ended from outside")]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(running, "here", ended)
+        done = cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
+    assert done.code == 1
+    assert "run000.txt: its process was ended" in done.err
+    assert [row["status"] for row in rows("out")] == ["ended", *["ok"] * 5]
+    done = cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
+    assert "5 unchanged, 1 analysed, 0 failed" in done.err
+    assert [row["status"] for row in rows("out")] == ["ok"] * 6
+
+
+def test_a_file_that_changes_while_it_is_analysed_is_another_by_the_next_pass(runs, cli, monkeypatch):
+    """The pass ends with what it saw; the next one sees the change."""
+    from springmass.batch import running, worker
+
+    def changed(jobs):
+        yield worker.analyse_many(jobs)
+        shutil.copy(runs / "run001.txt", runs / "run000.txt")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(running, "here", changed)
+        assert cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK).code == 0
+    assert "5 unchanged, 1 analysed" in cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK).err
+    table = rows("out")
+    assert table[0]["period"] == table[1]["period"]
+
+
 def test_lists_patterns_and_folders_in_folders_are_inputs(runs, cli):
     """A list names files, a pattern finds them, folders are looked into; a file that several name is one run."""
     (runs / "late").mkdir()
