@@ -16,7 +16,16 @@ F8 = NDArray[np.float64]
 I8 = NDArray[np.int64]
 U8 = NDArray[np.uint8]
 
-UNITS = {"length": "m", "angle": "rad", "voltage": "V", "acceleration": "m/s^2", "force": "N"}
+UNITS = {
+    "length": "m",
+    "angle": "rad",
+    "velocity": "m/s",
+    "angular_velocity": "rad/s",
+    "acceleration": "m/s^2",
+    "force": "N",
+    "voltage": "V",
+    "number": "1",
+}
 """What a sample may be of, and the one SI unit that it is then in. `pipeline.track.UNITS` is the same table."""
 
 

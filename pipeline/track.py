@@ -15,7 +15,16 @@ __all__ = ["F8", "U8", "UNITS", "Quality", "Track"]
 F8 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
 
-UNITS = {"length": "m", "angle": "rad", "voltage": "V", "acceleration": "m/s^2", "force": "N"}
+UNITS = {
+    "length": "m",
+    "angle": "rad",
+    "velocity": "m/s",
+    "angular_velocity": "rad/s",
+    "acceleration": "m/s^2",
+    "force": "N",
+    "voltage": "V",
+    "number": "1",
+}
 """What a track may be of, and the one SI unit that it is then in: `acquisition.block.UNITS`, held equal by a test."""
 
 

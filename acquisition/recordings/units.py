@@ -8,38 +8,68 @@ from typing import NamedTuple
 
 from acquisition.block import UNITS
 
-__all__ = ["LENGTHS", "TIMES", "Measure", "known_units", "length_power", "measure_of", "time_power", "unit_words"]
+__all__ = [
+    "LENGTHS",
+    "TIMES",
+    "Measure",
+    "known_units",
+    "measure_of",
+    "time_factor",
+    "time_power",
+    "unit_words",
+]
 
 LENGTHS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
 """Lengths by the power of ten that makes them metres."""
-TIMES = {"s": 0, "ms": -3, "us": -6, "ns": -9, "min": 0}
-"""Times by the power of ten that makes them seconds; of minutes :data:`MINUTE_S` more."""
+TIMES = {"s": 0, "ms": -3, "us": -6, "ns": -9, "min": 0, "h": 0}
+"""Times by the power of ten that makes them seconds, but for :func:`time_factor`."""
+_TIME_FACTORS = {"min": 60.0, "h": 3600.0}
 
 _OTHERS = {
+    "length": {"in": 0, "ft": 0},
     "angle": {"rad": 0, "mrad": -3, "deg": 0},
-    "voltage": {"V": 0, "mV": -3, "uV": -6, "kV": 3},
-    "acceleration": {"m/s^2": 0, "cm/s^2": -2, "mm/s^2": -3},
+    "velocity": {"m/s": 0, "cm/s": -2, "mm/s": -3, "km/h": 0},
+    "angular_velocity": {"rad/s": 0, "mrad/s": -3, "deg/s": 0, "rpm": 0},
+    "acceleration": {"m/s^2": 0, "cm/s^2": -2, "mm/s^2": -3, "g": 0, "mg": -3},
     "force": {"N": 0, "mN": -3, "kN": 3},
+    "voltage": {"V": 0, "mV": -3, "uV": -6, "kV": 3},
+    "number": {"1": 0},
 }
-_FACTORS = {"deg": math.pi / 180}
+_FACTORS = {
+    **dict.fromkeys(("deg", "deg/s"), math.pi / 180),
+    **dict.fromkeys(("g", "mg"), 9.80665),
+    "rpm": math.pi / 30,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "km/h": 1 / 3.6,
+}
 _SPELLINGS = {
     "um": ("µm", "μm", "micrometer", "micrometre"),
     "mm": ("millimeter", "millimetre", "毫米"),
     "cm": ("centimeter", "centimetre", "厘米"),
     "m": ("meter", "metre", "metri", "米"),
+    "in": ("inch", "inche"),
+    "ft": ("feet", "foot"),
     "us": ("µs", "μs", "microsecond"),
     "ms": ("msec", "millisecond", "毫秒"),
     "s": ("sec", "second", "seconde", "sekunde", "sekunden", "segundo", "secondi", "secondo", "秒"),
     "min": ("minute", "minuten", "minuto", "minuti"),
-    "rad": ("radian", "radiant"),
-    "deg": ("°", "degree"),
+    "h": ("hr", "hour", "stunde", "stunden", "heure", "hora"),
+    "rad": ("radian", "radiant", "rads"),
+    "deg": ("°", "º", "degree", "grad"),
+    "rpm": ("r/min", "rev/min"),
+    "deg/s": ("dps",),
     "V": ("v", "volt"),
     "mV": ("mv", "millivolt"),
-    "m/s^2": ("m/s²", "m/s2", "m/s**2", "m/s/s", "ms^-2", "m s^-2"),
     "N": ("newton",),
 }
 _WORDS = {word: symbol for symbol, words in _SPELLINGS.items() for word in words}
-_SQUARE = re.compile(r"(?:\^|\*\*)?2|²")
+_PLAIN = str.maketrans("⁻−²¹·⋅", "--21  ")
+_SECONDS = r"(?:s|sec|secs|second|seconds)"
+_PER_SECOND = re.compile(
+    rf"(?P<what>[^\s/^*.]+)(?:\s+per\s+|\s*/\s*){_SECONDS}(?P<two>\s*(?:\^|\*\*)?\s*2|\s+squared|\s*/\s*{_SECONDS})?"
+    r"|(?P<of>[^\s/^*.\d]+?)[\s*.]*s\s*(?:\^|\*\*)?\s*\(?-(?P<power>[12])\)?"
+)
 
 
 class Measure(NamedTuple):
@@ -58,7 +88,7 @@ class Measure(NamedTuple):
 
 _MEASURES = {
     unit: Measure(quantity, unit, power, _FACTORS.get(unit, 1.0))
-    for quantity, units in {"length": LENGTHS, **_OTHERS}.items()
+    for quantity, units in (("length", LENGTHS), *_OTHERS.items())
     for unit, power in units.items()
 }
 
@@ -73,8 +103,8 @@ def unit_words(unit: str) -> str:
 
     Examples
     --------
-    >>> unit_words(" centimeters "), unit_words("m/s2"), unit_words("V")
-    ('cm', 'm/s^2', 'V')
+    >>> unit_words(" centimeters "), unit_words("m/s2"), unit_words("rad s⁻¹"), unit_words("V")
+    ('cm', 'm/s^2', 'rad/s', 'V')
     """
     plain = " ".join(unit.split()).strip(".")
     lower = plain.lower()
@@ -83,8 +113,10 @@ def unit_words(unit: str) -> str:
     found = _WORDS.get(lower) or _WORDS.get(lower.removesuffix("s")) or _WORDS.get(lower.removesuffix("es"))
     if found:
         return found
-    if "/s" in lower and (squared := _SQUARE.sub("^2", lower)) in _MEASURES:
-        return squared
+    if (per := _PER_SECOND.fullmatch(lower.translate(_PLAIN))) is not None:
+        rate = f"{unit_words(per['what'] or per['of'])}/s" + ("^2" if per["two"] or per["power"] == "2" else "")
+        if rate in _MEASURES:
+            return rate
     return lower if lower in LENGTHS or lower in TIMES else plain
 
 
@@ -99,17 +131,11 @@ def measure_of(unit: str) -> Measure | None:
     return _MEASURES.get(unit_words(unit))
 
 
-def length_power(unit: str) -> int | None:
-    """Return the power of ten that makes a length metres; None for what is no length.
-
-    Examples
-    --------
-    >>> length_power("cm"), length_power("V")
-    (-2, None)
-    """
-    return LENGTHS.get(unit_words(unit))
-
-
 def time_power(unit: str) -> int | None:
     """Return the power of ten that makes a time seconds; None for what is no time."""
     return TIMES.get(unit_words(unit))
+
+
+def time_factor(unit: str) -> float:
+    """Return by what else than a power of ten a time is multiplied to be in seconds: 60 of minutes."""
+    return _TIME_FACTORS.get(unit_words(unit), 1.0)

@@ -157,7 +157,7 @@ def format_value(value: float, u: float, unit: str = "") -> str:
     >>> format_value(1.5e-7, 2.0e-9, "m")
     '(1.500 +- 0.020)e-07 m'
     """
-    tail = f" {unit}" if unit else ""
+    tail = f" {unit}" if unit not in ("", "1") else ""
     if not math.isfinite(value) or not math.isfinite(u):
         return f"{value:g} +- {u:g}{tail}"
     if u <= 0:

@@ -30,18 +30,22 @@ class Shown:
 SHOWN = {
     "m": Shown("distance", "mm", 1e3),
     "rad": Shown("angle", "rad", 1.0),
-    "V": Shown("voltage", "V", 1.0),
+    "m/s": Shown("velocity", "m/s", 1.0),
+    "rad/s": Shown("angular velocity", "rad/s", 1.0),
     "m/s^2": Shown("acceleration", "m/s^2", 1.0),
     "N": Shown("force", "N", 1.0),
+    "V": Shown("voltage", "V", 1.0),
+    "1": Shown("value", "", 1.0),
 }
 """By the one unit that each of :data:`pipeline.track.UNITS` has."""
 
-_OF_ACCELERATION = {
-    "m/s": "m/s^3",
-    "m/s^2": "m/s^4",
-    "1/(m s)": "s/m",
-    "m^(1-n)/s": "(m/s^2)^(1-n)/s",
+_SIMPLER = {
+    "m/s": {"m/s": "m/s^2", "m/s^2": "m/s^3", "1/(m s)": "1/m"},
+    "rad/s": {"m/s": "rad/s^2", "m/s^2": "rad/s^3", "1/(m s)": "1/rad"},
+    "m/s^2": {"m/s": "m/s^3", "m/s^2": "m/s^4", "1/(m s)": "s/m"},
+    "1": {"m/s": "1/s", "m/s^2": "1/s^2", "1/(m s)": "1/s", "m^(1-n)/s": "1/s"},
 }
+"""Units for a length, by the unit that takes the place of m, where powers of s cancel or nothing is left."""
 
 
 def amount(value: float, unit: str, form: str = ".2g") -> str:
@@ -64,7 +68,7 @@ def amount(value: float, unit: str, form: str = ".2g") -> str:
     shown = SHOWN[unit]
     if unit != "m" and form.endswith("f"):
         form = ".4g"
-    return f"{value * shown.factor:{form}} {shown.unit}"
+    return f"{value * shown.factor:{form}} {shown.unit}".rstrip()
 
 
 def noun(unit: str) -> str:
@@ -77,10 +81,11 @@ def plural(unit: str) -> str:
 
     Examples
     --------
-    >>> plural("m"), plural("V")
-    ('distances', 'voltages')
+    >>> plural("m"), plural("rad/s")
+    ('distances', 'angular velocities')
     """
-    return SHOWN[unit].noun + "s"
+    own = SHOWN[unit].noun
+    return f"{own[:-1]}ies" if own.endswith("y") else f"{own}s"
 
 
 def in_unit(form: str, unit: str) -> str:
@@ -90,7 +95,13 @@ def in_unit(form: str, unit: str) -> str:
     --------
     >>> in_unit("1/(m s)", "V"), in_unit("m/s", "rad"), in_unit("1/(m s)", "m/s^2"), in_unit("1/s", "N")
     ('1/(V s)', 'rad/s', 's/m', '1/s')
+    >>> in_unit("m^(1-n)/s", "rad/s"), in_unit("rad/(s m^2)", "1")
+    ('(rad/s)^(1-n)/s', 'rad/s')
     """
-    if unit == "m/s^2" and form in _OF_ACCELERATION:
-        return _OF_ACCELERATION[form]
-    return re.sub(r"\bm\b", unit, form)
+    if form == "m":
+        return unit
+    if form in _SIMPLER.get(unit, {}):
+        return _SIMPLER[unit][form]
+    if unit == "1":
+        return re.sub(r"\(s m\b[^)]*\)", "s", form)
+    return re.sub(r"\bm\b", f"({unit})" if "/" in unit else unit, form)

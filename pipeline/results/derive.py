@@ -33,6 +33,12 @@ from pipeline.track import F8, UNUSABLE, Quality
 __all__ = ["Derived", "Params", "derive"]
 
 # Powers of length and of one over time in the unit of a law's parameter.
+_INTEGRALS = {
+    "m/s": ("displacement_amplitude", "m", 1),
+    "m/s^2": ("displacement_amplitude", "m", 2),
+    "rad/s": ("angle_amplitude", "rad", 1),
+}
+"""Of records of a derivative: what its integral is called, its unit, and of which order the derivative is."""
 _DIMENSIONS = {"A0": (1, 0), "gamma": (0, 1), "beta": (-1, 1), "mu": (1, 1)}
 
 
@@ -102,18 +108,18 @@ class Derived:
     def half_stiffness(self) -> Estimate | None:
         """Mechanical energy over the recorded amplitude's square, N/m; per kilogram where the scene gives no mass.
 
-        Of accelerations in J/(m/s^2)^2; None where the record tells no displacement.
+        Of velocities and accelerations over the square of their unit; None where the record tells no displacement.
         """
         return self._part("half_stiffness")
 
     @cached_property
     def displacement(self) -> Estimate | None:
-        """Displacement over the recorded amplitude: 1 of a length, s^2 of an acceleration; None of anything else."""
+        """Displacement over the recorded amplitude: 1, of a velocity s, of an acceleration s^2; of others None."""
         return self._part("displacement")
 
     @cached_property
     def drag_length(self) -> Estimate | None:
-        """Drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude, m; of accelerations m/s^2.
+        """Drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude, in the record's unit.
 
         None without disc, mass or air temperature.
         """
@@ -197,8 +203,9 @@ def derive(
     :math:`Q = \\omega/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start,
     :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta`,
     :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
-    Of an acceleration of amplitude a the displacement's is :math:`a/(\\omega^2 + \\lambda^2)`, and with it everything
-    that needs a length; of angles, voltages and forces no such thing is given. The spring constant needs none.
+    Of an acceleration of amplitude a the displacement's is :math:`a/(\\omega^2 + \\lambda^2)`, of a velocity
+    :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`, and with it everything that needs a length, as of an angular velocity the
+    angle's; of angles, voltages, forces and numbers no such thing is given. The spring constant needs none.
     What depends on the damping law is an average over laws (:func:`pipeline.damping.average.average_over_laws`):
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
 
@@ -227,7 +234,7 @@ def derive(
     lam = laws.rate_at_start * rates
     natural = omega**2 + laws.squared_rate * rate**2
     # How large the displacement is where the recorded value is 1; nobody knows of a voltage or a force.
-    displacement = {"m": 1.0, "m/s^2": 1.0 / natural}.get(unit)
+    displacement = {"m": 1.0, "m/s": natural**-0.5, "m/s^2": 1.0 / natural}.get(unit)
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B")
     offset = inputs.add("rest_position", rest.mean, "A", free) * scale
     noise = inputs.add("noise", _noise(demodulated, unit), "A", demodulated.residual.size - 3.0 * windows)
@@ -241,11 +248,12 @@ def derive(
         "noise": (noise, unit),
         "damping_rate": (lam, "1/s"),
     }
-    if unit == "m/s^2":
-        found["displacement_amplitude"] = (start / (omega**2 + lam**2), "m")
-    if (per_value := 1.0 if unit == "rad" else displacement) is not None:
+    if unit in _INTEGRALS:
+        name, own, order = _INTEGRALS[unit]
+        found[name] = (start / (omega**2 + lam**2) ** (0.5 * order), own)
+    if (per_value := {"rad": 1.0, "rad/s": natural**-0.5}.get(unit, displacement)) is not None:
         v_rms = omega * lengths * laws.root_mean_square * per_value
-        found["velocity_rms"] = (v_rms, "rad/s" if unit == "rad" else "m/s")
+        found["velocity_rms"] = (v_rms, "rad/s" if unit.startswith("rad") else "m/s")
     if laws.values[1] > 0:
         found["quality_factor"] = (0.5 * omega / lam, "")
     coefficients = _coefficients(laws, rates, lengths)
@@ -254,17 +262,17 @@ def derive(
     mass = own if share is None else own + share
     parts: dict[str, tuple[Any, str]] = {}
     if displacement is not None:
-        parts["displacement"] = displacement, "" if unit == "m" else "s^2"
+        parts["displacement"] = displacement, {"m": "", "m/s": "s"}.get(unit, "s^2")
         energy = 0.5 * (omega * scale / filtered.gain * displacement) ** 2 * (1.0 if mass is None else mass)
-        parts["half_stiffness"] = energy, "N/m" if unit == "m" else "J s^4/m^2"
+        parts["half_stiffness"] = energy, {"m": "N/m", "m/s": "J s^2/m^2"}.get(unit, "J s^4/m^2")
     for name, x in (("mass", mass), ("own_mass", own)):
         if x is not None:
             parts[name] = x, "kg"
     # An angle may be a pendulum's, whose bob hangs from no spring unless the scene has one.
-    if mass is not None and (unit != "rad" or scene.spring_mass_kg is not None):
+    if mass is not None and (not unit.startswith("rad") or scene.spring_mass_kg is not None):
         found["spring_constant"] = (natural * mass, "N/m")
     if diameter is not None and displacement is not None:
-        length = found["displacement_amplitude"][0] if unit == "m/s^2" else start
+        length = start if unit == "m" else found["displacement_amplitude"][0]
         found["keulegan_carpenter_number"] = (2 * math.pi * length / diameter, "")
         if ambient.known:
             found["reynolds_number"] = (ambient.density * v_rms * diameter / ambient.viscosity(), "")

@@ -132,8 +132,8 @@ def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[
         celsius, pascal, _ = scene_air(scene)
         predicted_gamma = 8.0 * air_viscosity(celsius.value, pascal.value) * radius / mass
         b = 0.5 * STEADY_DISC_DRAG * scene_air_density(scene) * math.pi * radius**2
-        # Of the displacement; an acceleration's is smaller by omega^2, and of nothing else is one known.
-        share = {"m": 1.0, "m/s^2": omega**-2}.get(unit)
+        # Of the displacement, which is smaller than its derivatives by omega each; of nothing else is one known.
+        share = {"m": 1.0, "m/s": omega**-1, "m/s^2": omega**-2}.get(unit)
         predicted_beta = None if share is None else 4.0 * b * omega / (3.0 * math.pi * mass) * share
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
     yield Effect("quadratic_drag", predicted_beta, beta, in_unit("1/(m s)", unit), beta is not None, chosen)

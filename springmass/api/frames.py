@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.quantity import in_unit
 from pipeline.results.budget import Budget
 from pipeline.results.compare import Comparison
 from pipeline.track import Quality
@@ -80,7 +81,7 @@ def run_dataset(analysis: Analysis) -> xr.Dataset:
     import xarray as xr
 
     track, motion = analysis.track, analysis.motion
-    per = {"m": track.unit, "m/s": f"{track.unit}/s", "m/s^2": f"{track.unit}/s^2"}
+    per = {form: in_unit(form, track.unit) for form in ("m", "m/s", "m/s^2")}
     flags = {
         "flag_masks": np.array([flag.value for flag in Quality], np.uint8),
         "flag_meanings": " ".join(str(flag.name).lower() for flag in Quality),

@@ -23,8 +23,8 @@ __all__ = [
 ]
 
 ESTIMATES = (
-    "period", "frequency", "angular_frequency", "spring_constant", "amplitude", "displacement_amplitude", "offset",
-    "noise", "phase", "damping_rate", "quality_factor", "velocity_rms", "reynolds_number",
+    "period", "frequency", "angular_frequency", "spring_constant", "amplitude", "displacement_amplitude",
+    "angle_amplitude", "offset", "noise", "phase", "damping_rate", "quality_factor", "velocity_rms", "reynolds_number",
     "keulegan_carpenter_number", "drag_coefficient", "gamma", "beta", "mu", "c", "n", "natural_angular_frequency",
     "own_mass_kg", "first_mode_period", "second_mode_period", "first_mode_amplitude", "second_mode_amplitude",
     "relaxation_rate", "relaxation_rate_slow", "relaxation_rate_fast",
@@ -57,6 +57,7 @@ UNITS = {
     **dict.fromkeys(("own_mass_kg", "bob_mass_kg", "spring_mass_kg"), "kg"),
     "spring_constant": "N/m",
     "displacement_amplitude": "m",
+    "angle_amplitude": "rad",
     "phase": "rad",
     "disc_diameter_m": "m",
     "air_temperature_c": "degC",

@@ -21,6 +21,7 @@ _SIUNITX = {
     "rad/s": r"\radian\per\second",
     "N/m": r"\newton\per\metre",
     "m": r"\metre",
+    "1": "",
     "kg": r"\kilogram",
     "m/s": r"\metre\per\second",
     "1/s": r"\per\second",
@@ -29,6 +30,9 @@ _SIUNITX = {
     "V": r"\volt",
     "N": r"\newton",
     "m/s^2": r"\metre\per\second\squared",
+    "rad/s^2": r"\radian\per\second\squared",
+    "1/m": r"\per\metre",
+    "1/rad": r"\per\radian",
     "degC": r"\degreeCelsius",
     "Pa": r"\pascal",
 }

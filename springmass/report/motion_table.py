@@ -38,14 +38,17 @@ def columns_of(unit: str) -> tuple[str, ...]:
     """
     if unit == "m":
         return COLUMNS
-    names = {f"smooth_{noun(unit)}": "m", "derivative": "m/s", "second_derivative": "m/s^2"}
-    smooth = [f"{name}_{_spelt(in_unit(form, unit))}" for name, form in names.items()]
-    own = f"{noun(unit)}_{_spelt(unit)}"
+    word = noun(unit).replace(" ", "_")
+    names = {f"smooth_{word}": "m", "derivative": "m/s", "second_derivative": "m/s^2"}
+    smooth = [f"{name}{_spelt(in_unit(form, unit))}" for name, form in names.items()]
+    own = f"{word}{_spelt(unit)}"
     return ("time_s", own, "used", *(x for each in smooth for x in (each, f"u_{each}")))
 
 
 def _spelt(unit: str) -> str:
-    return unit.replace("/", "_per_").replace("^", "")
+    """Spell a unit as it stands behind a name; of a plain number nothing."""
+    spelt = unit.removeprefix("1").replace("/", "_per_").replace("^", "").strip("_")
+    return f"_{spelt}" if spelt else ""
 
 
 def smoothed_or_why(analysis: Analysis) -> Smoothed | str:

@@ -39,6 +39,7 @@ _QUANTITIES = (
     ("spring_constant", "spring constant", "k", "k", "k"),
     ("amplitude", "amplitude at the start", "A0", "A₀", "A_0"),
     ("displacement_amplitude", "amplitude of the displacement", "x0", "x₀", "x_0"),
+    ("angle_amplitude", "amplitude of the angle", "theta0", "θ₀", r"\theta_0"),
     ("offset", "rest position", "y0", "y₀", "y_0"),
     ("noise", "noise of one sample", "sigma", "σ", r"\sigma"),
     ("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda"),
@@ -58,7 +59,7 @@ _QUANTITIES = (
 )
 QUANTITIES = {name: quantity for name, quantity, *_ in _QUANTITIES}
 
-_PAGE_UNITS = {"degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
+_PAGE_UNITS = {"1": "", "degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 NOTHING = "-"
 

@@ -60,7 +60,9 @@ def verdict(analysis: Analysis) -> tuple[str, ...]:
     if isinstance(analysis.motion, Still):
         return ("Nothing oscillates in this record; rest position and noise are all that it gives.",)
     found = analysis.estimates
-    measured = f"The bob swings with the period T\u00a0=\u00a0{kept(found['period'])}"
+    unit = analysis.track.unit
+    moves = "bob swings" if unit == "m" else f"{noun(unit)} oscillates"
+    measured = f"The {moves} with the period T\u00a0=\u00a0{kept(found['period'])}"
     if "spring_constant" in found:
         measured += f", which makes the spring constant k\u00a0=\u00a0{kept(found['spring_constant'])}"
     return (f"{measured}.", _damped(analysis.motion.damping, analysis.motion.derived.coefficients))
@@ -162,7 +164,8 @@ def _energy(analysis: Analysis, motion: Oscillation) -> str:
 
 
 def _of_displacement(analysis: Analysis) -> str:
-    return " with A the recorded amplitude over ω²" if analysis.track.unit == "m/s^2" else ""
+    over = {"m/s": "ω", "m/s^2": "ω²"}.get(analysis.track.unit)
+    return f" with A the recorded amplitude over {over}" if over else ""
 
 
 def _drag(analysis: Analysis, motion: Oscillation) -> str:

@@ -62,8 +62,9 @@ def _contents(path: str, data: bytes) -> Contents:
     numbers = [np.array(column) for column in zip(*rows, strict=True)]
     names = tuple(f"column {column + 1}" for column in range(len(numbers)))
     sheet = Sheet(text, text.start, text.stop, 1, mark, names=names)
-    time = times_by_steps([Heading("", "")] * len(names), numbers) if len(names) > 1 else None
     counts = len(names) > 1 and are_row_numbers(numbers[0])
+    # Beside row numbers one column alone is what was measured, however it runs.
+    time = times_by_steps([Heading("", "")] * len(names), numbers) if len(names) > 1 + counts else None
     channels = (
         Channel(name, "", sheet, "", column, time)
         for column, name in enumerate(names)

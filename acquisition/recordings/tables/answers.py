@@ -33,10 +33,14 @@ _SLOW_S = 0.999
 _FIRST_ROWS = 50
 _ANEW = 0.2
 _LAST_BYTES = 4096
+_EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
+"""Times since 1970, from which size on they are in which unit."""
 _LIKELY = (
-    (re.compile(r"theta|θ|phi|φ|ang|winkel|rad|rotat|gyr|omega|ω", re.IGNORECASE), "rad"),
-    (re.compile(r"volt|spannung|^ch|signal|tens", re.IGNORECASE), "V"),
-    (re.compile(r"acc|beschl|versn", re.IGNORECASE), "m/s2"),
+    (re.compile(r"gyr|omega|ω|ang\w*[ _.]*(vel|speed|ges)|winkelges|^g[xyz](?![^\W_])", re.IGNORECASE), "rad/s"),
+    (re.compile(r"acc|beschl|versn|^a[xyz](?![^\W_])|g[-_ ]?f|^ac[xyz]", re.IGNORECASE), "m/s2"),
+    (re.compile(r"vel|speed|^v(?![^\W\d_])|^v[xyz](?![^\W_])|geschw", re.IGNORECASE), "m/s"),
+    (re.compile(r"theta|θ|phi|φ|ang|winkel|rad|rotat|roll|pitch|yaw", re.IGNORECASE), "rad"),
+    (re.compile(r"volt|spannung|^ch|signal|tens|^ai?\d|ampl", re.IGNORECASE), "V"),
     (re.compile(r"force|kraft|forza|fuerza", re.IGNORECASE), "N"),
 )
 
@@ -72,7 +76,7 @@ def settle(path: str, contents: Contents, said: Answers) -> Channel:
         chosen = named(path, channels, said.channel)
     else:
         fit = candidates([each for each in channels if each.name != said.time] or channels)
-        chosen = next((each for each in fit if measure_of(each.unit)), fit[0])
+        chosen = next((each for each in fit if each.measure), fit[0])
         if len(fit) > 1:
             names = ", ".join(f'"{each.label}"' for each in fit)
             questions.append((f"which channel of {names}", f"--channel {_quoted(chosen.name)}"))
@@ -82,11 +86,10 @@ def settle(path: str, contents: Contents, said: Answers) -> Channel:
         chosen = replace(chosen, time=None, formula=None)  # chunks: what lies between them is told nowhere
     chosen = _with_time_unit(path, chosen, said.time_unit)
     questions.extend(_of_times(contents, chosen, said))
-    if measure_of(chosen.unit) is None and said.unit is None:
-        what = (
-            f"what does one {chosen.unit} of {chosen.name} count as" if chosen.unit else f"what is {chosen.name}'s unit"
-        )
-        questions.append((what, f"--unit {_likely_unit(chosen.name)}"))
+    if chosen.measure is None and said.unit is None:
+        what = f"what does one {chosen.unit} of {chosen.name} count as (1: a plain number)"
+        what = what if chosen.unit else f"what is {chosen.name}'s unit"
+        questions.append((what, f"--unit {1 if chosen.unit else _likely_unit(chosen.name)}"))
     if questions:
         demand = f"{_columns(channels, chosen)}: {', and '.join(each for each, _ in questions)}?"
         given = _given(said)
@@ -104,7 +107,7 @@ def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tup
     FormatError
         If the unit given is none, or contradicts the file.
     """
-    stated = measure_of(channel.unit)
+    stated = channel.measure
     given = None if unit is None else measure_of(unit)
     if unit is not None and given is None:
         raise FormatError(path, f'unit must be one of {known_units()}, got "{unit}"', "name one of these")
@@ -119,8 +122,11 @@ def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tup
         raise FormatError(path, demand, "leave the unit out")
     if not channel.unit:
         return given, (Trap("unit_assumed", f'the unit of "{channel.name}", {unit}, was given by the user'),)
-    holds = "times, frequencies and damping rates hold, everything in metres is in that unit"
-    kind = "is no distance" if given.quantity == "length" else f"is no {given.quantity}"
+    holds = "times, frequencies and damping rates hold"
+    if given.quantity == "number":
+        return given, (Trap("unit_assumed", f'"{channel.label}" is read as plain numbers, as the user asked; {holds}'),)
+    kind = f"is no {'distance' if given.quantity == 'length' else given.quantity.replace('_', ' ')}"
+    holds += ", everything in metres is in that unit" if given.quantity == "length" else ""
     message = f'"{channel.label}" {kind}: one {channel.unit} counts as one {unit}, as the user asked; {holds}'
     return given, (Trap("unit_assumed", message),)
 
@@ -178,7 +184,7 @@ def _with_time_unit(path: str, chosen: Channel, unit: str | None) -> Channel:
         raise FormatError(path, f'time unit must be one of {", ".join(TIMES)}, got "{unit}"', "name one of these")
     if chosen.source.t is None if isinstance(chosen.source, Arrays) else chosen.time is None:
         raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
-    if chosen.time_unit and unit_words(chosen.time_unit) != unit_words(unit):
+    if time_power(chosen.time_unit) is not None and unit_words(chosen.time_unit) != unit_words(unit):
         said = unit_words(chosen.time_unit)
         raise FormatError(path, f'time unit "{unit}" was given, but the file says {said}', "leave it out")
     return replace(chosen, time_unit=unit)
@@ -196,12 +202,23 @@ def _of_times(contents: Contents, chosen: Channel, said: Answers) -> list[tuple[
         others = [each for each in contents.channels if each.name != chosen.name and each.run == chosen.run]
         or_time = ", or which column is the time (--time NAME)" if others else ""
         return [(f"what is the rate{or_time}", "--rate-hz R")]
-    if chosen.time_unit or chosen.formula is not None:
+    if time_power(chosen.time_unit) is not None or chosen.formula is not None:
         return []
-    steps = np.diff(_times_at_first(chosen))
-    if steps.size and float(np.median(steps)) >= _SLOW_S:
-        return [(f"what is {_time_name(chosen) or 'the time'}'s unit", "--time-unit ms")]
+    times = _times_at_first(chosen)
+    if chosen.time_unit:
+        what = f"what does one {chosen.time_unit} of {_time_name(chosen) or 'the time'} count as"
+        return [(what, f"--time-unit {_likely_time_unit(times)}")]
+    if times.size > 1 and float(np.median(np.diff(times))) >= _SLOW_S:
+        return [(f"what is {_time_name(chosen) or 'the time'}'s unit", f"--time-unit {_likely_time_unit(times)}")]
     return []
+
+
+def _likely_time_unit(times: F8) -> str:
+    """Return the unit in which times are most often printed so large, or in steps so long."""
+    if times.size < 2:
+        return "ms"
+    since_1970 = next((unit for least, unit in _EPOCHS if times[0] >= least), None)
+    return since_1970 or ("us" if float(np.median(np.diff(times))) >= 1000.0 else "ms")
 
 
 def _begins_anew(sheet: Sheet, column: int) -> bool:

@@ -23,7 +23,7 @@ from acquisition.recordings.sampling.timing import (
 )
 from acquisition.recordings.tables.contents import Arrays, Channel, Sheet
 from acquisition.recordings.tables.table import EMPTY, EXPONENT, UNREAD, Table, read_table
-from acquisition.recordings.units import TIMES, time_power, unit_words
+from acquisition.recordings.units import TIMES, time_factor, time_power
 
 __all__ = ["Sampled", "pull", "sample"]
 
@@ -86,9 +86,8 @@ def pull(path: str, channel: Channel, power: int) -> Rows:
 
 def _from_arrays(path: str, channel: Channel, arrays: Arrays, power: int) -> Rows:
     value = arrays.values / 10.0**-power if power else arrays.values.copy()
-    minutes = 60.0 if unit_words(channel.time_unit) == "min" else 1.0
     # A copy: channels may share the times, and they will be written to.
-    t = None if arrays.t is None else arrays.t * minutes / 10.0 ** -_time_power(path, channel)
+    t = None if arrays.t is None else arrays.t * time_factor(channel.time_unit) / 10.0 ** -_time_power(path, channel)
     bad = np.zeros(value.size, bool) if t is None else ~np.isfinite(t)
     if bad.any():
         value[bad] = np.nan
@@ -142,8 +141,8 @@ def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Rows:
         time_resolution = _resolution(printed, table.decimals[at], table.exponents[at], shift)
         if channel.formula is not None:
             tolerance = tolerance_of(printed, _kept(table.form[at], kept), shift, EXPONENT)
-        if unit_words(channel.time_unit) == "min":
-            printed, time_resolution = printed * 60.0, time_resolution * 60.0
+        if (factor := time_factor(channel.time_unit)) != 1.0:
+            printed, time_resolution = printed * factor, time_resolution * factor
         if not within(printed, _LONGEST_S):
             none = ~(np.abs(printed) < _LONGEST_S)
             printed, bad = np.where(none, np.nan, printed), bad | none

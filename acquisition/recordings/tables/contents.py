@@ -10,7 +10,7 @@ from acquisition.block import F8
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.text import Text
-from acquisition.recordings.units import length_power, unit_words
+from acquisition.recordings.units import Measure, measure_of, unit_words
 from acquisition.source import ClockKind
 
 __all__ = [
@@ -58,8 +58,10 @@ _BESIDE_TIME = frozenset(
 )
 """Words that a time may have beside its own: what else stands there makes it a time of something, a period say."""
 _WORDS = re.compile(r"[^\W\d_]+\d*|\d+")
+_ACCELERATION = re.compile(r"acc|beschl|versn|g[-_ ]?f|^a(?![^\W\d_])|^a[xyz](?![^\W_])", re.IGNORECASE)
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
-_HEADING = re.compile(r"(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*")
+_HEADING = re.compile(r"(?P<name>.*?)\s*[(\[<](?P<unit>[^()\[\]<>]*)[)\]>]\s*")
+_NO_UNIT = re.compile(r"\d+|.*:.*")  # the number of a channel, a remark
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,9 +170,19 @@ class Channel:
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
     @property
+    def measure(self) -> Measure | None:
+        """What its unit says that its values are of; None where it says nothing.
+
+        A g is standard gravity only of what is called an acceleration, else a gram.
+        """
+        found = measure_of(self.unit if self.unit != "G" else "g")
+        grams = found is not None and found.symbol in ("g", "mg") and not _ACCELERATION.search(self.name)
+        return None if grams else found
+
+    @property
     def is_length(self) -> bool:
         """Whether its unit is a length."""
-        return length_power(self.unit) is not None
+        return self.measure is not None and self.measure.quantity == "length"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,7 +221,9 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     """
     plain = heading.strip().strip('"').strip()
     found = _HEADING.fullmatch(plain)
-    return (found["name"].strip(), found["unit"].strip()) if found and found["name"] else (plain, "")
+    if not found or not found["name"] or _NO_UNIT.fullmatch(found["unit"].strip()):
+        return plain, ""
+    return found["name"].strip(), found["unit"].strip()
 
 
 def is_time(name: str) -> bool:

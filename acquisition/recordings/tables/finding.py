@@ -27,9 +27,13 @@ _CLOCK = re.compile(
     r"\s*(?P<half>[aApP]\.?[mM]\.?)?(?:Z|[+-]\d\d:?\d\d)?",
     re.ASCII,
 )
+_SETTING = re.compile(r"[=]|:(?!\s*$)")
+_LONGEST_NAME = 5  # words
 _BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
 _SLASH = re.compile(r"(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]+(?:/[^\s/]+)?)")
-_TAIL = re.compile(r"(?P<name>.*[^\W_])[_ ](?:in )?(?P<unit>[^\W_]+|m/s\^?[2²])")
+_TAIL = re.compile(r"(?P<name>.*?[^\W_])(?:[_ ](?:in )?|,\s*|:)(?P<unit>[^\W_]+(?:/s(?:ec)?(?:\^?2|²)?)?|°(?:/s)?)")
+_NO_TAIL = frozenset(("1", "in", "g", "mg"))
+"""Units that end a name as often for another reason: ``V_in``, ``x_1``."""
 _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
 
 
@@ -183,7 +187,7 @@ def _with_names(lines: Sequence[Line], start: int, mark: str, brackets: bool, wi
     names, units, at_names = [""] * width, [""] * width, start
     spare: tuple[tuple[str, str], ...] = ()
     for at in above:
-        found = _names(lines[at].text, mark, width)
+        found = _names(lines[at].text, mark, width, numbered=at_names < start)
         if not found:
             continue
         below = found[:width] + [""] * (width - len(found))
@@ -204,12 +208,17 @@ def _with_names(lines: Sequence[Line], start: int, mark: str, brackets: bool, wi
     return Found(preamble, tuple(headings), spare, lines[start], mark, brackets, ())
 
 
-def _names(line: str, mark: str, width: int) -> list[str]:
-    """Split a line into as many names as there are columns; none where it cannot be."""
+def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[str]:
+    """Split a line into as many names as there are columns; none where it cannot be.
+
+    Most names are words, but where channels may be ``numbered``; of one column alone a setting or a sentence is none.
+    """
     plain = line.lstrip(_COMMENT).rstrip().removeprefix("DEF=")
+    if width == 1 and (_SETTING.search(plain) or len(plain.split()) > _LONGEST_NAME):
+        return []
     for cells in _splits(plain, mark, width):
         words = [cell for cell in cells if cell and parse_number(cell) is None and not _CLOCK.fullmatch(cell)]
-        if words and 2 * len(words) >= len([cell for cell in cells if cell]) and max(map(len, words)) <= 80 + len(line):
+        if words and (numbered or 2 * len(words) >= len([cell for cell in cells if cell])):
             return cells
     return []
 
@@ -254,15 +263,24 @@ def heading_of(cell: str) -> tuple[str, str]:
     --------
     >>> heading_of("Zeit t / s"), heading_of("theta_rad"), heading_of("x_rojo"), heading_of("Time(sec)")
     (('Zeit t', 's'), ('theta', 'rad'), ('x_rojo', ''), ('Time', 'sec'))
+    >>> heading_of("Position in mm"), heading_of("Volt, V"), heading_of("gx_dps"), heading_of("V_in")
+    (('Position', 'mm'), ('Volt', 'V'), ('gx', 'dps'), ('V_in', ''))
     """
     name, unit = name_and_unit(cell)
     if unit:
         return name, unit
     for form in (_SLASH, _TAIL):
         found = form.fullmatch(name)
-        if found and (form is _SLASH or measure_of(found["unit"]) or time_power(found["unit"]) is not None):
+        if found and (form is _SLASH or _ends(found["name"], found["unit"])):
             return found["name"].strip(), found["unit"].strip()
     return name, ""
+
+
+def _ends(name: str, unit: str) -> bool:
+    """Tell whether what ends a name is its unit; a lonely h only of a time."""
+    if unit in _NO_TAIL or (unit == "h" and not is_time(name)):
+        return False
+    return measure_of(unit) is not None or time_power(unit) is not None
 
 
 def clock_s(cell: str) -> tuple[str, float, int] | None:

@@ -16,7 +16,10 @@ __all__ = ["are_row_numbers", "columns_of", "is_aside", "runs_forward", "times_b
 
 _INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
 _FIRST_NUMBERS = 10  # rows that are not like the others may stand before the first that is read
-_NEUTRAL = re.compile(r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|column \d+", re.IGNORECASE)
+_NEUTRAL = re.compile(
+    r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|(column|col|spalte|colonna|columna|var|field|unnamed:)[-_ ]?\d+",
+    re.IGNORECASE,
+)
 """Names that say nothing against a column of times."""
 _SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10", re.IGNORECASE)
 """Names of times that are no clock: how long something took."""

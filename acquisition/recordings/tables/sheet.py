@@ -16,7 +16,6 @@ from acquisition.recordings.tables.answers import Answers, measure, settle
 from acquisition.recordings.tables.channel import pull, sample
 from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet, channels_of
 from acquisition.recordings.tables.text import head_lines, says_simulated, text_of
-from acquisition.recordings.units import length_power
 from acquisition.source import Kind, SourceInfo
 
 __all__ = ["ColumnFormat", "headed_format"]
@@ -97,7 +96,7 @@ class ColumnFormat:
     def _survey(self, path: str, channel: Channel) -> Survey:
         rows = 0
         try:
-            pulled = pull(path, channel, length_power(channel.unit) or 0)
+            pulled = pull(path, channel, channel.measure.power if channel.measure else 0)
             rows = pulled.value.size
             column = sample(path, channel, pulled, None)
         except NeedsAnswer:

@@ -55,9 +55,10 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
                 "more",
             )
         )
-    if track.unit not in ("m", "m/s^2"):
+    per_value = {"m": omega**2, "m/s": omega, "m/s^2": 1.0}.get(track.unit)
+    if per_value is None:
         return Checked(tuple(found))
-    gravities = amplitude * (omega**2 if track.unit == "m" else 1.0) / GRAVITY_M_PER_S2
+    gravities = amplitude * per_value / GRAVITY_M_PER_S2
     if gravities > MOST_GRAVITIES:
         misfits.append(Misfit(name="implausible_motion", amplitude_m=amplitude * (1.0 - 1.0 / gravities)))
         mains = _mains(f, rate_hz)
@@ -78,8 +79,8 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
                 "warning",
                 f"an amplitude of {amplitude:.3g} {track.unit} at {f:.4g} Hz needs {gravities:.2g} times the "
                 "acceleration of gravity, which no bob hanging from a spring reaches: likely a wrong unit, hum, or "
-                f"{'a velocity read as distance' if track.unit == 'm' else 'counts read as m/s^2'}; check unit and "
-                "column",
+                f"{'a velocity read as distance' if track.unit == 'm' else f'counts read as {track.unit}'}; check "
+                "unit and column",
             )
         )
     # Where distances are counted from the first sample, as from a velocity, their zero says nothing.

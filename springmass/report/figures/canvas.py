@@ -254,7 +254,8 @@ def value_label(what: str, unit: str) -> str:
     >>> value_label("amplitude", "m"), value_label("amplitude", "m/s^2")
     ('amplitude / mm', 'amplitude / (m/s²)')
     """
-    return f"{what} / {_in_brackets(SHOWN[unit].unit)}"
+    own = SHOWN[unit].unit
+    return f"{what} / {_in_brackets(own)}" if own else what
 
 
 def derivative_label(what: tuple[str, str], form: str, unit: str) -> str:

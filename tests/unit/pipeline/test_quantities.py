@@ -57,9 +57,17 @@ def test_the_same_numbers_give_the_same_results_in_their_own_unit(quantity: str,
     units = dict(
         zip(*(getattr(oscillation(other).damping.best.joint, each) for each in ("names", "units")), strict=True)
     )
-    per = {"rad": "1/(rad s)", "V": "1/(V s)", "m/s^2": "s/m", "N": "1/(N s)"}[unit]
-    assert units == {"A0": unit, "gamma": "1/s", "beta": per}
-    assert oscillation(other).derived.coefficients["beta"].unit == per
+    per = {
+        "rad": "1/(rad s)",
+        "V": "1/(V s)",
+        "m/s": "1/m",
+        "rad/s": "1/rad",
+        "m/s^2": "s/m",
+        "N": "1/(N s)",
+        "1": "1/s",
+    }
+    assert units == {"A0": unit, "gamma": "1/s", "beta": per[unit]}
+    assert oscillation(other).derived.coefficients["beta"].unit == per[unit]
 
 
 @every
@@ -75,35 +83,42 @@ def test_no_number_is_in_metres_where_nothing_was_measured_in_them(quantity: str
     needless = {name for name, own in told.items() if re.search(r"\bm\b", own.replace(unit, ""))}
     # A mass and a period give N/m whatever was recorded; an acceleration gives lengths by omega^2.
     allowed = {"spring_constant", "budget spring_constant"}
-    if unit == "m/s^2":
+    if unit in ("m/s", "m/s^2"):
         derived = ("displacement_amplitude", "velocity_rms")
         allowed |= {*derived, *(f"budget {name}" for name in derived)}
-        needless = {name for name in needless if told[name] not in ("m/s^3", "s/m", "(m/s^2)^(1-n)/s")}
+        own = ("m/s^2", "m/s^3", "1/m", "s/m", f"({unit})^(1-n)/s")
+        needless = {name for name in needless if told[name] not in own}
     assert needless <= allowed
 
 
-def test_an_acceleration_gives_the_displacement_and_what_follows_from_it() -> None:
-    """Amplitude, velocity, Reynolds number, drag and energy are those of the bob, by omega^2, within two u."""
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_derivative_gives_the_displacement_and_what_follows_from_it(order: int) -> None:
+    """Of a velocity or an acceleration amplitude, Reynolds number, drag and energy are the bob's, within two u."""
     t = times(60.0)
     start, lam = TRUTH.amplitude, TRUTH.gamma + TRUTH.beta * TRUTH.amplitude
-    exact = 9.81 + TRUTH.omega**2 * (TRUTH.position(t) - TRUTH.offset)
-    y = exact + 0.02 * np.random.default_rng(4).standard_normal(t.size)
-    by_acceleration = analyse(Track.from_arrays(t, y, quantity="acceleration", unit="m/s^2"), SCENE)
+    displacement = TRUTH.position(t) - TRUTH.offset
+    noise = np.random.default_rng(4).standard_normal(t.size)
+    if order == 2:
+        y = 9.81 + TRUTH.omega**2 * displacement + 0.02 * noise
+        by_derivative = analyse(Track.from_arrays(t, y, quantity="acceleration", unit="m/s^2"), SCENE)
+    else:
+        y = np.gradient(displacement, t, edge_order=2) + 0.0025 * noise
+        by_derivative = analyse(Track.from_arrays(t, y, quantity="velocity", unit="m/s"), SCENE)
     by_length = analyse(track(), SCENE)
-    amplitude = by_acceleration.estimates["displacement_amplitude"]
+    amplitude = by_derivative.estimates["displacement_amplitude"]
     assert amplitude.unit == "m"
     assert abs(amplitude.value - start) < 2.5 * amplitude.u < 0.01 * start
-    assert (
-        abs(by_acceleration.estimates["damping_rate"].value - lam) < 3.0 * by_acceleration.estimates["damping_rate"].u
-    )
+    assert abs(by_derivative.estimates["damping_rate"].value - lam) < 3.0 * by_derivative.estimates["damping_rate"].u
     names = ("velocity_rms", "reynolds_number", "keulegan_carpenter_number", "spring_constant")
-    for name in (*names, "drag_coefficient") if "drag_coefficient" in by_acceleration.estimates else names:
-        mine, its = by_acceleration.estimates[name], by_length.estimates[name]
+    drag = "drag_coefficient"
+    both = drag in by_derivative.estimates and drag in by_length.estimates
+    for name in (*names, drag) if both else names:
+        mine, its = by_derivative.estimates[name], by_length.estimates[name]
         assert mine.unit == its.unit
         assert abs(mine.value - its.value) < 3.0 * np.hypot(mine.u, its.u), name
     curves = [
         motion.derived.energy_curve(motion.damping, motion.demodulated)
-        for motion in map(oscillation, (by_acceleration, by_length))
+        for motion in map(oscillation, (by_derivative, by_length))
     ]
     assert curves[0] is not None
     assert curves[1] is not None
@@ -111,11 +126,28 @@ def test_an_acceleration_gives_the_displacement_and_what_follows_from_it() -> No
     assert curves[0].y[0] == pytest.approx(curves[1].y[0], rel=0.01)
     drags = [
         motion.derived.drag_curve(motion.damping, motion.demodulated)
-        for motion in map(oscillation, (by_acceleration, by_length))
+        for motion in map(oscillation, (by_derivative, by_length))
     ]
     assert drags[0] is not None
     assert drags[1] is not None
     assert drags[0].y[-1] == pytest.approx(drags[1].y[-1], rel=0.05)
+
+
+def test_an_angular_velocity_gives_the_angle() -> None:
+    """Its amplitude over omega, and none of what needs a length; a spring constant where the scene has a spring."""
+    t = times(60.0)
+    angle = TRUTH.position(t) - TRUTH.offset
+    y = np.gradient(angle, t, edge_order=2) + 0.0025 * np.random.default_rng(4).standard_normal(t.size)
+    spring = replace(SCENE, spring_mass_kg=Estimate(0.01, 1e-4, "kg"))
+    for scene in (SCENE, spring):
+        found = analyse(Track.from_arrays(t, y, quantity="angular_velocity", unit="rad/s"), scene).estimates
+        amplitude = found["angle_amplitude"]
+        assert amplitude.unit == "rad"
+        assert abs(amplitude.value - TRUTH.amplitude) < 2.5 * amplitude.u < 0.01 * TRUTH.amplitude
+        assert abs(found["period"].value - TRUTH.period) < 3.0 * found["period"].u
+        assert found["velocity_rms"].unit == "rad/s"
+        assert ("spring_constant" in found) == (scene is spring)
+        assert not {"displacement_amplitude", "reynolds_number", "drag_coefficient"} & set(found)
 
 
 def test_what_a_scene_allows_of_an_angle_a_voltage_and_a_force() -> None:
@@ -179,13 +211,13 @@ def test_words_are_of_the_records_own_quantity(quantity: str, unit: str) -> None
 
 
 def test_a_shake_beyond_gravity_is_implausible_and_an_angle_never() -> None:
-    """An acceleration of 30 m/s^2 is none of a hanging bob; 30 rad or 30 V are nobody's business."""
+    """An acceleration of 30 m/s^2 is none of a hanging bob, nor 30 m/s; 30 rad or 30 V are nobody's business."""
     t = times(20.0)
     y = 30.0 * np.cos(8.3 * t) + 0.01 * np.random.default_rng(1).standard_normal(t.size)
     for quantity, unit in UNITS.items():
         found = analyse(Track.from_arrays(t, y, quantity=quantity, unit=unit))
         codes = {finding.code for finding in found.findings}
-        assert ("implausible_motion" in codes) == (quantity in ("length", "acceleration")), quantity
+        assert ("implausible_motion" in codes) == (quantity in ("length", "velocity", "acceleration")), quantity
         assert ("implausible_distance" in codes) == (quantity == "length"), quantity
 
 

@@ -24,7 +24,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.results.checks.finding import Finding
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
-from pipeline.track import UNUSABLE, Track
+from pipeline.track import UNITS, UNUSABLE, Track
 from springmass.report.advice import ADVICE, LAW_CODES
 from springmass.report.budgets import INPUTS, budget_csv, budget_text, budgets_of, correlations_of
 from springmass.report.figures import comparison_figure, draw, motion_figure, render
@@ -223,6 +223,19 @@ def test_rejected_laws_are_named_in_words() -> None:
     assert table.count("<tbody") == len(motion.damping.fits)
     assert re.findall(r'<th scope="col">([^<]*)</th>', table) == ["law", "reduced χ²", "Δχ²", "dof", "ΔBIC"]
     assert re.search(r'linear<br><span class="sub">rejected', table)
+
+
+@pytest.mark.parametrize(("quantity", "unit"), UNITS.items())
+def test_the_verdict_speaks_of_what_was_recorded(quantity: str, unit: str) -> None:
+    """A bob swings where its distance was taken; of anything else nobody knows of one, and no caption names a plot."""
+    t = np.arange(1500) / 50.0
+    y = 2.0 + 0.05 * np.exp(-0.02 * t) * np.cos(6.0 * t) + 3e-4 * np.random.default_rng(3).standard_normal(t.size)
+    analysis = analyse(Track.from_arrays(t, y, quantity=quantity, unit=unit))
+    word = {"length": "bob swings", "number": "value oscillates"}.get(quantity, f"{quantity} oscillates")
+    assert verdict(analysis)[0].startswith(f"The {word.replace('_', ' ')} with the period T")
+    names = draw(analysis) if quantity in ("velocity", "number") else ("position", "amplitude", "phase", "motion")
+    for name in names:
+        assert ("bob" in caption(name, analysis)) <= (quantity == "length")
 
 
 @pytest.mark.parametrize("make", [bare, damped])
