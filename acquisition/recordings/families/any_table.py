@@ -23,12 +23,14 @@ from acquisition.recordings.tables.roles import columns_of, is_aside, times_by_n
 from acquisition.recordings.tables.sheet import ColumnFormat
 from acquisition.recordings.tables.text import Text, decode, guess_delimiter, is_text, parse_number, text_of
 from acquisition.recordings.tables.wrapped import SETTINGS, begins_with_lists, unwrapped
+from acquisition.recordings.units import measure_of, time_power
 
 __all__ = ["FORMAT"]
 
 _HEAD_LINES = 300
 _DAY_S = 86400.0
 _MONITOR = b" -> "
+_WRAPS = (b"[", SETTINGS.encode())  # how rows begin that are wrapped, and could be taken for a table as they stand
 _BLANKS = bytes.maketrans(b"[];", b"   ")
 
 
@@ -50,7 +52,8 @@ def _contents(path: str, data: bytes) -> Contents:
     if found is None:
         raise FormatError(path, "expected rows of numbers, three or more alike", "check that the export ended")
     columns = columns_of(found.rows)
-    headings, times, formula = list(found.headings), times_by_name(found.headings, columns), _formula(found)
+    headings, words = _units_beside(found)
+    times, formula = times_by_name(headings, columns), _formula(found)
     traps = list(_preamble(found))
     clocks = [column for column, cell in enumerate(found.rows[0]) if clock_s(cell) and parse_number(cell) is None]
     if found.brackets:
@@ -69,7 +72,7 @@ def _contents(path: str, data: bytes) -> Contents:
     sheet = Sheet(text, found.line.start, text.stop, found.line.number, found.mark, names=tuple(names))
     channels = []
     for column, each in enumerate(headings):
-        if column in times or column in clocks or (formula is not None and column == 0):
+        if column in times or column in clocks or column in words or (formula is not None and column == 0):
             continue
         aside = is_aside(each, columns[column], bool(times) or len(columns) > 1)
         time = max((at for at in times if at < column), default=times[0] if times else None)
@@ -94,6 +97,17 @@ def _contents(path: str, data: bytes) -> Contents:
     return Contents(tuple(channels), title=title, traps=tuple(traps), zeros=text.zeros)
 
 
+def _units_beside(found: Found) -> tuple[list[Heading], set[int]]:
+    """Give numbers the unit that stands behind each of them in a column of its own; return also these columns."""
+    headings, words = list(found.headings), set()
+    for column, cells in enumerate(zip(*found.rows, strict=True)):
+        known = measure_of(cells[0]) is not None or time_power(cells[0]) is not None
+        if column and known and parse_number(cells[0]) is None and len(set(cells)) == 1 and not headings[column].name:
+            headings[column - 1] = replace(headings[column - 1], unit=headings[column - 1].unit or cells[0])
+            words.add(column)
+    return headings, words
+
+
 def _plain(path: str, text: Text) -> Text:
     """Take marks of thousands out of a text; the last line of its head says what separates cells."""
     lines = text.head(_HEAD_LINES)
@@ -107,7 +121,9 @@ def _plain(path: str, text: Text) -> Text:
 
 def _find(text: Text) -> tuple[Text, Found | None]:
     """Find the table; where rows are wrapped in words or brackets, in the text without these."""
-    wrapped = _MONITOR in text.data[: 1 << 16] or text.data.startswith(SETTINGS.encode(), text.start)
+    wrapped = any(each in text.data[: 1 << 16] for each in (_MONITOR, b" & ")) or text.data.startswith(
+        _WRAPS, text.start
+    )
     found = None if wrapped else find_table(text.head(_HEAD_LINES))
     told = None if found is not None else unwrapped(text)
     if told is None:

@@ -23,6 +23,7 @@ __all__ = [
     "candidates",
     "channels_of",
     "is_time",
+    "is_uncertainty",
     "name_and_unit",
     "named",
     "numbered_apart",
@@ -32,7 +33,7 @@ __all__ = [
 
 _TIME_WORDS = frozenset(
     (
-        *("time", "times", "t", "elapsed", "timestamp", "seconds", "secs", "millis", "milliseconds"),
+        *("time", "times", "t", "elapsed", "timestamp", "seconds", "secs", "millis", "milliseconds", "micros"),
         *("zeit", "tempo", "tempi", "temps", "tiempo", "tiempos", "tijd", "tid", "czas", "čas", "aika", "idő"),
         *("zaman", "время", "时间", "時間", "시간"),
     )
@@ -59,6 +60,10 @@ _BESIDE_TIME = frozenset(
 """Words that a time may have beside its own: what else stands there makes it a time of something, a period say."""
 _WORDS = re.compile(r"[^\W\d_]+\d*|\d+")
 _ACCELERATION = re.compile(r"acc|beschl|versn|g[-_ ]?f|^a(?![^\W\d_])|^a[xyz](?![^\W_])", re.IGNORECASE)
+_UNCERTAIN = re.compile(
+    r".*\b(u?n?certain\w*|err\w*|sigma|std|incert\w*|unsicher\w*|fehler|sd)\b.*|[dδΔσu][_ ]?[a-zθφ]|[a-zθφ]'|[\d.,]+",
+    re.IGNORECASE,
+)
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _HEADING = re.compile(r"(?P<name>.*?)\s*[(\[<](?P<unit>[^()\[\]<>]*)[)\]>]\s*")
 _NO_UNIT = re.compile(r"\d+|.*:.*")  # the number of a channel, a remark
@@ -242,6 +247,17 @@ def is_time(name: str) -> bool:
     return all(len(word) == 1 or word.isdecimal() or word in _BESIDE_TIME for word in beside)
 
 
+def is_uncertainty(name: str) -> bool:
+    """Tell whether a column's name says that it is the uncertainty of another's values.
+
+    Examples
+    --------
+    >>> is_uncertainty("uncertainty t"), is_uncertainty("dx"), is_uncertainty("Position")
+    (True, True, False)
+    """
+    return bool(_UNCERTAIN.fullmatch(name.strip()))
+
+
 def candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
     """Return the channels that may be meant where none is named: the lengths, or else all that do not stand aside."""
     fit = [each for each in channels if not each.aside] or channels
@@ -368,6 +384,6 @@ def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind =
         for column, name in zip(own, names, strict=True):
             time = max((each for each in of_run if each < column), default=of_run[0] if of_run else None)
             time_unit = "" if time is None else headings[time].unit
-            unit, aside = headings[column].unit, name.lower().startswith("date")
+            unit, aside = headings[column].unit, name.lower().startswith("date") or is_uncertainty(name)
             found.append(Channel(name, unit, sheet, run, column, time, time_unit, clock=clock, aside=aside))
     return tuple(found)

@@ -32,6 +32,7 @@ _LONGEST_NAME = 5  # words
 _BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
 _SLASH = re.compile(r"(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]+(?:/[^\s/]+)?)")
 _TAIL = re.compile(r"(?P<name>.*?[^\W_])(?:[_ ](?:in )?|,\s*|:)(?P<unit>[^\W_]+(?:/s(?:ec)?(?:\^?2|²)?)?|°(?:/s)?)")
+_IN = re.compile(r"(?P<name>.*?\S)\s+in\s+(?P<unit>\S+)")
 _NO_TAIL = frozenset(("1", "in", "g", "mg"))
 """Units that end a name as often for another reason: ``V_in``, ``x_1``."""
 _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
@@ -269,7 +270,7 @@ def heading_of(cell: str) -> tuple[str, str]:
     name, unit = name_and_unit(cell)
     if unit:
         return name, unit
-    for form in (_SLASH, _TAIL):
+    for form in (_SLASH, _TAIL, _IN):
         found = form.fullmatch(name)
         if found and (form is _SLASH or _ends(found["name"], found["unit"])):
             return found["name"].strip(), found["unit"].strip()

@@ -1,17 +1,20 @@
 """Numbers whose thousands are set apart: ``1,234.5``, ``1.234,5``, ``1 234,5``, ``1'234.5``.
 
 They are read where the file itself says which mark is which. ``1,500`` beside ``0.01`` may be either, and is refused:
-taken for a decimal mark it would be wrong by a thousand.
+taken for a decimal mark it would be wrong by a thousand. A column of ``950`` and ``1,000`` has thousands, as fractions
+would not end in a zero only there; where every number of a column is like ``1,500``, with no other mark in the file,
+the comma is decimal, and this is told.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from itertools import zip_longest
 
 from acquisition.errors import FormatError
 
-__all__ = ["ungrouped"]
+__all__ = ["doubtful", "ungrouped"]
 
 _REMEDY = "write the numbers without a mark of thousands"
 _BLANK = rb"(?: |'|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)"
@@ -22,6 +25,13 @@ _APART = re.compile(rb"(?:'|\xa0|\xaf|\x99)\d{3}")  # the last byte of a blank; 
 _BLANK_APART = re.compile(rb" \d{3}(?<=\d \d{3})")
 _SPACED = re.compile(_SIGN + rb"[1-9]\d{0,2}(?:" + _BLANK + rb"\d{3})+(?:[.,]\d*)?" + _EXPONENT)
 _BLANKS = re.compile(_BLANK)
+_DECIMAL = {
+    each: re.compile(rb"[%b](?!\d{3}(?!\d))|(?<!\d)0\d*[%b]|\d{4}[%b]" % ((re.escape(each),) * 3))
+    for each in (b",", b".")
+}
+"""A mark that can only be decimal: of other than three digits, or behind a zero or four digits."""
+_ONE_GROUP = {each: re.compile(_SIGN + rb"[1-9]\d{0,2}" + re.escape(each) + rb"\d{3}") for each in (b",", b".")}
+_WHOLE, _LONG = re.compile(_SIGN + rb"\d{1,3}"), re.compile(_SIGN + rb"\d{4,}")
 
 
 def ungrouped(path: str, rows: bytes, mark: str) -> Callable[[bytes], bytes] | None:
@@ -51,11 +61,13 @@ def ungrouped(path: str, rows: bytes, mark: str) -> Callable[[bytes], bytes] | N
         (b" " in rows and _BLANK_APART.search(rows) is not None)
         or (any(each in rows for each in _OTHER_BLANKS) and _APART.search(rows) is not None)
     )
-    if not blanks and not (points and commas):
+    alone = b"" if points == commas else b"." if points else b","
+    group = _group_of_columns(path, rows, mark, alone) if alone and not _DECIMAL[alone].search(rows) else b""
+    if not blanks and not group and not (points and commas):
         return None
     cell = _cell(mark)
     found = {each[0].strip(b' "') for each in cell.finditer(rows)}
-    group = _group(path, found)
+    group = group or _group(path, found)
     spaced = blanks and any(_SPACED.fullmatch(each) for each in found)
     if not group and not spaced:
         return None
@@ -68,6 +80,36 @@ def ungrouped(path: str, rows: bytes, mark: str) -> Callable[[bytes], bytes] | N
         return _BLANKS.sub(b"", plain.replace(group, b"") if group else plain)
 
     return lambda lines: cell.sub(without, lines)
+
+
+def doubtful(rows: bytes, mark: str) -> str:
+    """Return a number like ``1,500`` whose mark is read as decimal though all like it may be thousands; else nothing.
+
+    Examples
+    --------
+    >>> doubtful(b"1;1,500\\n2;1,512\\n", ";"), doubtful(b"1;1,500\\n2;0,512\\n", ";")
+    ('1,500', '')
+    """
+    if mark == "," or b"," not in rows or b"." in rows or _DECIMAL[b","].search(rows):
+        return ""
+    found = next((each[0] for each in _cell(mark).finditer(rows) if b"," in each[0]), b"")
+    return _shown(found.strip(b' "'))
+
+
+def _group_of_columns(path: str, rows: bytes, mark: str, group: bytes) -> bytes:
+    """Return the one mark of a table where it sets thousands apart in some column, as whole numbers beside show."""
+    if mark == group.decode():
+        return b""
+    split = [[cell.strip(b' "') for cell in line.split(mark.encode() or None)] for line in rows.splitlines()]
+    for column in zip_longest(*split, fillvalue=b""):
+        grouped = [cell for cell in column if _ONE_GROUP[group].fullmatch(cell)]
+        whole = sum(bool(_WHOLE.fullmatch(cell)) for cell in column)
+        if not grouped or not whole or any(_LONG.fullmatch(cell) for cell in column):
+            continue
+        if any(cell.endswith(b"0") for cell in grouped):
+            return group
+        raise FormatError(path, f'"{_shown(grouped[0])}" beside whole numbers may be thousands or decimals', _REMEDY)
+    return b""
 
 
 def _cell(mark: str) -> re.Pattern[bytes]:

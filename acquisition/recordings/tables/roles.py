@@ -8,12 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from acquisition.block import F8
-from acquisition.recordings.tables.contents import Heading, is_time
+from acquisition.recordings.tables.contents import Heading, is_time, is_uncertainty
 from acquisition.recordings.tables.text import parse_number
 from acquisition.recordings.units import time_power
 
 __all__ = ["are_row_numbers", "columns_of", "is_aside", "runs_forward", "times_by_name", "times_by_steps"]
 
+_NUMBERED = re.compile(r".*(index|sample|frame|number|count|row|seq)s?", re.IGNORECASE)
 _INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
 _FIRST_NUMBERS = 10  # rows that are not like the others may stand before the first that is read
 _NEUTRAL = re.compile(
@@ -25,10 +26,6 @@ _SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|ta
 """Names of times that are no clock: how long something took."""
 _SPARSE = 0.2  # a column with numbers in fewer of its rows is none of samples
 _CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
-_UNCERTAIN = re.compile(
-    r".*\b(u?n?certain\w*|err\w*|sigma|std|incert\w*|unsicher\w*|fehler|sd)\b.*|[dδΔσu][_ ]?[a-zθφ]|[a-zθφ]'|[\d.,]+",
-    re.IGNORECASE,
-)
 
 
 def columns_of(rows: Sequence[Sequence[str]]) -> list[F8]:
@@ -67,8 +64,8 @@ def is_aside(heading: Heading, column: F8, others: bool) -> bool:
         Whether there are other columns to tell times.
     """
     name = " ".join(heading.name.lower().replace("_", " ").split())
-    index = others and are_row_numbers(column) and (name.rstrip("s") in _INDEX or name in _INDEX or "number" in name)
-    return index or bool(name and _UNCERTAIN.fullmatch(name)) or bool(np.mean(np.isfinite(column)) < _SPARSE)
+    index = others and are_row_numbers(column) and (name in _INDEX or bool(_NUMBERED.fullmatch(name)))
+    return index or is_uncertainty(name) or bool(np.mean(np.isfinite(column)) < _SPARSE)
 
 
 def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[int]:

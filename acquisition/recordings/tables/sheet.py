@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 from acquisition.block import Block
@@ -15,6 +15,7 @@ from acquisition.recordings.sampling.timing import check_rate
 from acquisition.recordings.tables.answers import Answers, measure, settle
 from acquisition.recordings.tables.channel import pull, sample
 from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet, channels_of
+from acquisition.recordings.tables.grouped import doubtful, ungrouped
 from acquisition.recordings.tables.text import head_lines, says_simulated, text_of
 from acquisition.source import Kind, SourceInfo
 
@@ -58,7 +59,7 @@ class ColumnFormat:
     ) -> Recording:
         """Read one channel of one run; see :class:`acquisition.recordings.base.Format`."""
         check_rate(path, rate_hz)
-        contents = self.contents(path, data)
+        contents = self._plain(path, data)
         chosen = settle(path, contents, Answers(channel, rate_hz, unit, run, time, time_unit))
         of, told = measure(path, chosen, unit)
         column = sample(path, chosen, pull(path, chosen, of.power), rate_hz, contents.zeros)
@@ -85,9 +86,27 @@ class ColumnFormat:
             start_time=chosen.start_time,
         )
 
+    def _plain(self, path: str, data: bytes) -> Contents:
+        """Return what a file holds, its numbers without marks of thousands."""
+        contents = self.contents(path, data)
+        sheets = {id(each.source): each.source for each in contents.channels if isinstance(each.source, Sheet)}
+        plain, traps = {}, []
+        for key, sheet in sheets.items():
+            text, rows = sheet.text, sheet.text.data[sheet.start : sheet.stop]
+            if (take := ungrouped(path, rows, sheet.delimiter)) is not None:
+                text = replace(text, data=text.data[: sheet.start] + take(rows))
+                plain[key] = replace(sheet, text=text, stop=len(text.data))
+            elif shown := doubtful(rows, sheet.delimiter):
+                message = f'"{shown}" was read with a decimal comma: nothing in the file says that it is of thousands'
+                traps.append(Trap("decimal_comma", message))
+        if not plain and not traps:
+            return contents
+        channels = (replace(each, source=plain.get(id(each.source), each.source)) for each in contents.channels)
+        return replace(contents, channels=tuple(channels), traps=(*contents.traps, *traps))
+
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Tell of every channel what the file says by itself, with nothing chosen or given."""
-        channels = self.contents(path, data).channels
+        channels = self._plain(path, data).channels
         found = tuple(self._survey(path, each) for each in channels)
         if not any(each.samples for each in found):
             pull(path, channels[0], 0)  # says what is wrong

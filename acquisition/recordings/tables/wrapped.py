@@ -26,7 +26,8 @@ _OF_TEXT = 0.3  # so much of a text must be lists, if these are what it holds
 _NUMBER = r"(?<![\w.])[-+]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][-+]?\d{1,3})?(?![\d:])"
 _CLOCK = r"(?<![\w.:])\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?(?![\d:])"
 _CELL = re.compile(rf"{_CLOCK}|{_NUMBER}")
-_MONITOR = re.compile(rf"({_CLOCK})\s*->\s*")
+_DAY = r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?"
+_MONITOR = re.compile(rf"\[?{_DAY}({_CLOCK})(?:\s*->\s*|\]\s*)")
 _LIST_NAME = r"""["']?(?P<name>[^\W\d][\w ()/^.]{0,40}?)["']?\s*[:=]\s*(?:(?:np\.)?array\(\s*)?\["""
 _CELLS = r"(?P<cells>[-+\d.,eE\s\"'naNul]+)"
 _LIST, _LIST_BEGINS = re.compile(rf"{_LIST_NAME}{_CELLS}\]"), re.compile(_LIST_NAME + _CELLS)
@@ -83,7 +84,8 @@ def _plain(line: str) -> str:
     """Return a line that is no row, a table's names say; the rule below these names is left empty."""
     if not line.strip("|-+:= \t"):
         return ""
-    return "\t".join(cell.strip() for cell in line.strip("| ").split("|")) if "|" in line else line
+    mark = next((each for each in "|&" if each in line), "")
+    return "\t".join(cell.strip() for cell in line.strip("|\\ ").split(mark)) if mark else line
 
 
 def _headings(skeleton: str) -> tuple[Heading, ...]:
