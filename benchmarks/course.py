@@ -8,8 +8,8 @@ hand (another clock, another scale, noise added; written as tables).
 - the same over a loop of lmfit that gives the same answer: every law of one closed form, their choice, and the
   covariance of the best;
 - what a second pass over unchanged inputs takes of the first;
-- speed of two processes over twice that of one, by what each process used and waited for: a neighbour on the machine
-  does not count;
+- speed of two processes over that of two passes by one process, each over half of the runs at the same time: both
+  sides have both cores busy. By what each process used and waited for: a neighbour on the machine does not count;
 - the largest resident memory of a worker, MB;
 - a filter over the catalog of many rows, ms.
 """
@@ -138,7 +138,7 @@ def measure(runs: int, folder: Path) -> Measured:
     with threadpool_limits(1):
         few = some[: max(1, min(5, runs // 10))]
         every_law = _processor(lambda: [all_laws(*_read(file)) for file in few]) / len(few)
-    one = _processor(lambda: _whole(_started(inputs, folder / "jobs1", "1")), *CHILDREN)
+    apart = _processor(lambda: _two_halves(inputs, folder / "jobs1"), *CHILDREN)
     idle: list[float] = []
     two = _processor(lambda: idle.append(idle_of_two(inputs, folder / "jobs2")), *CHILDREN)
     done = subprocess.run([sys.executable, "-c", WORKER, str(inputs)], check=True, capture_output=True)
@@ -149,7 +149,7 @@ def measure(runs: int, folder: Path) -> Measured:
         fits[1] * runs / took["standard"],
         every_law * runs / took["standard"],
         again / took["standard"],
-        one / (two + sum(idle)),
+        apart / (two + sum(idle)),
         half_mb,
         whole_mb,
     )
@@ -178,9 +178,16 @@ def _processor(call: Callable[[], object], *of: int) -> float:
     return used() - before
 
 
-def _started(inputs: Path, out: Path, jobs: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "springmass", "batch", str(inputs), "-o", str(out), "--jobs", jobs]
-    return subprocess.Popen([*command, "--reports", "0"], stderr=subprocess.DEVNULL)
+def _started(inputs: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "springmass", "batch", str(inputs), "-o", str(out), "--reports", "0", *options]
+    return subprocess.Popen(command, stderr=subprocess.DEVNULL)
+
+
+def _two_halves(inputs: Path, out: Path) -> None:
+    """Make two passes by one process at the same time, each over half of the runs."""
+    halves = [_started(inputs, out, "--jobs", "1", "--shard", f"{i}/2") for i in (1, 2)]
+    for half in halves:
+        _whole(half)
 
 
 def _whole(process: subprocess.Popen[bytes]) -> None:
@@ -194,7 +201,7 @@ def idle_of_two(inputs: Path, out: Path) -> float:
     That is what the two wait for work, and what the first process uses while it is alone. The time in which a process
     could run and a neighbour on the machine had the core is the neighbour's.
     """
-    process = _started(inputs, out, "2")
+    process = _started(inputs, out, "--jobs", "2")
     seen: dict[int, tuple[float, float, float]] = {}  # of each worker: first look, last look, not idle by then, s
     alone, mine = 0.0, 0.0
     while process.poll() is None:

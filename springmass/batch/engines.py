@@ -29,15 +29,19 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def chunks(jobs: Sequence[Job], processes: int, largest: int = CHUNK) -> list[list[Job]]:
-    """Cut jobs into chunks, small enough that no process waits long for the last."""
-    size = max(1, min(largest, -(-len(jobs) // (4 * processes))))
-    return [list(jobs[at : at + size]) for at in range(0, len(jobs), size)]
+def chunks(jobs: Sequence[Job], processes: int) -> list[list[Job]]:
+    """Cut jobs into chunks, smaller toward the end, so that no process waits long for the last."""
+    cut, at = [], 0
+    while at < len(jobs):
+        size = max(1, min(CHUNK, (len(jobs) - at) // (4 * processes)))
+        cut.append(list(jobs[at : at + size]))
+        at += size
+    return cut
 
 
 def here(jobs: Sequence[Job]) -> Iterator[Rows]:
     """Yield the rows of jobs done in this process."""
-    yield from map(analyse_many, chunks(jobs, 1))
+    yield from (analyse_many(jobs[at : at + CHUNK]) for at in range(0, len(jobs), CHUNK))
 
 
 def by_processes(jobs: Sequence[Job], processes: int) -> Iterator[Rows]:
