@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["contents", "damped", "short_course", "write_recording"]
+__all__ = ["bad_files", "contents", "damped", "short_course", "write_recording"]
 
 HEAD = "Motion Sensor Data File Mar 12, 2024 2:05 PM\r\nTime (s)\tDistance (cm)\tDist Error (cm)\r\n"
 
@@ -39,3 +40,43 @@ def contents(folder: Path) -> dict[str, bytes]:
     """Return every file of a course's results by name, but its log and its lock."""
     files = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name not in ("batch.log", "lock")]
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def bad_files(folder: Path) -> list[str]:
+    """Write files none of which gives a period, each for another reason; return their paths."""
+    head, *rows = write_recording(folder / "bad.txt", damped(1)).read_bytes().splitlines(keepends=True)
+    names, rows = rows[0], rows[1:]
+    times = [row.partition(b"\t")[0] for row in rows]
+    made = {
+        "bad.txt": b"".join([head, names, *rows]).replace(b"0.", b"zero."),
+        "empty.txt": b"",
+        "head_alone.txt": head + names,
+        "one_row.txt": b"".join([head, names, rows[0]]),
+        "words.txt": b"Dear all,\nthe recordings are attached.\n",
+        "noise.txt": np.random.default_rng(1).bytes(5000),
+        "nul.txt": bytes(4096),
+        "no_run.h5": b"",
+        "torn.h5": b"\x89HDF\r\n\x1a\n" + bytes(600),
+        "torn.xlsx": b"PK\x03\x04" + b"x" * 300,
+        "torn.zip": b"PK\x05\x06" + bytes(10),
+        "torn.cap": b"PK\x03\x04" + b"y" * 100,
+        "torn.lvm": b"LabVIEW Measurement\t\nWriter_Version\t2\n",
+        "torn.tdms": b"TDSm" + b"\xff" * 60,
+        "no_number.txt": b"".join([head, names, *(t + b"\tNaN\t0.239\r\n" for t in times)]),
+        "huge.txt": b"".join([head, names, *(t + b"\t1e308\t0.239\r\n" for t in times)]),
+        "at_rest.txt": b"".join([head, names, *(t + b"\t20.0000\t0.239\r\n" for t in times)]),
+        "one_time.txt": b"".join(
+            [head, names, *(b"0.000" + row[len(t) :] for t, row in zip(times, rows, strict=True))]
+        ),
+        "backward.txt": b"".join([head, names, *reversed(rows)]),
+        "one_line.txt": head + names + b"1" * 300_000,
+        "quotes.csv": b'time,distance\n"0.0,1\n0.1,"2\n',
+        "which.csv": b"a,b\n" + b"".join(b"%.2f,%.3f\n" % (0.01 * i, np.sin(i)) for i in range(200)),
+        "infinite.csv": b"time (s),distance (m)\n" + b"".join(b"%.2f,inf\n" % (0.01 * i) for i in range(200)),
+    }
+    for name, content in made.items():
+        (folder / name).write_bytes(content)
+    (folder / "nowhere.txt").symlink_to("gone.txt")
+    os.mkfifo(folder / "pipe.txt")
+    (folder / "device.h5").symlink_to("/dev/null")
+    return [str(Path(folder.name) / name) for name in (*made, "nowhere.txt", "pipe.txt", "device.h5")]

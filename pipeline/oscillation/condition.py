@@ -21,6 +21,7 @@ QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard no
 TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
 CREST_SIGMAS = 3.5
 BLOCK = 256  # samples that tell the curvature where they are
+LARGEST = 1e100  # of a value that was measured: what lies beyond is a missing sample
 ROUNDING = 1e-9  # of the largest value: values that differ by less are one, converted twice
 
 
@@ -163,8 +164,8 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
     """
     params = params or Params()
     flags = track.flags.copy()
-    finite = np.isfinite(track.y)
-    flags[~finite] |= np.uint8(Quality.MISSING)
+    measured = np.abs(track.y) < LARGEST  # and not NaN
+    flags[~measured] |= np.uint8(Quality.MISSING)
     # A reader that already said which of two exchanged rows is wrong is believed.
     judged = (flags & np.uint8(Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME)) != 0
     flags |= _time_flags(np.where(judged, np.nan, track.t), judged)

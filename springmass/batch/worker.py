@@ -221,8 +221,9 @@ def _thumbnail(t: F8, y: F8, period_s: float) -> str:
 
 
 def _told(job: Job, message: str) -> str:
-    """Return a message with paths as the inputs name them, in one line."""
-    return " ".join(message.replace(job.folder.rstrip(os.sep) + os.sep, "").split())
+    """Return a message in one line that names the run's path as the inputs do."""
+    told = " ".join(message.replace(job.whole(job.path), job.path).split())
+    return told if job.path in told else f"{job.path}: {told}"
 
 
 def _sha256(path: str) -> str:

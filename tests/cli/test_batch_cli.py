@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 
 import springmass
-from tests.courses import contents, short_course, write_recording
+from tests.courses import bad_files, contents, short_course, write_recording
 
 LIMIT_S = 120
 CLUSTER = """
@@ -26,6 +26,7 @@ if __name__ == "__main__":
         print(cluster.scheduler_address, *(worker.pid for worker in cluster.workers.values()), flush=True)
         sys.stdin.read()
 """
+MANY = 2600 if os.environ.get("SPRINGMASS_TRIALS") else 26  # a hundred for each bad one
 QUICK = ("--reports", "0", "--accuracy", "fast")
 
 
@@ -152,20 +153,30 @@ def test_no_scheduler_and_no_folder_are_one_line(runs, cli):
     assert "that springmass batch made" in cli("report", runs, "run001").complaint
 
 
-def test_bad_files_fail_alone(runs, cli):
+@pytest.mark.parametrize("good", [6, pytest.param(MANY, marks=pytest.mark.trials)])
+def test_bad_files_fail_alone(tmp_path, monkeypatch, cli, good):
     """Exit code 1; each failure is one line and a row; the others are equal to those of a pass without it."""
-    cli("batch", runs, "-o", "good", "--jobs", "1", *QUICK)
-    (runs / "bad1.txt").write_bytes(b"Motion Sensor Data File\r\nTime (s)\tDistance (cm)\r\n0.0\tx\r\n")
-    (runs / "bad2.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + b"\0" * 600)
-    done = cli("batch", runs, "-o", "bad", "--jobs", "1", *QUICK)
+    monkeypatch.chdir(tmp_path)
+    runs = Path(short_course(tmp_path / "runs", good).name)
+    inputs = [str(path) for path in sorted(runs.iterdir())]
+    Path("list.txt").write_text("\n".join(inputs))
+    assert cli("batch", "@list.txt", "-o", "good", "--jobs", "1", *QUICK).code == 0
+    bad = bad_files(runs)
+    Path("list.txt").write_text("\n".join(sorted([*inputs, *bad])))
+    done = cli("batch", "@list.txt", "-o", "bad", "--jobs", "1", *QUICK)
     assert done.code == 1
-    assert "8 runs: 0 unchanged, 8 analysed, 2 failed" in done.err
+    assert f"{good + len(bad)} runs: 0 unchanged, {good + len(bad)} analysed, {len(bad)} failed" in done.err
+    assert "defect of the program" not in done.err
     table = rows("bad")
-    failed = [row for row in table if row["status"] == "failed"]
-    assert [row["run"] for row in failed] == ["bad1", "bad2"]
-    assert all(row["error"] in done.err for row in failed)
+    failed = [row for row in table if row["status"] != "ok"]
+    assert sorted(row["path"] for row in failed) == sorted(bad)
+    for row in failed:
+        assert row["path"] in row["error"]
+        assert done.err.splitlines().count(f"springmass: {row['error']}") == 1
     assert [row for row in table if row["status"] == "ok"] == rows("good")
-    assert cli("batch", runs, "-o", "bad", "--jobs", "1", *QUICK).code == 1  # still
+    done = cli("batch", "@list.txt", "-o", "bad", "--jobs", "1", *QUICK)
+    assert done.code == 1  # still
+    assert f"{good + len(bad)} unchanged, 0 analysed, {len(bad)} failed" in done.err
 
 
 def test_a_run_without_oscillation_is_named(runs, cli):
