@@ -40,6 +40,7 @@ from pipeline.results.checks.plausibility import judge_plausibility
 from pipeline.results.checks.sample_findings import STEPS, count_quality, find_clusters, judge_samples
 from pipeline.results.checks.segment_findings import judge_rows, judge_segments
 from pipeline.results.checks.self_check import check_residuals, holding, judge_held
+from pipeline.results.checks.wave_slips import find_wave_slips
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
 from pipeline.results.findings import judge, judge_fits, judge_overdamped, judge_scene
@@ -296,12 +297,13 @@ def _oscillation(
         misfits=checked.misfits,
         smoothing=smoothing,
     )
-    clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]))
+    slips = find_wave_slips(track, demodulated)
+    clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]), slips)
     findings = by_severity(
         judge_segments(windows.segments),
         judge(cycles, demodulated, damping, phase, rest, waveform, disturbances, derived.coefficients),
         checked.findings,
-        judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters),
+        judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters, slips),
         judge_scene(scene, effects),
         judge_fits(fitted.full, solved),
         judge_clock(track, instrument),

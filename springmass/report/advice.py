@@ -21,7 +21,7 @@ _BESIDE = {
         "at_rest handled restarted touched phase_jump clipped false_echoes locked_echoes missing_samples "
         "duplicate_time non_monotonic_time quantised held_samples smoothed_sensor not_sinusoidal undersampled "
         "rest_drift correlated_residuals lost_target rows_lost interleaved_records zero_filled_tail no_oscillation "
-        "two_modes overdamped mains_hum implausible_motion implausible_distance sensor_lost"
+        "two_modes overdamped mains_hum implausible_motion implausible_distance sensor_lost wave_slips"
     ),
     "amplitude": "sideways_mode strongly_damped short_record not_converged",
     "phase": "amplitude_dependent_frequency",
@@ -39,6 +39,7 @@ ADVICE = {
     "interleaved_records": "Separate every other row.",
     "overdamped": "If the bob does not move in oil, see what it rubs against.",
     "false_echoes": "Move the sensor, or put a flat target on the bob.",
+    "wave_slips": "Put a flat, hard target on the bob; exchange the sensor.",
     "clipped": "Move what stands nearer than the bob, or keep the bob within range.",
     "locked_echoes": "Take away what stands beside the path; turn off the sensor's filter.",
     "missing_samples": "Keep the bob within range.",

@@ -42,6 +42,7 @@ __all__ = ["Ended", "Progress", "Sensor", "Session", "Trigger"]
 
 SAY_NS = 1_500_000_000  # silence so long before a run is said
 HEAR_S = 3.0  # silence longer than this before a run is no sensor
+HEARD, ANSWERED = 3, 12  # readings that make a sensor, and within which one that is asked says what it is
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # of samples that nobody looked at before the run began
 BYTES_PER_READ = 64  # log bytes a reading takes, for the look at the disk
@@ -135,23 +136,31 @@ class Session:
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
         said_ns: int | None = self._clock.now_ns() + SAY_NS
-        while min(self._tee.readings) < 3:
-            if said_ns is not None and self._clock.now_ns() > said_ns:
-                mute = next(i for i, count in enumerate(self._tee.readings) if count < 3)
+        while self._waits_for_word():
+            mute = next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)
+            if mute is not None and said_ns is not None and self._clock.now_ns() > said_ns:
                 say(f"{self.sensors[mute].transport.name}: nothing readable so far; check power, wiring and --baud")
                 said_ns = None
             if self._clock.now_ns() > deadline:
-                mute = next(i for i, count in enumerate(self._tee.readings) if count < 3)
+                if mute is None:
+                    return
                 self.stop()
                 raise ProgramError(self._not_heard(mute), SENSOR)
             self._wait_until(self._clock.now_ns() + 50_000_000)
+
+    def _waits_for_word(self) -> bool:
+        """Whether a sensor was not heard yet, or may still answer what it is."""
+        return any(
+            count < HEARD or (count < ANSWERED and sensor.family.identify and chain.told.identity is None)
+            for count, sensor, chain in zip(self._tee.readings, self.sensors, self._chains, strict=True)
+        )
 
     def meet(self) -> list[str]:
         """Keep what the sensors said that they are, take the rate that one is set to, and return lines on it."""
         said: list[str] = []
         for channel, sensor in enumerate(self.sensors):
             identity = self._chains[channel].told.identity
-            if identity is None:
+            if identity is None or sensor.identity is not None:
                 continue
             said += meeting(sensor, identity)
             rate_hz = sensor.rate_hz or identity.settings.get("rate_hz")
@@ -327,6 +336,7 @@ class Session:
             if turn_ns == end_ns:
                 break
             if turn_ns == tick_ns:
+                self.meet()  # one that answered late has to prove itself all the same, should its port come back
                 self._ring(display, self._tee.blocks, start_ns, recorder)
                 tick_ns += SECOND_NS
         self._tee.stop()  # what comes while the last line is shown is no part of the run

@@ -13,6 +13,7 @@ from pipeline.numerics.quantity import amount, noun, plural
 from pipeline.oscillation.condition import Conditioned, Cut
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.checks.finding import Finding
+from pipeline.results.checks.wave_slips import WaveSlips, judge_wave_slips
 from pipeline.track import F8, U8, UNUSABLE, Quality
 
 __all__ = ["STEPS", "Clusters", "count_quality", "find_clusters", "judge_samples"]
@@ -65,7 +66,11 @@ def count_quality(flags: U8) -> dict[str, int]:
 
 
 def judge_samples(
-    conditioned: Conditioned, flags: U8, noise_m: float, clusters: Clusters | None = None
+    conditioned: Conditioned,
+    flags: U8,
+    noise_m: float,
+    clusters: Clusters | None = None,
+    slips: WaveSlips | None = None,
 ) -> Iterator[Finding]:
     """Yield what the samples alone say, whether they oscillate or not.
 
@@ -78,6 +83,8 @@ def judge_samples(
         Standard deviation of one sample, m.
     clusters : Clusters, optional
         Of false echoes, where the record oscillates.
+    slips : WaveSlips, optional
+        False echoes that have a finding of their own; the clusters are of the others.
     """
     track, plateaus_m, quantum_m = conditioned.track, conditioned.plateaus_m, conditioned.quantum_m
     counts, n = count_quality(flags), len(track)
@@ -91,12 +98,14 @@ def judge_samples(
             f"{counts['clipped']} of {n} samples lie on a plateau at {levels}: a fixed object or a lost target cut the "
             "motion there; they were left out and the amplitude comes from the rest of each cycle",
         )
-    if counts["false_echo"]:
-        share = counts["false_echo"] / n
+    if slips is not None:
+        yield from judge_wave_slips(slips, n, track.unit)
+    if echoes := counts["false_echo"] - (0 if slips is None else slips.rows.size):
+        share = echoes / n
         yield Finding(
             "false_echoes",
             "warning" if share > 0.1 else "info",
-            f"{counts['false_echo']} of {n} samples ({share:.1%}) are false echoes and were left out of the fit"
+            f"{echoes} of {n} samples ({share:.1%}) are false echoes and were left out of the fit"
             + _words_on(clusters, track.unit),
         )
     if counts["missing"]:
@@ -128,7 +137,9 @@ def judge_samples(
         )
 
 
-def find_clusters(demodulated: Demodulated, phase: Callable[[NDArray[np.int64]], F8]) -> Clusters:
+def find_clusters(
+    demodulated: Demodulated, phase: Callable[[NDArray[np.int64]], F8], slips: WaveSlips | None = None
+) -> Clusters:
     """Count clusters of false echoes.
 
     Parameters
@@ -137,6 +148,8 @@ def find_clusters(demodulated: Demodulated, phase: Callable[[NDArray[np.int64]],
         For its flags, and for how far off flagged samples lie.
     phase : callable
         Gives the phase of the oscillation at some rows (k,) int64 of the record, (k,) float64, rad.
+    slips : WaveSlips, optional
+        False echoes that are left out here.
 
     Notes
     -----
@@ -144,6 +157,8 @@ def find_clusters(demodulated: Demodulated, phase: Callable[[NDArray[np.int64]],
     :math:`2\\sum r_i\\cos\\varphi_i/N`, the sum over false echoes and N all samples fitted.
     """
     echo = (demodulated.flags & np.uint8(Quality.FALSE_ECHO)) != 0
+    if slips is not None:
+        echo[slips.rows] = False
     rows = np.flatnonzero(echo)
     if not rows.size:
         return Clusters(0, 0, 0, 0.0)

@@ -1,0 +1,167 @@
+"""A rangefinder of this project behind a port: what `record` and `springmass firmware` say of it and to it.
+
+The board here is none of the decoder's: its lines are the page's, written out.
+"""
+
+from __future__ import annotations
+
+import binascii
+import contextlib
+import os
+import pty
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from acquisition.live.firmware import VERSION
+
+PERIOD_S = 0.01
+
+
+def line(body: str) -> bytes:
+    """Return a body as docs/reference/line-protocol.md frames it."""
+    return f"${body}*{binascii.crc_hqx(body.encode('ascii'), 0xFFFF):04X}\n".encode("ascii")
+
+
+class Board:
+    """Speaks as the firmware does, on a pseudo-terminal: silent until it is asked what it is, as after a reset.
+
+    Parameters
+    ----------
+    version : str
+        Of its firmware.
+    letter : str
+        Status of every reading.
+    """
+
+    def __init__(self, version: str = VERSION, letter: str = "E") -> None:
+        self.heard: list[str] = []
+        self._version, self._letter = version, letter
+        self._settings = {"R": "100", "G": "116,25000", "J": "0", "N": ""}
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Be switched off."""
+        self._stop.set()
+        self._thread.join()
+        os.close(self._slave)
+        os.close(self._master)
+
+    def _run(self) -> None:
+        asked, number, began_s = b"", 0, 0.0
+        while not self._stop.wait(PERIOD_S):
+            with contextlib.suppress(BlockingIOError):
+                asked += os.read(self._master, 4096)
+            while b"\n" in asked:
+                command, _, asked = asked.partition(b"\n")
+                self.heard.append(command.decode("ascii"))
+                self._obey(self.heard[-1])
+            began_s = began_s or time.monotonic()
+            while self.heard and number < (time.monotonic() - began_s) / PERIOD_S:
+                echo = f"{2000 + number % 7:d}.25" if self._letter == "E" else ""
+                self._send(line(f"R1,{number:010d},{number * 10_000:010d},{echo},,{self._letter}"))
+                number += 1
+
+    def _obey(self, command: str) -> None:
+        if command == "R13":  # within the range that the command line allows, and refused by this one
+            self._send(line("X1,command"))
+            return
+        if command != "?":
+            self._settings[command[0]] = command[1:]
+        rate, gate, spread, name = self._settings.values()
+        self._send(line(f"I1,springmass-rangefinder,{self._version},{name},{rate},{gate},{spread},0"))
+
+    def _send(self, data: bytes) -> None:
+        try:
+            os.write(self._master, data)
+        except BlockingIOError:
+            pass  # nobody reads: lost, as on any line
+
+
+@pytest.fixture
+def board() -> Iterator[Callable[..., Board]]:
+    """Return what makes boards; none outlives the test."""
+    made: list[Board] = []
+
+    def make(*arguments: str) -> Board:
+        made.append(Board(*arguments))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+def recorded(cli: Callable, port: str, out: Path, seconds: float) -> object:
+    """Record what a board sends."""
+    return cli("record", "--port", port, "--sensor", "line-protocol", "--seconds", str(seconds), "-o", out)
+
+
+def test_record_shows_what_the_sensor_is(cli: Callable, board: Callable[..., Board], tmp_path: Path) -> None:
+    """Model, version and settings; one that is up to date is not asked to be updated."""
+    here = board()
+    done = recorded(cli, here.port, tmp_path / "run.h5", 0.5)
+    assert f"{here.port}: springmass-rangefinder {VERSION}: 100 Hz, echoes of 116 to 25000 us" in done.err
+    assert "older" not in done.err
+    assert here.heard[0] == "?"
+
+
+def test_record_asks_for_an_update_where_the_firmware_is_older(
+    cli: Callable, board: Callable[..., Board], tmp_path: Path
+) -> None:
+    """And goes on with the one that is there."""
+    here = board("1.4.2")
+    done = recorded(cli, here.port, tmp_path / "run.h5", 0.5)
+    assert f"its firmware 1.4.2 is older than {VERSION}" in done.err
+    assert f"`springmass firmware --port {here.port} --flash` updates it" in done.err
+    assert (tmp_path / "run.h5").is_file()
+
+
+@pytest.mark.parametrize(
+    ("letter", "words"),
+    [
+        ("A", "the transducer does not answer its trigger: check its 5 V and ground, TRIG on D9 and ECHO on D8"),
+        ("S", "ECHO stays high: check its wire on D8, and switch the transducer off and on"),
+        ("N", "no target for 1 s: check that the bob hangs over the sensor"),
+    ],
+)
+def test_a_fault_that_the_sensor_knows_is_said_in_its_words(
+    cli: Callable, board: Callable[..., Board], tmp_path: Path, letter: str, words: str
+) -> None:
+    """Once a second has passed without a distance; as none comes, the recording ends with 4."""
+    done = recorded(cli, board(VERSION, letter).port, tmp_path / "run.h5", 2.5)
+    assert words in done.err
+    assert done.code == 4
+
+
+def test_firmware_shows_a_board_and_asks_for_an_update(cli: Callable, board: Callable[..., Board]) -> None:
+    """Without a setting it changes nothing."""
+    here = board("1.4.2")
+    done = cli("firmware", "--port", here.port)
+    assert done.code == 0
+    assert f"{here.port}: springmass-rangefinder 1.4.2: 100 Hz" in done.out
+    assert f"{VERSION} comes with this program; `springmass firmware --port {here.port} --flash` updates it" in done.out
+    assert set(here.heard) == {"?"}
+
+
+def test_firmware_sets_a_board_and_shows_what_it_then_is(cli: Callable, board: Callable[..., Board]) -> None:
+    """Each setting as the protocol's command; what the device does not take is said with exit code 4."""
+    here = board()
+    settings = ("--rate", "50", "--gate", "600,4000", "--spread", "1000", "--name", "bench-3")
+    done = cli("firmware", "--port", here.port, *settings)
+    assert done.code == 0, done.err
+    assert "named bench-3: 50 Hz, echoes of 600 to 4000 us, pings spread over 1000 us, no thermometer" in done.out
+    assert [word for word in here.heard if word != "?"] == ["R50", "G600,4000", "J1000", "Nbench-3"]
+    refused = cli("firmware", "--port", here.port, "--rate", "13")
+    assert refused.code == 4
+    assert "the device does not take 'R13'; docs/reference/line-protocol.md has the ranges" in refused.complaint

@@ -1,0 +1,83 @@
+"""`springmass record` reads the emulated rangefinder's port in real time, as it reads a real one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.live.firmware import VERSION
+from storage.run_file.reading import open_run
+
+from .conftest import Built, read_log
+
+pytestmark = pytest.mark.trials
+
+SECONDS = 8.0
+LIMIT_S = 120.0
+M_PER_US = 344.0e-6 / 2.0
+
+
+@pytest.fixture
+def port(built: Built, tmp_path: Path) -> Iterator[Path]:
+    """Give a pseudo-terminal behind which the firmware runs at the pace of the clock, one echo in fifty lost."""
+    link = tmp_path / "rangefinder"
+    words = [built.bench, built.elf, f"--pty={link}", f"--log={tmp_path / 'truth.log'}", "--lost=0.02"]
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL) as bench:
+        for _ in range(int(LIMIT_S / 0.02)):
+            if link.is_symlink():
+                break
+            threading.Event().wait(0.02)
+        yield link
+        bench.terminate()
+        bench.wait(LIMIT_S)
+
+
+def test_record_reads_the_firmware_in_real_time(port: Path, tmp_path: Path) -> None:
+    """What is recorded was sent, in its order and with the firmware's own times; what is not is a gap in the run.
+
+    Nothing here depends on how fast the machine is: a slow one gets fewer readings, none of them wrong.
+    """
+    out = tmp_path / "run.h5"
+    words = ["record", "--port", port, "--sensor", "line-protocol", "--seconds", str(SECONDS), "-o", out]
+    done = subprocess.run(
+        [sys.executable, "-m", "springmass", *words], capture_output=True, text=True, timeout=LIMIT_S, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    with open_run(out) as run:
+        run.verify()
+        samples, decoding = run.samples(), run.provenance["decoding"]
+    sent = {}
+    for row in read_log(tmp_path / "truth.log", 0.0, 0, 0, True).readings():
+        sent[row[0]] = (row[1] * 1e-6, float(row[2]) * M_PER_US if row[2] else np.nan)
+    # Sensor times count from the first reading; which number that was, the times themselves tell.
+    at = {round(time_s * 1e6): number for number, (time_s, _) in sent.items()}
+    first = _first(samples.t, samples.distance, sent)
+    start_s = sent[first][0]
+    numbers = [at.get(round((t + start_s) * 1e6)) for t in samples.t]
+    assert None not in numbers, "a time that was not sent"
+    np.testing.assert_allclose(samples.distance, [sent[number][1] for number in numbers], rtol=0, atol=1e-9)
+    lost = sum(gap["lost"] for gap in decoding["gaps"])
+    assert numbers[-1] - numbers[0] + 1 == len(numbers) + lost, "readings are missing and it is not said"
+    assert len(numbers) > 100
+    assert np.isnan(samples.distance).any()
+    assert set(decoding["conditions"]) <= {"no_echo", "busy"}
+    if "identity" in decoding:  # said every five seconds of the emulator's time
+        assert decoding["identity"]["version"] == VERSION
+    assert "Traceback" not in done.stderr
+
+
+def _first(t: np.ndarray, distance: np.ndarray, sent: dict[int, tuple[float, float]]) -> int:
+    """Return the number of the reading at which the run begins: the one from which the first distances go on."""
+    known = np.flatnonzero(np.isfinite(distance))[:50]
+    for number, (start_s, _) in sent.items():
+        steps = np.rint(t[known] / 0.01).astype(int)
+        there = [sent.get(number + step, (start_s, np.nan))[1] for step in steps]
+        if np.allclose(there, distance[known], rtol=0, atol=1e-9):
+            return number
+    raise AssertionError("no such distances were sent")
