@@ -82,10 +82,8 @@ class Board:
         self._send(line(f"I1,springmass-rangefinder,{self._version},{name},{rate},{gate},{spread},0"))
 
     def _send(self, data: bytes) -> None:
-        try:
+        with contextlib.suppress(BlockingIOError):  # nobody reads: lost, as on any line
             os.write(self._master, data)
-        except BlockingIOError:
-            pass  # nobody reads: lost, as on any line
 
 
 @pytest.fixture

@@ -200,9 +200,9 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 @pytest.fixture
 def answer_within() -> Callable[[int], AbstractContextManager[None]]:
-    """Return a context that raises TimeoutError where its body works longer than so many seconds, or waits six times.
+    """Return a context that raises TimeoutError where its body works three times so many seconds, or waits thirty.
 
-    Processor time tells work from a machine that is busy; what waits for ever uses none.
+    Processor time tells work from a machine that is busy, and the factor a slow one; what waits for ever uses none.
     """
 
     @contextmanager
@@ -211,8 +211,8 @@ def answer_within() -> Callable[[int], AbstractContextManager[None]]:
             raise TimeoutError(f"no answer within {seconds} s")
 
         before = [signal.signal(each, late) for each in (signal.SIGALRM, signal.SIGPROF)]
-        signal.setitimer(signal.ITIMER_PROF, seconds)
-        signal.alarm(6 * seconds)
+        signal.setitimer(signal.ITIMER_PROF, 3 * seconds)
+        signal.alarm(30 * seconds)
         try:
             yield
         finally:

@@ -6,10 +6,12 @@ import dataclasses
 import errno
 import fcntl
 import grp
+import itertools
 import math
 import os
 import socket
 import sys
+import termios
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -146,10 +148,13 @@ def run(
     faults: Faults | None = None,
     options: dict[str, Any] | None = None,
     position: Callable[[float], float] = swing,
-    timeout_s: float = 0.03,
+    timeout_s: float = 5.0,
     informed: bool = True,
 ) -> Result:
-    """Read a simulated sensor of a family through a pseudo-terminal until it falls silent."""
+    """Read a simulated sensor of a family through a pseudo-terminal until it falls silent.
+
+    A polled one has so long to answer that a busy machine loses no reply; where silence is the fault it has less.
+    """
     family = get_family(name)
     finder = Rangefinder(rate_hz, position)
     chain = SensorChain(family, options=options, rate_hz=rate_hz)
@@ -167,10 +172,20 @@ def run(
             assert port.done.wait(WAIT_S), "the simulated sensor did not come to its end"
             # A polled sensor that has fallen silent is asked on: no more data is the end of it too.
             keeper.until_quiet()
+            while waiting(line):
+                keeper.until_quiet()
         finally:
             reader.stop()
     told = (keeper.events, keeper.moments)
     return Result(finder.taken, port.sent, port.unsent, keeper.samples, keeper.rows, chain, *told)
+
+
+def waiting(line: Line) -> int:
+    """Return how many bytes came that the reader, on a busy machine, has not read yet."""
+    descriptor = line.transport.fileno()
+    if descriptor < 0:
+        return 0
+    return int.from_bytes(fcntl.ioctl(descriptor, termios.FIONREAD, bytes(4)), sys.byteorder)
 
 
 @pytest.fixture(autouse=True)
@@ -231,7 +246,8 @@ def test_device_time_comes_with_the_line_protocol() -> None:
 @pytest.mark.parametrize("name", ["line-protocol", "ffhls", "maxbotix-hr", "us100"])
 def test_no_target_is_a_missing_sample(name: str) -> None:
     """Where the bob is nearer than the sensor hears, samples are missing and never distances."""
-    result = run(name, position=lambda t: 0.1 if 0.1 < t < 0.15 else 0.6)
+    places = itertools.cycle([0.6, 0.6, 0.1])
+    result = run(name, position=lambda _: next(places))
     missing = np.isnan(result.samples.distance)
     assert 0 < missing.sum() < len(missing)
     np.testing.assert_array_equal(missing, (result.samples.flags & Flag.MISSING) != 0)
@@ -277,7 +293,7 @@ def test_a_short_reply_does_not_shift_those_after_it() -> None:
     """Replies without header that lose a byte are dropped by a flush, so that no value is put together of two."""
     result = run("us100", seconds=0.5, faults=Faults(drop_rate=0.2), position=lambda _: 0.6)
     assert "timeout" in result.kinds()
-    assert len(result.samples) > 0.6 * result.sent
+    assert len(result.samples) + result.kinds().count("timeout") >= result.sent - 1
     np.testing.assert_allclose(result.samples.distance, 0.6, atol=1e-9)
 
 
@@ -285,9 +301,9 @@ def test_a_short_reply_does_not_shift_those_after_it() -> None:
 def test_a_polled_sensor_that_is_silent_for_a_while_times_out(name: str) -> None:
     """Requests without a reply are told as timeouts, and distances go on after the silence."""
     faults = Faults(stall=(0.1, 0.1))
-    result = run(name, seconds=0.35, faults=faults, position=lambda _: 0.6, timeout_s=0.02)
+    result = run(name, seconds=0.8, faults=faults, position=lambda _: 0.6, timeout_s=0.04)
     assert "timeout" in result.kinds()
-    assert result.taken[-1].true_s > 0.3
+    assert result.taken[-1].true_s > 0.2
     # How many come depends on how busy the machine is; that some come after the silence does not.
     assert result.samples.host_ns is not None
     known = np.isfinite(result.samples.distance)

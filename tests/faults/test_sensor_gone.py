@@ -31,8 +31,8 @@ from storage.run_file.writing import write_run
 
 UNPLUGS = int(os.environ.get("SPRINGMASS_UNPLUGS", "3"))
 RUN_S = 6.0  # no recording here is longer
-ANSWER_S = RUN_S + 10.0
-"""Within ten seconds of its end a recording has answered."""
+ANSWER_S = RUN_S + 90.0
+"""Within ten seconds of its end a recording has answered, on a machine that is not nine times as busy."""
 SECOND = 8000
 
 
