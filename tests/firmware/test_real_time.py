@@ -24,30 +24,37 @@ M_PER_US = 344.0e-6 / 2.0
 
 
 @pytest.fixture
-def port(built: Built, tmp_path: Path) -> Iterator[Path]:
+def running(built: Built, tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[bytes]]]:
     """Give a pseudo-terminal behind which the firmware runs at the pace of the clock, one echo in fifty lost."""
     link = tmp_path / "rangefinder"
-    words = [built.bench, built.elf, f"--pty={link}", f"--log={tmp_path / 'truth.log'}", "--lost=0.02"]
+    words: list[str | Path] = [
+        built.bench,
+        built.elf,
+        f"--pty={link}",
+        f"--log={tmp_path / 'truth.log'}",
+        "--lost=0.02",
+    ]
     with subprocess.Popen(words, stdout=subprocess.DEVNULL) as bench:
         for _ in range(int(LIMIT_S / 0.02)):
             if link.is_symlink():
                 break
             threading.Event().wait(0.02)
-        yield link
+        yield link, bench
         bench.terminate()
-        bench.wait(LIMIT_S)
 
 
-def test_record_reads_the_firmware_in_real_time(port: Path, tmp_path: Path) -> None:
+def test_record_reads_the_firmware_in_real_time(running: tuple[Path, subprocess.Popen[bytes]], tmp_path: Path) -> None:
     """What is recorded was sent, in its order and with the firmware's own times; what is not is a gap in the run.
 
     Nothing here depends on how fast the machine is: a slow one gets fewer readings, none of them wrong.
     """
-    out = tmp_path / "run.h5"
+    (port, bench), out = running, tmp_path / "run.h5"
     words = ["record", "--port", port, "--sensor", "line-protocol", "--seconds", str(SECONDS), "-o", out]
     done = subprocess.run(
         [sys.executable, "-m", "springmass", *words], capture_output=True, text=True, timeout=LIMIT_S, check=False
     )
+    bench.terminate()
+    assert bench.wait(LIMIT_S) == 0  # its log is whole then
     assert done.returncode == 0, done.stderr
     with open_run(out) as run:
         run.verify()
