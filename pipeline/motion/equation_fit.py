@@ -245,6 +245,11 @@ def fit_equation(
     if chosen is None:
         return EquationMisfit(f"the damping ratio is {ratio:.2g} at the start, and no fit of the equation converged")
     found = _described(search, *chosen)
+    if found.damping.best.rate_at_start() < 0.0:
+        return EquationMisfit(
+            f"the bob stops within the record, but the equation of motion with {LAWS[found.damping.selected].words} "
+            "would let it swing up: no damping ended this motion, and the averaged law stands"
+        )
     if not found.damping.squared_rate(demodulated.t) < found.state["angular_frequency"].value ** 2:
         return EquationMisfit(f"{found.why}; so strong a damping leaves no oscillation whose frequency could be given")
     return found

@@ -259,3 +259,15 @@ def test_a_motion_of_another_equation_is_not_forced_into_this_one() -> None:
     codes = {finding.code: finding.message for finding in analyse(Track.from_arrays(T, y), SPRING).findings}
     assert "strongly_damped" not in codes
     assert "equation of motion" in codes["not_converged"]
+
+
+def test_what_swings_up_and_stops_is_no_drag_that_drives() -> None:
+    """A neighbour sets a bob going and takes it back: no equation with a negative drag stands for that."""
+    t = np.arange(1830) / 19.73
+    envelope = np.where(t < 38.0, 0.00035 * t * np.exp(1.0 - t / 10.0), 0.0)
+    y = 0.5 + envelope * np.cos(2.0 * np.pi * t / 1.4127 - 0.3 * np.sin(t / 6.0))
+    y += 0.0005 * np.random.default_rng(0).standard_normal(t.size)
+    found = analyse(Track.from_arrays(t, np.round(y, 3)))
+    codes = {each.code for each in found.findings}
+    assert "strongly_damped" not in codes
+    assert not codes.isdisjoint(("not_converged", "no_law_fits", "no_oscillation"))
