@@ -67,6 +67,7 @@ class SensorChain:
         self._clock_ppm = clock_ppm
         self.last: Readings = NO_READINGS
         self._next = 0
+        self._way_s = 0.0  # of the last sound from the sensor to what it met
         self._held: list[Reading] = []
         self._breaks: list[int] = []  # numbers among those held of readings before which the stream was broken off
 
@@ -98,12 +99,22 @@ class SensorChain:
             self._held += self.decoder.feed(host_ns, data)
 
     def block(self) -> Block:
-        """Return the samples of the readings held, with the next indices of the run, and hold none."""
+        """Return the samples of the readings held, with the next indices of the run, and hold none.
+
+        Notes
+        -----
+        A device clock is read when the ping leaves, and the distance is that at which the sound meets the bob, half of
+        its time of flight later: a sample's time is that. Left at the ping, a bob of 50 mm and 0.76 s would show a
+        second harmonic of 31 um, for the further it is the later it is met.
+        """
         held, self._held = self._held, []
         host_ns, sequence, device_us, echo_us, distance_m, _ = zip(*held, strict=True) if held else _NONE
         stamps = np.array(host_ns, np.int64)
         t, flags = self.timebase.push_all(held, stamps, np.array(sequence, np.int64), np.array(device_us, np.int64))
-        distance = self.calibration.distance(np.array(echo_us, np.float64), np.array(distance_m, np.float64))
+        echo = np.array(echo_us, np.float64)
+        distance = self.calibration.distance(echo, np.array(distance_m, np.float64))
+        if self.family.has_device_time:
+            t = t + self._ways(0.5e-6 * echo)
         flags[np.isnan(distance)] |= MISSING
         if self._breaks:
             flags[[at for at in self._breaks if at < len(held)]] |= GAP_BEFORE
@@ -111,6 +122,17 @@ class SensorChain:
         first = self._next
         self._next += len(held)
         return Block(first, t, distance, flags, stamps)
+
+    def _ways(self, ways_s: F8) -> F8:
+        """Return how long after its ping each reading (n,) met the bob, s; one without an echo as long as the last.
+
+        Sound that was on its way for longer than a period belongs to an earlier ping.
+        """
+        known = ways_s < 0.5 / self.timebase.rate_hz
+        latest = np.maximum.accumulate(np.where(known, np.arange(ways_s.size), -1))
+        ways_s = np.where(latest >= 0, ways_s[latest], self._way_s)
+        self._way_s = float(ways_s[-1]) if ways_s.size else self._way_s
+        return ways_s
 
     def lost(self) -> None:
         """The port went away: a frame cut in half by that is no frame, and the next sample is flagged."""

@@ -123,7 +123,9 @@ class VirtualRangefinder:
         sensor = self.sensor
         intended_s = sequence / sensor.rate_hz / (1.0 + sensor.crystal_ppm * 1e-6)
         moment = intended_s + (self._rng.normal(0.0, sensor.jitter_s) if sensor.jitter_s else 0.0)
-        away = self._position(moment) + self._false_echo(moment) + self._rng.normal(0.0, sensor.noise_m)
+        # Sound that leaves now meets the bob half its time of flight later.
+        met = moment + self._position(moment) / sensor.speed_of_sound_m_per_s
+        away = self._position(met) + self._false_echo(moment) + self._rng.normal(0.0, sensor.noise_m)
         away = min(away, sensor.far_limit_m)
         flight_s = 2.0 * away / sensor.speed_of_sound_m_per_s
         device_us = round(sequence / sensor.rate_hz * 1e6) % (1 << 32)
@@ -141,7 +143,11 @@ class VirtualRangefinder:
         distance = np.array([shot.distance_m for shot in shots], np.float64)
         flags = np.isnan(distance) * np.uint8(Flag.MISSING)
         host_ns = np.array([round(shot.true_s * 1e9) for shot in shots], np.int64)
-        return Block(0, np.arange(len(shots)) / self.sensor.rate_hz, distance, flags, host_ns)
+        # The moments at which sound met the bob, by the sensor's clock; of one that met nothing, as the one before.
+        ways_s = np.array([0.5e-6 * shot.echo_us for shot in shots], np.float64)
+        heard = np.maximum.accumulate(np.where(np.isfinite(ways_s), np.arange(len(shots)), -1))
+        ways_s = np.where(heard >= 0, ways_s[heard], 0.0)
+        return Block(0, np.arange(len(shots)) / self.sensor.rate_hz + ways_s, distance, flags, host_ns)
 
     def info(self, name: str) -> SourceInfo:
         """Return what is known of it as a source."""

@@ -78,7 +78,8 @@ def test_a_simulated_run_becomes_a_run_file_with_its_truth(cli: Callable, tmp_pa
     assert loaded.info.kind == "simulated"
     assert loaded.info.clock == "device"
     assert 295 <= len(loaded.samples) <= 310
-    np.testing.assert_allclose(np.diff(loaded.samples.t), 0.01, atol=1e-9)
+    # A bob that swings is met a little sooner or later after each ping.
+    np.testing.assert_allclose(np.diff(loaded.samples.t), 0.01, atol=1e-4)
     motion = analyse(loaded.track).motion
     assert isinstance(motion, Oscillation)
     omega = motion.derived.statistical["angular_frequency"]
@@ -109,7 +110,8 @@ def test_a_long_recording_goes_on_in_further_files_without_losing_a_sample(
     assert done.code == 0, done.err
     with open_run(tmp_path / "run.h5") as run:
         names = [original.name for original in run.originals()]
-        np.testing.assert_allclose(np.diff(run.samples().t), 0.01, atol=1e-9)
+        # A bob that swings is met a little sooner or later after each ping.
+        np.testing.assert_allclose(np.diff(run.samples().t), 0.01, atol=1e-4)
         assert run.provenance["log"]["lost"] == 0
     assert names[:3] == ["run.wire", "run.001.wire", "run.002.wire"]
     assert [path.name for path in tmp_path.glob("run*")] == ["run.h5"]
@@ -374,7 +376,8 @@ def test_a_killed_recording_is_recovered_from_its_log(cli: Callable, tmp_path: P
     with open_run(tmp_path / "run.h5") as run:
         samples = run.samples()
     assert len(samples) >= 95
-    np.testing.assert_allclose(np.diff(samples.t), 0.01, atol=1e-9)
+    # A bob that swings is met a little sooner or later after each ping.
+    np.testing.assert_allclose(np.diff(samples.t), 0.01, atol=1e-4)
     assert (tmp_path / "run.wire").exists()
 
 

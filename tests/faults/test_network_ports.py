@@ -141,7 +141,8 @@ def test_a_sensor_behind_rfc2217_is_recorded_like_one_on_a_cable(family: str, ra
     assert np.ptp(samples.distance) > 0.08
     if family == "line-protocol":
         # Its numbers say that nothing is missing.
-        np.testing.assert_allclose(np.diff(samples.t), 1.0 / rate_hz, atol=1e-9)
+        # A bob that swings is met a little sooner or later after each ping.
+        np.testing.assert_allclose(np.diff(samples.t), 1.0 / rate_hz, atol=1e-4)
 
 
 def test_a_server_that_hangs_up_is_a_gap_and_the_run_goes_on(tmp_path: Path) -> None:

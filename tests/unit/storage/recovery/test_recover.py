@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -104,9 +105,10 @@ def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
         told = run.provenance
     assert (told["software"], told["recorded_with"], told["reads"]) == ("springmass", "0.1.0", 201)
     assert told["log"]["ended"]
-    assert (told["marks"][0]["text"], round(told["marks"][0]["t_s"], 9)) == ("half way", 1.0)
-    assert told["clock_map"]["t0_mono_ns"] == START_NS + 2_000_000_000
-    assert told["start_time"] == "2020-09-13T12:26:42.000000+00:00"
+    assert (told["marks"][0]["text"], round(told["marks"][0]["t_s"], 2)) == ("half way", 1.0)
+    assert told["clock_map"]["t0_mono_ns"] == pytest.approx(START_NS + 2_000_000_000, abs=1_000_000)
+    began = datetime.fromisoformat(told["start_time"]) - datetime(2020, 9, 13, 12, 26, 42, tzinfo=UTC)
+    assert abs(began.total_seconds()) < 2e-3
 
 
 def test_several_sensors_make_several_files(tmp_path: Path) -> None:
@@ -137,7 +139,7 @@ def test_a_torn_log_gives_what_it_holds_and_says_so(tmp_path: Path) -> None:
         samples = run.samples()
         after = int(np.flatnonzero(samples.flags & Flag.GAP_BEFORE)[0])
         assert samples.t[after] - samples.t[after - 1] > 0.015
-        expected = 0.3 + 0.05 * np.sin(14 * samples.t)
+        expected = 0.3 + 0.05 * np.sin(14 * (samples.t - samples.distance / 344.0))  # as at the ping
         assert np.max(np.abs(samples.distance - expected)) < 1e-4
         assert run.originals()[0].data == bytes(data)
 
