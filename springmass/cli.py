@@ -10,7 +10,7 @@ import os
 import sys
 
 from springmass import __version__
-from springmass.errors import INTERRUPTED, OK, SENSOR, SOME_FAILED, UNREADABLE, USAGE, complain, hush
+from springmass.errors import INTERRUPTED, OK, SENSOR, SOME_FAILED, UNREADABLE, USAGE, complain, hush, speak_up
 from springmass.terminal.arguments import COMMANDS
 
 TYPE_CHECKING = False
@@ -33,6 +33,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"springmass {__version__}")
     parser.add_argument("-q", "--quiet", action="store_true", help="say on stderr what is wrong, and nothing else")
+    parser.add_argument("-v", "--verbose", action="store_true", help="say on stderr what is read, used and written too")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, (add, summary) in COMMANDS.items():
         described = summary[0].upper() + summary[1:] + "."
@@ -87,6 +88,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = build_parser().parse_args(arguments)
     if options.quiet:
         hush()
+    if options.verbose:
+        speak_up()
     from importlib import import_module
 
     # A title or a name that the terminal's code lacks is shown escaped. Line by line, so that both streams come in the

@@ -30,13 +30,16 @@ __all__ = [
     "USAGE",
     "ProgramError",
     "complain",
+    "detail",
     "hush",
     "hushed",
+    "speak_up",
     "suggest",
     "tell",
 ]
 
 _quiet = False
+_verbose = False
 OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERRUPTED = 0, 1, 2, 3, 4, 5, 130
 
 
@@ -65,6 +68,18 @@ def tell(message: str) -> None:
     """Write one line to stderr, control characters in it made visible; nothing under ``-q``."""
     if not _quiet:
         _write(message)
+
+
+def detail(message: str) -> None:
+    """Write one line to stderr on what is being done, under ``-v`` only."""
+    if _verbose:
+        _write(message)
+
+
+def speak_up() -> None:
+    """Write from here on what is done, too."""
+    global _verbose
+    _verbose = True
 
 
 def hush() -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -125,6 +126,8 @@ def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | No
         _print_together(analysed, options)
     if analysed and out is not None:
         tell(f"written: {_write_together(analysed, out / TOGETHER)}")
+    if len(analysed) > 1:
+        suggest(f"springmass compare {shlex.join(options.input)}")
     codes = [done.code for done in everything]
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 
 from springmass.batch.search import search
-from springmass.errors import OK, tell
+from springmass.errors import OK, suggest, tell
 
 __all__ = ["run"]
 
@@ -28,5 +29,7 @@ def run(options: argparse.Namespace) -> int:
             print(json.dumps(row, allow_nan=False))
     else:
         print(text_of(found.rows, found.columns), end="")
+    if found.rows and "run" in found.columns:
+        suggest(f"springmass report {shlex.join([*options.input[:1], str(found.rows[0]['run'])])}")
     tell(f"{len(found.rows)} of {found.whole} runs; the index: {found.index}")
     return OK

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 
 from acquisition.errors import visible
 from springmass.batch.results_table import is_course
 from springmass.commands import completions
-from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, tell
+from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
 from springmass.runs.json_results import picked, provenance_of, rejected
@@ -53,7 +54,11 @@ def run(options: argparse.Namespace) -> int:
     if out is not None:
         from springmass.report.write import write_report
 
-        tell(f"report: {write_report(out, runs, compared=compared, summary=result, pdf=options.pdf)}")
+        page = write_report(out, runs, compared=compared, summary=result, pdf=options.pdf)
+        tell(f"report: {page}")
+        suggest(f"open {page} in a browser")
+    else:
+        suggest("the same command with --out DIR writes the report")
     findings = [*result["findings"], *(f for run in runs for f in run.result["findings"])]
     if options.strict and (wrong := rejected(findings)):
         complain(f"rejected under --strict: {', '.join(wrong)}")
@@ -72,6 +77,8 @@ def _run_courses(options: argparse.Namespace) -> int:
     if options.strict and found.suspects:
         complain(f"rejected under --strict: {len(found.suspects)} runs differ from their course")
         return REJECTED
+    for suspect in found.suspects[:1]:
+        suggest(f"springmass report {shlex.join([*options.input[:1], suspect.name])}")
     return OK
 
 

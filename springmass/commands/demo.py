@@ -9,7 +9,7 @@ from pathlib import Path
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.convert import write_loaded
-from springmass.errors import OK
+from springmass.errors import OK, suggest
 from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed, analyse_loaded, make_folder
 from springmass.runs.comparing import compare_analysed
@@ -36,6 +36,7 @@ def run(options: argparse.Namespace) -> int:
         print(findings_text(one.result["findings"]))
     print(f"\n{compared.comparison.message}")
     print(f"\nReport: {write_report(out / 'demo.results', analysed, compared=compared)}")
+    suggest("springmass analyse YOUR_RECORDING --scene BENCH.toml; springmass scene prints such a file to fill in")
     return OK
 
 

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import springmass
-from springmass.errors import OK, SOME_FAILED
+from springmass.errors import OK, SOME_FAILED, suggest
 
 __all__ = ["Check", "examine", "foreign_packages", "run"]
 
@@ -58,6 +58,8 @@ def run(options: argparse.Namespace) -> int:
             print(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:<24} {check.found}")
             if not check.ok:
                 print(f"      {check.remedy}")
+    if all(check.ok for check in checks):
+        suggest("springmass demo")
     return OK if all(check.ok for check in checks) else SOME_FAILED
 
 

@@ -13,7 +13,7 @@ from acquisition.decoders.family import Identity
 from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
 from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
-from springmass.errors import OK, SENSOR, USAGE, ProgramError, tell
+from springmass.errors import OK, SENSOR, USAGE, ProgramError, suggest, tell
 from springmass.session.identity import outdated, settings_of
 
 __all__ = ["run"]
@@ -38,6 +38,8 @@ def run(options: argparse.Namespace) -> int:
     print(f"{options.port}: {identity}{settings_of(identity)}")
     if outdated(identity):
         print(f"{VERSION} comes with this program; `springmass firmware --port {options.port} --flash` updates it")
+    else:
+        suggest(f"springmass record --port {shlex.quote(options.port)} --page")
     return OK
 
 

@@ -6,11 +6,12 @@ import argparse
 import csv
 import io
 import json
+import shlex
 
 import numpy as np
 
 from springmass.batch.search import search
-from springmass.errors import OK, UNREADABLE, ProgramError, tell
+from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
 from springmass.runs.analysing import make_folder
 
 __all__ = ["run"]
@@ -45,4 +46,5 @@ def run(options: argparse.Namespace) -> int:
     save(drag_map_figure(runs), folder, "drag-map")
     write_whole(folder / "drag-map.csv", out.getvalue())
     tell(f"{len(runs)} of {len(found)} runs give a drag coefficient; written: {folder / 'drag-map.svg'}")
+    suggest(f"springmass compare {shlex.join(options.input)}")
     return OK

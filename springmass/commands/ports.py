@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,7 +13,7 @@ from acquisition.clock import SystemClock
 from acquisition.decoders.registry import describe_bytes, probe
 from acquisition.errors import PortError
 from acquisition.live.serial_port import SerialPort, list_ports
-from springmass.errors import OK, SENSOR, ProgramError, tell
+from springmass.errors import OK, SENSOR, ProgramError, suggest, tell
 
 __all__ = ["name_sensors", "run"]
 
@@ -33,6 +34,8 @@ def run(options: argparse.Namespace) -> int:
         print(f"{row['device']:<16} {row['description']}")
         if row["heard"] is not None:
             print(f"{'':<16} {row['heard']}")
+    known = [row["device"] for row in rows if row["families"]]
+    suggest(f"springmass record --port {shlex.quote(known[0])}" if known else "springmass record --simulate SCENE.toml")
     return OK
 
 

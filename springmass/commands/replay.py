@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.replay import Replay
 from springmass.commands import completions
 from springmass.commands.convert import write_loaded
-from springmass.errors import OK, USAGE, ProgramError, tell
+from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.runs.loading import load
 
 __all__ = ["run"]
@@ -46,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
                 Path(options.output), replace(loaded, info=source.info), source, overwrite=options.overwrite
             )
             tell(f"{path}: replayed from {loaded.path}")
+            suggest(f"springmass analyse {shlex.quote(str(path))}")
             return OK
         samples = loaded.samples
         print("time_s", "distance_m" if samples.quantity == "length" else samples.quantity, "flags", sep="\t")

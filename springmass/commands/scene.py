@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 
-from springmass.errors import OK, USAGE, ProgramError, tell
+from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 
 __all__ = ["run"]
 
@@ -57,11 +58,13 @@ def run(options: argparse.Namespace) -> int:
         ask_about(scene, options.check)
         told = ", ".join(f"[{table}] {key}" for table, keys in scene.to_mapping().items() for key in keys)
         print(f"{options.check}: a scene that states {told or 'nothing'}")
+        suggest(f"springmass analyse RECORDING --scene {shlex.quote(options.check)}")
         return OK
     if options.input is None:
         if noted:
             raise ProgramError("--scene, --note and --mark belong to a recording; name it", USAGE)
         print(TEMPLATE, end="")
+        suggest("springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
         raise ProgramError(f"{options.input}: nothing to note; give --scene, --note or --mark S=TEXT", USAGE)
@@ -71,4 +74,5 @@ def run(options: argparse.Namespace) -> int:
     given = None if options.scene is None else read_scene(options.scene)
     written = write_about(about_of(path).with_more(given, options.note, options.mark))
     tell(f"{written}: used from now on with {path.name}")
+    suggest(f"springmass analyse {shlex.quote(str(path))}")
     return OK

@@ -7,7 +7,7 @@ import json
 import textwrap
 
 from acquisition.decoders.registry import families
-from springmass.errors import OK
+from springmass.errors import OK, suggest
 
 __all__ = ["run"]
 
@@ -24,4 +24,5 @@ def run(options: argparse.Namespace) -> int:
         step = f"{family.resolution_m * 1e3:.3g}"
         print(f"{family.name:<18} {family.rate_hz:>9.3g} {step:>9} {reach:>13} {family.baud:>7}  {family.title}")
         print(textwrap.fill(family.limits, 96, initial_indent=" " * 19, subsequent_indent=" " * 19))
+    suggest("springmass ports tells which of them speaks, and where")
     return OK

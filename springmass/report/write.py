@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from springmass.errors import detail
 from springmass.report.budgets import budget_csv
 from springmass.report.figures import KINDS, NAMES, comparison_figure, draw, render
 from springmass.report.html import render_html
@@ -74,6 +75,7 @@ def write_report(
     stems = _stems(names)
     with whole_folder(directory, _names(stems), PAGE) as folder:
         _write(folder, runs, stems, compared, summary, KINDS if pdf else KINDS[:1])
+    detail(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
     return directory / PAGE
 
 

@@ -15,7 +15,7 @@ from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.results.classic import Classic, classic
 from springmass import __version__
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import USAGE, ProgramError, detail
 from springmass.runs.json_results import result_of
 from springmass.runs.loading import Loaded
 
@@ -89,6 +89,8 @@ def analyse_loaded(
     """
     scene = scene_of(loaded, scene)
     analysis = analyse(loaded.track, scene, params_for(accuracy))
+    stated = ", ".join(f"[{table}] {key}" for table, keys in scene.to_mapping().items() for key in keys)
+    detail(f"analysed: {loaded.path} at {accuracy}, with a scene that states {stated or 'nothing'}")
     by_classic = classic(loaded.track, scene) if with_classic else None
     result = result_of(
         loaded,

@@ -19,7 +19,7 @@ from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
 from acquisition.source import SourceInfo
 from pipeline.track import Track
-from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, tell
+from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, detail, tell
 from springmass.runs.about import about_of
 from springmass.runs.tracks import to_track
 from storage.errors import RunDamaged
@@ -182,6 +182,8 @@ def load(
         if about.notes:
             noted["notes"] = list(about.notes)
         loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
+    told = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
+    detail(f"read: {where}: {told} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
     if clock_ppm is not None:
         loaded = replace(loaded, track=replace(loaded.track, clock_limit=clock_ppm * 1e-6))
     return replace(loaded, track=cut(loaded.track, from_s, to_s, where=where))
