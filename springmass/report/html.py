@@ -168,6 +168,7 @@ def _part(
             _subtitle(given, analysis.track),
             f"{date_words(run.recorded)[:1].upper()}{date_words(run.recorded)[1:]}.",
             f"Bench: {bench_words(analysis.scene)}.",
+            *(f"Noted: {visible(str(note))}" for note in run.recorded.get("notes", ())),
         ],
         "kind": analysis.track.kind,
         "verdict": verdict(analysis),

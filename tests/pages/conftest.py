@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
 from springmass.cli import main
 from springmass.runs.loading import sample_data
@@ -161,3 +161,68 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
     yield context
     context.close()
     assert not wrong
+
+
+WIDTHS = {"laptop": (1366, 768), "phone": (390, 844), "A4": (680, 970)}
+"""Pixels; A4 less margins of 15 mm at 96 pixels an inch."""
+
+OUTSIDE = """() => {
+  const found = [], wide = document.documentElement.clientWidth;
+  const name = e => `${e.tagName}.${e.getAttribute('class') || ''}: ${(e.textContent || '').trim().slice(0, 40)}`;
+  if (document.documentElement.scrollWidth > wide) found.push('the page scrolls sideways');
+  for (const e of document.querySelectorAll('body *')) {
+    const style = getComputedStyle(e), box = e.getBoundingClientRect();
+    const head = e.closest('thead');
+    if (head && getComputedStyle(head).position === 'absolute') continue;  // for screen readers alone
+    if (e.closest('svg') || box.width === 0) continue;
+    if (box.left < -0.5 || box.right > wide + 0.5) found.push('outside ' + name(e));
+    if (style.overflowX !== 'visible' && e.scrollWidth > e.clientWidth + 1) found.push('cut off ' + name(e));
+  }
+  for (const svg of document.querySelectorAll('svg')) {
+    const frame = svg.getBoundingClientRect();
+    for (const text of svg.querySelectorAll('text')) {
+      const box = text.getBoundingClientRect();
+      if (box.left < frame.left - 1 || box.right > frame.right + 1
+          || box.top < frame.top - 1 || box.bottom > frame.bottom + 1)
+        found.push('outside its figure ' + name(text));
+    }
+  }
+  return found;
+}"""
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """A page without network, its errors kept as failures."""
+    context = browser.new_context(offline=True)
+    opened = context.new_page()
+    errors: list[str] = []
+    opened.on("pageerror", lambda error: errors.append(str(error)))
+    opened.on("requestfailed", lambda request: errors.append(request.url))
+    yield opened
+    context.close()
+    assert errors == []
+
+
+@pytest.fixture
+def show(page: Page) -> Callable[[Path, str], None]:
+    """Return a function that opens a page as wide as a medium is; paper with the styles of print."""
+
+    def shown(path: Path, width: str) -> None:
+        wide, tall = WIDTHS[width]
+        page.set_viewport_size({"width": wide, "height": tall})
+        page.emulate_media(media="print" if width == "A4" else "screen")
+        page.goto(path.as_uri())
+
+    return shown
+
+
+@pytest.fixture
+def clipped(page: Page, show: Callable[[Path, str], None]) -> Callable[[Path, str], list[str]]:
+    """Return a function that names what of a page lies outside a medium, is cut off, or leaves its figure."""
+
+    def outside(path: Path, width: str) -> list[str]:
+        show(path, width)
+        return list(page.evaluate(OUTSIDE))
+
+    return outside
