@@ -173,4 +173,4 @@ def test_a_reader_that_goes_away_ends_it_quietly(recording: Path) -> None:
         assert process.stdout.readline() == "time_s\tdistance_m\tflags\n"
         process.stdout.close()
         assert process.stderr.read() == ""
-        assert process.wait(timeout=30) == 0
+        assert process.wait(timeout=120) == 0

@@ -27,7 +27,7 @@ from storage.run_file.reading import open_run
 STEP_S = 0.01
 FIRST_US, STEP_US = 1000.0, 0.25
 SPEED_M_PER_S = 344.0
-LIMIT_S = 60.0
+LIMIT_S = 180.0
 
 
 def line_of(number: int, *, heard: bool = True) -> bytes:

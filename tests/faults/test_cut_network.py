@@ -14,7 +14,7 @@ import pytest
 
 from storage.run_file.reading import open_run
 
-RUN_S, ANSWER_S = 16.0, 10.0
+RUN_S, ANSWER_S = 16.0, 100.0
 FEEDER = """
 import binascii, socket, sys, time
 listener = socket.create_server((sys.argv[1], int(sys.argv[2])))

@@ -32,7 +32,7 @@ from storage.wire_log.scanning import read_log
 
 TRIALS = 50 if os.environ.get("SPRINGMASS_TRIALS") else 12
 SECOND_NS = 1_000_000_000
-WAIT_S = 30.0
+WAIT_S = 120.0
 
 
 class Hanging:

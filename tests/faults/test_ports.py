@@ -38,7 +38,7 @@ from acquisition.readings import Read, Readings
 from acquisition.simulated.pseudo_terminal import Faults, VirtualPort
 from acquisition.simulated.rangefinder import Shot, VirtualRangefinder, VirtualSensor
 
-WAIT_S = 10.0
+WAIT_S = 60.0
 QUIET_S = 0.4
 NAMES = [family.name for family in families()]
 STREAMING = [family.name for family in families() if family.poll is None]
