@@ -146,6 +146,8 @@ def compared_text(found: CourseCompared) -> str:
         within = "one run a bench" if math.isnan(one.within) else f"{one.within:.2g} within a bench"
         between = "one bench" if math.isnan(one.between) else f"{one.between:.2g} between {one.benches} benches"
         lines.append(f"  {one.runs} runs; scatter {within} (stated {one.stated:.2g}), {between}")
+    if any(one.quantity == "drag_coefficient" for one in found.agreements):
+        lines.append("a drag coefficient counts all damping as drag of the disc, that of spring and hook too")
     laws = ", ".join(f"{law} {count}" for law, count in found.laws.items())
     lines += ["", f"damping laws selected: {laws}"] if laws else []
     lines += ["", f"{len(found.suspects)} runs differ from their course"] if found.suspects else []

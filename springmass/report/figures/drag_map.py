@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipeline.bench.derived_drag import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.track import F8
 from springmass.report.figures.canvas import (
     BLUE,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["DragRun", "drag_map_figure", "drag_of_disc_at_rest", "drag_of_plate"]
 
 COLOURS = ((BLUE, "-"), (VERMILLION, "--"), (GREEN, "-."), (PURPLE, ":"), (ORANGE, "-"), (SKY, "--"))
-STEADY = 1.17
 WIDTH, HEIGHT, LEFT, GAP, RIGHT = 7.2, 3.6, 0.62, 0.45, 0.12  # inches
 NARROW = 5.0  # inches, below which the panels stand under each other
 
@@ -66,7 +66,7 @@ def drag_of_disc_at_rest(reynolds: F8) -> F8:
     .. [1] A. Oberbeck, J. reine angew. Math. 81 (1876) 62; H. Lamb, Hydrodynamics, art. 339.
     .. [2] S. F. Hoerner, Fluid-Dynamic Drag, 1965, section III.
     """
-    return np.maximum(64.0 / (np.pi * reynolds), STEADY)
+    return np.maximum(64.0 / (np.pi * reynolds), STEADY_DISC_DRAG)
 
 
 def drag_of_plate(keulegan_carpenter: F8) -> F8:
@@ -74,13 +74,15 @@ def drag_of_plate(keulegan_carpenter: F8) -> F8:
 
     Notes
     -----
-    :math:`8.0\\,KC^{-1/3}` at low KC [1]_: a disc sheds less at its rim, its values lie below with about that slope.
+    :math:`\\max(10\\,KC^{-1/3}, 1.95)`, fitted [1]_ to measured coefficients [2]_ [3]_.
 
     References
     ----------
-    .. [1] J. M. R. Graham, J. Fluid Mech. 97 (1980) 331.
+    .. [1] M. Luhar, H. M. Nepf, J. Fluids Struct. 61 (2016) 20, arXiv:1510.01237.
+    .. [2] G. H. Keulegan, L. H. Carpenter, J. Res. Natl. Bur. Stand. 60 (1958) 423.
+    .. [3] T. Sarpkaya, J. L. O'Keefe, J. Offshore Mech. Arct. Eng. 118 (1996) 64.
     """
-    return 8.0 * keulegan_carpenter ** (-1.0 / 3.0)
+    return np.maximum(10.0 * keulegan_carpenter ** (-1.0 / 3.0), 1.95)
 
 
 def drag_map_figure(runs: Sequence[DragRun], *, width: float = WIDTH) -> Figure:
@@ -151,11 +153,14 @@ def _draw(panel: Axes, runs: Sequence[DragRun], discs: Sequence[str], column: in
     if column == 0:
         line, words = drag_of_disc_at_rest(grid), "disc, steady stream (limits)"
     else:
-        line, words = drag_of_plate(grid), "flat plate, Graham 1980"
+        line, words = drag_of_plate(grid), "oscillating flat plate, Luhar and Nepf 2016"
+        assumed = np.array([disc_drag_coefficient(x) for x in grid.tolist()])
+        panel.plot(grid, assumed, color=GREY, lw=1.1, ls=(0, (1, 1)), label="oscillating disc, as simulate assumes")
     panel.plot(grid, line, color="#000000" if column else GREY, lw=1.1, ls=(0, (5, 2)), label=words)
     panel.set_xlim(low, high)
     panel.set_ylim(
-        0.7 * min(*np.quantile(heights, (0.01,)), line.min()), 1.4 * max(*np.quantile(heights, (0.99,)), STEADY)
+        0.7 * min(*np.quantile(heights, (0.01,)), line.min()),
+        1.4 * max(*np.quantile(heights, (0.99,)), STEADY_DISC_DRAG),
     )
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

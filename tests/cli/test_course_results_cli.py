@@ -1,0 +1,110 @@
+"""What is asked of a course's results: a search, a comparison, a map of its drag."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springmass.cli import main
+from tests.courses import write_recording
+
+K, SPRING_KG, DIAMETER_M, RHO = 14.0, 0.010, 0.102, 1.199  # N/m, kg, m, kg/m3
+DRAG = {"thin": 5.0, "thick": 3.0}
+BOBS_KG = (0.180, 0.195, 0.210, 0.225)
+
+
+def simulate(bob_kg: float, drag: float, seed: int) -> np.ndarray:
+    """Return distances of a bob with quadratic drag alone, A0/(1 + beta A0 t), in closed form."""
+    rng, t = np.random.default_rng(seed), np.arange(4000) / 100.0
+    mass = bob_kg + SPRING_KG / 3.0 + RHO * DIAMETER_M**3 / 3.0
+    omega = math.sqrt(K / mass)
+    beta = drag * 2.0 * omega * RHO * math.pi * DIAMETER_M**2 / 4.0 / (3.0 * math.pi * mass)
+    return 0.25 + 0.05 / (1.0 + beta * 0.05 * t) * np.cos(omega * t + seed) + 1e-4 * rng.standard_normal(t.size)
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of eight runs of one spring with two discs, at two benches."""
+    top = tmp_path_factory.mktemp("course")
+    (top / "runs").mkdir()
+    rows = []
+    for i, (disc, bob_kg) in enumerate((disc, bob_kg) for disc in DRAG for bob_kg in BOBS_KG):
+        write_recording(top / "runs" / f"run{i}.txt", simulate(bob_kg, DRAG[disc], i))
+        rows.append(
+            {"path": f"runs/run{i}.txt", "bob_mass_kg": bob_kg, "bob_mass_kg_u": 5e-5, "spring_mass_kg": SPRING_KG,
+             "disc_diameter_m": DIAMETER_M, "air_temperature_c": 20.0, "section": "AB"[i % 2], "disc": disc}
+        )  # fmt: skip
+    with (top / "runs.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    options = ["--runs", str(top / "runs.csv"), "-o", str(top / "out"), "--jobs", "1", "--reports", "0"]
+    assert main(["batch", str(top / "runs"), *options, "--accuracy", "fast"]) == 0
+    return top / "out"
+
+
+@pytest.fixture(autouse=True)
+def index(tmp_path, monkeypatch):
+    """The index lies apart from the user's."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+def test_the_catalog_lists_what_an_expression_selects(course, cli):
+    """By a tag and an uncertainty, sorted, as CSV and as JSON; an expression that is none is one line."""
+    where = "section = 'A' and period_u < 1e-4"
+    done = cli("catalog", course, "--where", where, "--sort=-period", "--columns", "run,period,section")
+    listed = list(csv.DictReader(done.out.splitlines()))
+    assert {row["run"] for row in listed[:2]} == {"run2", "run6"}  # the heavier bobs
+    assert {row["run"] for row in listed[2:]} == {"run0", "run4"}
+    assert {row["section"] for row in listed} == {"A"}
+    (row,) = (json.loads(line) for line in cli("catalog", course, "--where", "run = 'run3'", "--json").out.splitlines())
+    assert row["run"] == "run3"
+    wrong = cli("catalog", course, "--where", "secton = 'A'")
+    assert wrong.code == 2
+    assert "an expression over columns was demanded" in wrong.complaint
+
+
+def test_a_course_is_compared_by_spring_and_disc(course, cli):
+    """One spring constant of all runs, one drag coefficient a disc, scatter within and between benches."""
+    done = cli("compare", course, "--json")
+    told = json.loads(done.out)
+    found = {(one["quantity"], one["group"]): one for one in told["agreements"]}
+    (spring,) = (one for (quantity, _), one in found.items() if quantity == "spring_constant")
+    assert spring["runs"] == 8
+    assert spring["benches"] == 2
+    assert spring["mean"]["value"] == pytest.approx(K, abs=3.0 * spring["mean"]["u"] + 1e-3 * K)
+    for disc, drag in DRAG.items():
+        assert found["drag_coefficient", disc]["runs"] == 4
+        assert found["drag_coefficient", disc]["mean"]["value"] == pytest.approx(drag, rel=0.03)
+    assert told["suspects"] == []
+    assert "counts all damping as drag" in cli("compare", course, "--where", "disc = 'thin'").out
+
+
+def test_the_map_holds_the_drag_that_was_put_in(course, cli, tmp_path):
+    """At every amplitude the coefficient of the closed form, at its Re and KC; the figure as SVG and PDF."""
+    done = cli("map", course, "--out", tmp_path)
+    assert done.code == 0
+    assert {path.name for path in tmp_path.glob("drag-map.*")} == {"drag-map.svg", "drag-map.pdf", "drag-map.csv"}
+    with (tmp_path / "drag-map.csv").open(newline="") as file:
+        points = list(csv.DictReader(file))
+    assert len(points) == 8 * 8
+    eta = 1.813e-5  # Pa s, of air at 20 degrees
+    for i, point in enumerate(points):
+        bob_kg, disc = BOBS_KG[i // 8 % 4], ("thin", "thick")[i // 32]
+        assert (point["run"], point["disc"]) == (f"run{i // 8}", disc)
+        coefficient, u = float(point["drag_coefficient"]), float(point["drag_coefficient_u"])
+        assert coefficient == pytest.approx(DRAG[disc], abs=4.0 * u)
+        assert u < 0.1 * DRAG[disc]
+        kc, reynolds = float(point["keulegan_carpenter_number"]), float(point["reynolds_number"])
+        omega = math.sqrt(K / (bob_kg + SPRING_KG / 3.0 + RHO * DIAMETER_M**3 / 3.0))
+        amplitude = kc * DIAMETER_M / (2.0 * math.pi)
+        assert amplitude < 0.0505
+        assert reynolds == pytest.approx(RHO * omega * amplitude / math.sqrt(2.0) * DIAMETER_M / eta, rel=0.01)
+    first = [float(point["keulegan_carpenter_number"]) for point in points[7::8]]
+    assert first == pytest.approx([2.0 * math.pi * 0.05 / DIAMETER_M] * 8, rel=0.03)
+    assert "needs bob, disc and air" in cli("map", course, "--where", "disc = 'none'", "--out", tmp_path).complaint
