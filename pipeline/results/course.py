@@ -25,7 +25,6 @@ NEAR = 4.0  # within which a run with its fault mended must come
 FEW = 4  # runs that make no middle
 POWERS = (-3, -2, -1, 1, 2, 3)  # of ten, between units
 LEAST_SCATTER = {"spring": 2e-4, "drag": 0.02}  # relative, of a middle of runs that agree too well
-WITHIN = 0.06  # of a power of ten, in its logarithm
 SPREAD_OF_KC = 0.5  # in the logarithm, from which a slope over it is sought
 
 
@@ -194,11 +193,12 @@ def suspects(runs: Sequence[CourseRun]) -> tuple[Suspect, ...]:
 
     Notes
     -----
-    A middle is a median, its scatter the median deviation. A record that was clipped says so itself. Where noise, rest
-    and amplitude together lie a power of ten beside the course's, it is the unit of the distance. A spring constant
-    :data:`FAR` from those of its spring is a mass in another unit (a power of ten), a mass exchanged with that of
-    another such run (both come near with the masses exchanged), another spring (it lies near that one's), or unknown.
-    A drag coefficient far from those of its disc at the same Keulegan-Carpenter number is another disc, where it comes
+    A middle is a median, its scatter the median deviation. A record that was clipped says so itself. Where noise,
+    rest and amplitude together lie a power of ten beside the course's, it is the unit of the distance. A spring
+    constant :data:`FAR` from those of its spring is a mass in another unit (it agrees with a power of ten of it), a
+    mass exchanged with that of another such run (both come near with the masses exchanged), another spring (it lies
+    near that one's), or unknown. A drag coefficient far from those of its disc at the same Keulegan-Carpenter
+    number is another disc, where it comes
     near that one's with its diameter: :math:`C \\propto D^{-2}`.
     """
     found: dict[str, Suspect] = {}
@@ -274,13 +274,14 @@ def _springs(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
         middle = middles[run.spring]
         off = _log(run.spring_constant) - middle.centre
         told = f"k is {100 * math.expm1(off):+.3g} % off the {middle.label or 'course'}'s"
-        power = round(off / math.log(10))
+        powers = [p for p in POWERS if abs(_away(run, middles, mass=run.bob_mass_kg * 10.0**p)) < NEAR]
         if run.name in partners:
             other = partners[run.name]
             message = f"{told}; with its mass and that of {other} exchanged both agree with their springs"
             yield Suspect(run.name, "masses exchanged", message, other)
-        elif power in POWERS and abs(off / math.log(10) - power) < WITHIN:
-            yield Suspect(run.name, "unit of the mass", f"k is 10^{power:+d} of its spring's: the unit of its mass")
+        elif powers:
+            message = f"{told}; with 10^{powers[0]:+d} of its mass it agrees: the unit of its mass"
+            yield Suspect(run.name, "unit of the mass", message)
         elif near := [m.label for s, m in middles.items() if s != run.spring and abs(_away(run, middles, m)) < NEAR]:
             yield Suspect(run.name, "wrong spring", f"{told}, and that of spring {near[0]}", near[0])
         else:
