@@ -135,7 +135,7 @@ def test_every_option_in_the_reference_exists() -> None:
     known = {s for _, parser in parsers() for action in parser._actions for s in action.option_strings}
     text = (REFERENCE / "command-line.md").read_text(encoding="utf-8")
     named = set(re.findall(r"`(--?[a-z][a-z-]*)", without_code(text)))
-    assert named <= known | {"--version", "-q", "--quiet"}
+    assert named <= known | {"--version", "-q", "--quiet", "-v", "--verbose"}
 
 
 def test_every_estimate_is_documented() -> None:

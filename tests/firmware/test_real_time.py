@@ -20,7 +20,8 @@ pytestmark = pytest.mark.trials
 
 SECONDS = 8.0
 LIMIT_S = 120.0
-M_PER_US = 344.0e-6 / 2.0
+SPEED_M_PER_S = 344.0
+M_PER_US = SPEED_M_PER_S * 0.5e-6
 
 
 @pytest.fixture
@@ -64,9 +65,13 @@ def test_record_reads_the_firmware_in_real_time(running: tuple[Path, subprocess.
         sent[row[0]] = (row[1] * 1e-6, float(row[2]) * M_PER_US if row[2] else np.nan)
     # Sensor times count from the first reading; which number that was, the times themselves tell.
     at = {round(time_s * 1e6): number for number, (time_s, _) in sent.items()}
-    first = _first(samples.t, samples.distance, sent)
+    # A sample's time is that at which the sound met the bob; without an echo, as long behind its ping as the last.
+    ways_s = samples.distance / SPEED_M_PER_S
+    heard = np.maximum.accumulate(np.where(np.isfinite(ways_s), np.arange(ways_s.size), -1))
+    pings_s = samples.t - np.where(heard >= 0, ways_s[heard], 0.0)
+    first = _first(pings_s, samples.distance, sent)
     start_s = sent[first][0]
-    numbers = [at.get(round((t + start_s) * 1e6)) for t in samples.t]
+    numbers = [at.get(round((t + start_s) * 1e6)) for t in pings_s]
     assert None not in numbers, "a time that was not sent"
     np.testing.assert_allclose(samples.distance, [sent[number][1] for number in numbers], rtol=0, atol=1e-9)
     lost = sum(gap["lost"] for gap in decoding["gaps"])
