@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from playwright.sync_api import Browser
 
 from springmass.cli import main
 from tests.courses import damped, write_recording
-from tests.pages.test_pages import OUTSIDE, WIDTHS
+from tests.pages.test_pages import WIDTHS
 
 TAGS = "path,section,bob_mass_kg,air_temperature_c,disc_diameter_m\nrun0.txt,mon,0.2,20,0.1\nrun1.txt,tue,0.21,20,0.1\n"
 
@@ -35,14 +36,9 @@ def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_nothing_of_a_course_is_clipped(browser: Browser, course: Path, width: str) -> None:
+def test_nothing_of_a_course_is_clipped(clipped: Callable[..., list[str]], course: Path, width: str) -> None:
     """Nothing lies outside the medium or is cut off."""
-    wide, tall = WIDTHS[width]
-    page = browser.new_page(viewport={"width": wide, "height": tall}, offline=True)
-    page.emulate_media(media="print" if width == "A4" else "screen")
-    page.goto(course.as_uri())
-    assert page.evaluate(OUTSIDE) == []
-    page.close()
+    assert clipped(course, width) == []
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
