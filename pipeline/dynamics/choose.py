@@ -14,7 +14,9 @@ from pipeline.dynamics.integrators.runge_kutta import RK4
 from pipeline.dynamics.integrators.solve_ivp import SolveIvp
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
-from pipeline.dynamics.prediction.pilot import fine_step, in_own_units, predicted_by_pilot, rounding_error
+from pipeline.dynamics.prediction.cycles import predicted
+from pipeline.dynamics.prediction.pilot import fine_step, in_own_units
+from pipeline.dynamics.prediction.rounding import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
@@ -143,12 +145,11 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
             f"no integrator keeps a tolerance of {tolerance:g} for {seconds:g} s of this scene; "
             "ask for a larger tolerance or a shorter run"
         )
-    velocity = best.integrator.predicted_velocity_error(reduced, best.step_s, seconds)
     return replace(
         best,
         terms=terms,
-        predicted_error=best.predicted_error + left_out,
-        predicted_velocity_error=velocity + left_out,
+        predicted_error=best.integrator.predicted_error(reduced, best.step_s, seconds) + left_out,
+        predicted_velocity_error=best.integrator.predicted_velocity_error(reduced, best.step_s, seconds) + left_out,
     )
 
 
@@ -160,7 +161,7 @@ def _may_pay(problem: Problem, spacing_s: float, count: int, tolerance: float, m
     if _LIMIT_NS + _STEP_NS["rk4"] * seconds / fine_step(in_own_units(problem)) >= most_ns:
         return False  # the pilot alone costs more
     parts = math.floor((most_ns - _RUN_NS) / (_STEP_NS["rk4"] * count))
-    return parts > 0 and predicted_by_pilot(RK4, STRANG, problem, spacing_s / parts, seconds, pilots=1) <= tolerance
+    return parts > 0 and predicted(RK4, STRANG, problem, spacing_s / parts, seconds, pilots=1) <= tolerance
 
 
 def demand_tolerance(problem: Problem, seconds: float, tolerance: float) -> None:
@@ -204,7 +205,7 @@ def fit_step(
         cost = cost_ns(integrator, problem, parts, count, seconds)
         if parts > MOST_PARTS or cost >= (most_ns if found is None else found.cost_ns):
             break
-        error = integrator.predicted_error(problem, spacing_s / parts, seconds)
+        error = integrator.bound(problem, spacing_s / parts, seconds)
         tried.add(parts)
         if error <= tolerance:
             found = Choice(integrator, parts, spacing_s / parts, error, cost, problem)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,10 +65,13 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
     omega = eq.angular_frequency_per_s
     time = seconds + 1.0 / omega
     with np.errstate(over="ignore"):
+        # Under a cubic spring another amplitude is another pace, and the phase drifts for all the time that is left.
+        bend = 0.75 * abs(eq.cubic_per_m2_s2) * (start / omega) * (start / omega)
+        drift = 1.0 + bend / math.sqrt(1.0 + bend) * omega * time if math.isfinite(bend) else math.inf
         sizes = {
-            "viscous_drag": ("gamma_per_s", gamma * time * (1.0 + 0.5 * gamma / omega)),
-            "quadratic_drag": ("drag_per_m", beta * start * time),
-            "friction": ("friction_m_per_s2", mu * time / start if start > 0 else 0.0),
+            "viscous_drag": ("gamma_per_s", gamma * time * (1.0 + 0.5 * gamma / omega) * drift),
+            "quadratic_drag": ("drag_per_m", beta * start * time * drift),
+            "friction": ("friction_m_per_s2", mu * time / start * drift if start > 0 else 0.0),
             "amplitude_dependent_frequency": (
                 "cubic_per_m2_s2",
                 0.375 * abs(eq.cubic_per_m2_s2) * start * start / omega * time,

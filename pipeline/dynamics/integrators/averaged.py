@@ -14,7 +14,8 @@ import numpy as np
 from pipeline.dynamics.amplitude import amplitude
 from pipeline.dynamics.integrator import Integrator, demand_times
 from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.prediction.pilot import bounded, predicted_by_pilot
+from pipeline.dynamics.prediction.cycles import predicted
+from pipeline.dynamics.prediction.pilot import bounded
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 
@@ -52,7 +53,7 @@ class Averaged(Integrator):
         demand_times(step_s, seconds)
         if self.refusal(problem):
             return math.inf
-        return bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds, of_velocity=of_velocity))
+        return bounded(lambda: predicted(self, STRANG, problem, step_s, seconds, of_velocity=of_velocity))
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Evaluate the model at every kept time."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.dynamics.flow import flows
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
-from pipeline.dynamics.prediction.pilot import rounding_error
+from pipeline.dynamics.prediction.rounding import expected_rounding
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 
@@ -40,9 +40,9 @@ class Exact(Integrator):
         return _states(problem, step_s * every, steps // every + 1)
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return the rounding of the phase."""
+        """Return the rounding that is expected of the phase."""
         demand_times(step_s, seconds)
-        return rounding_error(problem, seconds)
+        return expected_rounding(problem, seconds)
 
 
 EXACT = Exact()

@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 from pipeline.dynamics.equation import Equation, Real
 from pipeline.dynamics.integrator import Integrator, StepMaker, demand_times, kept, with_start
 from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.prediction.pilot import bounded, predicted_by_pilot, rounding_error
+from pipeline.dynamics.prediction.cycles import predicted
+from pipeline.dynamics.prediction.pilot import bounded
+from pipeline.dynamics.prediction.rounding import stepped_rounding
 from pipeline.dynamics.prediction.stability import limit_by_search
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
@@ -57,8 +59,8 @@ class OneStep(Integrator):
 
     def _predicted(self, problem: Problem, step_s: float, seconds: float, *, of_velocity: bool) -> float:
         demand_times(step_s, seconds)
-        rounding = rounding_error(problem, seconds, seconds / step_s)
-        of = bounded(lambda: predicted_by_pilot(self, STRANG, problem, step_s, seconds, of_velocity=of_velocity))
+        rounding = stepped_rounding(problem, seconds, step_s)
+        of = bounded(lambda: predicted(self, STRANG, problem, step_s, seconds, of_velocity=of_velocity))
         return rounding + of
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:

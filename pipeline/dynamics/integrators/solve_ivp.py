@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrator import Integrator, demand_times
-from pipeline.dynamics.prediction.pilot import rounding_error
+from pipeline.dynamics.prediction.rounding import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8

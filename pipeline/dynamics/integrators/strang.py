@@ -24,7 +24,9 @@ import numpy as np
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrator import Integrator, demand_times, kept, with_start
 from pipeline.dynamics.integrators.turning import Friction
-from pipeline.dynamics.prediction.pilot import bounded, predicted_by_pilot, rounding_error
+from pipeline.dynamics.prediction.cycles import predicted
+from pipeline.dynamics.prediction.pilot import bounded
+from pipeline.dynamics.prediction.rounding import stepped_rounding
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
@@ -61,12 +63,10 @@ class Strang(Integrator):
 
     def _predicted(self, problem: Problem, step_s: float, seconds: float, *, of_velocity: bool) -> float:
         demand_times(step_s, seconds)
-        rounding = rounding_error(problem, seconds, seconds / step_s)
-        if problem.equation.is_linear:
-            return rounding
-        return rounding + bounded(
-            lambda: predicted_by_pilot(self, self, problem, step_s, seconds, of_velocity=of_velocity)
-        )
+        rounding = stepped_rounding(problem, seconds, step_s)
+        if not (problem.equation.drag_per_m or problem.equation.cubic_per_m2_s2):
+            return rounding  # between turning points its flow is exact
+        return rounding + bounded(lambda: predicted(self, self, problem, step_s, seconds, of_velocity=of_velocity))
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Split every step; with friction, from turning point to turning point."""

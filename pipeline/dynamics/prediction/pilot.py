@@ -21,7 +21,16 @@ from pipeline.track import F8
 
 C16 = NDArray[np.complex128]
 
-__all__ = ["bounded", "fine_step", "in_own_units", "predicted_by_pilot", "rounding_error"]
+__all__ = [
+    "bounded",
+    "compared",
+    "fine_step",
+    "in_own_units",
+    "is_kinked",
+    "predicted_by_pilot",
+    "resonance",
+    "scatter",
+]
 
 FINE = 0.25  # radians a step, of the spring, of drag and of quadratic drag together: there the power law holds
 FAR = 0.1  # of the amplitude: an error beyond it follows the power law no more
@@ -30,18 +39,6 @@ STIFF = 10.0  # drag over spring beyond which a pilot cannot have steps that fin
 MOST_STIFF_STEPS = 20_000
 MOST_PARTS = 16  # of a step, for the truth beside it
 MOST_STEPS = 4_000_000  # of a truth: a million radians
-
-
-def rounding_error(problem: Problem, seconds: float, steps: float = 0.0) -> float:
-    """Return the error over the amplitude that rounding leaves at best: of the phase, and of steps that repeat.
-
-    Notes
-    -----
-    The phase :math:`\\omega t` is a product of rounded numbers: its error is its own size times the relative rounding.
-    A step that is repeated repeats the rounding of its coefficients: a fifth of the relative rounding each.
-    """
-    phase = problem.equation.angular_frequency_per_s * seconds
-    return float(np.finfo(np.float64).eps) * (4.0 + phase + 0.2 * steps)
 
 
 def bounded(predict: Callable[[], float]) -> float:
@@ -99,8 +96,8 @@ def predicted_by_pilot(
     problem = in_own_units(problem)
     start, omega = problem.amplitude_m(), problem.equation.angular_frequency_per_s
     fine = fine_step(problem)
-    pilot = max(step_s, min(fine, seconds / 4.0))
-    kinked, plain = _kinked(problem.equation), integrator is not solver and integrator.order > 0
+    pilot = max(step_s, min(fine, seconds / 4.0)) if integrator.order else min(fine, seconds / 4.0)
+    kinked, plain = is_kinked(problem.equation), integrator is not solver and integrator.order > 0
     # The kink of drag at a turning point keeps a high order from what its power promises.
     order = min(integrator.order, 3) if kinked else integrator.order
     if plain and omega * pilot * MOST_STIFF_STEPS < 2.0 * math.pi:
@@ -126,9 +123,8 @@ def predicted_by_pilot(
         pilot = max(step_s, 0.25 * pilot)
     error = max(error * (step_s / (share * pilot)) ** order for error, share in zip(errors, shares, strict=True))
     if plain and pilot > step_s:
-        turns = 1.0 + omega * seconds / math.pi
-        error += problem.equation.friction_m_per_s2 * step_s / (omega * start) * math.sqrt(turns)
-    return error + _resonance(problem, step_s, seconds) if integrator is solver else error
+        error += scatter(problem, step_s, seconds)
+    return error + resonance(problem, step_s, seconds) if integrator is solver else error
 
 
 @functools.lru_cache(maxsize=8)
@@ -137,11 +133,20 @@ def in_own_units(problem: Problem) -> Problem:
     return problem.scaled()[0]
 
 
-def _kinked(eq: Equation) -> bool:
+def scatter(problem: Problem, step_s: float, seconds: float) -> float:
+    """Return what friction adds where turning points are not located: force times step each, of any sign."""
+    eq = problem.equation
+    turns = 1.0 + eq.angular_frequency_per_s * seconds / math.pi
+    force = eq.friction_m_per_s2 / (eq.angular_frequency_per_s * problem.amplitude_m())
+    return float(force * step_s * math.sqrt(turns))
+
+
+def is_kinked(eq: Equation) -> bool:
+    """Whether a force of the equation has a kink where the velocity is 0."""
     return bool(eq.drag_per_m > 0.0 or eq.friction_m_per_s2 > 0.0)
 
 
-def _resonance(problem: Problem, step_s: float, seconds: float) -> float:
+def resonance(problem: Problem, step_s: float, seconds: float) -> float:
     """Return the most that quadratic drag in kicks adds up where N steps make a cycle, N next to an even number.
 
     The kicks see the harmonics of |sin| sin, 8 / (pi k (k^2 - 4)) for odd k. Those next to N act as the first one does:
@@ -176,15 +181,27 @@ def _largest_errors(
 ) -> tuple[float, float]:
     """Return the largest errors of displacement, and of velocity over the angular frequency, of a run, m."""
     try:
-        coarse, truth = _truth(solver, problem, pilot, parts, seconds)
-        if integrator is solver and coarse is not None:
-            found = coarse
-        else:
-            found = _states(integrator, problem, pilot, len(truth) - 1, 1)
+        found, truth = compared(integrator, solver, problem, pilot, parts, seconds)
     except DynamicsError:
         return math.inf, math.inf  # it ran away: that is its error
     off = found - truth
     return _peak(np.abs(off.real)), _peak(np.abs(off.imag))
+
+
+def compared(
+    integrator: Integrator, solver: Integrator, problem: Problem, step_s: float, parts: int, seconds: float
+) -> tuple[C16, C16]:
+    """Return the states of a method and the true ones (n,): displacement, and velocity over the angular frequency.
+
+    Raises
+    ------
+    DynamicsError
+        If one of them ran away.
+    """
+    coarse, truth = _truth(solver, problem, step_s, parts, seconds)
+    if integrator is solver and coarse is not None:
+        return coarse, truth
+    return _states(integrator, problem, step_s, len(truth) - 1, 1), truth
 
 
 def _states(integrator: Integrator, problem: Problem, step_s: float, steps: int, every: int) -> C16:
@@ -203,7 +220,7 @@ def _peak(error: F8) -> float:
     return float(most - 0.125 * (after - before) ** 2 / bend if bend < 0.0 else most)
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache(maxsize=16)
 def _truth(solver: Integrator, problem: Problem, pilot: float, parts: int, seconds: float) -> tuple[C16 | None, C16]:
     """Return the states in steps of the pilot, if these are fine, and the extrapolated ones at the same times.
 

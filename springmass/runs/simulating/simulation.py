@@ -14,7 +14,7 @@ from pipeline.dynamics.choose import SAFETY, Choice, choose, cost_ns, demand_tol
 from pipeline.dynamics.integrators.exact import closed_form
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.integrators.taylor import TAYLOR
-from pipeline.dynamics.prediction.pilot import rounding_error
+from pipeline.dynamics.prediction.rounding import rounding_error
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 from springmass.errors import USAGE, ProgramError
