@@ -28,10 +28,11 @@ def test_one_trajectory_of_mixed_drag(benchmark, dynamics):
 
 
 def test_the_compared_errors_are_equal(dynamics):
-    """Strang errs by at most 1e-6, and LSODA is not asked for more than that."""
+    """Strang and what is chosen err by at most 1e-6, and LSODA is not asked for more than either has."""
     errors = dynamics.errors()
     assert errors["strang"] <= 1e-6
     assert 0.3 * errors["strang"] <= errors["LSODA"] <= 3.0 * errors["strang"]
+    assert errors["auto for 1e-6"] <= errors["finer LSODA"] <= 1e-6
 
 
 def test_every_ratio_can_be_taken(dynamics):

@@ -33,7 +33,6 @@ MOST_PARTS = 100_000
 MOST_TRIES = 12
 SAFETY = 1.25  # what a prediction may be short of the truth
 SAFETY_UNLOCATED = 1.5  # where turning points lie within steps
-SAFETY_WITHOUT_STEP = 1.01  # where it is not carried from one step to another
 
 # Nanoseconds on the machine of the notes: of a run, of a step and of a kept state where that is what counts.
 _RUN_NS = 1e5
@@ -136,7 +135,7 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     # First those whose error is known without a pilot, then by what each costs at least: the dear need no prediction.
     for integrator in sorted(AUTO, key=lambda each: (each not in KNOWN, cost_ns(each, reduced, 1, count, seconds))):
         most = math.inf if best is None else best.cost_ns
-        safety = SAFETY_UNLOCATED if integrator is RK4 else SAFETY if integrator.order else SAFETY_WITHOUT_STEP
+        safety = SAFETY_UNLOCATED if integrator is RK4 else SAFETY
         if integrator is RK4 and not _may_pay(reduced, spacing_s, count, room / safety, most):
             continue
         best = fit_step(integrator, reduced, spacing_s, count, room / safety, most) or best
@@ -145,10 +144,13 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
             f"no integrator keeps a tolerance of {tolerance:g} for {seconds:g} s of this scene; "
             "ask for a larger tolerance or a shorter run"
         )
+    error = best.predicted_error
+    if isinstance(best.integrator, Taylor):  # so far by its tolerance
+        error = best.integrator.predicted_error(reduced, best.step_s, seconds)
     return replace(
         best,
         terms=terms,
-        predicted_error=best.integrator.predicted_error(reduced, best.step_s, seconds) + left_out,
+        predicted_error=error + left_out,
         predicted_velocity_error=best.integrator.predicted_velocity_error(reduced, best.step_s, seconds) + left_out,
     )
 
@@ -197,7 +199,7 @@ def fit_step(
         return None
     if isinstance(integrator, Taylor | SolveIvp):
         integrator = replace(integrator, tolerance=min(tolerance, 1e-3))
-    if cost_ns(integrator, problem, 1, count, seconds) >= most_ns:
+    if cost_ns(integrator, problem, 1, count, seconds) >= most_ns or integrator.least_error(problem) > tolerance:
         return None
     parts = least = _least_parts(integrator, problem, spacing_s)
     found, tried = None, set[int]()

@@ -57,6 +57,10 @@ class Integrator(ABC):
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the expected largest error of the displacement over the starting amplitude."""
 
+    def least_error(self, problem: Problem) -> float:  # noqa: ARG002 - for some the problem tells
+        """Return an error that it has at least, over the amplitude: what it need not be predicted for."""
+        return 0.0
+
     def bound(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what a choice of a step goes by: the predicted error, or a bound of it that costs less."""
         return self.predicted_error(problem, step_s, seconds)

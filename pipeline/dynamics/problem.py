@@ -62,6 +62,8 @@ class Problem:
         eq = self.equation
         size = max(abs(self.displacement_m), abs(self.velocity_m_per_s / eq.angular_frequency_per_s))
         unit = math.ldexp(1.0, min(max(math.frexp(size)[1], -1021), 1022))
+        if unit == 1.0 and eq.friction_m_per_s2 <= _MOST_FRICTION:
+            return self, unit
         parts = {
             "drag_per_m": eq.drag_per_m * unit,
             # Friction beyond all bounds holds whatever it touches, and a bound that large does too.

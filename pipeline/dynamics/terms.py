@@ -67,7 +67,7 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
     with np.errstate(over="ignore"):
         # Under a cubic spring another amplitude is another pace, and the phase drifts for all the time that is left.
         bend = 0.75 * abs(eq.cubic_per_m2_s2) * (start / omega) * (start / omega)
-        drift = 1.0 + bend / math.sqrt(1.0 + bend) * omega * time if math.isfinite(bend) else math.inf
+        drift = 1.0 + bend / math.sqrt(1.0 + bend) * omega * time if math.isfinite(bend) else 1e100
         sizes = {
             "viscous_drag": ("gamma_per_s", gamma * time * (1.0 + 0.5 * gamma / omega) * drift),
             "quadratic_drag": ("drag_per_m", beta * start * time * drift),
@@ -77,6 +77,7 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
                 0.375 * abs(eq.cubic_per_m2_s2) * start * start / omega * time,
             ),
         }
+    sizes = {name: (attribute, math.inf if math.isnan(size) else size) for name, (attribute, size) in sizes.items()}
     room = SHARE * tolerance
     terms, dropped = [], {}
     for name, (attribute, size) in sorted(sizes.items(), key=lambda item: item[1][1]):

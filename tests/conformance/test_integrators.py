@@ -19,6 +19,7 @@ FIXED = [name for name, each in INTEGRATORS.items() if each.order]
 LOCATED = ("exact", "strang", "taylor", "lsoda", "dop853", "averaged")  # those that find turning points, or need none
 # What a prediction may be short of the truth: a kink that is not located scatters, scipy's tolerance is a wish.
 SHORT = {"lsoda": 20.0, "dop853": 5.0}
+ROUNDED = 1e-12  # of the amplitude: an error of rounding is predicted within a factor of ten
 BENCH = Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235)
 
 
@@ -41,7 +42,10 @@ def error_of(case: dict[str, Any], trajectory: Trajectory) -> float:
 
 @pytest.mark.parametrize("name", STORED["cases"])
 def test_the_error_against_forty_digits_is_the_predicted_one(integrator: Integrator, name: str) -> None:
-    """Against a reference that shares no code, the error is no larger than predicted, up to a stated factor."""
+    """Against a reference that shares no code, the error is no larger than predicted, and no less than a tenth of it.
+
+    A kink that is not located keeps a high order from its power: there a twentieth. Rounding is told within ten.
+    """
     # Scipy's take seconds for two minutes; half a minute tells of them here, the whole in the trials.
     demand_the_predicted_error(integrator, STORED["cases"][name], 3000 if integrator.name in SHORT else None)
 
@@ -70,7 +74,10 @@ def demand_the_predicted_error(integrator: Integrator, case: dict[str, Any], mos
         return
     found = error_of(case, integrator.run(problem, STEP / parts, steps * parts, every=parts))
     located = integrator.name in LOCATED or not problem.equation.friction_m_per_s2
-    assert found <= SHORT.get(integrator.name, 1.3 if located else 12.0) * predicted
+    short = SHORT.get(integrator.name, 1.3 if located else 12.0)
+    assert found <= (max(short, 10.0) if found < ROUNDED else short) * predicted
+    if located and integrator.name not in SHORT:
+        assert predicted <= (20.0 if integrator.order > 2 else 10.0) * max(found, np.finfo(float).eps)
 
 
 @pytest.mark.parametrize("name", STORED["cases"])

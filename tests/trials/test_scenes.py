@@ -17,9 +17,12 @@ import pytest
 from pipeline.dynamics import Equation, Problem
 from pipeline.dynamics.choose import choose
 from pipeline.errors import DynamicsError
+from springmass.runs.simulating.simulation import checked
 
 SCENES = min(200, int(os.environ.get("SPRINGMASS_TRIALS", "40")))
 LONGEST = 2e4 if SCENES < 200 else np.inf  # radians of a scene that is solved where time is short
+CHECKED = 2e4 if SCENES == 200 else 2e3  # radians of a scene whose error is measured too
+ROUNDING = float(np.finfo(np.float64).eps)
 STORED = Path(__file__).resolve().parents[1] / "reference" / "scenes.json"
 
 pytestmark = pytest.mark.trials
@@ -37,8 +40,13 @@ def radians(scene: dict[str, Any]) -> float:
 
 
 def test_every_scene_is_solved_within_its_tolerance_or_refused() -> None:
-    """No trajectory that is returned misses its tolerance at the stored times; what is refused is named with why."""
-    missed, refused, ratios = [], [], []
+    """What is returned keeps its tolerance, what is refused says why; 99 of 100 errors are as predicted and measured.
+
+    Within a factor of ten, where both are held to be at least the rounding of the amplitude itself. Two of all the
+    scenes, and one of few, may be off: their stored times miss the moment at which the error is largest.
+    """
+    missed, refused = [], []
+    ratios: dict[str, list[tuple[float, int]]] = {"predicted": [], "measured": []}
     for number, scene in enumerate(scenes()):
         problem = Problem(Equation(**scene["equation"]), *scene["start"])
         size, tolerance = problem.amplitude_m(), scene["tolerance"]
@@ -52,11 +60,16 @@ def test_every_scene_is_solved_within_its_tolerance_or_refused() -> None:
         error = off / size if size > 0.0 else off
         if error > tolerance:
             missed.append((number, scene["kind"], choice.integrator.name, error, tolerance))
-        if size > 0.0 and error > 1e-13:
-            ratios.append(choice.predicted_error / error)
-    within = np.mean([0.1 <= each <= 10.0 for each in ratios]) if ratios else 1.0
+        told = {"predicted": choice.predicted_error}
+        if radians(scene) <= CHECKED:
+            told["measured"] = checked(problem, choice, run, scene["spacing_s"], scene["count"]).error
+        for name, value in told.items():
+            ratios[name].append((max(value, ROUNDING) / max(error, ROUNDING), number))
+    off_by_ten = {name: [each for each in all_ if not 0.1 <= each[0] <= 10.0] for name, all_ in ratios.items()}
+    counts = {name: f"{len(off_by_ten[name])} of {len(all_)}" for name, all_ in ratios.items()}
     print(
-        f"{len(scenes())} scenes: missed {missed}; refused {refused}; predicted over true error within 10 on "
-        f"{within:.1%} of {len(ratios)} whose error is above rounding"
+        f"{len(scenes())} scenes: missed {missed}; refused {len(refused)} {refused}; off by ten {counts} {off_by_ten}"
     )
     assert not missed
+    for name, all_ in ratios.items():
+        assert len(off_by_ten[name]) <= max(1.0, 0.01 * len(all_) + 1e-9), off_by_ten

@@ -10,7 +10,7 @@ from pipeline.dynamics.equation import Equation, Real
 from pipeline.dynamics.integrator import Integrator, StepMaker, demand_times, kept, with_start
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.prediction.cycles import predicted
-from pipeline.dynamics.prediction.pilot import bounded
+from pipeline.dynamics.prediction.pilot import bounded, in_own_units
 from pipeline.dynamics.prediction.rounding import stepped_rounding
 from pipeline.dynamics.prediction.stability import limit_by_search
 from pipeline.dynamics.problem import Problem
@@ -59,7 +59,7 @@ class OneStep(Integrator):
 
     def _predicted(self, problem: Problem, step_s: float, seconds: float, *, of_velocity: bool) -> float:
         demand_times(step_s, seconds)
-        rounding = stepped_rounding(problem, seconds, step_s)
+        rounding = stepped_rounding(in_own_units(problem), seconds, step_s)
         of = bounded(lambda: predicted(self, STRANG, problem, step_s, seconds, of_velocity=of_velocity))
         return rounding + of
 

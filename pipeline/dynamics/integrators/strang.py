@@ -25,7 +25,8 @@ from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrator import Integrator, demand_times, kept, with_start
 from pipeline.dynamics.integrators.turning import Friction
 from pipeline.dynamics.prediction.cycles import predicted
-from pipeline.dynamics.prediction.pilot import bounded
+from pipeline.dynamics.prediction.leading import STRANG_TERMS, leading
+from pipeline.dynamics.prediction.pilot import bounded, in_own_units, resonance
 from pipeline.dynamics.prediction.rounding import stepped_rounding
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
@@ -35,6 +36,7 @@ __all__ = ["STRANG", "Strang"]
 
 
 LONGEST_WITH_FRICTION = 1e6  # radians a step
+SHORT_STEP = 0.5  # radians up to which the leading term of the error tells
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,16 +65,23 @@ class Strang(Integrator):
 
     def _predicted(self, problem: Problem, step_s: float, seconds: float, *, of_velocity: bool) -> float:
         demand_times(step_s, seconds)
-        rounding = stepped_rounding(problem, seconds, step_s)
+        rounding = stepped_rounding(in_own_units(problem), seconds, step_s)
         if not (problem.equation.drag_per_m or problem.equation.cubic_per_m2_s2):
             return rounding  # between turning points its flow is exact
+        problem = in_own_units(problem)
+        radians = problem.equation.angular_frequency_per_s * step_s
+        if radians < SHORT_STEP:
+            known = leading(STRANG_TERMS, problem, radians, seconds, of_velocity=of_velocity)
+            if known is not None:
+                return rounding + known + resonance(problem, step_s, seconds)
         return rounding + bounded(lambda: predicted(self, self, problem, step_s, seconds, of_velocity=of_velocity))
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Split every step; with friction, from turning point to turning point."""
         eq = problem.equation
         if not eq.friction_m_per_s2:
-            y, v = kept(_states(problem, step_s), steps, every).T
+            states = (_kicked if eq.cubic_per_m2_s2 else _dragged)(problem, step_s, every)
+            y, v = kept(states, steps // every, 1).T
             # What is kept is half an oscillator short of the end of its step.
             a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * step_s)
             return with_start(problem, a * y + b * v, c * y + d * v)
@@ -91,27 +100,55 @@ class Strang(Integrator):
         return with_start(problem, y, v)
 
 
-def _states(problem: Problem, h: float) -> Iterator[float]:
-    """Yield displacement and velocity in turn, between the drag of each step and the half oscillator that ends it.
+def _dragged(problem: Problem, h: float, every: int) -> Iterator[float]:
+    """Yield displacement and velocity in turn, between the drag of a step and the half oscillator that ends it.
 
-    The half steps of neighbours are joined into whole ones: half the time. A cubic force is a kick before and after
-    the drag.
+    The half steps of neighbours are joined into whole ones: half the time. Of so many steps the last is told.
     """
     eq = problem.equation
-    a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
-    y, v = problem.displacement_m, problem.velocity_m_per_s
-    y, v = a * y + b * v, c * y + d * v
-    a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, h)
-    slow, kick = eq.drag_per_m * h, 0.5 * h * eq.cubic_per_m2_s2
+    y, v, a, b, c, d = _begun(problem, h)
+    slow, between = eq.drag_per_m * h, range(every - 1)
+    if not between:
+        while True:
+            v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+            yield y
+            yield v
+            y, v = a * y + b * v, c * y + d * v
     while True:
-        if kick:
-            v -= kick * y * y * y
+        for _ in between:
+            v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+            y, v = a * y + b * v, c * y + d * v
         v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
-        if kick:
-            v -= kick * y * y * y
         yield y
         yield v
         y, v = a * y + b * v, c * y + d * v
+
+
+def _kicked(problem: Problem, h: float, every: int) -> Iterator[float]:
+    """Yield the same of a cubic spring, whose force is a kick before and after the drag."""
+    eq = problem.equation
+    y, v, a, b, c, d = _begun(problem, h)
+    slow, half, between = eq.drag_per_m * h, 0.5 * h * eq.cubic_per_m2_s2, range(every - 1)
+    while True:
+        for _ in between:
+            kick = half * y * y * y
+            v -= kick
+            v = (v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)) - kick
+            y, v = a * y + b * v, c * y + d * v
+        kick = half * y * y * y
+        v -= kick
+        v = (v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)) - kick
+        yield y
+        yield v
+        y, v = a * y + b * v, c * y + d * v
+
+
+def _begun(problem: Problem, h: float) -> tuple[float, ...]:
+    """Half an oscillator from the start, and the matrix of a whole one."""
+    omega, gamma = problem.equation.angular_frequency_per_s, problem.equation.gamma_per_s
+    a, b, c, d = flow(omega, gamma, 0.5 * h)
+    y, v = problem.displacement_m, problem.velocity_m_per_s
+    return a * y + b * v, c * y + d * v, *flow(omega, gamma, h)
 
 
 STRANG = Strang()

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from pipeline.dynamics.integrator import Integrator
-from pipeline.dynamics.prediction.envelope import frequency
+from pipeline.dynamics.prediction.envelope import frequency, slow_rate
 from pipeline.dynamics.prediction.growth import FAR, Rates, grown, levels, slow_from
 from pipeline.dynamics.prediction.pilot import (
     compared,
@@ -26,6 +26,7 @@ __all__ = ["predicted"]
 
 CYCLES = 3
 ROUNDED = 2e-14  # of the amplitude: a difference that rounding may make
+DEAD = 9.0  # decay times after which a ten-thousandth is left
 MOST_PILOT = 1.0  # radians a step up to which cycles are looked at in steps
 
 
@@ -57,20 +58,48 @@ def predicted(
         return 0.0
     problem = in_own_units(problem)
     since = slow_from(problem, seconds)
-    pilot = fine_step(problem) if integrator.order == 0 else max(step_s, fine_step(problem))
-    if since >= seconds or pilot * problem.equation.angular_frequency_per_s > MOST_PILOT:
+    fine = fine_step(problem)
+    if since >= seconds:
+        # What comes after the motion has died away errs by less than what came before.
+        seconds = min(seconds, DEAD / slow_rate(problem.equation)) if problem.equation.gamma_per_s else seconds
         return predicted_by_pilot(integrator, solver, problem, step_s, seconds, pilots=pilots, of_velocity=of_velocity)
+    # A step so long that a cycle has few of them errs by more than a finer one's power says, or as much: refused alike.
+    coarse = max(1.0, problem.equation.angular_frequency_per_s * step_s / MOST_PILOT) if integrator.order else 1.0
+    step_s /= coarse
+    pilot = max(step_s, fine) if integrator.order else fine
     first = predicted_by_pilot(integrator, solver, problem, step_s, since, pilots=pilots, of_velocity=of_velocity)
     if not math.isfinite(first):
         return first
-    at = _rates(integrator, solver, problem, step_s if pilot > fine_step(problem) else 0.0, seconds, since)
+    at, own, unscaled = _added_up(
+        integrator, solver, problem, step_s if pilot > fine else 0.0, seconds, since, of_velocity
+    )
     order = min(integrator.order, 3) if is_kinked(problem.equation) else integrator.order
-    power = (step_s / at[1]) ** order if order else 1.0
-    rates = Rates(at[0].amplitude, at[0].of_amplitude * power, at[0].of_phase * power)
-    error = first + grown(problem, seconds, since, rates, of_velocity=of_velocity)
+    power = (step_s / own) ** order if order else 1.0
+    if unscaled * max(power, 1.0) > FAR:  # no longer in proportion
+        rates = Rates(at.amplitude, at.of_amplitude * power, at.of_phase * power)
+        error = first + grown(problem, seconds, since, rates, of_velocity=of_velocity)
+    else:
+        error = first + unscaled * power
     if integrator is solver:
-        return error + resonance(problem, step_s, seconds)
-    return error + (scatter(problem, step_s, seconds) if order else 0.0)
+        error += resonance(problem, step_s, seconds)
+    elif order:
+        error += scatter(problem, step_s, seconds)
+    return error * coarse**order
+
+
+@functools.lru_cache(maxsize=16)
+def _added_up(
+    integrator: Integrator,
+    solver: Integrator,
+    problem: Problem,
+    step_s: float,
+    seconds: float,
+    since: float,
+    of_velocity: bool,
+) -> tuple[Rates, float, float]:
+    """Return rates, the step of the pilot that shows them, s, and what error they make in it."""
+    rates, pilot = _rates(integrator, solver, problem, step_s, seconds, since)
+    return rates, pilot, grown(problem, seconds, since, rates, of_velocity=of_velocity)
 
 
 @functools.lru_cache(maxsize=16)
@@ -95,6 +124,7 @@ def _rates(
 def _added(integrator: Integrator, solver: Integrator, pilot: float, problem: Problem) -> tuple[float, float]:
     """Return what a second adds to the errors of amplitude, relative, and phase, from whole cycles."""
     eq, start = problem.equation, problem.displacement_m
+    omega = eq.angular_frequency_per_s
     pace = float(frequency(eq, np.array([start]))[0])
     pace = math.sqrt(max(pace * pace - eq.gamma_per_s**2, 1e-12 * pace * pace))
     long = CYCLES * 2.0 * math.pi / pace
@@ -109,11 +139,12 @@ def _added(integrator: Integrator, solver: Integrator, pilot: float, problem: Pr
         found, truth = compared(integrator, solver, problem, step, parts, long)
     except DynamicsError:
         return math.inf, math.inf
-    with np.errstate(all="ignore"):
-        off = np.log(found[-1] / truth[-1])
-    if not abs(off) > ROUNDED:  # which has a prediction of its own
+    # Along the motion a difference is one of time, across it one of size.
+    (y, v), (dy, dv) = ((float(z.real), omega * float(z.imag)) for z in (truth[-1], found[-1] - truth[-1]))
+    if not math.hypot(dy, dv / omega) > ROUNDED * start:  # which has a prediction of its own
         return 0.0, 0.0
-    bend = eq.cubic_per_m2_s2 * start * start
-    as_phase = eq.angular_frequency_per_s * pace / (eq.angular_frequency_per_s**2 + bend)
-    scale = (pilot / step) ** integrator.order
-    return float(off.real) / long * scale, float(off.imag) * as_phase / long * scale
+    pull, stiff = float(eq.spring(y)), omega**2 + eq.cubic_per_m2_s2 * start * start
+    of_size = (v * dv + pull * dy) / (v * v + pull * y)
+    of_time = (dy * v - dv * pull / stiff) / (v * v + pull * pull / stiff)
+    scale = (pilot / step) ** integrator.order / long
+    return of_size * scale, of_time * pace * scale

@@ -15,7 +15,7 @@ from pipeline.track import F8
 
 __all__ = ["Envelope", "frequency", "pace_and_shear", "slow_rate"]
 
-POINTS = 80
+POINTS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

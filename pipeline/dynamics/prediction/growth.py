@@ -6,6 +6,7 @@ equations carry them to the end, however far that is.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ __all__ = ["Rates", "grown", "levels", "slow_from"]
 SLOW = 0.02  # of the amplitude a radian: a motion that loses less is told from a few of its cycles
 SHORT, FIRST = 60.0, 19.0  # radians: of a motion that is looked at whole; of its first cycles
 DEEP = 30.0  # starting amplitude over the least that is looked at: what errs below that is small
-APART = 3.2  # one level's amplitude over the next one's
+APART = 6.5  # one level's amplitude over the next one's
 SAME = 1.15  # a range of amplitudes that one level stands for
 FAR = 0.1  # an error that changes its own growth
 CYCLES_LEFT = 24.0  # amplitude over friction's shift of the rest position: three cycles lose half of it
@@ -52,6 +53,7 @@ class Rates:
         return cls(amplitudes, found[:, 0], found[:, 1])
 
 
+@functools.lru_cache(maxsize=16)
 def slow_from(problem: Problem, seconds: float) -> float:
     """Return from when on a motion loses little a cycle, s; the whole time where it never does or is short.
 
@@ -114,21 +116,36 @@ def grown(problem: Problem, seconds: float, since: float, rates: Rates, *, of_ve
     course = Envelope.of(problem, seconds, since)
     t, a = course.t, np.maximum(course.amplitude, 1e-12 * start)
     pace, shear = pace_and_shear(eq, a)
+    added = _between(rates.amplitude, rates.of_amplitude, a)
     with np.errstate(all="ignore"):
         lost = np.minimum(_summed(eq.gamma_per_s + 2.0 * beta * a, t), 700.0)
-        off = np.exp(-lost) * _summed(np.exp(lost) * a * _between(rates.amplitude, rates.of_amplitude, a), t)
-        of_amplitude = off / a
-        of_phase = _summed(_between(rates.amplitude, rates.of_phase, a) + shear * pace * of_amplitude, t)
+        off = np.exp(-lost) * _summed(np.exp(lost) * a * added, t)
+        if np.max(np.abs(off)) > FAR * start:
+            off = _far(t, a, added, eq.gamma_per_s, beta)
+            if eq.cubic_per_m2_s2 and np.max(off) > start:
+                return math.inf  # where the spring is another one
+        of_phase = _summed(_between(rates.amplitude, rates.of_phase, a) + shear * pace * off / a, t)
         bend = eq.cubic_per_m2_s2 * a * a
         stiff = eq.angular_frequency_per_s**2
-        weight = (
+        # Over the amplitude: how fast the displacement passes rest, and how fast the velocity turns.
+        fastest = (
             (stiff + bend) / (eq.angular_frequency_per_s * pace) if of_velocity else np.sqrt(stiff + 0.5 * bend) / pace
         )
-        size = a * np.where(of_velocity, weight, 1.0) / start
-        small = np.hypot(of_amplitude, of_phase * (1.0 if of_velocity else weight))
-        far = np.abs(np.exp(np.minimum(of_amplitude, 700.0) + 1j * np.clip(of_phase, -math.pi, math.pi)) - 1.0)
-        error = float(np.max(size * np.where(small < FAR, small, np.maximum(far, np.minimum(small, 1.0)))))
+        turned = 2.0 * np.sin(0.5 * np.minimum(np.abs(of_phase), math.pi))
+        error = float(np.max(np.hypot(off * (fastest if of_velocity else 1.0), a * fastest * turned))) / start
     return math.inf if math.isnan(error) else error
+
+
+def _far(t: F8, a: F8, added: F8, gamma: float, beta: float) -> F8:
+    """The error of the amplitude where it is large: what grows by itself, and is held by quadratic drag."""
+    off, now = np.zeros_like(a), 0.0
+    for k in range(1, len(t)):
+        dt, rate = float(t[k] - t[k - 1]), float(added[k])
+        now = now + rate * float(a[k]) * dt
+        now *= math.exp(min((rate - gamma - 2.0 * beta * float(a[k])) * dt, 700.0))
+        now /= 1.0 + beta * abs(now) * dt
+        off[k] = now = min(now, 1e300)
+    return off
 
 
 def _summed(values: F8, t: F8) -> F8:
@@ -143,4 +160,4 @@ def _between(at: F8, values: F8, wanted: F8) -> F8:
     values = values[::-1]
     if np.all(values > 0.0) or np.all(values < 0.0):
         return np.asarray(np.sign(values[0]) * np.exp(np.interp(x, known, np.log(np.abs(values)))))
-    return np.interp(x, known, values)
+    return np.asarray(np.interp(x, known, values))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -12,7 +13,8 @@ from pipeline.dynamics.problem import Problem
 __all__ = ["expected_rounding", "rounding_error", "sheared_rounding", "stepped_rounding"]
 
 EPS = float(np.finfo(np.float64).eps)
-A_STEP = 0.04  # of the relative rounding: what a step adds whose coefficients are rounded
+A_STEP = 0.08  # of the relative rounding: what a step adds whose coefficients are rounded
+A_SHEAR = 0.1  # of the relative rounding, times the root of the phase: what scatters in the amplitude
 TYPICAL = 0.3  # of a product's largest rounding: what it has on the average
 
 
@@ -52,22 +54,31 @@ def expected_rounding(problem: Problem, seconds: float, a_radian: float = TYPICA
         fall = slow_rate(eq)
         rate = fall if eq.gamma_per_s >= eq.angular_frequency_per_s else eq.angular_frequency_per_s
         most = min(seconds, power / fall) if fall else seconds
-        return EPS * (1.0 + a_radian * (rate * most) ** power * math.exp(-fall * most))
+        phase: float = (rate * most) ** power
+        return EPS * (1.0 + a_radian * phase * math.exp(-fall * most))
+    return EPS * (1.0 + a_radian * _phase_left(problem, seconds, power))
+
+
+@functools.lru_cache(maxsize=16)
+def _phase_left(problem: Problem, seconds: float, power: float) -> float:
+    """Return the largest power of the phase times what is left of the amplitude."""
     left = Envelope.of(problem, seconds)
-    return EPS * (1.0 + a_radian * float(np.max((eq.angular_frequency_per_s * left.t) ** power * left.share)))
+    return float(np.max((problem.equation.angular_frequency_per_s * left.t) ** power * left.share))
 
 
 def stepped_rounding(problem: Problem, seconds: float, step_s: float) -> float:
     """Return what rounding is expected to leave of a step, s, that repeats: its coefficients' is in every one."""
-    radians = problem.equation.angular_frequency_per_s * step_s
-    return expected_rounding(problem, seconds, TYPICAL + A_STEP / radians)
+    eq = problem.equation
+    a_step = step_s * (eq.angular_frequency_per_s if eq.gamma_per_s < eq.angular_frequency_per_s else slow_rate(eq))
+    return expected_rounding(problem, seconds, TYPICAL + A_STEP / max(a_step, EPS * EPS))
 
 
-def sheared_rounding(problem: Problem, seconds: float, a_radian: float) -> float:
+def sheared_rounding(problem: Problem, seconds: float) -> float:
     """Return what rounding that scatters in the amplitude adds to the phase under a cubic spring, as another pace."""
     eq, start = problem.equation, problem.amplitude_m()
     if not eq.cubic_per_m2_s2:
         return 0.0
     left = Envelope.of(problem, seconds)
     pace, shear = pace_and_shear(eq, left.amplitude)
-    return EPS * a_radian * float(np.max(np.abs(shear) * (pace * left.t) ** 1.5 * left.amplitude)) / start
+    drift = float(np.max(np.abs(shear) * (pace * left.t) ** 1.5 * left.amplitude))
+    return EPS * A_SHEAR * drift / start

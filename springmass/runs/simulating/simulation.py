@@ -14,7 +14,7 @@ from pipeline.dynamics.choose import SAFETY, Choice, choose, cost_ns, demand_tol
 from pipeline.dynamics.integrators.exact import closed_form
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.integrators.taylor import TAYLOR
-from pipeline.dynamics.prediction.rounding import rounding_error
+from pipeline.dynamics.prediction.rounding import expected_rounding
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 from springmass.errors import USAGE, ProgramError
@@ -281,7 +281,6 @@ def checked(problem: Problem, choice: Choice, trajectory: Trajectory, spacing_s:
     quarter of the step.
     """
     seconds = spacing_s * count
-    rounding = rounding_error(problem, seconds)
     reference, words, resolution = _reference(problem, choice, spacing_s, count)
     start = problem.amplitude_m()
     if start == 0.0:
@@ -289,7 +288,9 @@ def checked(problem: Problem, choice: Choice, trajectory: Trajectory, spacing_s:
     speed = start * problem.equation.angular_frequency_per_s
     error = float(np.max(np.abs(trajectory.y - reference.y))) / start
     velocity = float(np.max(np.abs(trajectory.v - reference.v))) / speed
-    resolution = max(resolution * error, 0.01 * rounding)
+    # The closed form is good to the last digit of a state, all others to what many sums leave.
+    own = 0.0 if problem.equation.is_linear else expected_rounding(problem, seconds, power=0.5)
+    resolution = max(resolution * error, own, float(np.finfo(np.float64).eps))
     return Check(reference, words, max(error, resolution), max(velocity, resolution), resolution)
 
 
