@@ -14,9 +14,9 @@ from pipeline.dynamics.integrators.runge_kutta import RK4
 from pipeline.dynamics.integrators.solve_ivp import SolveIvp
 from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
-from pipeline.dynamics.prediction.cycles import predicted
 from pipeline.dynamics.prediction.pilot import fine_step, in_own_units
 from pipeline.dynamics.prediction.rounding import rounding_error
+from pipeline.dynamics.prediction.stretch import predicted
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError

@@ -14,10 +14,10 @@ import numpy as np
 from pipeline.dynamics.amplitude import amplitude
 from pipeline.dynamics.integrator import Integrator, demand_times
 from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.prediction.cycles import predicted
 from pipeline.dynamics.prediction.leading import AVERAGED_TERMS, leading
 from pipeline.dynamics.prediction.pilot import bounded, in_own_units
 from pipeline.dynamics.prediction.rounding import expected_rounding
+from pipeline.dynamics.prediction.stretch import predicted
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 

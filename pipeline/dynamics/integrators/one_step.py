@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pipeline.dynamics.equation import Equation, Real
 from pipeline.dynamics.integrator import Integrator, StepMaker, demand_times, kept, with_start
 from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.prediction.cycles import predicted
 from pipeline.dynamics.prediction.pilot import bounded, in_own_units
 from pipeline.dynamics.prediction.rounding import stepped_rounding
 from pipeline.dynamics.prediction.stability import limit_by_search
+from pipeline.dynamics.prediction.stretch import predicted
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 

@@ -24,10 +24,10 @@ import numpy as np
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrator import Integrator, demand_times, kept, with_start
 from pipeline.dynamics.integrators.turning import Friction
-from pipeline.dynamics.prediction.cycles import predicted
 from pipeline.dynamics.prediction.leading import STRANG_TERMS, leading
 from pipeline.dynamics.prediction.pilot import bounded, in_own_units, resonance
 from pipeline.dynamics.prediction.rounding import stepped_rounding
+from pipeline.dynamics.prediction.stretch import predicted
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
