@@ -21,7 +21,7 @@ from acquisition.recordings.tables.finding import Found, clock_s, find_table
 from acquisition.recordings.tables.grouped import ungrouped
 from acquisition.recordings.tables.roles import columns_of, is_aside, times_by_name, times_by_steps
 from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import Text, decode, guess_delimiter, is_text, parse_number, text_of
+from acquisition.recordings.tables.text import Line, Text, decode, guess_delimiter, is_text, parse_number, text_of
 from acquisition.recordings.tables.wrapped import SETTINGS, begins_with_lists, unwrapped
 from acquisition.recordings.units import measure_of, time_power
 
@@ -38,7 +38,7 @@ def _evidence(head: bytes) -> str:
     if not is_text(head) or head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<"):
         return ""
     try:
-        _, found = _find(_plain("", Text.of(head)))
+        _, found = _find(*_plain("", Text.of(head)))
     except FormatError as error:
         return str(error)  # said again, with the file's name, when it is read
     if found is None:
@@ -48,7 +48,7 @@ def _evidence(head: bytes) -> str:
 
 
 def _contents(path: str, data: bytes) -> Contents:
-    text, found = _find(_plain(path, text_of(path, data)))
+    text, found = _find(*_plain(path, text_of(path, data)))
     if found is None:
         raise FormatError(path, "expected rows of numbers, three or more alike", "check that the export ended")
     columns = columns_of(found.rows)
@@ -108,26 +108,27 @@ def _units_beside(found: Found) -> tuple[list[Heading], set[int]]:
     return headings, words
 
 
-def _plain(path: str, text: Text) -> Text:
-    """Take marks of thousands out of a text; the last line of its head says what separates cells."""
+def _plain(path: str, text: Text) -> tuple[Text, list[Line]]:
+    """Take marks of thousands out of a text, whose head's last line says what separates cells; return also its head."""
     lines = text.head(_HEAD_LINES)
     rows = text.data[text.start : text.stop]
     take = ungrouped(path, rows, guess_delimiter(lines[-1].text)) if lines else None
     if take is None or begins_with_lists(decode(rows[: 1 << 16])):  # a list's commas separate
-        return text
+        return text, lines
     rows = take(rows)
-    return replace(text, data=text.data[: text.start] + rows + text.data[text.stop :], stop=text.start + len(rows))
+    text = replace(text, data=text.data[: text.start] + rows + text.data[text.stop :], stop=text.start + len(rows))
+    return text, text.head(_HEAD_LINES)
 
 
-def _find(text: Text) -> tuple[Text, Found | None]:
+def _find(text: Text, lines: list[Line]) -> tuple[Text, Found | None]:
     """Find the table; where rows are wrapped in words or brackets, in the text without these."""
     wrapped = any(each in text.data[: 1 << 16] for each in (_MONITOR, b" & ")) or text.data.startswith(
         _WRAPS, text.start
     )
-    found = None if wrapped else find_table(text.head(_HEAD_LINES))
+    found = None if wrapped else find_table(lines)
     told = None if found is not None else unwrapped(text)
     if told is None:
-        return text, found or find_table(text.head(_HEAD_LINES))
+        return text, found or find_table(lines)
     plain, headings = told
     found = find_table(plain.head(_HEAD_LINES))
     if found is not None and len(headings) == len(found.headings):

@@ -11,6 +11,7 @@ same cores). One division then puts the point back, and whatever power of ten ma
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -92,7 +93,7 @@ def read_fixed(
     raw = np.frombuffer(lines, np.uint8)
     ends = np.flatnonzero((raw == ord(mark)) | (raw == _NEWLINE)).reshape(-1, len(cells))
     if not first.translate(None, mark.encode() + b".\r\n") and parse_number(cells[columns[0]]) is not None:
-        whole = _load_whole(lines, mark, raw, len(cells), columns)
+        whole = _load_whole(lines, mark, raw, ends.shape, columns)
     else:
         whole = _load(lines.translate(None, b".\r"), mark, columns, len(cells), np.int64)
     if whole is None or len(whole) != len(ends):  # loadtxt makes no row of an empty line
@@ -177,7 +178,9 @@ def read_single(cell: str, shift: int) -> tuple[float, int]:
     return value, min(printed_decimals(cell), EXPONENT - 1) + (EXPONENT if "e" in cell.lower() else 0)
 
 
-def _load_whole(lines: bytes, mark: str, raw: U8, cells: int, columns: Sequence[int]) -> NDArray[np.int64] | None:
+def _load_whole(
+    lines: bytes, mark: str, raw: U8, shape: tuple[int, ...], columns: Sequence[int]
+) -> NDArray[np.int64] | None:
     """Hand lines of digits, signs, points and marks to numpy.fromstring; None where a cell holds no number.
 
     It takes any white space for a mark. Where signs stand only before digits and behind marks no cell can hold more
@@ -189,7 +192,7 @@ def _load_whole(lines: bytes, mark: str, raw: U8, cells: int, columns: Sequence[
         if not (((before == ord(mark)) | (before == _NEWLINE)) & (after >= _ZERO) & (after <= _NINE)).all():
             return None
     found = np.fromstring(lines.translate(bytes.maketrans(mark.encode(), b"\t"), b".\r"), np.int64, sep="\t")
-    return found.reshape(-1, cells)[:, columns] if found.size == lines.count(b"\n") * cells else None
+    return found.reshape(shape)[:, columns] if found.size == math.prod(shape) else None
 
 
 def _load(lines: bytes, mark: str, columns: Sequence[int], cells: int, dtype: type[np.generic]) -> NDArray[Any] | None:
