@@ -160,6 +160,25 @@ def test_a_folder_is_one_table(cli: Cli, tmp_path: Path) -> None:
     assert entries[2]["missing"] == ["channel", "unit"]
 
 
+def test_a_run_of_a_zip_is_analysed(cli: Cli, data: Path, tmp_path: Path) -> None:
+    """A MotionSensor.vi pair and a table beside it: all in one table, and each a run that the line names."""
+    path = tmp_path / "shelf.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name in ("undamped_simulated_position.txt", "undamped_simulated_velocity.txt"):
+            archive.write(data / name, name)
+        archive.writestr("run.csv", "Time (s),Position (m)\n" + "".join(f"{i / 10},{i % 3}\n" for i in range(40)))
+    families = [line.split()[1] for line in cli("formats", path).out.splitlines()[1:]]
+    assert families == ["motion-sensor", "motion-sensor", "csv"]
+    refused = cli("analyse", path, "--json")
+    assert refused.code == 3
+    assert "which of the 3 runs" in refused.complaint
+    (found,) = cli("analyse", path, "--json", "--run", "undamped_simulated_position.txt").results
+    (alone,) = cli("analyse", data / "undamped_simulated_position.txt", "--json").results
+    assert found["input"]["kind"] == "simulated"
+    mine, its = (each["estimates"]["period"] for each in (found, alone))
+    assert abs(mine["value"] - its["value"]) < its["u"]
+
+
 def test_a_zip_is_one_table(cli: Cli, tmp_path: Path) -> None:
     """As a folder is, whatever its files are called."""
     with zipfile.ZipFile(tmp_path / "runs.zip", "w") as archive:

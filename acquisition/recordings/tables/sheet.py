@@ -70,7 +70,7 @@ class ColumnFormat:
         quantum, others = value_traps(value, column.flags, resolution, column.line, length=distance)
         name = PurePath(path).name
         clock = "nominal" if column.timing.grid is not None else chosen.clock
-        kind: Kind = "simulated" if says_simulated(f"{contents.title} {chosen.name} {name}") else "replay"
+        kind: Kind = "simulated" if says_simulated(f"{contents.title} {chosen.run} {chosen.name} {name}") else "replay"
         info = SourceInfo(kind, name, column.timing.rate_hz, quantum_m=quantum or None, clock=clock)
         return Recording(
             format=self.name,

@@ -33,6 +33,7 @@ _HANZI = re.compile(rb"(?:[\xb0-\xd7\xa1-\xa3][\xa1-\xfe])+[\x21-\x7e]?")
 """Chinese characters in common use, in GB 2312; what cp1252 has there are capitals, which seldom stand in pairs."""
 _LINE_END = re.compile(rb"\r\n|\r|\n")
 _BLANKS = "\t\f "
+_ZIP = b"PK\x03\x04"
 
 
 class Line(NamedTuple):
@@ -122,6 +123,8 @@ def is_text(data: bytes) -> bool:
     (True, False)
     """
     head = data[:8192]
+    if head.startswith(_ZIP):  # of texts that are stored as they are, with hardly a control character
+        return False
     if _utf16(head):
         return True
     head = head.rstrip(b"\0") or head
