@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ from springmass.runs.comparing import Compared
 from springmass.runs.json_results import picked
 
 if TYPE_CHECKING:
+    from jinja2 import Template
     from markupsafe import Markup
 
 __all__ = ["render_html"]
@@ -88,6 +90,25 @@ def render_html(
     First what holds, Table 1, the main figure and what changes a number, then everything else; each fact once.
     Every text is escaped by the template engine; only the pictures, made here, go in as they are.
     """
+    # One run alone shows its law at the top; where several are compared it is their constants.
+    numbers = itertools.count(2 if compared is not None else 1)
+    parts = [
+        _part(i, run, drawn, numbers, alone=len(runs) == 1)
+        for i, (run, drawn) in enumerate(zip(runs, pictures, strict=True))
+    ]
+    return _template().render(
+        title=", ".join(run.name for run in runs),
+        parts=parts,
+        tables=list(_tables(runs)),
+        compared=None if compared is None else _compared(compared, overview),
+        contents=list(_contents(parts, compared)),
+        provenance=list(_flattened(provenance)),
+    )
+
+
+@functools.cache
+def _template() -> Template:
+    """Return the page's template; to compile it takes as long as to draw a figure."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -107,20 +128,7 @@ def render_html(
         "typeset": typeset,
         "breakable": _breakable,
     }
-    # One run alone shows its law at the top; where several are compared it is their constants.
-    numbers = itertools.count(2 if compared is not None else 1)
-    parts = [
-        _part(i, run, drawn, numbers, alone=len(runs) == 1)
-        for i, (run, drawn) in enumerate(zip(runs, pictures, strict=True))
-    ]
-    return environment.get_template("report.html.j2").render(
-        title=", ".join(run.name for run in runs),
-        parts=parts,
-        tables=list(_tables(runs)),
-        compared=None if compared is None else _compared(compared, overview),
-        contents=list(_contents(parts, compared)),
-        provenance=list(_flattened(provenance)),
-    )
+    return environment.get_template("report.html.j2")
 
 
 def _shown(value: object) -> object:

@@ -83,6 +83,7 @@ _SETTINGS: dict[Any, Any] = {
 }
 WIDTH = 7.2  # inches, as all lengths here
 LEFT, RIGHT, BOTTOM = 0.72, 0.12, 0.45
+SHORT = 4  # characters of a number that fits beside an axis whatever they are
 DENSE_POINTS = 2500  # of samples; more are a line between the least and the greatest of every bin
 RASTER_POINTS = 300  # of markers; more are pixels in the file, fewer bytes than as many shapes
 KINDS: tuple[Literal["svg"], Literal["pdf"]] = ("svg", "pdf")
@@ -134,8 +135,13 @@ def _shrink_wide_numbers(figure: Figure) -> None:
     """Print the numbers at an axis smaller where they would run into its label."""
     room = 0.38 * figure.dpi
     for axes in figure.axes:
-        widest = max((label.get_window_extent().width for label in axes.get_yticklabels()), default=0.0)
-        if widest > room and axes.get_ylabel():
+        if not axes.get_xlabel():
+            axes.xaxis.set_label_coords(0.5, 0.0)  # else room for it is sought, which takes as long as to draw the axis
+        if not axes.get_ylabel():
+            continue
+        labels = [label for label in axes.get_yticklabels() if len(label.get_text()) > SHORT]
+        widest = max((label.get_window_extent().width for label in labels), default=0.0)
+        if widest > room:
             size = _SETTINGS["font.size"] * room / widest
             axes.tick_params(axis="y", labelsize=max(size, 6.0))
 
