@@ -7,6 +7,7 @@ take longer to begin (``benchmarks/many.py``). Their reports, a second each and 
 from __future__ import annotations
 
 import argparse
+import filecmp
 import json
 import os
 import shlex
@@ -22,11 +23,12 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
 from springmass.commands import completions
-from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, suggest, tell
+from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, hush, suggest, tell
+from springmass.runs.about import remember_scene
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder, scene_of
 from springmass.runs.inputs import Found, files_of
 from springmass.runs.json_results import picked, rejected
-from springmass.runs.loading import load
+from springmass.runs.loading import Loaded, load, sample_data
 from springmass.runs.scenes import amended, read_scenes
 from springmass.terminal.arguments import BENCH
 from storage.errors import StorageError, WriteFailed
@@ -45,6 +47,7 @@ class _Task:
     name: str
     scene: Scene | None
     options: argparse.Namespace
+    writes: bool = False  # whether files may be written at all
     report: Path | None = None  # the folder for it
 
 
@@ -59,6 +62,7 @@ class _Done:
     table: Mapping[str, Estimate] = field(default_factory=dict)
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
     page: Path | None = None
+    remembered: bool = False  # whether its scene was noted beside it
 
 
 def run(options: argparse.Namespace) -> int:
@@ -78,6 +82,7 @@ def run(options: argparse.Namespace) -> int:
             name,
             scenes[one.of],
             options,
+            out is not None,
             out / in_a_name(name, ".results") if out is not None and every else None,
         )
         for one, name in zip(found, distinct_names([one.path for one in found]), strict=True)
@@ -90,14 +95,17 @@ def _writes(options: argparse.Namespace) -> bool:
 
 
 def _one(task: _Task) -> int:
-    analysed = _attempt(task)
-    if isinstance(analysed, _Done):
-        complain(*analysed.complaints)
-        return analysed.code
+    attempted = _attempt(task)
+    if isinstance(attempted, _Done):
+        complain(*attempted.complaints)
+        return attempted.code
+    analysed, noted = attempted
     if task.options.json:
         print(json.dumps(analysed.result, allow_nan=False), flush=True)
     else:
         _print_text(analysed, si=task.options.si)
+    if noted is not None:
+        tell(f"{noted}: this scene, used from now on with {task.found.path}")
     if task.report is not None:
         page = _write(analysed, task.report, pdf=task.options.pdf)
         tell(f"report: {page}")
@@ -122,6 +130,8 @@ def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | No
         for line in done.complaints:
             complain(line)
     analysed = [done for done in everything if done.result]
+    if noted := sum(done.remembered for done in everything):
+        tell(f"scenes noted beside {noted} recordings, NAME.about.toml, used from now on with them")
     if analysed and not options.json:
         _print_together(analysed, options)
     if analysed and out is not None:
@@ -140,13 +150,12 @@ def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
     if tasks[0].report is None or workers == 1:
         yield from map(_work, tasks)
         return
-    import signal
     from concurrent.futures import ProcessPoolExecutor
     from concurrent.futures.process import BrokenProcessPool
     from multiprocessing import get_context
 
     # Fresh processes: a fork of one that has threads of linear algebra may hang. Ctrl-C is this process's.
-    with ProcessPoolExecutor(workers, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), _begin, (tasks[0].options.quiet,)) as pool:
         try:
             yield from pool.map(_work, tasks)
         except BrokenProcessPool as error:
@@ -157,6 +166,15 @@ def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
             raise
 
 
+def _begin(quiet: bool) -> None:
+    """Begin a process that makes reports: Ctrl-C is the first process's, and what that does not say nobody does."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if quiet:
+        hush()
+
+
 def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -165,9 +183,10 @@ def _work(task: _Task) -> _Done:
     """Analyse one of several inputs, and write its report where one is asked for."""
     from springmass.report.tables import every_number, table_estimates
 
-    analysed = _attempt(task)
-    if isinstance(analysed, _Done):
-        return analysed
+    attempted = _attempt(task)
+    if isinstance(attempted, _Done):
+        return attempted
+    analysed, noted = attempted
     code, complaints = _judged(analysed, task)
     page = None
     if task.report is not None:
@@ -176,28 +195,49 @@ def _work(task: _Task) -> _Done:
         except WriteFailed as error:
             code, complaints = USAGE, (*complaints, str(error))
     analysis = analysed.analysis
-    return _Done(task.name, code, complaints, analysed.result, table_estimates(analysis), every_number(analysis), page)
+    table, numbers = table_estimates(analysis), every_number(analysis)
+    return _Done(task.name, code, complaints, analysed.result, table, numbers, page, noted is not None)
 
 
-def _attempt(task: _Task) -> Analysed | _Done:
+def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
+    """Analyse an input; return that, and where its scene was noted from now on."""
     options = task.options
     asked = {**completions(options), "velocity": options.velocity or task.found.velocity}
     try:
         bench = _bench(options)
         loaded = load(task.found.path, **asked, from_s=options.from_s, to_s=options.to_s, clock_ppm=options.clock_ppm)
-        return analyse_loaded(
+        scene = amended(scene_of(loaded, task.scene), bench, where="the command line") if bench else task.scene
+        analysed = analyse_loaded(
             loaded,
-            amended(scene_of(loaded, task.scene), bench, where="the command line") if bench else task.scene,
+            scene,
             parameters={**picked(options, PARAMETERS), "velocity": asked["velocity"]},
             accuracy=options.accuracy,
             with_classic=options.method == "classic",
         )
+        return analysed, _remembered(loaded, scene) if task.writes else None
     except ProgramError as error:
         return _Done(task.name, error.exit_code, (str(error),))
     except (AcquisitionError, StorageError) as error:
         return _Done(task.name, UNREADABLE, (str(error),))
     except PipelineError as error:
         return _Done(task.name, UNREADABLE, (f"{task.found.path}: {error}",))
+
+
+def _remembered(loaded: Loaded, scene: Scene | None) -> Path | None:
+    """Note a scene that was given beside its recording; where nothing can be written it is said, and done without."""
+    if scene is None or _bundled(loaded.path):
+        return None
+    try:
+        return remember_scene(loaded.path, loaded.scene, scene)
+    except WriteFailed as error:
+        tell(f"{error}; the scene is not noted beside {loaded.path}")
+        return None
+
+
+def _bundled(path: Path) -> bool:
+    """Tell the recordings that come with the program, wherever they lie: their folder stays as it is."""
+    own = sample_data() / path.name
+    return own.is_file() and filecmp.cmp(own, path, shallow=False)
 
 
 def _bench(options: argparse.Namespace) -> dict[tuple[str, str], dict[str, float]]:

@@ -18,7 +18,7 @@ from springmass.errors import USAGE, ProgramError
 from springmass.runs.scenes import read_tables
 from storage.atomic import write_whole
 
-__all__ = ["About", "about_of", "write_about"]
+__all__ = ["About", "about_of", "remember_scene", "write_about"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +77,31 @@ def about_of(recording: Path) -> About:
         demand = "notes are a list of texts, marks are [[marks]] with t_s and text"
         raise ProgramError(f"{path}: {demand}; mend or remove the file", USAGE) from error
     return About(path, scene, notes, marks)
+
+
+def remember_scene(recording: Path, own: Mapping[str, Any] | None, used: Scene) -> Path | None:
+    """Note beside a recording the scene that was used with it, so that the next command uses it too.
+
+    Parameters
+    ----------
+    recording : Path
+    own : mapping or None
+        The scene that is used with it anyway, as its file or the notes beside it say.
+    used : Scene
+
+    Returns
+    -------
+    Path or None
+        The notes; None where they say so already.
+
+    Raises
+    ------
+    storage.errors.WriteFailed
+        If nothing can be written there.
+    """
+    if used.to_mapping() == Scene.from_mapping(own or {}, where=str(recording)).to_mapping():
+        return None
+    return write_about(about_of(recording).with_more(used, (), ()))
 
 
 def write_about(about: About) -> Path:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from springmass.runs.scenes import read_scene
+from storage.errors import WriteFailed
 
 Cli = Callable[..., Any]
 
@@ -102,6 +103,52 @@ def test_what_is_noted_beside_a_recording_is_used_and_said(cli: Cli, run: Path, 
     (given,) = cli("analyse", run, "--json", "--scene", data / "undamped.scene.toml").results
     assert given["provenance"]["parameters"]["scene"]["bob"]["mass_kg"]["value"] == 0.2007
     assert run.read_bytes() == before
+
+
+def test_the_scene_last_used_is_remembered_and_said(cli: Cli, data: Path, tmp_path: Path) -> None:
+    """analyse notes a given scene beside the recording, once, and uses it from then on; --no-report writes nothing."""
+    recording = tmp_path / "morning.txt"
+    recording.write_bytes((data / "damped_simulated_position.txt").read_bytes())
+    beside, given = recording.with_name("morning.about.toml"), ("--scene", data / "damped.scene.toml")
+    cli("analyse", recording, *given, "--no-report")
+    assert not beside.exists()
+    line = ("analyse", recording, *given, "--mass-kg", "0.3", "--out", tmp_path)
+    first = cli(*line)
+    assert f"{beside}: this scene, used from now on with {recording}" in first.err
+    (result,) = cli("analyse", recording, "--json").results
+    assert result["provenance"]["parameters"]["scene"]["bob"]["mass_kg"] == 0.3
+    again = cli(*line)
+    assert "from now on" not in again.err
+    assert f"{beside}: its scene noted beside the recording" in again.err
+
+
+def test_scenes_of_several_are_remembered_and_the_bundled_recordings_left_alone(
+    cli: Cli, data: Path, tmp_path: Path
+) -> None:
+    """One line for all; beside what comes with the program, and its copies, nothing is written."""
+    for name in ("a.txt", "b.txt", "damped_simulated_position.txt"):
+        (tmp_path / name).write_bytes((data / "damped_simulated_position.txt").read_bytes())
+    runs = sorted(tmp_path.glob("*.txt"))
+    done = cli("analyse", *runs, "--scene", data / "damped.scene.toml", "--out", tmp_path / "out")
+    assert "scenes noted beside 2 recordings" in done.err
+    assert sorted(path.name for path in tmp_path.glob("*.about.toml")) == ["a.about.toml", "b.about.toml"]
+
+
+def test_where_no_scene_can_be_noted_the_numbers_come_all_the_same(
+    cli: Cli, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder that takes nothing costs the note, which is said, and no result."""
+    recording = tmp_path / "morning.txt"
+    recording.write_bytes((data / "damped_simulated_position.txt").read_bytes())
+
+    def refuse(*_: object) -> None:
+        raise WriteFailed(recording, "cannot be written (read-only)", "name another folder")
+
+    monkeypatch.setattr("springmass.commands.analyse.remember_scene", refuse)
+    done = cli("analyse", recording, "--scene", data / "damped.scene.toml", "--out", tmp_path / "out")
+    assert done.code == 0
+    assert "spring constant" in done.out
+    assert f"the scene is not noted beside {recording}" in done.err
 
 
 @pytest.mark.parametrize(
