@@ -25,6 +25,7 @@ PAGES = (
     "docs/tutorial.md",
     "docs/how-to/add-a-format.md",
     "docs/how-to/add-a-law.md",
+    "docs/how-to/add-a-sensor.md",
     "docs/how-to/compare-runs.md",
     "docs/how-to/compare-with-the-classic-method.md",
     "docs/how-to/make-a-lab-report.md",
@@ -32,6 +33,7 @@ PAGES = (
     "docs/how-to/record-at-the-bench.md",
     "docs/how-to/simulate-a-bench.md",
     "docs/reference/run-file.md",
+    "docs/reference/wire-log.md",
     "docs/reference/command-line.md",
     "docs/explanation/accuracy.md",
     "docs/explanation/method.md",
@@ -50,6 +52,12 @@ LONG = (
     "docs/explanation/method.md",
 )
 """Pages with many commands: they run with the trials."""
+ELSEWHERE = (
+    "docs/how-to/analyse-a-course.md",  # tests/cli/test_batch_cli.py, with folders of recordings
+    "docs/how-to/watch-a-recording.md",  # tests/pages: a page stays open until its reader ends it
+    "docs/reference/page-messages.md",  # tests/pages/test_bench_page.py, with the address of a page
+)
+"""Pages whose blocks need what no page can bring along, and where the same is run."""
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 FENCE = re.compile(r"^```(?P<language>python|console)[ \t]*\n(?P<body>.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
 
@@ -124,6 +132,13 @@ def test_every_block_of_a_page_does_what_it_says(page: str, folder: Path) -> Non
 def test_the_pages_that_run_hold_blocks() -> None:
     """A page is listed above only if there is something on it to run."""
     assert all(blocks_of(page) for page in PAGES)
+
+
+def test_no_page_with_blocks_is_left_out() -> None:
+    """Every page that has something to run is run here, or named with what runs it."""
+    found = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    pages = {path.relative_to(ROOT).as_posix() for path in found}
+    assert {page for page in pages if blocks_of(page)} == {*PAGES, *ELSEWHERE}
 
 
 def run_python(page: str, block: Block, names: dict[str, object]) -> None:
