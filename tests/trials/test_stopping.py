@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -42,8 +43,10 @@ class Bench:
     noise: np.random.Generator
     synthetic: ModuleType
 
-    def looks(self, seconds: np.ndarray) -> list[tuple[float, dict[str, Any]]]:
-        """Return what the page tells after so many seconds each."""
+    def looks(
+        self, seconds: np.ndarray, enough: Callable[[dict[str, Any]], bool]
+    ) -> list[tuple[float, dict[str, Any]]]:
+        """Return what the page tells after so many seconds each, up to where that is enough to whoever looks."""
         t = self.synthetic.times(float(seconds[-1]), RATE_HZ)
         y = self.truth.position(t * (1.0 - self.clock)) + self.sigma_m * self.noise.standard_normal(t.size)
         told = []
@@ -51,6 +54,8 @@ class Bench:
             n = round(end * RATE_HZ)
             track = Track(t[:n], y[:n], np.zeros(n, np.uint8), RATE_HZ, clock="device")
             told.append((float(end), motion_of(track, EMPTY)))
+            if "stop" in told[-1][1] and enough(told[-1][1]["stop"]):
+                break
         return told
 
 
@@ -102,7 +107,7 @@ def test_intervals_hold_for_those_who_stop_when_they_like(synthetic: ModuleType)
     held, held_samples, two_u, times = [], [], [], []
     for seed in range(TRIALS):
         each = bench(synthetic, seed, ("linear", "quadratic", "linear+quadratic"))
-        told = each.looks(LOOKS_S)
+        told = each.looks(LOOKS_S, lambda stop: stop["more_s"] == 0.0)
         seen = each.truth.period * (1.0 + each.clock)  # the clock runs fast: it counts more seconds a swing
         wish = seen * (1.0 + 1e-4 * np.random.default_rng((19, seed)).standard_normal())
         stop = stopped(told, wish)
@@ -132,7 +137,8 @@ def test_when_laws_can_be_told_is_foretold(synthetic: ModuleType) -> None:
     ratios, inside = [], []
     for seed in range(TRIALS):
         each = bench(synthetic, seed, ("linear", "quadratic"))
-        needs = [(t, m["stop"]["laws"]) for t, m in each.looks(TELLING_S) if "stop" in m]
+        looks = each.looks(TELLING_S, lambda stop: bool(stop["laws"] and stop["laws"]["told"]))
+        needs = [(t, m["stop"]["laws"]) for t, m in looks if "stop" in m]
         told = next((i for i, (_, need) in enumerate(needs) if need and need["told"]), None)
         if not told:
             continue
