@@ -296,7 +296,12 @@ def _trimmed(seen: _Seen, start: int, stop: int, bound: float, share: float) -> 
 def _chosen(seen: _Seen, parts: list[tuple[int, int]], conditioned: Conditioned) -> Segments | None:
     """Return the longest of the parts that oscillate, and what lies beside it."""
     parts = [part for part in parts if part[1] > part[0]]
-    size = np.array([np.median(np.abs(seen.plane[first:stop])) for first, stop in parts])
+    # A decay that outlasts its motion is small for most of its time: where it began counts too.
+    whole, begun = (
+        np.array([np.median(np.abs(seen.plane[first : min(stop, first + most)])) for first, stop in parts])
+        for most in (seen.t.size, REACH)
+    )
+    size = np.maximum(whole, begun)
     free = size > STILL * size.max()
     length = np.array([stop - first for first, stop in parts])
     chosen = int(np.argmax(np.where(free, length, 0)))

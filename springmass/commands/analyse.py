@@ -37,6 +37,7 @@ __all__ = ["run"]
 
 PARAMETERS = ("accuracy", "method", "velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "clock_ppm", "strict")
 TOGETHER = "together.results"
+LONGEST_INPUTS = 48  # characters: names that are repeated in what to type next
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +138,8 @@ def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | No
     if analysed and out is not None:
         tell(f"written: {_write_together(analysed, out / TOGETHER)}")
     if len(analysed) > 1:
-        suggest(f"springmass compare {shlex.join(options.input)}")
+        inputs = shlex.join(options.input)
+        suggest(f"springmass compare {inputs if len(inputs) <= LONGEST_INPUTS else '...'}")
     codes = [done.code for done in everything]
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED

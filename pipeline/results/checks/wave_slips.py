@@ -26,6 +26,7 @@ MOST_NOISE = 1.0 / 8.0  # of a wave: noise beyond it reaches from one to the nex
 WIDEST = 0.35  # of a wave, half the width in which a slip is told
 LEAST = 3
 HEAVY = 0.1  # of all samples
+CLUSTERED = 2.0  # by how much echoes in clusters of many may exceed what as many single ones leave
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +61,9 @@ def find_wave_slips(track: Track, demodulated: Demodulated) -> WaveSlips:
     -----
     A slip lies within four standard deviations of the noise and 3 % of a wave, at most 0.35 of it, of
     :math:`c\\,\\tau/2` beside the motion, with :math:`\\tau` = 25 us. Slips are told where three at least lie there,
-    and more by three standard deviations of the count than the other false echoes within two waves, spread evenly,
-    would leave there. Noise of more than an eighth of a wave hides them.
+    and more by three standard deviations of the count than twice what the other false echoes within two waves, spread
+    evenly, would leave there: those come in clusters, and scatter more than counts do. Noise of more than an eighth of
+    a wave hides slips.
     """
     wave_m = 0.5 * WAVE_S * (track.speed_of_sound_m_per_s or SPEED_M_PER_S)
     noise_m = demodulated.noise_m
@@ -75,7 +77,7 @@ def find_wave_slips(track: Track, demodulated: Demodulated) -> WaveSlips:
     beside = np.count_nonzero((np.abs(off) <= 2.0) & ~slipped)
     by_chance = beside * 2.0 * width / (2.0 - 2.0 * width)
     found = int(np.count_nonzero(slipped))
-    if found < LEAST or found <= by_chance + 3.0 * np.sqrt(by_chance):
+    if found < LEAST or found <= CLUSTERED * by_chance + 3.0 * np.sqrt(by_chance):
         return none
     return WaveSlips(rows[slipped], int(np.count_nonzero(off[slipped] < 0.0)), wave_m)
 

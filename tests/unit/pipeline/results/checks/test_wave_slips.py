@@ -72,3 +72,19 @@ def test_false_echoes_anywhere_are_no_slips() -> None:
 def test_noise_hides_slips_and_is_none() -> None:
     """A sensor of 1.1 mm, whose outliers by four standard deviations lie a wave off."""
     assert "wave_slips" not in findings_of(np.zeros(6000), noise_m=1.1e-3)[0]
+
+
+def test_echoes_in_clusters_are_no_slips() -> None:
+    """The bundled recording has clusters of echoes of 2.5 to 7.5 mm, more of them about a wave off than by chance."""
+    rng = np.random.default_rng(8)
+    off_m = np.zeros(12_000)
+    for at, length, size in zip(
+        rng.choice(11_900, 45), rng.integers(3, 18, 45), rng.uniform(2.5, 7.5, 45), strict=True
+    ):
+        off_m[at : at + length] = 1e-3 * size
+    off_m[rng.choice(12_000, 110)] = rng.uniform(-8.6e-3, 8.6e-3, 110)
+    found, _ = findings_of(off_m)
+    assert "wave_slips" not in found
+    assert "false_echoes" in found
+    slipped = np.where(slips(120, 12_000) != 0.0, slips(120, 12_000), off_m)
+    assert 110 <= int(findings_of(slipped)[0]["wave_slips"].message.split()[0]) <= 300
