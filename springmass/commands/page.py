@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from acquisition.clock import SystemClock
 from springmass.commands import completions
 from springmass.errors import OK, USAGE, ProgramError, tell
 from springmass.page.desk import Desk
@@ -30,10 +29,10 @@ def run(options: argparse.Namespace) -> int:
     over = threading.Event()
     opening = Opening(options.page_port, network=address_in_network() if options.lan else "")
     if getattr(options, "recorder", False):
-        desk = Desk(SystemClock(), wanted_u_s, _say, name=path.with_suffix(".h5").name)
+        desk = Desk(wanted_u_s, _say, name=path.with_suffix(".h5").name)
         opening = _from_recorder(opening, desk, over)
     else:
-        desk = Desk(SystemClock(), wanted_u_s)
+        desk = Desk(wanted_u_s)
         _look_at(desk, path, options)
     opening.opened = _ready(options, opening)
     try:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from acquisition.clock import Clock
 from springmass.page.afterwards import Afterwards
 from springmass.page.feeds import LogFeed
 from springmass.page.view import View
@@ -30,7 +29,6 @@ class Desk:
 
     Parameters
     ----------
-    clock : Clock
     wanted_u_s : float or None
         Of the period, s; None: 40 ppm of it.
     controls : callable or None
@@ -48,10 +46,8 @@ class Desk:
         What the recorder said last: its ``phase`` and what belongs to it.
     """
 
-    def __init__(
-        self, clock: Clock, wanted_u_s: float | None, controls: Controls | None = None, *, name: str = ""
-    ) -> None:
-        self._clock, self._wanted_u_s = clock, wanted_u_s
+    def __init__(self, wanted_u_s: float | None, controls: Controls | None = None, *, name: str = "") -> None:
+        self._wanted_u_s = wanted_u_s
         self.controls = controls
         self.name = name
         self.closed = False
@@ -131,7 +127,7 @@ class Desk:
         if self.watcher is not None:
             self.watcher.close()
         self.view = view
-        self.watcher = Watcher(view, scene, self._clock, self._wanted_u_s)
+        self.watcher = Watcher(view, scene, self._wanted_u_s)
 
     def _free(self) -> int | None:
         try:

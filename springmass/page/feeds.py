@@ -79,7 +79,10 @@ class LogFeed:
         elif record.kind is Kind.EVENT and len(self.view.notes) < MOST_NOTES:
             content = event_content(record.payload)
             if content["kind"] not in UNTOLD:
-                facts = ", ".join(f"{name} {value}" for name, value in content["facts"].items())
+                facts = ", ".join(
+                    f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
+                    for name, value in content["facts"].items()
+                )
                 self.view.notes.append(f"{content['kind']}: {facts}" if facts else str(content["kind"]))
 
     def _mark(self, record: Record) -> None:

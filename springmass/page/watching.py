@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from acquisition.clock import Clock
 from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
@@ -20,6 +21,7 @@ from pipeline.track import F8, Track
 from springmass.page.stopping import ALPHA, more_seconds, widening
 from springmass.page.telling import Need, seconds_to_tell
 from springmass.page.view import View
+from springmass.report.advice import advice_on
 
 __all__ = ["Watcher", "motion_of"]
 
@@ -28,6 +30,8 @@ SHARE = 0.05
 LEAST_WAIT_S = 1.0
 NAMES = ("period", "spring_constant", "damping_rate", "noise", "offset", "quality_factor")
 CURVE_POINTS = 200
+FIT_BEFORE_S, FIT_AFTER_S, FIT_POINTS = 40.0, 60.0, 101
+"""The latest fit is drawn so long before its last window and after it."""
 LAST_WINDOWS = 4
 U_CLOCK_REACH = 2.0
 """So many u of a fixed, unknown rate of the clock: nobody stops on it."""
@@ -55,14 +59,39 @@ def motion_of(track: Track, scene: Scene, wanted_u_s: float | None = None) -> di
     except PipelineError as error:
         return {**message, "why": str(error)}
     message["findings"] = [
-        {"code": f.code, "severity": f.severity, "message": f.message}
+        {"code": f.code, "severity": f.severity, "message": f.message, "advice": advice_on(f.code, analysis)}
         for f in analysis.findings
         if f.severity != "info"
     ]
     motion = analysis.motion
     if not isinstance(motion, Oscillation):
-        return {**message, "why": motion.why}
+        return {**message, "why": motion.why, "estimates": _estimates(analysis)}
     return {**message, **_oscillation(analysis, motion, wanted_u_s)}
+
+
+def _estimates(analysis: Analysis) -> dict[str, dict[str, Any]]:
+    found = {name: analysis.estimates[name] for name in NAMES if name in analysis.estimates}
+    return {name: _told(each) for name, each in {**found, **_sampling(analysis.track)}.items()}
+
+
+def _sampling(track: Track) -> dict[str, Estimate]:
+    """Return the rate, Hz, and the share of samples that are missing, %.
+
+    The rate's u is what the clock may be off and what the times scatter by; a share's is that of its posterior by
+    Jeffreys' prior, for none missing of a few is no proof that none will be.
+    """
+    steps = np.diff(track.t[np.isfinite(track.t)])
+    n, missing = len(track), int(np.count_nonzero(np.isnan(track.y)))
+    found = {}
+    if steps.size > 1 and (span := float(steps.sum())) > 0.0:
+        clock = Instrument.of(track).clock_rate
+        rate = steps.size / span * clock.value
+        found["sample_rate"] = Estimate(
+            rate, rate * math.hypot(clock.u / clock.value, float(np.std(steps)) / span), "Hz"
+        )
+    a, b = missing + 0.5, n - missing + 0.5
+    u_share = math.sqrt(a * b / (a + b + 1.0)) / (a + b)
+    return {**found, "drop_outs": Estimate(100.0 * missing / n, 100.0 * u_share, "%")}
 
 
 def _oscillation(analysis: Analysis, motion: Oscillation, aim_s: float | None) -> dict[str, Any]:
@@ -71,9 +100,9 @@ def _oscillation(analysis: Analysis, motion: Oscillation, aim_s: float | None) -
     told = kept[:: -(-kept.size // MOST_POINTS)]
     start, end = damping.t0, float(np.nanmax(analysis.track.t))
     times = np.linspace(start, end, CURVE_POINTS)
-    estimates = {name: analysis.estimates[name] for name in NAMES if name in analysis.estimates}
+    estimates = _estimates(analysis)
     if (now := _now(windows.amplitude[kept], damping.scatter.u[kept])) is not None:
-        estimates["amplitude_now"] = now
+        estimates["amplitude_now"] = _told(now)
     period, frequency = analysis.estimates["period"], motion.phase.angular_frequency
     wanted_u_s = WANTED * period.value if aim_s is None else aim_s
     # What the samples leave open shrinks with the recording; what the sensor's clock may be off does not.
@@ -85,7 +114,7 @@ def _oscillation(analysis: Analysis, motion: Oscillation, aim_s: float | None) -
     if wanted_u_samples_s is not None:
         need = more_seconds(u_samples, wanted_u_samples_s, end - start, damping.best.amplitude)
     return {
-        "estimates": {name: _told(each) for name, each in estimates.items()},
+        "estimates": estimates,
         "amplitude": {
             "t": windows.t[told].tolist(),
             "value": windows.amplitude[told].tolist(),
@@ -126,10 +155,18 @@ def _now(amplitude: F8, u: F8) -> Estimate | None:
     return Estimate(float(np.average(values, weights=weights)), float(weights.sum() ** -0.5), "m")
 
 
-def _latest_fit(motion: Oscillation, end: float) -> dict[str, float]:
-    """Return the last window's sine: position = rest + amplitude cos(omega (t - moment) + phase)."""
-    windows = motion.demodulated
+def _latest_fit(motion: Oscillation, end: float) -> dict[str, Any]:
+    """Return the last window's sine, position = rest + amplitude decay(t) cos(omega (t - moment) + phase).
+
+    ``decay`` is the damping law's amplitude by that of the moment, in even steps of time from the moment.
+    """
+    windows, damping = motion.demodulated, motion.damping
+    after = np.linspace(-FIT_BEFORE_S, FIT_AFTER_S, FIT_POINTS)
+    curve = damping.best.amplitude(np.maximum(windows.t[-1] + after - damping.t0, 0.0))
+    now = float(damping.best.amplitude(windows.t[-1:] - damping.t0)[0])
+    decay = np.clip(np.nan_to_num(curve / now), 0.0, None) if now > 0.0 else np.ones(after.size)
     return {
+        "decay": {"from": -FIT_BEFORE_S, "step": float(after[1] - after[0]), "value": decay.tolist()},
         "moment": float(windows.t[-1]),
         "amplitude": float(windows.amplitude[-1]),
         "phase": float(windows.phase[-1]),
@@ -172,7 +209,6 @@ class Watcher:
     view : View
     scene : mapping or None
         What the recording says of its bench.
-    clock : Clock
     wanted_u_s : float or None
         Of the period, s; None: 40 ppm of it.
 
@@ -182,10 +218,9 @@ class Watcher:
         The latest; its ``count`` tells one from the one before.
     """
 
-    def __init__(self, view: View, scene: Mapping[str, Any] | None, clock: Clock, wanted_u_s: float | None) -> None:
+    def __init__(self, view: View, scene: Mapping[str, Any] | None, wanted_u_s: float | None) -> None:
         self._view = view
         self._scene = Scene.from_mapping(scene or {}, where="the recording's scene")
-        self._clock = clock
         self._wanted_u_s = wanted_u_s
         self._stop = threading.Event()
         self.message: dict[str, Any] = {"type": "motion", "count": 0, "why": "no samples so far"}
@@ -222,11 +257,11 @@ class Watcher:
             wait_s = LEAST_WAIT_S
             if len(self._view.series[0]) == seen:
                 continue
-            start_ns = self._clock.now_ns()
+            start_s = time.thread_time()  # of work, not of waiting for a core that others hold
             seen, count = len(self._view.series[0]), count + 1
             try:
                 self.message = {**motion_of(self.track(), self._scene, self._wanted_u_s), "count": count}
             except Exception as error:  # a defect of the analysis is shown, and the samples go on
                 self.message = {"type": "motion", "count": count, "why": f"{type(error).__name__}: {error}"}
             if count > 1:  # the first one loads what it needs
-                wait_s = max(LEAST_WAIT_S, (self._clock.now_ns() - start_ns) * 1e-9 / SHARE)
+                wait_s = max(LEAST_WAIT_S, (time.thread_time() - start_s) / SHARE)

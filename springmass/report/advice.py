@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from pipeline.analyse import Analysis, Oscillation
 from springmass.report.words import typeset
 from springmass.terminal.printing import STANDING
 
-__all__ = ["ADVICE", "LAW_CODES", "MOST_HEEDED", "Told", "sorted_out"]
+__all__ = ["ADVICE", "LAW_CODES", "MOST_HEEDED", "Told", "advice_on", "sorted_out"]
 
 MOST_HEEDED = 3
 LAW_CODES = frozenset({"law_rejected", "laws_not_separable", "mixed_drag", "no_law_fits"})
@@ -83,6 +87,23 @@ ADVICE = {
     "readings_dropped": "Record on another disk.",
 }
 """What to do about an error or a warning, one sentence by code."""
+
+
+def advice_on(code: str, analysis: Analysis) -> str:
+    """Return what to do about a finding of a run; where the motion is cut, by how far to move the sensor.
+
+    The swing as it began, a centimetre to spare, in whole centimetres; by the widest of the cuts.
+    """
+    motion, unit = analysis.motion, analysis.track.unit
+    if code == "clipped" and isinstance(motion, Oscillation) and unit == "m":
+        rest, amplitude = analysis.estimates["offset"].value, float(motion.damping.best.amplitude(np.zeros(1))[0])
+        cuts = [(cut.end, cut.from_m) for cut in analysis.conditioned.cuts if cut.fixed]
+        cuts = cuts or [("far" if m > rest else "near", m) for m in analysis.conditioned.plateaus_m]
+        lacks = [(amplitude - abs(from_m - rest), end) for end, from_m in cuts]
+        if lacks and len({end for _, end in lacks}) == 1 and max(lacks)[0] > 0.0:
+            lack, end = max(lacks)
+            return f"Move the sensor {math.ceil(100.0 * lack + 1.0)} cm {'away' if end == 'near' else 'nearer'}."
+    return ADVICE.get(code, "")
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,10 @@ import csv
 import http.client
 import json
 import os
+import re
 import struct
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -178,6 +180,19 @@ def test_everybody_can_read_it(replay: Page, width: int, scheme: Any) -> None:
         replay.screenshot(path=Path(folder) / f"bench-page-{width}-{scheme}.png", full_page=True)
 
 
+def test_by_night_the_same_charts_are_drawn(replay: Page) -> None:
+    """Where the run was shown anew, a change of colours draws its charts again and none of those before them."""
+    replay.evaluate("begin_anew()")
+    replay.emulate_media(color_scheme="dark")
+    replay.wait_for_function("() => matchMedia('(prefers-color-scheme: dark)').matches")
+    for chart in ("position", "amplitude", "phase", "spectrum"):
+        assert replay.locator(f"div#{chart} .uplot").count() == 1
+        assert replay.evaluate(f"{chart}.plot.root === document.querySelector('div#{chart} .uplot')")
+    assert replay.evaluate("position.plot.axes[0].stroke()") == "#ededed"
+    for label in ("sampling rate", "drop-outs"):
+        assert label in replay.inner_text("#estimates")
+
+
 def test_two_hours_are_drawn_by_least_and_greatest(replay: Page) -> None:
     """720,000 samples become as many points as the screen can show, and no spike among them is lost."""
     points, least, greatest, gaps = replay.evaluate("""() => {
@@ -226,6 +241,25 @@ def test_two_look_and_a_stranger_does_not(record: Callable[..., Any], browser: A
     connection.close()
     with pytest.raises(InvalidStatus):
         connect(f"ws://{netloc}/v1/run", origin="http://evil.example")  # type: ignore[arg-type]
+    program.end()
+
+
+def test_the_client_of_the_documentation(record: Callable[..., Any]) -> None:
+    """The ten lines of docs/reference/page-messages.md run as they stand and print the samples."""
+    program = record()
+    page = (Path(__file__).parents[2] / "docs/reference/page-messages.md").read_text()
+    client = page.split("## A client")[1].split("```python\n")[1].split("```")[0]
+    assert len([line for line in client.splitlines() if line and not line.startswith(("import", "from"))]) <= 10
+    client = re.sub(r'"http://127[^"]*"', repr(program.address), client)
+    with subprocess.Popen([sys.executable, "-u", "-c", client], stdout=subprocess.PIPE, text=True) as reading:
+        assert reading.stdout is not None
+        said: list[str] = []
+        while not {"hello", "state"} <= set(said) or not any(line.startswith("[") for line in said):
+            line = reading.stdout.readline()
+            assert line, "the client ended"
+            said.append(line.strip())
+        reading.kill()
+    assert said[0] == "hello"
     program.end()
 
 

@@ -121,7 +121,7 @@ const ACTIONS = {
   },
   voice() {
     const e = motion && motion.estimates;
-    const words = e ? `Period ${e.period.value.toFixed(3)} seconds` + (e.amplitude_now ? `, amplitude ${(e.amplitude_now.value * scale()).toFixed(1)} ${unit() === "mm" ? "millimetres" : unit()}` : "") : "No motion yet";
+    const words = e && e.period ? `Period ${e.period.value.toFixed(3)} seconds` + (e.amplitude_now ? `, amplitude ${(e.amplitude_now.value * scale()).toFixed(1)} ${unit() === "mm" ? "millimetres" : unit()}` : "") : "No motion yet";
     say(words);
     if (window.speechSynthesis) { speechSynthesis.cancel(); speechSynthesis.speak(new SpeechSynthesisUtterance(words)); }
   },

@@ -9,8 +9,18 @@ class Chart {
     this.labels = labels;
     this.more = more || {};
     this.build(series);
-    new ResizeObserver(() => this.plot.setSize(this.size())).observe(this.box);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build(this.series));
+    this.sizes = new ResizeObserver(() => this.plot.setSize(this.size()));
+    this.sizes.observe(this.box);
+    this.scheme = () => this.build(this.series);
+    this.media = matchMedia("(prefers-color-scheme: dark)");
+    this.media.addEventListener("change", this.scheme);
+  }
+
+  // A chart whose place another one takes follows neither size nor colours any more.
+  destroy() {
+    this.sizes.disconnect();
+    this.media.removeEventListener("change", this.scheme);
+    this.plot.destroy();
   }
 
   size() { return { width: Math.max(this.box.clientWidth, 200), height: Math.max(this.box.clientHeight - 28, 120) }; }

@@ -113,10 +113,12 @@ function item(text, kind) {
 // Phones go dark otherwise; browsers allow it under https and on this computer alone.
 let awake = null;
 async function keep_awake() {
-  if (run.source === "REPLAY" || !navigator.wakeLock || awake) return;
+  if (run.source === "REPLAY" || awake) return;
+  $("sleep").hidden = Boolean(navigator.wakeLock) || run.role !== "viewer";
+  if (!navigator.wakeLock) return;
   try {
     awake = await navigator.wakeLock.request("screen");
     awake.addEventListener("release", () => { awake = null; });
-  } catch (error) { /* refused: the screen goes dark as it does elsewhere, and the viewers' text says so */ }
+  } catch (error) { $("sleep").hidden = run.role !== "viewer"; }
 }
 document.addEventListener("visibilitychange", () => { dirty = true; if (!document.hidden && run) keep_awake(); });

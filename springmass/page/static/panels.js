@@ -1,7 +1,7 @@
 "use strict";
 // Numbers, charts, cursors.
 const WINDOWS = [5, 10, 30, 60, 300, Infinity];
-const LABELS = { period: "period", amplitude_now: "amplitude now", spring_constant: "spring constant k", damping_rate: "damping rate", noise: "noise", offset: "rest position", quality_factor: "quality factor" };
+const LABELS = { period: "period", amplitude_now: "amplitude now", spring_constant: "spring constant k", damping_rate: "damping rate", noise: "noise", offset: "rest position", quality_factor: "quality factor", sample_rate: "sampling rate", drop_outs: "drop-outs" };
 const KINDS = { voltage: "voltage", angle: "angle", acceleration: "acceleration", force: "force", length: "position" };
 let position, amplitude, phase, spectrum, shown_zero;
 let frozen = false, fixed = false, window_index = 1, playing = false, play_time = null, play_moment = 0, pinned = null;
@@ -12,7 +12,7 @@ function begin_anew() {
   play_time = null;
   if (run.source === "REPLAY") window_index = WINDOWS.length - 1, show_window();
   const what = `${shown_zero === undefined ? KINDS[run.quantity] || run.quantity : "displacement"} / ${unit()}`;
-  for (const id of ["position", "amplitude", "phase", "spectrum"]) $(id).replaceChildren();
+  if (position) for (const chart of [position, amplitude, phase, spectrum]) chart.destroy();
   const select = { cursor: { drag: { x: true, y: false, setScale: false } }, hooks: { setSelect: [selected], setCursor: [pointed], draw: [draw_marks] } };
   position = new Chart("position", [{ label: "samples", stroke: COLOURS.data, width: 1, points: { show: false } }, line("fit", COLOURS.fit), line("rest", COLOURS.rest, [6, 4], 1)], ["time / s", what], select);
   amplitude = new Chart("amplitude", [points("amplitude")], ["time / s", `amplitude / ${unit()}`]);
@@ -54,7 +54,7 @@ function show_motion() {
   list($("estimates"), motion.estimates || {});
   $("stopping").textContent = motion.stop ? stopping(motion.stop) : "";
   $("telling").textContent = motion.stop && motion.stop.laws ? telling(motion.stop.laws) : "";
-  $("findings").replaceChildren(...(motion.findings || []).map((f) => item(f.message, f.severity)));
+  $("findings").replaceChildren(...(motion.findings || []).map((f) => item(f.advice ? `${f.message}. ${f.advice}` : f.message, f.severity)));
   if (!(motion.findings || []).length) $("findings").replaceChildren(item(motion.count ? "nothing to say" : "nothing yet"));
   if (motion.amplitude) {
     const laws = motion.laws, times = motion.amplitude.t;
@@ -91,7 +91,7 @@ function show_region(found) {
   $("region-title").textContent = `Region ${found.from.toFixed(2)} to ${found.to.toFixed(2)} s`;
   list($("region-estimates"), found.estimates || {});
   $("region-why").textContent = found.why || "";
-  say(`${$("region-title").textContent}: ${found.estimates ? `period ${short(found.estimates.period)}` : found.why}`);
+  say(`${$("region-title").textContent}: ${found.estimates && found.estimates.period ? `period ${short(found.estimates.period)}` : found.why}`);
 }
 
 function fit_between(from, to) { ask_server({ type: "region", from: Math.min(from, to), to: Math.max(from, to) }); }
@@ -185,7 +185,13 @@ function in_view() {
 function fit_at(t) {
   const fit = motion && motion.fit;
   if (!fit || t < fit.moment - 20 || play_time !== null) return null;
-  return fit.rest + fit.amplitude * Math.cos(fit.omega * (t - fit.moment) + fit.phase);
+  return fit.rest + fit.amplitude * decay(fit.decay, t - fit.moment) * Math.cos(fit.omega * (t - fit.moment) + fit.phase);
+}
+
+// What the damping law leaves of the last window's amplitude so many seconds from it.
+function decay({ from, step, value }, after) {
+  const at = Math.min(Math.max((after - from) / step, 0), value.length - 1), low = Math.min(Math.floor(at), value.length - 2);
+  return value[low] + (at - low) * (value[low + 1] - value[low]);
 }
 
 function step_play() {
