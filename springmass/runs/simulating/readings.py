@@ -42,16 +42,19 @@ def readings(trajectory: Trajectory, sensor: VirtualSensor, name: str, seed: int
     """
     rest = rest_m(trajectory)
     end = float(trajectory.t[-1])
-    # All moments at which it may look, interpolated at once: its own, the ones beside them, and after the end.
+    # All moments at which it may look, interpolated at once: its own, the ones beside them, and after the end; and
+    # those at which the sound of each meets the bob.
     grid = np.arange(math.ceil(end * sensor.rate_hz) + 3) / sensor.rate_hz
     distances = rest + trajectory.at(grid)
+    met = grid + distances / sensor.speed_of_sound_m_per_s
+    there = dict(zip(met.tolist(), (rest + trajectory.at(met)).tolist(), strict=True))
 
     def position(t: float) -> float:
         place = t * sensor.rate_hz
         row = round(place)
         if abs(place - row) < 1e-6:
             return float(distances[min(max(row, 0), distances.size - 1)])
-        return rest + float(trajectory.at(np.array([t]))[0])
+        return there[t] if t in there else rest + float(trajectory.at(np.array([t]))[0])
 
     finder = VirtualRangefinder(position, sensor, np.random.default_rng(seed))
     return finder.block(end + 1.0 / sensor.rate_hz), finder.info(name)
