@@ -6,10 +6,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.block import F8, I8, U8, Flag
 
-__all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "Readings"]
+__all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "Readings", "carried"]
 
 NAN = math.nan
 
@@ -49,6 +50,12 @@ class Reading(NamedTuple):
 
 COLUMNS = (*Reading._fields, "flags")
 """The columns that readings have."""
+
+
+def carried(values: F8, known: NDArray[np.bool_], before: float) -> F8:
+    """Return values (n,) with the last known one in place of each that is not, and ``before`` in front of the first."""
+    latest = np.maximum.accumulate(np.where(known, np.arange(values.size), -1))
+    return np.where(latest >= 0, values[latest], before)
 
 
 class Readings(tuple[Reading, ...]):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import resource
 import tempfile
 import time
@@ -18,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from springmass.cli import main
+from springmass.runs.processes import cores
 
 RUNS = 20
 SECONDS = 120
@@ -77,6 +77,5 @@ if __name__ == "__main__":
         joint = min((analysed(files, Path(name)) for _ in range(3)), key=lambda taken: taken.wall_s)
         print(f"{RUNS} runs, one table: {joint.wall_s:.2f} s, {joint.processor_s:.2f} s of processor")
         reports = analysed(files, Path(name), "--report")
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        share = reports.wall_s * cores / RUNS
-        print(f"with reports: {reports.wall_s:.1f} s, {share:.2f} s a run and core of {cores}")
+        share = reports.wall_s * cores() / RUNS
+        print(f"with reports: {reports.wall_s:.1f} s, {share:.2f} s a run and core of {cores()}")

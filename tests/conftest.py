@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import signal
+import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -101,3 +102,29 @@ def _windows(
         flags=np.zeros(at.size * samples, np.uint8),
         lost=0,
     )
+
+
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        print(cluster.scheduler_address, *(worker.pid for worker in cluster.workers.values()), flush=True)
+        sys.stdin.read()
+"""
+CLUSTER_ENDS_S = 300.0
+
+
+@pytest.fixture
+def cluster() -> Iterator[tuple[str, list[int]]]:
+    """A dask cluster of two processes: its address and their numbers."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", CLUSTER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    address, *pids = process.stdout.readline().decode().split()
+    yield address, [int(pid) for pid in pids]
+    process.stdin.close()
+    process.wait(CLUSTER_ENDS_S)
+    process.stdout.close()

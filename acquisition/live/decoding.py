@@ -17,7 +17,7 @@ from acquisition.decoders.framed import FramedDecoder
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM, fit_clock
 from acquisition.live.timebase import Timebase, demand_within
-from acquisition.readings import NO_READINGS, Reading, Readings
+from acquisition.readings import NO_READINGS, Reading, Readings, carried
 from acquisition.source import SourceInfo
 
 __all__ = ["SensorChain"]
@@ -128,9 +128,7 @@ class SensorChain:
 
         Sound that was on its way for longer than a period belongs to an earlier ping.
         """
-        known = ways_s < 0.5 / self.timebase.rate_hz
-        latest = np.maximum.accumulate(np.where(known, np.arange(ways_s.size), -1))
-        ways_s = np.where(latest >= 0, ways_s[latest], self._way_s)
+        ways_s = carried(ways_s, ways_s < 0.5 / self.timebase.rate_hz, self._way_s)
         self._way_s = float(ways_s[-1]) if ways_s.size else self._way_s
         return ways_s
 

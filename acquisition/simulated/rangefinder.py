@@ -10,6 +10,7 @@ import numpy as np
 
 from acquisition.block import Block, Flag
 from acquisition.errors import SensorError
+from acquisition.readings import carried
 from acquisition.source import SourceInfo
 
 __all__ = ["Shot", "VirtualRangefinder", "VirtualSensor"]
@@ -145,9 +146,8 @@ class VirtualRangefinder:
         host_ns = np.array([round(shot.true_s * 1e9) for shot in shots], np.int64)
         # The moments at which sound met the bob, by the sensor's clock; of one that met nothing, as the one before.
         ways_s = np.array([0.5e-6 * shot.echo_us for shot in shots], np.float64)
-        heard = np.maximum.accumulate(np.where(np.isfinite(ways_s), np.arange(len(shots)), -1))
-        ways_s = np.where(heard >= 0, ways_s[heard], 0.0)
-        return Block(0, np.arange(len(shots)) / self.sensor.rate_hz + ways_s, distance, flags, host_ns)
+        t = np.arange(len(shots)) / self.sensor.rate_hz + carried(ways_s, np.isfinite(ways_s), 0.0)
+        return Block(0, t, distance, flags, host_ns)
 
     def info(self, name: str) -> SourceInfo:
         """Return what is known of it as a source."""

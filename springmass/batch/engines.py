@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures import Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context, parent_process
 from typing import Any
 
 from springmass.batch.plan import Job
 from springmass.batch.worker import analyse_many, blank_row
 from springmass.errors import SOME_FAILED, USAGE, ProgramError
+from springmass.runs.processes import pool
 
-__all__ = ["by_dask", "by_processes", "cores", "here", "pool"]
+__all__ = ["by_dask", "by_processes", "here"]
 
 Rows = list[dict[str, Any]]
 CHUNK = 32  # runs of a part: what a kill costs at most, a process
 DASK_CHUNK = 100  # a task of fewer costs more to hand out than to do
 TRIES = 3  # of a run whose process ends under it
 AHEAD = 2  # chunks a process that wait for it
-
-
-def cores() -> int:
-    """Return how many processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def chunks(jobs: Sequence[Job], processes: int) -> list[list[Job]]:
@@ -100,25 +92,6 @@ def _alone(job: Job) -> Iterator[Rows]:
         except BrokenProcessPool:
             told = f"{job.path}: its process was ended from outside {TRIES + 1} times, for lack of memory perhaps"
             yield [blank_row(job, "ended", f"{told}; the next pass tries it again")]
-
-
-def pool(processes: int) -> ProcessPoolExecutor:
-    """Return a pool of fresh processes that leave Ctrl-C to this one and end with it."""
-    # Fresh processes: a fork of one that has threads of linear algebra may hang.
-    return ProcessPoolExecutor(processes, get_context("spawn"), _begin)
-
-
-def _begin() -> None:
-    """Leave Ctrl-C to the first process, and end with it: a pool's process would wait for ever for one killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    if parent is not None:
-
-        def follow() -> None:
-            parent.join()
-            os._exit(1)
-
-        threading.Thread(target=follow, daemon=True).start()
 
 
 def by_dask(jobs: Sequence[Job], address: str) -> Iterator[Rows]:

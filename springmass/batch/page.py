@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from springmass.batch.reports import REPORTS, need_of, report_name
 from springmass.batch.rows import FAILED
@@ -42,18 +41,14 @@ def write_page(
     reports : set of str
         Folders of reports that can be linked.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from springmass.report.html import template
 
     every = [_line(name, row, tags, reports) for name, row in runs]
     there = [i for i in range(len(SHOWN)) if any(line["cells"][i][1] for line in every)]  # no column without a number
     lines = [{**line, "cells": [line["cells"][i] for i in there]} for line in every]
     lines.sort(key=lambda line: (*(-x for x in line["need"]), line["name"]))
     told = {kind: sum(line["look"] == kind for line in lines) for kind in ("failed", "error", "warning", "fine")}
-    environment = Environment(
-        loader=PackageLoader("springmass.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True, finalize=lambda value: visible(value) if type(value) is str else value,
-    )  # fmt: skip
-    page = environment.get_template("course.html.j2").render(
+    page = template("course.html.j2").render(
         title=folder.resolve().name, lines=lines, tags=tags, quantities=[SHOWN[i] for i in there], told=told
     )
     return write_whole(folder / PAGE, page.encode("utf-8", "backslashreplace"))

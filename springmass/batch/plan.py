@@ -18,6 +18,7 @@ from pipeline.errors import SceneError
 from springmass.batch.course import POSITION, Said, join, read_course
 from springmass.batch.rows import dumped
 from springmass.errors import UNREADABLE, USAGE, ProgramError
+from springmass.runs.analysing import numbered
 from springmass.runs.inputs import Found, files_of
 from springmass.runs.scenes import read_scene
 
@@ -220,15 +221,7 @@ def names_of(jobs: Sequence[Job]) -> list[str]:
         return []
     whole = [os.path.abspath(job.whole(job.path)) for job in jobs]
     above = os.path.commonpath([os.path.dirname(path) for path in whole])
-    counts: dict[str, int] = {}
-    names: dict[str, None] = {}
-    for path in whole:
-        stem = os.path.splitext(os.path.relpath(path, above))[0].replace(os.sep, "/")
-        count = counts.get(stem, 0) + 1
-        while (name := stem if count == 1 else f"{stem}-{count}") in names:
-            count += 1
-        counts[stem], names[name] = count, None
-    return list(names)
+    return numbered([os.path.splitext(os.path.relpath(path, above))[0].replace(os.sep, "/") for path in whole])
 
 
 @functools.cache

@@ -64,7 +64,7 @@ def write_reports(folder: Path, chosen: Sequence[tuple[str, Job]], jobs: int | N
         return
     (folder / REPORTS).mkdir(exist_ok=True)
     tasks = [(run, job, folder / REPORTS / report_name(run)) for run, job in chosen]
-    from springmass.batch.engines import cores, pool
+    from springmass.runs.processes import cores, pool
 
     processes = min(jobs or cores(), len(tasks))
     if processes == 1:
@@ -84,21 +84,16 @@ def write_one(run: str, job: Job, folder: Path) -> Path:
         With exit code 3 if its recording cannot be analysed.
     """
     from acquisition.errors import AcquisitionError
-    from pipeline.bench.scene import Scene
     from pipeline.errors import PipelineError
+    from springmass.batch.worker import load_job
     from springmass.errors import hushed
     from springmass.report.write import write_report
     from springmass.runs.analysing import analyse_loaded
-    from springmass.runs.loading import load
     from storage.errors import StorageError
 
-    answers = dict(job.answers)
-    if "velocity" in answers:
-        answers["velocity"] = job.whole(answers["velocity"])
     try:
         with hushed():
-            loaded = load(job.whole(job.path), **answers)
-        given = None if job.scene is None else Scene.from_mapping(job.scene)
+            loaded, given = load_job(job)
         analysed = analyse_loaded(
             loaded,
             given,

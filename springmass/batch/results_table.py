@@ -15,12 +15,12 @@ from springmass.batch.rows import COLUMNS, NUMBERS, WHOLE, columns_of
 from springmass.errors import USAGE, ProgramError
 from storage.atomic import whole_file
 
-__all__ = ["CSV", "PARQUET", "is_course", "read_rows", "tags_in", "text_of", "write_tables"]
+__all__ = ["CSV", "PARQUET", "is_course", "read_rows", "table_of", "tags_in", "text_of", "write_tables"]
 
 CSV, PARQUET = "results.csv", "results.parquet"
 GROUP = 1000  # rows of a row group: what is held at once
 _WHOLE, _NUMBERS = frozenset(WHOLE), frozenset(NUMBERS)
-_FORMULA = ("=", "+", "-", "@", "\t")
+_FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠", "\t")
 
 
 def write_tables(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> None:
@@ -64,7 +64,13 @@ def _type(name: str, pa: Any) -> Any:
 
 def is_course(folder: str | os.PathLike[str]) -> bool:
     """Tell a folder with the table of a course."""
-    return any(os.path.isfile(os.path.join(folder, name)) for name in (PARQUET, CSV))
+    return table_of(folder) is not None
+
+
+def table_of(folder: str | os.PathLike[str]) -> Path | None:
+    """Return the table of a course, the Parquet where it is there; None of any other folder."""
+    tables = (Path(folder) / name for name in (PARQUET, CSV))
+    return next((path for path in tables if os.path.isfile(path)), None)
 
 
 def read_rows(folder: Path) -> Iterator[dict[str, Any]]:

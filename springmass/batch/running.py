@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from springmass.batch.engines import by_dask, by_processes, cores, here
+from springmass.batch.engines import by_dask, by_processes, here
 from springmass.batch.page import PAGE, write_page
 from springmass.batch.plan import Job, Plan, code_sha256, names_of, shard_of
 from springmass.batch.reports import linked, need_of, worst, write_reports
@@ -20,6 +20,7 @@ from springmass.batch.rows import FAILED, dumped, flat
 from springmass.batch.store import Store
 from springmass.batch.worker import unchanged
 from springmass.errors import USAGE, ProgramError
+from springmass.runs.processes import cores
 
 __all__ = ["LOG", "Options", "Outcome", "make", "run_pass"]
 

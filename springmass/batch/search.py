@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from springmass import __version__
-from springmass.batch.results_table import CSV, PARQUET, read_rows, tags_in
+from springmass.batch.results_table import read_rows, table_of, tags_in
 from springmass.batch.rows import DETAILS, FILTERED, columns_of
 from springmass.errors import USAGE, ProgramError
 from storage.atomic import remove_leftovers
@@ -110,9 +110,8 @@ def _rows(folders: Sequence[str]) -> Iterator[dict[str, Any]]:
 
 
 def _table(folder: Path) -> Path:
-    for name in (PARQUET, CSV):
-        if (folder / name).is_file():
-            return folder / name
+    if (table := table_of(folder)) is not None:
+        return table
     demand = "a folder of results that springmass batch made was demanded, got another"
     raise ProgramError(f"{folder}: {demand}; name that of its -o", USAGE)
 

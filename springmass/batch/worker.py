@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,12 +22,13 @@ from pipeline.track import F8
 from springmass.batch.plan import Job, code_sha256
 from springmass.batch.rows import ESTIMATES
 from springmass.errors import ProgramError, hushed
+from springmass.runs.about import about_path
 from springmass.runs.analysing import scene_of
 from springmass.runs.json_results import all_findings
 from springmass.runs.loading import Loaded, load
 from storage.errors import StorageError
 
-__all__ = ["analyse_many", "blank_row", "stamps_of", "unchanged"]
+__all__ = ["analyse_many", "blank_row", "load_job", "stamps_of", "unchanged"]
 
 BINS, FEWEST_BINS = 60, 8  # of a thumbnail
 DRAG_POINTS = 8
@@ -46,11 +48,7 @@ def analyse_one(job: Job) -> dict[str, Any]:
         row["stamps"] = stamps_of(job)  # first: a file that changes meanwhile is another by the next pass
         row["hashes"] = {path: _sha256(job.whole(path)) for path, *_ in row["stamps"]}
         row["input_sha256"] = row["hashes"].get(job.path)
-        answers = dict(job.answers)
-        if "velocity" in answers:
-            answers["velocity"] = job.whole(answers["velocity"])
-        loaded = load(job.whole(job.path), **answers)
-        given = None if job.scene is None else Scene.from_mapping(job.scene)
+        loaded, given = load_job(job)
         analysis = analyse(loaded.track, scene_of(loaded, given), params_for(job.accuracy))
         _fill(row, loaded, analysis)
     except (ProgramError, AcquisitionError, PipelineError, StorageError, OSError) as error:
@@ -60,6 +58,15 @@ def analyse_one(job: Job) -> dict[str, Any]:
     except Exception as error:  # a defect: the other runs of a thousand are not to wait for its repair
         row["error"] = _told(job, f"{job.path}: a defect of the program: {type(error).__name__}: {error}")
     return row
+
+
+def load_job(job: Job) -> tuple[Loaded, Scene | None]:
+    """Return a run's recording, and the scene that was given for it."""
+    answers = dict(job.answers)
+    if "velocity" in answers:
+        answers["velocity"] = job.whole(answers["velocity"])
+    loaded = load(job.whole(job.path), **answers)
+    return loaded, None if job.scene is None else Scene.from_mapping(job.scene)
 
 
 def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, Any]:
@@ -88,7 +95,7 @@ def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, An
 
 def stamps_of(job: Job) -> list[list[Any]]:
     """Return path, size and time of modification in ns of every file that a run is read from; absent ones are not."""
-    beside = os.path.join(os.path.dirname(job.path), f"{os.path.splitext(os.path.basename(job.path))[0]}.about.toml")
+    beside = str(about_path(Path(job.path)))
     found = []
     for path in (job.path, job.answers.get("velocity"), beside):
         if path:

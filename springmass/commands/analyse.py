@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import filecmp
 import json
-import os
 import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,12 +22,13 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
 from springmass.commands import completions
-from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, hush, suggest, tell
+from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, suggest, tell
 from springmass.runs.about import remember_scene
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder, scene_of
 from springmass.runs.inputs import Found, files_of
 from springmass.runs.json_results import picked, rejected
 from springmass.runs.loading import Loaded, load, sample_data
+from springmass.runs.processes import cores, pool
 from springmass.runs.scenes import amended, read_scenes
 from springmass.terminal.arguments import BENCH
 from storage.errors import StorageError, WriteFailed
@@ -148,37 +148,21 @@ def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | No
 
 def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
     """Yield what became of each task, in their order; with reports a process a core works on them."""
-    workers = min(_cores(), len(tasks))
+    workers = min(cores(), len(tasks))
     if tasks[0].report is None or workers == 1:
         yield from map(_work, tasks)
         return
-    from concurrent.futures import ProcessPoolExecutor
     from concurrent.futures.process import BrokenProcessPool
-    from multiprocessing import get_context
 
-    # Fresh processes: a fork of one that has threads of linear algebra may hang. Ctrl-C is this process's.
-    with ProcessPoolExecutor(workers, get_context("spawn"), _begin, (tasks[0].options.quiet,)) as pool:
+    with pool(workers, quiet=tasks[0].options.quiet) as processes:
         try:
-            yield from pool.map(_work, tasks)
+            yield from processes.map(_work, tasks)
         except BrokenProcessPool as error:
             demand = "a process that makes reports was ended from outside, for lack of memory perhaps"
             raise ProgramError(f"{demand}; give fewer inputs at once", SOME_FAILED) from error
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            processes.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def _begin(quiet: bool) -> None:
-    """Begin a process that makes reports: Ctrl-C is the first process's, and what that does not say nobody does."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if quiet:
-        hush()
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _work(task: _Task) -> _Done:

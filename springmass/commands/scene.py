@@ -48,7 +48,7 @@ position = "below"                          # or "above" the bob
 def run(options: argparse.Namespace) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from springmass.runs.about import about_of, write_about
-    from springmass.runs.scenes import ask_about, read_scene
+    from springmass.runs.scenes import ask_about, read_scene, stated_keys
 
     noted = options.scene is not None or options.note or options.mark
     if options.check is not None:
@@ -56,8 +56,7 @@ def run(options: argparse.Namespace) -> int:
             raise ProgramError("--check looks at a scene file alone; leave the rest out", USAGE)
         scene = read_scene(options.check)
         ask_about(scene, options.check)
-        told = ", ".join(f"[{table}] {key}" for table, keys in scene.to_mapping().items() for key in keys)
-        print(f"{options.check}: a scene that states {told or 'nothing'}")
+        print(f"{options.check}: a scene that states {stated_keys(scene)}")
         suggest(f"springmass analyse RECORDING --scene {shlex.quote(options.check)}")
         return OK
     if options.input is None:

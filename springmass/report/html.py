@@ -96,7 +96,7 @@ def render_html(
         _part(i, run, drawn, numbers, alone=len(runs) == 1)
         for i, (run, drawn) in enumerate(zip(runs, pictures, strict=True))
     ]
-    return _template().render(
+    return template("report.html.j2").render(
         title=", ".join(run.name for run in runs),
         parts=parts,
         tables=list(_tables(runs)),
@@ -107,8 +107,8 @@ def render_html(
 
 
 @functools.cache
-def _template() -> Template:
-    """Return the page's template; to compile it takes as long as to draw a figure."""
+def template(name: str) -> Template:
+    """Return a page's template; to compile that of a report takes as long as to draw a figure."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -128,7 +128,7 @@ def _template() -> Template:
         "typeset": typeset,
         "breakable": _breakable,
     }
-    return environment.get_template("report.html.j2")
+    return environment.get_template(name)
 
 
 def _shown(value: object) -> object:

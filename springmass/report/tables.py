@@ -164,6 +164,7 @@ def cell(text: str) -> str:
 
 
 _FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
+"""What a spreadsheet takes for the beginning of a formula."""
 
 
 def pretty(estimate: Estimate | None) -> str:

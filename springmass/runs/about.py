@@ -18,7 +18,7 @@ from springmass.errors import USAGE, ProgramError
 from springmass.runs.scenes import read_tables
 from storage.atomic import write_whole
 
-__all__ = ["About", "about_of", "remember_scene", "write_about"]
+__all__ = ["About", "about_of", "about_path", "remember_scene", "write_about"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +53,11 @@ class About:
         return ", ".join(parts)
 
 
+def about_path(recording: Path) -> Path:
+    """Return where what is noted of a recording stands, or would."""
+    return recording.with_name(f"{recording.stem}.about.toml")
+
+
 def about_of(recording: Path) -> About:
     """Read what is noted beside a recording; nothing where there is no such file.
 
@@ -61,7 +66,7 @@ def about_of(recording: Path) -> About:
     ProgramError
         With exit code 2 if the file is there and says something that it cannot.
     """
-    path = recording.with_name(f"{recording.stem}.about.toml")
+    path = about_path(recording)
     if not os.path.exists(path):  # Path.exists would raise for a name that is too long
         return About(path)
     told = read_tables(path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,6 +18,7 @@ from springmass import __version__
 from springmass.errors import USAGE, ProgramError, detail
 from springmass.runs.json_results import result_of
 from springmass.runs.loading import Loaded
+from springmass.runs.scenes import stated_keys
 
 __all__ = [
     "Analysed",
@@ -89,8 +90,7 @@ def analyse_loaded(
     """
     scene = scene_of(loaded, scene)
     analysis = analyse(loaded.track, scene, params_for(accuracy))
-    stated = ", ".join(f"[{table}] {key}" for table, keys in scene.to_mapping().items() for key in keys)
-    detail(f"analysed: {loaded.path} at {accuracy}, with a scene that states {stated or 'nothing'}")
+    detail(f"analysed: {loaded.path} at {accuracy}, with a scene that states {stated_keys(scene)}")
     by_classic = classic(loaded.track, scene) if with_classic else None
     result = result_of(
         loaded,
@@ -116,10 +116,14 @@ def distinct_names(paths: Sequence[str]) -> list[str]:
     >>> distinct_names(["a/bob.txt", "b/bob.txt", "disc.h5"])
     ['bob', 'bob-2', 'disc']
     """
+    return numbered([Path(path).stem for path in paths])
+
+
+def numbered(stems: Iterable[str]) -> list[str]:
+    """Return names in their order, later ones of one name numbered."""
     counts: dict[str, int] = {}
     names: dict[str, None] = {}
-    for path in paths:
-        stem = Path(path).stem
+    for stem in stems:
         count = counts.get(stem, 0) + 1
         while (name := stem if count == 1 else f"{stem}-{count}") in names:
             count += 1

@@ -12,7 +12,7 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import USAGE, ProgramError, complain
 
-__all__ = ["amended", "ask_about", "read_scene", "read_scenes", "read_tables"]
+__all__ = ["amended", "ask_about", "read_scene", "read_scenes", "read_tables", "stated_keys"]
 
 LONGEST_SCENE = 1 << 14  # bytes; of longer ones some take seconds to parse
 
@@ -105,6 +105,11 @@ def amended(scene: Scene, values: Mapping[tuple[str, str], Mapping[str, float]],
         return Scene.from_mapping(tables, where=where)
     except SceneError as error:
         raise ProgramError(str(error), USAGE) from error
+
+
+def stated_keys(scene: Scene) -> str:
+    """Return what a scene states, in words: tables and keys."""
+    return ", ".join(f"[{table}] {key}" for table, keys in scene.to_mapping().items() for key in keys) or "nothing"
 
 
 def ask_about(scene: Scene, where: str | Path) -> None:

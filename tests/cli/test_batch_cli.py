@@ -8,7 +8,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
@@ -18,14 +17,6 @@ import springmass
 from tests.courses import bad_files, contents, short_course, write_recording
 
 LIMIT_S = 120
-CLUSTER = """
-import sys
-from distributed import LocalCluster
-if __name__ == "__main__":
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
-        print(cluster.scheduler_address, *(worker.pid for worker in cluster.workers.values()), flush=True)
-        sys.stdin.read()
-"""
 MANY = 2600 if os.environ.get("SPRINGMASS_TRIALS") else 26  # a hundred for each bad one
 QUICK = ("--reports", "0", "--accuracy", "fast")
 
@@ -115,21 +106,6 @@ def test_processes_and_shards_give_the_bytes_of_one_process(runs, cli):
         folders.append(contents(out))
     assert folders[0] == folders[1] == folders[2]
     assert any(name.endswith("report.html") for name in folders[0])
-
-
-@pytest.fixture
-def cluster() -> Iterator[tuple[str, list[int]]]:
-    """A dask cluster of two processes: its address and their numbers."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", CLUSTER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-    )
-    assert process.stdin is not None
-    assert process.stdout is not None
-    address, *pids = process.stdout.readline().decode().split()
-    yield address, [int(pid) for pid in pids]
-    process.stdin.close()
-    process.wait(LIMIT_S)
-    process.stdout.close()
 
 
 def test_dask_gives_the_bytes_of_one_process(runs, cli, cluster):

@@ -119,8 +119,8 @@ def test_a_process_ended_from_outside_is_one_line(cli: Cli, bench: Path, monkeyp
         def map(self, *_: object) -> list[object]:
             raise BrokenProcessPool
 
-    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Broken)
-    monkeypatch.setattr("springmass.commands.analyse._cores", lambda: 2)
+    monkeypatch.setattr("springmass.commands.analyse.pool", Broken)
+    monkeypatch.setattr("springmass.commands.analyse.cores", lambda: 2)
     done = cli("analyse", bench, "--report", "--out", bench / "out")
     assert done.code == 1
     assert "a process that makes reports was ended from outside" in done.err.splitlines()[-1]

@@ -12,7 +12,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,14 +24,6 @@ LIMIT_S = 300.0
 RUNS = 24 if "SPRINGMASS_KILLS" in os.environ else 6
 DASK_RUNS = 250 if "SPRINGMASS_KILLS" in os.environ else RUNS  # three tasks, or one
 OPTIONS = ("--reports", "0", "--accuracy", "fast")
-CLUSTER = """
-import sys
-from distributed import LocalCluster
-if __name__ == "__main__":
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
-        print(cluster.scheduler_address, *(worker.pid for worker in cluster.workers.values()), flush=True)
-        sys.stdin.read()
-"""
 
 
 @pytest.fixture(scope="module")
@@ -98,21 +89,6 @@ def test_a_killed_pass_is_completed(place, tmp_path, who):
         assert contents(out) == clean
         with (out / "results.csv").open(newline="") as file:
             assert [row["run"] for row in csv.DictReader(file)] == [f"run{i:03d}" for i in range(RUNS)]
-
-
-@pytest.fixture
-def cluster() -> Iterator[tuple[str, list[int]]]:
-    """A dask cluster of two processes: its address and their numbers."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", CLUSTER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-    )
-    assert process.stdin is not None
-    assert process.stdout is not None
-    address, *pids = process.stdout.readline().decode().split()
-    yield address, [int(pid) for pid in pids]
-    process.stdin.close()
-    process.wait(LIMIT_S)
-    process.stdout.close()
 
 
 def used_s(pid: int) -> float:

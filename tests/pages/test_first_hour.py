@@ -16,6 +16,8 @@ from types import ModuleType
 
 import pytest
 
+from springmass.runs.loading import sample_data
+
 SCENE = """
 [bob]
 mass_kg = { value = 0.2, u = 0.0001 }
@@ -42,21 +44,13 @@ with xr.open_dataset("bob.h5") as samples:
 
 
 @pytest.fixture
-def bench(tmp_path: Path, data: Path) -> Path:
+def bench(tmp_path: Path) -> Path:
     """A folder as somebody has it: two old recordings, and what is known of the bench."""
     for name in ("undamped", "damped"):
-        shutil.copy(data / f"{name}_simulated_position.txt", tmp_path / f"{name}.txt")
+        shutil.copy(sample_data() / f"{name}_simulated_position.txt", tmp_path / f"{name}.txt")
     (tmp_path / "bench.toml").write_text(SCENE)
     (tmp_path / "runs").mkdir()
     return tmp_path
-
-
-@pytest.fixture(scope="session")
-def data() -> Path:
-    """The bundled recordings."""
-    from springmass.runs.loading import sample_data
-
-    return sample_data()
 
 
 @pytest.fixture

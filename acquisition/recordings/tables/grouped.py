@@ -141,12 +141,11 @@ def _group(path: str, cells: set[bytes]) -> bytes:
     for group in (b",", b"."):
         both = re.compile(_thousands(group) + re.escape(_other(group)) + rb"\d*" + _EXPONENT)
         many = re.compile(_SIGN + rb"[1-9]\d{0,2}(?:" + re.escape(group) + rb"\d{3}){2,}")
-        one = re.compile(_SIGN + rb"[1-9]\d{0,2}" + re.escape(group) + rb"\d{3}")
         mark = re.compile(_SIGN + rb"\d+" + re.escape(group) + rb"\d*" + _EXPONENT)
         for each in cells:
             if both.fullmatch(each) or many.fullmatch(each):
                 sure[group] = each
-            elif one.fullmatch(each):
+            elif _ONE_GROUP[group].fullmatch(each):
                 unsure[group] = each
             elif mark.fullmatch(each):
                 decimal[group] = each

@@ -67,7 +67,7 @@ def leading(
     end = omega * seconds
     if eq.friction_m_per_s2 or max(g, q, abs(s)) > WEAK or not SHORTEST < end < LONGEST:
         return None
-    fall = 4.0 / (3.0 * math.pi) * q
+    fall = eq.laws()[1] * start / omega
     time = 1.0 / max(g + fall, 1e-12)
     long = math.log1p(end / time)
     off = phase = worst = before = 0.0

@@ -18,11 +18,10 @@ from pipeline.dynamics.sensitivity import C16
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.runs.simulating.simulation import Against, Move, count_of, plan
+from springmass.runs.simulating.simulation import FINE, Against, Move, count_of, plan
 
 __all__ = ["completed", "deviation_text", "duration_s", "lay_over"]
 
-FINE = 24.0  # states a radian between which an interpolation errs by 1e-8 of the amplitude
 WIDER = 1.96  # noise of a sample by which the band is widened: 95 % of it
 HALF = 0.5
 FURTHEST_U = 20.0  # standard uncertainties by which an input is moved

@@ -20,6 +20,7 @@ from pipeline.track import F8
 from springmass.errors import USAGE, ProgramError
 
 __all__ = [
+    "FINE",
     "Against",
     "Check",
     "Move",
@@ -33,6 +34,7 @@ __all__ = [
 ]
 
 DEFAULT_TOLERANCE = 1e-6
+FINE = 24.0  # states a radian between which an interpolation errs by 1e-8 of the amplitude
 BAND_SHARE, LARGEST_DEFAULT = 0.01, 1e-3
 MOST_SAMPLES = 20_000_000
 REFERENCE_TOLERANCE = 1e-16  # asked of a Taylor series: its rounding is all that is left

@@ -21,7 +21,7 @@ from pipeline.track import F8
 from springmass.runs.analysing import in_a_name, made_now, make_folder
 from springmass.runs.simulating.prepared import Prepared
 from springmass.runs.simulating.readings import plain_block, readings, rest_m
-from springmass.runs.simulating.simulation import Against, Simulation, count_of, plan
+from springmass.runs.simulating.simulation import FINE, Against, Simulation, count_of, plan
 from springmass.runs.simulating.told import band_columns
 
 __all__ = ["write_folder", "write_readings"]
@@ -31,7 +31,6 @@ FILES = frozenset(
     {"run.h5", "simulation.json", "band.csv", "against.csv"}
     | {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf")}
 )
-FINE = 24.0  # states a radian between which an interpolation errs by 1e-8 of the amplitude
 
 
 def write_folder(
