@@ -111,7 +111,7 @@ def test_a_process_ended_from_outside_is_one_line(cli: Cli, bench: Path, monkeyp
     """Where the system takes a process that makes reports, the line says so and the exit code is 1."""
 
     class Broken:
-        def __init__(self, *_: object) -> None: ...
+        def __init__(self, *_: object, **__: object) -> None: ...
         def __enter__(self) -> Broken:
             return self
 
