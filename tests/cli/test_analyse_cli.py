@@ -382,6 +382,7 @@ def test_json_writes_no_files(cli: Cli, recording: Path, tmp_path: Path, monkeyp
     assert list(here.iterdir()) == []
 
 
+@pytest.mark.trials
 def test_files_of_one_name_get_results_of_their_own(cli: Cli, recording: Path, tmp_path: Path) -> None:
     """Recordings are called data.txt in one folder after the other; none overwrites another's results."""
     paths = []

@@ -186,6 +186,7 @@ def test_silence_is_told_before_a_run_starts(cli: Callable, tmp_path: Path, sile
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.trials
 def test_another_sensor_is_recognised_by_its_bytes(cli: Callable, tmp_path: Path) -> None:
     """Bytes of another family: the line says what they look like, exit code 4."""
     with speaking("ffhls") as sensor:
@@ -433,6 +434,7 @@ def rulered(cli: Callable, tmp_path: Path, hands: Hands, *rulers: str) -> Simple
         )
 
 
+@pytest.mark.trials
 def test_two_distances_by_the_ruler_set_offset_and_scale(
     cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -449,6 +451,7 @@ def test_two_distances_by_the_ruler_set_offset_and_scale(
     np.testing.assert_allclose(distance[-10:], 0.5, atol=0.002)
 
 
+@pytest.mark.trials
 def test_one_distance_by_the_ruler_moves_the_rest_position_with_it(cli: Callable, tmp_path: Path) -> None:
     """An offset of a decimetre is no motion of the bob: the trigger comes with the motion, not before."""
     hands = Hands([0.4])
@@ -546,6 +549,7 @@ def test_silence_is_said_before_the_recording_gives_up(cli: Callable, tmp_path: 
     assert "not a byte came" in last
 
 
+@pytest.mark.trials
 def test_record_alone_finds_the_only_rangefinder(
     cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, silent_port: str
 ) -> None:

@@ -43,6 +43,7 @@ PAGES = (
     "docs/decisions/0004-demodulation-first.md",
 )
 LONG = (
+    "docs/tutorial.md",
     "docs/how-to/compare-runs.md",
     "docs/how-to/compare-with-the-classic-method.md",
     "docs/how-to/make-a-lab-report.md",

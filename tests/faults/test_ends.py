@@ -191,6 +191,7 @@ def told(recording: Any) -> str:
     return str(said)
 
 
+@pytest.mark.trials
 def test_a_second_ctrl_c_while_the_disk_hangs_leaves_the_log_and_says_where(bench: Any, tmp_path: Path) -> None:
     """The first waits for the disk; the second ends at once, removes nothing, and names the log and what to do."""
     out = tmp_path / "run.h5"
@@ -215,6 +216,7 @@ def test_a_second_ctrl_c_while_the_disk_hangs_leaves_the_log_and_says_where(benc
     assert len(numbers) > 200
 
 
+@pytest.mark.trials
 def test_a_disk_that_takes_nothing_more_ends_the_recording_with_what_it_has(bench: Any, tmp_path: Path) -> None:
     """At a file-size limit: exit code 4, one line that says why, the run file of what came before, and the log."""
     out = tmp_path / "run.h5"
@@ -237,6 +239,7 @@ def test_a_disk_that_takes_nothing_more_ends_the_recording_with_what_it_has(benc
     assert len(numbers) > 200
 
 
+@pytest.mark.trials
 def test_a_folder_that_is_renamed_takes_its_recording_along(bench: Any, tmp_path: Path) -> None:
     """The run goes on, and its run file lies beside the log, in the folder by its new name."""
     before, after = tmp_path / "before", tmp_path / "after"
@@ -256,6 +259,7 @@ def test_a_folder_that_is_renamed_takes_its_recording_along(bench: Any, tmp_path
     assert [path.name for path in after.iterdir()] == ["run.h5"]
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("by", ["nothing", "another file"])
 def test_a_log_that_is_taken_away_is_noticed_and_saved(bench: Any, tmp_path: Path, by: str) -> None:
     """Deleted or replaced while it is recorded: said in the run and at its end, and no reading is missing."""
@@ -278,6 +282,7 @@ def test_a_log_that_is_taken_away_is_noticed_and_saved(bench: Any, tmp_path: Pat
         assert recording.log.read_bytes() == b"mine"
 
 
+@pytest.mark.trials
 def test_a_further_file_of_a_log_that_is_taken_away_is_saved_too(bench: Any, tmp_path: Path) -> None:
     """Deleted after the log went on in it: said which it was, and no reading is missing."""
     out = tmp_path / "run.h5"
@@ -309,6 +314,7 @@ def test_a_killed_recording_leaves_its_log(bench: Any, tmp_path: Path) -> None:
     assert len(numbers) > 200
 
 
+@pytest.mark.trials
 def test_a_sensor_that_hears_one_ping_of_five_is_recorded(bench: Any, tmp_path: Path) -> None:
     """Pings without an echo are missing samples, the rest is recorded, and an analysis says what it can."""
     out = tmp_path / "run.h5"

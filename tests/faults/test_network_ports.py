@@ -145,6 +145,7 @@ def test_a_sensor_behind_rfc2217_is_recorded_like_one_on_a_cable(family: str, ra
         np.testing.assert_allclose(np.diff(samples.t), 1.0 / rate_hz, atol=1e-4)
 
 
+@pytest.mark.trials
 def test_a_server_that_hangs_up_is_a_gap_and_the_run_goes_on(tmp_path: Path) -> None:
     """After the connection breaks the reader connects again, and the gap stands in the run with its length."""
     out = tmp_path / "run.h5"

@@ -49,6 +49,7 @@ def events_of(run_file: Path) -> list[str]:
         return [event["kind"] for event in run.provenance["events"]]
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("how", ["unplugged for good", "silent"])
 def test_a_sensor_that_is_gone_at_the_end_is_said_and_ends_with_4(
     bench: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str], how: str
@@ -88,6 +89,7 @@ def test_strict_rejects_a_run_whose_sensor_was_lost(tmp_path: Path, capsys: pyte
     assert "rejected under --strict: sensor_lost" in capsys.readouterr().err
 
 
+@pytest.mark.trials
 def test_another_sensor_on_the_name_of_a_lost_one_is_not_recorded(bench: Any, tmp_path: Path) -> None:
     """What takes the port's name and speaks otherwise is refused and named; no byte of it is in the run."""
     out = tmp_path / "run.h5"
@@ -105,6 +107,7 @@ def test_another_sensor_on_the_name_of_a_lost_one_is_not_recorded(bench: Any, tm
     assert "reopened" not in kinds
 
 
+@pytest.mark.trials
 def test_the_sensor_itself_is_recorded_again(bench: Any, tmp_path: Path) -> None:
     """The one that was unplugged proves itself by its wire form, and not a reading since it did is missing."""
     out = tmp_path / "run.h5"
@@ -148,6 +151,7 @@ def foreign(port: Path) -> Iterator[None]:
         os.close(master)
 
 
+@pytest.mark.trials
 def test_a_connection_that_says_nothing_any_more_is_a_sensor_gone(bench: Any, tmp_path: Path) -> None:
     """Over TCP: open to the end, silent for its last half; the connection is probed by the system meanwhile."""
     out = tmp_path / "run.h5"

@@ -85,6 +85,7 @@ def test_the_first_minute(bench: tuple[Any, Page]) -> None:
     assert (program.out.parent / "run.results" / "report.html").is_file()
 
 
+@pytest.mark.trials
 def test_the_trigger_keeps_what_came_before(bench: tuple[Any, Page]) -> None:
     """Zeroed and armed on the page, the run begins by itself, with the seconds from before its moment."""
     program, page = bench
@@ -105,6 +106,7 @@ def test_the_trigger_keeps_what_came_before(bench: tuple[Any, Page]) -> None:
     assert samples.t[moved.argmax()] - samples.t[0] == pytest.approx(1.5, abs=0.05)
 
 
+@pytest.mark.trials
 def test_a_trigger_is_disarmed_and_the_run_begun_by_hand(bench: tuple[Any, Page]) -> None:
     """T again goes back to ready; what is asked beyond what may be is passed over."""
     program, page = bench
@@ -119,6 +121,7 @@ def test_a_trigger_is_disarmed_and_the_run_begun_by_hand(bench: tuple[Any, Page]
     program.end()
 
 
+@pytest.mark.trials
 def test_a_ruler_moves_the_zero_of_the_distances(bench: tuple[Any, Page]) -> None:
     """The bob that hangs at 250 mm is said to hang at 260: the run's distances say so too."""
     program, page = bench
@@ -139,6 +142,7 @@ def test_a_ruler_moves_the_zero_of_the_distances(bench: tuple[Any, Page]) -> Non
         assert run.provenance["sensor"]["calibration"]["offset_m"] == pytest.approx(0.01, abs=1e-3)
 
 
+@pytest.mark.trials
 def test_notes_and_putting_aside(bench: tuple[Any, Page]) -> None:
     """Notes stand in the log and beside the run; a run that is put aside is not deleted."""
     program, page = bench
@@ -176,6 +180,7 @@ def test_nothing_is_recorded_where_the_page_is_closed_before(bench: tuple[Any, P
     assert "nothing was recorded" in "".join(program.said)
 
 
+@pytest.mark.trials
 def test_a_killed_server_comes_back(bench: tuple[Any, Page]) -> None:
     """Under the same address, to the same browser, which needs no other link; the recording lacks nothing."""
     program, page = bench
@@ -209,6 +214,7 @@ def viewers(record: Callable[..., Any], context: BrowserContext) -> tuple[Any, P
     return program, page, page.evaluate("run.share")
 
 
+@pytest.mark.trials
 def test_two_viewers_and_one_controller(viewers: tuple[Any, Page, str], browser: Browser) -> None:
     """Viewers see the samples and the state, and can change nothing; their address is shown, and as a QR code."""
     program, page, address = viewers
@@ -240,6 +246,7 @@ def test_two_viewers_and_one_controller(viewers: tuple[Any, Page, str], browser:
     program.end()
 
 
+@pytest.mark.trials
 def test_a_viewer_by_a_script(viewers: tuple[Any, Page, str]) -> None:
     """What no browser would send is refused too: a command closes the socket with 1003."""
     import http.client
@@ -268,6 +275,7 @@ def test_a_viewer_by_a_script(viewers: tuple[Any, Page, str]) -> None:
     program.end()
 
 
+@pytest.mark.trials
 def test_the_cursor_and_a_part_by_the_keyboard(start: Callable[..., Any], context: BrowserContext) -> None:
     """X puts the cursor, arrows move it, Enter pins it, G has the part between fitted; arrows scrub without it."""
     import springmass

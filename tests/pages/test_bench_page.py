@@ -91,6 +91,7 @@ def test_from_opening_to_the_run_file(record: Callable[..., Any], context: Brows
     assert distance.size - shown.size < 50
 
 
+@pytest.mark.trials
 def test_a_killed_page_ends_no_recording(record: Callable[..., Any]) -> None:
     """The page's process is gone; the recording ends with its seconds, and lacks no reading."""
     program = record("--seconds", "5")
@@ -223,6 +224,7 @@ def test_every_key_has_its_button(replay: Page) -> None:
     assert replay.inner_text("#said").startswith("Period 0.790 seconds")
 
 
+@pytest.mark.trials
 def test_two_look_and_a_stranger_does_not(record: Callable[..., Any], browser: Any, context: BrowserContext) -> None:
     """The cookie opens a second page in the same browser; another browser, host or origin gets nothing."""
     program = record()
@@ -244,6 +246,7 @@ def test_two_look_and_a_stranger_does_not(record: Callable[..., Any], browser: A
     program.end()
 
 
+@pytest.mark.trials
 def test_the_client_of_the_documentation(record: Callable[..., Any]) -> None:
     """The ten lines of docs/reference/page-messages.md run as they stand and print the samples."""
     program = record()
@@ -263,6 +266,7 @@ def test_the_client_of_the_documentation(record: Callable[..., Any]) -> None:
     program.end()
 
 
+@pytest.mark.trials
 def test_a_client_of_ten_lines(record: Callable[..., Any]) -> None:
     """As docs/reference/page-messages.md has it; a message that means nothing closes the connection."""
     program = record()

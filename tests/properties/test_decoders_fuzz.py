@@ -254,6 +254,7 @@ def target(data: bytes) -> None:
         check(names[data[0] % len(names)], body, [min(data[1], len(body))])
 
 
+@pytest.mark.trials
 @pytest.mark.skipif(
     importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
 )

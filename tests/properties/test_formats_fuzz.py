@@ -331,6 +331,7 @@ def target(data: bytes) -> None:
 @pytest.mark.skipif(
     importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
 )
+@pytest.mark.trials
 def test_a_coverage_guided_hunt_finds_nothing(hunt: ModuleType, tmp_path: Path) -> None:
     """Some thousand inputs, grown from sound files towards code not yet reached; bounded in number and seconds."""
     few = np.arange(6) / 100.0

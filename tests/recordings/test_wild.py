@@ -378,6 +378,7 @@ def test_the_unit_that_is_answered_changes_no_time(recordings: Path, row: Row) -
 STEADY = ("coupled", "heidelberg", "Pos B", "tracker", "trkerr", "xyerr")
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("row", of(STEADY), ids=lambda row: f"{row.start}:{row.channel}")
 def test_the_unit_that_is_answered_changes_no_period(recordings: Path, row: Row) -> None:
     """No threshold of the analysis is in metres."""

@@ -142,6 +142,7 @@ def test_a_flood_of_echoes_raises_nothing(synthetic: ModuleType, accuracy: str, 
         assert np.mean((result.flags[false] & np.uint8(Quality.FALSE_ECHO)) > 0) > 0.98
 
 
+@pytest.mark.trials
 @pytest.mark.parametrize("periods", [1.5, 1.8, 2.5, 3.5])
 def test_short_records_are_what_the_best_tier_is_for(synthetic: ModuleType, periods: float) -> None:
     """On 1.5 to 3.5 periods it errs no more than standard, and its 68 % intervals of the period hold so often."""
