@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 
-__all__ = ["COUNTER_PPM", "ClockFit", "fit_clock"]
+__all__ = ["COUNTER_PPM", "ClockFit", "ClockSamples", "fit_clock"]
 
 COUNTER_PPM = 100_000.0
 """What the pace of a program may be off its nominal rate, ppm: a loop that waits 10 ms takes the ping's time on top."""
@@ -26,6 +26,8 @@ SILENCE_S = 0.05
 STEP_S = 0.02
 """A step of the least delay that is none of the rate's, s: a USB bridge holds bytes for 16 ms (FTDI AN232B-04)."""
 FEWEST = 24
+MOST = 1 << 19
+"""At most so many samples, at least half as many, evenly spread over a run, tell how the clocks run."""
 NANO = 1e-9
 
 
@@ -67,13 +69,42 @@ class ClockFit:
     span_s: float = 0.0
 
 
+class ClockSamples:
+    """Times by both clocks of samples spread evenly over a run of any length."""
+
+    def __init__(self) -> None:
+        self._step = 1
+        self._kept: list[tuple[F8, I8]] = []
+        self._count = 0
+
+    def take(self, first: int, t: F8, host_ns: I8) -> None:
+        """Take the next samples: the index of the first, sensor times in s, host stamps in ns."""
+        start = -first % self._step
+        self._kept.append((t[start :: self._step].copy(), host_ns[start :: self._step].copy()))
+        self._count += self._kept[-1][0].size
+        if self._count > MOST:
+            t, host_ns = self.columns()
+            self._step *= 2
+            self._kept = [(t[::2].copy(), host_ns[::2].copy())]
+            self._count = self._kept[0][0].size
+
+    def columns(self) -> tuple[F8, I8]:
+        """Return sensor times in s and host stamps in ns."""
+        if not self._kept:
+            return np.empty(0), np.empty(0, np.int64)
+        t, host_ns = zip(*self._kept, strict=True)
+        self._kept = [(np.concatenate(t), np.concatenate(host_ns))]
+        return self._kept[0]
+
+
 def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     """Regress the host clock on sensor time.
 
     Parameters
     ----------
     t : (n,) float64, s
-        Sensor times.
+        Sensor times: of the pings, where the device stamps these. A time of reflection moves with the bob, and the
+        stamps do not.
     host_ns : (n,) int64, ns
         Host stamps of the same readings.
 

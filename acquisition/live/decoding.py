@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.block import F8, I8, Block, Flag
+from acquisition.block import F8, Block, Flag
 from acquisition.decoders.family import Family, Told
 from acquisition.decoders.framed import FramedDecoder
 from acquisition.live.calibration import Calibration
-from acquisition.live.clock_fit import COUNTER_PPM, fit_clock
+from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples, fit_clock
 from acquisition.live.timebase import Timebase, demand_within
 from acquisition.readings import NO_READINGS, Reading, Readings, carried
 from acquisition.source import SourceInfo
@@ -68,6 +68,8 @@ class SensorChain:
         self.last: Readings = NO_READINGS
         self._next = 0
         self._way_s = 0.0  # of the last sound from the sensor to what it met
+        self._clock = ClockSamples()
+        self._at_reflection = False
         self._held: list[Reading] = []
         self._breaks: list[int] = []  # numbers among those held of readings before which the stream was broken off
 
@@ -113,8 +115,10 @@ class SensorChain:
         t, flags = self.timebase.push_all(held, stamps, np.array(sequence, np.int64), np.array(device_us, np.int64))
         echo = np.array(echo_us, np.float64)
         distance = self.calibration.distance(echo, np.array(distance_m, np.float64))
+        self._clock.take(self._next, t, stamps)
         if self.family.has_device_time:
             t = t + self._ways(0.5e-6 * echo)
+            self._at_reflection |= self._way_s > 0.0
         flags[np.isnan(distance)] |= MISSING
         if self._breaks:
             flags[[at for at in self._breaks if at < len(held)]] |= GAP_BEFORE
@@ -161,9 +165,9 @@ class SensorChain:
             clock=self.timebase.clock,
         )
 
-    def report(self, t: F8, host_ns: I8) -> dict[str, Any]:
+    def report(self) -> dict[str, Any]:
         """Return faults, gaps and the clock's rate error as plain numbers, for the run's provenance."""
-        clock, told = fit_clock(t, host_ns), self.told
+        clock, told = fit_clock(*self._clock.columns()), self.told
         known, left_out = np.isfinite(clock.rate_error_ppm), self.timebase.gaps_left_out
         return {
             "faults": dict(self.decoder.faults),
@@ -174,6 +178,7 @@ class SensorChain:
             "restarts": self.timebase.restarts,
             "clock": {
                 "kind": self.timebase.clock,
+                "moment": "reflection" if self._at_reflection else "reading",
                 "rate_error_ppm": clock.rate_error_ppm if known else None,
                 "u_rate_error_ppm": clock.u_rate_error_ppm if known else None,
                 "host_jitter_s": clock.jitter_s if known else None,
@@ -182,5 +187,6 @@ class SensorChain:
                 "held_readings": clock.held,
                 "longest_stall_s": clock.longest_stall_s,
                 "steps": clock.steps,
+                "span_s": clock.span_s,
             },
         }

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
-
-import numpy as np
 
 from acquisition.block import Block
 from acquisition.decoders.family import RESONATOR_PPM
@@ -18,6 +17,7 @@ __all__ = ["to_track"]
 
 MOTION_SENSOR = "motion-sensor"  # fixes the speed of sound
 LINE_PROTOCOL = "line-protocol"  # sends echo times
+COMPARED = {"rate_error_ppm", "u_rate_error_ppm", "span_s", "held_readings", "longest_stall_s"}  # of a clock
 
 
 def to_track(
@@ -67,14 +67,32 @@ def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str,
     """How the device's clock ran against the host's, where stamps of both are there, and what it may be off."""
     if info.clock != "device" or samples.host_ns is None or not (samples.host_ns >= 0).all():
         return {}
+    noted = provenance.get("decoding", {}).get("clock", {})
+    # By the pings, whose times no sample has; a file of an earlier version leaves the comparison to its reader.
+    told = noted if noted.keys() >= COMPARED else _compared_anew(samples)
+    clock = {
+        "clock_limit": 1e-6 * noted.get("limit_ppm", RESONATOR_PPM),
+        "held_samples": told["held_readings"],
+        "longest_stall_s": told["longest_stall_s"],
+    }
+    if told["rate_error_ppm"] is None or told["u_rate_error_ppm"] is None:
+        return clock
+    rate, u_rate = told["rate_error_ppm"] * 1e-6, told["u_rate_error_ppm"] * 1e-6
+    return {**clock, "rate_error": rate, "u_rate_error": u_rate, "compared_s": told["span_s"]}
+
+
+def _compared_anew(samples: Block) -> dict[str, Any]:
+    """Compare the clocks by a run's samples."""
+    assert samples.host_ns is not None
     fit = fit_clock(samples.t, samples.host_ns)
-    noted = provenance.get("decoding", {}).get("clock", {}).get("limit_ppm")
-    limit_ppm = noted if isinstance(noted, (int, float)) else RESONATOR_PPM
-    told = {"clock_limit": limit_ppm * 1e-6, "held_samples": fit.held, "longest_stall_s": fit.longest_stall_s}
-    if not np.isfinite(fit.rate_error_ppm):
-        return told
-    rate, u_rate = fit.rate_error_ppm * 1e-6, fit.u_rate_error_ppm * 1e-6
-    return {**told, "rate_error": rate, "u_rate_error": u_rate, "compared_s": fit.span_s}
+    known = math.isfinite(fit.rate_error_ppm)
+    return {
+        "rate_error_ppm": fit.rate_error_ppm if known else None,
+        "u_rate_error_ppm": fit.u_rate_error_ppm if known else None,
+        "span_s": fit.span_s,
+        "held_readings": fit.held,
+        "longest_stall_s": fit.longest_stall_s,
+    }
 
 
 def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:

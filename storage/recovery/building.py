@@ -7,9 +7,7 @@ import hashlib
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from acquisition.block import F8, I8, Block
+from acquisition.block import Block
 from acquisition.live.decoding import SensorChain
 from acquisition.recordings.recording import Trap
 from storage.recovery.losses import LossCount, end_of
@@ -23,8 +21,6 @@ __all__ = ["SensorRun"]
 
 FIRST_SAMPLES = 1000
 """Of so many the earliest stamp says when t = 0 was; later ones would bring in the difference of the clocks' rates."""
-CLOCK_SAMPLES = 1 << 19
-"""At most so many, at least half as many, evenly spread over the run, tell how the clocks run against each other."""
 
 
 class SensorRun:
@@ -42,7 +38,6 @@ class SensorRun:
 
     def __init__(self, writer: RunWriter, contents: LogContents, sensor: SensorEntry, chain: SensorChain) -> None:
         self._writer, self._contents, self._sensor, self._chain = writer, contents, sensor, chain
-        self._clock = _ClockSamples()
         self._digest = hashlib.sha256()
         self._first_ns: list[int] = []
         self._samples = 0
@@ -62,7 +57,6 @@ class SensorRun:
             self._first_ns += [host_ns - round(t * 1e9) for t, host_ns in pairs]
         self._samples += len(block)
         self._losses.push(block)
-        self._clock.take(block.first, block.t, block.host_ns)
         self._writer.append(block)
 
     def finish(
@@ -82,7 +76,7 @@ class SensorRun:
         extra : mapping
             Goes into the provenance besides.
         """
-        decoding = self._chain.report(*self._clock.columns())
+        decoding = self._chain.report()
         faults, damage = decoding["faults"], self._contents.damage
         end_ns = end_of(notes.events(), [last_ns], header.mono_ns)
         losses = self._losses.losses(notes.events(self._sensor.channel), header.mono_ns, end_ns)
@@ -113,33 +107,6 @@ class SensorRun:
             },
         )
         return RecoveredRun(self._sensor, self._writer.path, self._samples, faults, decoding, losses)
-
-
-class _ClockSamples:
-    """Times by both clocks of samples spread evenly over a run of any length."""
-
-    def __init__(self) -> None:
-        self._step = 1
-        self._kept: list[tuple[F8, I8]] = []
-        self._count = 0
-
-    def take(self, first: int, t: F8, host_ns: I8) -> None:
-        start = -first % self._step
-        self._kept.append((t[start :: self._step].copy(), host_ns[start :: self._step].copy()))
-        self._count += self._kept[-1][0].size
-        if self._count > CLOCK_SAMPLES:
-            t, host_ns = self.columns()
-            self._step *= 2
-            self._kept = [(t[::2].copy(), host_ns[::2].copy())]
-            self._count = self._kept[0][0].size
-
-    def columns(self) -> tuple[F8, I8]:
-        """Return sensor times in s and host stamps in ns."""
-        if not self._kept:
-            return np.empty(0), np.empty(0, np.int64)
-        t, host_ns = zip(*self._kept, strict=True)
-        self._kept = [(np.concatenate(t), np.concatenate(host_ns))]
-        return self._kept[0]
 
 
 def _traps(damage: Damage) -> tuple[Trap, ...]:

@@ -6,7 +6,7 @@
                           tools that look at the root alone (files from before there were any have none)
     /entry                NXentry @default=signal; title, start_time where known
     /entry/signal         NXdata @signal=distance @axes=[time] @kind; on the dimension ``time``:
-        time              f8 s, elapsed; @epoch says when t = 0 was, @clock where the times come from
+        time              f8 s, elapsed; @epoch says when t = 0 was, @clock where the times come from, @moment of what
         distance          f8 m @ancillary_variables @quantity
         distance_errors   f4 m, standard deviation; only where the source knows it, NaN where unmeasured
         quality           u1 @flag_masks @flag_meanings
@@ -258,6 +258,8 @@ def column_attributes(column: Column, header: Header) -> dict[str, Any]:
     if column.name == "time":
         found["clock"] = header.info.clock
         found["epoch"] = _text(header, "start_time") or "unknown"
+        moment = header.provenance.get("decoding", {}).get("clock", {}).get("moment")
+        found |= {"moment": moment} if moment else {}
     if header.quantity not in ("", "length") and column.attributes.get("units") in ("m", "m/s"):
         found["units"] = header.unit + column.attributes["units"].removeprefix("m")
         found["long_name"] = column.attributes["long_name"].replace("distance from the sensor", header.quantity)

@@ -43,7 +43,26 @@ _SENSOR = Table(
     may={"calibration": CALIBRATION_RULE, "family": Text(), "options": Table(other=Json())},
     other=Json(),
 )
-_PROVENANCE = Table(may={"sensor": _SENSOR, "start_time": Optional(Text(200))}, other=Json())
+_CLOCK = Table(
+    may={
+        "rate_error_ppm": Optional(Number(-1e300, 1e300)),
+        "u_rate_error_ppm": Optional(Number(0.0, 1e300)),
+        "limit_ppm": Number(0.0, 1e300),
+        "span_s": Number(0.0, 1e300),
+        "held_readings": _COUNT,
+        "longest_stall_s": Number(0.0, 1e300),
+        "moment": Choice(("reflection", "reading")),
+    },
+    other=Json(),
+)
+_PROVENANCE = Table(
+    may={
+        "sensor": _SENSOR,
+        "start_time": Optional(Text(200)),
+        "decoding": Table(may={"clock": _CLOCK}, other=Json()),
+    },
+    other=Json(),
+)
 
 HEADER_RULE = Table(
     keys={
