@@ -92,7 +92,7 @@ def read_fixed(
         return None
     raw = np.frombuffer(lines, np.uint8)
     ends = np.flatnonzero((raw == ord(mark)) | (raw == _NEWLINE)).reshape(-1, len(cells))
-    if not first.translate(None, mark.encode() + b".\r\n") and parse_number(cells[columns[0]]) is not None:
+    if not first.translate(None, mark.encode() + b".\r\n") and all(map(bool, cells)):
         whole = _load_whole(lines, mark, raw, ends.shape, columns)
     else:
         whole = _load(lines.translate(None, b".\r"), mark, columns, len(cells), np.int64)
