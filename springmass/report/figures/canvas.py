@@ -105,24 +105,19 @@ def render(figure: Figure, kind: Literal["svg", "pdf"]) -> bytes:
     with style():
         _shrink_wide_numbers(figure)
         figure.savefig(out, format=kind, metadata=metadata[kind])
-    return _rounded(out.getvalue()) if kind == "svg" else out.getvalue()
+    return _cut(out.getvalue()) if kind == "svg" else out.getvalue()
 
 
-def _rounded(svg: bytes) -> bytes:
-    """Round an SVG file's paths to a tenth of a point, a sixth of a screen's pixel; text and pixels stay."""
-    paths = re.sub(rb' d="[^"]*"', lambda path: _LONG[2].sub(_to_tenths, b" " + b" ".join(path[0].split())), svg)
-    return re.sub(rb' (?:x|y|transform)="[^"]*"', lambda found: _LONG[3].sub(_to_hundredths, found[0]), paths)
+def _cut(svg: bytes) -> bytes:
+    """Cut the numbers of an SVG file's paths to tenths of a point, a sixth of a screen's pixel; text and pixels stay.
+
+    To round them takes four times as long.
+    """
+    paths = re.sub(rb' d="[^"]*"', lambda path: _TENTHS.sub(rb"\1", b" " + b" ".join(path[0].split())), svg)
+    return re.sub(rb' (?:x|y|transform)="[^"]*"', lambda found: _HUNDREDTHS.sub(rb"\1", found[0]), paths)
 
 
-_LONG = {digits: re.compile(rb"-?\d+\.\d{%d,}" % digits) for digits in (2, 3)}
-
-
-def _to_tenths(number: re.Match[bytes]) -> bytes:
-    return b"%.10g" % round(float(number[0]), 1)
-
-
-def _to_hundredths(number: re.Match[bytes]) -> bytes:
-    return b"%.10g" % round(float(number[0]), 2)
+_TENTHS, _HUNDREDTHS = re.compile(rb"(\.\d)\d+"), re.compile(rb"(\.\d\d)\d+")
 
 
 def save(figure: Figure, folder: Path, name: str) -> None:
