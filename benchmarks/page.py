@@ -2,6 +2,7 @@
 
 Prints a line for each figure. The recording is a simulated bench at 100 Hz behind a pseudo-terminal; viewers are
 sockets that read all they are sent, in this process, or a browser (``--browser``), whose screen is drawn.
+``--history H`` plays so many hours in a browser and tells the time from frame to frame.
 ``--suspend S`` lets one viewer read nothing for so long; ``--slip`` compares the sampler with and without the page.
 """
 
@@ -55,6 +56,18 @@ DRAWN = """() => {
   };
   requestAnimationFrame(look);
 }"""
+
+FRAMES = """(count) => new Promise((done) => {
+  const each = [];
+  let before = performance.now();
+  const next = () => {
+    const now = performance.now();
+    each.push(now - before);
+    before = now;
+    if (each.length < count) requestAnimationFrame(next); else done(each);
+  };
+  requestAnimationFrame(next);
+})"""
 
 
 @dataclass(frozen=True)
@@ -201,6 +214,40 @@ def screen(seconds: float) -> dict[str, float]:
     return {"cpu": cpu, "serving": serve, "p50_s": float(np.median(lag)), "p95_s": float(np.quantile(lag, 0.95))}
 
 
+def history(hours: float, frames: int = 240) -> dict[str, float]:
+    """Return the time from frame to frame while so many hours are played, all in view and a minute of them, s."""
+    from playwright.sync_api import sync_playwright
+
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        path, t = Path(folder) / "long.txt", np.arange(round(hours * 360_000)) / 100.0
+        y = 25.0 + 5.0 * np.exp(-1e-4 * t) * np.cos(8.0 * t)
+        rows = "".join(f"{a:.2f}\t{b:.4f}\t0.239\n" for a, b in zip(t, y, strict=True))
+        path.write_text(
+            f"Motion Sensor Data File Mar 12, 2024 2:05 PM\nTime (s)\tDistance (cm)\tDist Error (cm)\n{rows}"
+        )
+        command = [sys.executable, "-m", "springmass", "replay", str(path), "--page", "--no-browser"]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as process:
+            assert process.stderr is not None
+            address = next(m[1] for line in process.stderr if (m := re.search(r"page: (http\S+)", line)))
+            browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=BROWSER.split())
+            page = browser.new_page(viewport={"width": 1366, "height": 900})
+            page.goto(address)
+            page.wait_for_function(f"() => samples.length && samples[0].count >= {t.size}", timeout=120_000)
+            page.select_option("#speed", "20")
+            page.locator("#time").fill("0.6")
+            page.keyboard.press(" ")
+            found = {}
+            for window in ("all", "60 s"):
+                while not page.inner_text("#window").startswith(window):
+                    page.keyboard.press("w")
+                each = np.array(page.evaluate(FRAMES, frames)) / 1e3
+                found |= {f"{window}_p50_s": float(np.median(each)), f"{window}_p95_s": float(np.quantile(each, 0.95))}
+            browser.close()
+            process.send_signal(signal.SIGINT)
+            process.stderr.read()
+    return found
+
+
 def slip(seconds: float, *, page: bool) -> float:
     """Return by how much the sampler's stamps slip against the sensor's clock, 99th percentile, s."""
     with tempfile.TemporaryDirectory() as folder:
@@ -229,9 +276,13 @@ def main() -> None:
     parser.add_argument("--suspend", type=float, default=0.0, metavar="S")
     parser.add_argument("--browser", action="store_true")
     parser.add_argument("--slip", action="store_true")
+    parser.add_argument("--history", type=float, default=0.0, metavar="HOURS")
     options = parser.parse_args()
     if options.browser:
         print(f"page in a browser, sample to screen: {_told(screen(options.seconds))}")
+    elif options.history:
+        told = ", ".join(f"{name[:-2]} {1e3 * each:.0f} ms" for name, each in history(options.history).items())
+        print(f"from frame to frame while {options.history:g} h at 100 Hz are played: {told}")
     elif options.slip:
         without, beside = (slip(options.seconds, page=page) for page in (False, True))
         print(f"sampler's slip, p99: {1e3 * without:.1f} ms without the page, {1e3 * beside:.1f} ms with two viewers")

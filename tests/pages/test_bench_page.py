@@ -151,6 +151,22 @@ def test_an_old_run_is_played(replay: Page) -> None:
     assert half == pytest.approx(0.5, abs=0.01)
 
 
+def test_the_end_of_an_old_run_is_its_beginning_where_it_loops(replay: Page) -> None:
+    """Without the loop it stays at its last sample; with it what is shown begins anew, and plays on."""
+    last = "samples[0].t[samples[0].count - 1]"
+    replay.select_option("#speed", "20")
+    replay.locator("#time").fill("0.995")
+    replay.keyboard.press(" ")
+    replay.wait_for_function("() => !playing")
+    assert replay.evaluate(f"play_time === {last}")
+    replay.check("#loop")
+    replay.locator("#time").fill("0.995")
+    replay.keyboard.press(" ")
+    replay.wait_for_function(f"() => play_time < {last} / 2")
+    assert replay.evaluate("playing")
+    replay.wait_for_function("() => position.plot.data[0].at(-1) < 20")
+
+
 def test_what_is_in_view_is_saved(replay: Page, tmp_path: Path) -> None:
     """As CSV, cell for cell what was recorded."""
     with replay.expect_download() as download:

@@ -134,8 +134,15 @@ const ACTIONS = {
 };
 for (const button of document.querySelectorAll("#actions button")) button.addEventListener("click", () => ACTIONS[button.id]());
 
+// What has the focus takes the key itself: a field or a list all of them, a slider those that move it, a box the space.
+function takes(target, key) {
+  if (target.type === "range") return /^(Arrow|Page|Home|End)/.test(key);
+  if (target.type === "checkbox") return key === " ";
+  return /^(INPUT|SELECT)$/.test(target.tagName);
+}
+
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]") || /^(INPUT|SELECT)$/.test(event.target.tagName)) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]") || takes(event.target, event.key)) return;
   const arrow = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   if (arrow && run && run.source === "REPLAY" && !cursor_on) { event.preventDefault(); scrub(end_time() + arrow * (event.shiftKey ? 10 : 1)); return; }
   if (arrow && cursor_on) { event.preventDefault(); move_cursor(arrow * (event.shiftKey ? 10 : 1)); return; }
