@@ -228,9 +228,9 @@ def _no_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscill
         return NoOscillation(f"the {noun(unit)} does not follow the period that its spectrum shows")
     # Noise that knows of itself, a ride and a walk have more between their samples than white noise.
     noise = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
-    # Both are estimates from the same samples; five standard deviations of their squares' difference are nothing: of
-    # 300 records at -10 dB one has 3.9.
-    chance = 5.0 * math.sqrt(5.0 / max(float(np.sum(demodulated.count)), 1.0))
+    # Both are estimates from the same n samples, and of white noise the ratio of their squares has a variance of 8.5/n.
+    # Five standard deviations are nothing: of 2,000 records at -10 dB one has 4.3.
+    chance = 5.0 * math.sqrt(8.5 / max(float(np.sum(demodulated.count)), 1.0))
     excess = math.sqrt(max(left**2 - (1.0 + chance) * noise**2, 0.0))
     if left <= 0.15 * size or (left <= 4.0 * conditioned.noise_m and excess <= WANDERING * size):
         return None
