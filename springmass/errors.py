@@ -29,10 +29,12 @@ __all__ = [
     "UNREADABLE",
     "USAGE",
     "ProgramError",
+    "adopt",
     "complain",
     "detail",
     "hush",
     "hushed",
+    "manner",
     "speak_up",
     "suggest",
     "tell",
@@ -86,6 +88,17 @@ def hush() -> None:
     """Write from here on what is wrong, and nothing else."""
     global _quiet
     _quiet = True
+
+
+def manner() -> tuple[bool, bool]:
+    """Return whether this process says but what is wrong, and whether it says what is done, too."""
+    return _quiet, _verbose
+
+
+def adopt(quiet: bool, verbose: bool) -> None:
+    """Speak as the process does that began this one, by its :func:`manner`."""
+    global _quiet, _verbose
+    _quiet, _verbose = quiet, verbose
 
 
 @contextlib.contextmanager

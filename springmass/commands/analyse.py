@@ -154,7 +154,7 @@ def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
         return
     from concurrent.futures.process import BrokenProcessPool
 
-    with pool(workers, quiet=tasks[0].options.quiet) as processes:
+    with pool(workers) as processes:
         try:
             yield from processes.map(_work, tasks)
         except BrokenProcessPool as error:

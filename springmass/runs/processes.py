@@ -8,7 +8,7 @@ import threading
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context, parent_process
 
-from springmass.errors import hush
+from springmass.errors import adopt, manner
 
 __all__ = ["cores", "pool"]
 
@@ -18,24 +18,16 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def pool(processes: int, *, quiet: bool = False) -> ProcessPoolExecutor:
-    """Return a pool of fresh processes that leave Ctrl-C to this one and end with it.
-
-    Parameters
-    ----------
-    processes : int
-    quiet : bool
-        Whether they say what is wrong, and nothing else.
-    """
+def pool(processes: int) -> ProcessPoolExecutor:
+    """Return a pool of fresh processes that speak as this one does, leave Ctrl-C to it and end with it."""
     # Fresh processes: a fork of one that has threads of linear algebra may hang.
-    return ProcessPoolExecutor(processes, get_context("spawn"), _begin, (quiet,))
+    return ProcessPoolExecutor(processes, get_context("spawn"), _begin, manner())
 
 
-def _begin(quiet: bool) -> None:
+def _begin(quiet: bool, verbose: bool) -> None:
     """Leave Ctrl-C to the first process, and end with it: a pool's process would wait for ever for one killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if quiet:
-        hush()
+    adopt(quiet, verbose)
     parent = parent_process()
     if parent is not None:
 

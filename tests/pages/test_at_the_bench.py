@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, BrowserContext, Page
 from websockets.sync.client import connect
 
@@ -43,6 +44,27 @@ def bench(record: Callable[..., Any], context: BrowserContext) -> tuple[Any, Pag
     page.goto(program.address)
     page.wait_for_function(PHASE.format(phase="ready"))
     return program, page
+
+
+@pytest.mark.trials
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1366, 390])
+def test_everybody_can_read_a_bench(
+    record: Callable[..., Any], context: BrowserContext, width: int, scheme: Any
+) -> None:
+    """While it records: no violation of the accessibility rules, nothing wider than the screen."""
+    program = record()
+    page = context.new_page()
+    page.emulate_media(color_scheme=scheme)
+    page.set_viewport_size({"width": width, "height": 844})
+    page.goto(program.address)
+    page.wait_for_function(SEEN.format(count=600))
+    page.wait_for_function("() => motion && motion.omega")
+    found = Axe().run(page)
+    assert found.violations_count == 0, found.generate_report()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    if folder := os.environ.get("SPRINGMASS_SCREENSHOTS"):
+        page.screenshot(path=Path(folder) / f"live-{width}-{scheme}.png", full_page=True)
 
 
 def page_process(program: Any) -> int:
