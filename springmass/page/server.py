@@ -271,7 +271,10 @@ def _text(asked: Mapping[str, Any]) -> str:
 
 def _json(content: Any) -> str:
     """Return JSON that browsers read: what is no number is null."""
-    return json.dumps(_finite(content), allow_nan=False)
+    try:
+        return json.dumps(content, allow_nan=False)
+    except ValueError:  # rarely: to look at every number before takes as long again
+        return json.dumps(_finite(content), allow_nan=False)
 
 
 def _finite(content: Any) -> Any:

@@ -75,7 +75,7 @@ class LogFollower:
             if len(self._data) >= LONGEST and not found:
                 demand = f"a record was demanded at byte {self._offset}, got damaged bytes"
                 raise NotALog(self._path, demand, "springmass recover reads what lies behind them")
-            if len(data) == STRETCH and found:
+            if found:
                 return found  # the rest at the next call: a long log is shown a stretch at a time
             if not data and not self._go_on():
                 return found
