@@ -25,7 +25,7 @@ _BESIDE = {
         "at_rest handled restarted touched phase_jump clipped false_echoes locked_echoes missing_samples "
         "duplicate_time non_monotonic_time quantised held_samples smoothed_sensor not_sinusoidal undersampled "
         "rest_drift correlated_residuals lost_target rows_lost interleaved_records zero_filled_tail no_oscillation "
-        "two_modes overdamped mains_hum implausible_motion implausible_distance sensor_lost wave_slips"
+        "two_modes overdamped mains_hum implausible_motion implausible_distance implausible_sag sensor_lost wave_slips"
     ),
     "amplitude": "sideways_mode strongly_damped short_record not_converged",
     "phase": "amplitude_dependent_frequency",
@@ -61,6 +61,7 @@ ADVICE = {
     "undersampled": "Record at ten samples a period and more.",
     "mains_hum": "See to the sensor's supply; use none of the numbers.",
     "implausible_motion": "Check unit and column.",
+    "implausible_sag": "Check the unit of the times (--time-unit).",
     "implausible_distance": "Check unit and column.",
     "short_record": "Record ten periods or more.",
     "amplitude_dependent_frequency": "Quote the amplitude with the period.",

@@ -17,6 +17,7 @@ __all__ = ["judge_plausibility"]
 MAINS_HZ = (50.0, 60.0, 100.0, 120.0)
 FARTHEST_M = 11.0  # that ultrasonic sensors of the bench reach
 MOST_GRAVITIES = 1.2
+LONGEST_SAG_M = 25.0  # that a spring of the bench is stretched by its bob: a period of 10 s
 FEWEST = 4.0  # samples a period
 
 
@@ -35,7 +36,7 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
     A bob hangs from a spring that pulls only, so it never falls faster than freely: :math:`A\\omega^2 \\le g`, and
     not much more while the spring goes slack; of an acceleration that is the amplitude itself. What goes beyond enters
     the uncertainties: of an amplitude n times as large as gravity lets it be, the share :math:`1 - 1/n`; of a distance
-    that cannot be, all; of the mains, all.
+    that cannot be, all; of the mains, all. The bob stretches its spring by :math:`g/\\omega^2`.
     """
     track = conditioned.track
     used = (demodulated.flags & UNUSABLE) == 0
@@ -81,6 +82,17 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
                 "acceleration of gravity, which no bob hanging from a spring reaches: likely a wrong unit, hum, or "
                 f"{'a velocity read as distance' if track.unit == 'm' else f'counts read as {track.unit}'}; check "
                 "unit and column",
+            )
+        )
+    sag_m = GRAVITY_M_PER_S2 / omega**2
+    if sag_m > LONGEST_SAG_M:
+        found.append(
+            Finding(
+                "implausible_sag",
+                "warning",
+                f"a bob that swings once in {1.0 / f:.4g} s stretches its spring by {sag_m:.3g} m, as long as a "
+                "pendulum of that period is: likely times in ms or us read as seconds, or no bob on a spring; check "
+                "the unit of the times (--time-unit)",
             )
         )
     # Where distances are counted from the first sample, as from a velocity, their zero says nothing.

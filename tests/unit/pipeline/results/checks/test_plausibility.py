@@ -29,6 +29,12 @@ def test_distances_in_another_unit() -> None:
     assert {"implausible_distance", "implausible_motion"} <= codes(5.0, 1.32, rest=30.0)
 
 
+def test_times_in_another_unit() -> None:
+    """Milliseconds read as seconds: a spring of 142 km; a period of 9 s is long, and may be."""
+    assert codes(0.05, 1.32e-3, rate_hz=0.1, seconds=20_000.0) == {"implausible_sag"}
+    assert codes(0.05, 1.0 / 9.0, rate_hz=10.0, seconds=200.0) == set()
+
+
 def test_velocity_read_as_distance() -> None:
     """What is negative half of the time is no distance."""
     assert "implausible_distance" in codes(0.4, 1.32, rest=0.0)
