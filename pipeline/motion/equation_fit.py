@@ -160,10 +160,12 @@ def _stop_row(conditioned: Conditioned) -> int | None:
         return None
     y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
     end = float(np.median(y[blocks[-max(count // 10, 2) :]]))
+    # Of a sensor that counts, distances are whole steps: two of them are two in every unit, however that rounds.
+    least = (2.0 + 1e-6) * noise
     # Most bobs move at the end of their record, and the last blocks say so.
-    if _away(y[blocks[-4:]], end).max() > 2.0 * noise:
+    if _away(y[blocks[-4:]], end).max() > least:
         return None
-    moving = np.flatnonzero(_away(y[blocks], end) > 2.0 * noise)
+    moving = np.flatnonzero(_away(y[blocks], end) > least)
     # A few blocks that deep noise lifts are no motion: of those before the stop a share must stand off.
     if moving.size < 3 or moving.size < 0.3 * (moving[-1] + 1):
         return None

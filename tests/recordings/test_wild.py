@@ -375,7 +375,7 @@ def test_the_unit_that_is_answered_changes_no_time(recordings: Path, row: Row) -
         np.testing.assert_array_equal(each.flags, read[0].flags)
 
 
-STEADY = ("coupled", "heidelberg", "Pos B", "tracker", "trkerr", "xyerr")
+STEADY = ("coupled", "heidelberg", "Pos A", "Pos B", "tracker", "trkerr", "xyerr")
 
 
 @pytest.mark.trials
