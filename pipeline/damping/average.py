@@ -68,7 +68,8 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     :math:`p\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it, with p of 0.5 for a free power and 0.2 for those with
     friction; so do laws that are not rejected and no longer admissible, for a small weight counts where the rates lie
     far apart. Laws that only add a term to the selected one are not among these. Where linear and quadratic drag is
-    out of reach, the laws are weighed by their BIC.
+    out of reach, the laws are weighed by their BIC; where chi-square rejects them all, by their BIC over the reduced
+    chi-square of the best: the points scatter by so much more than they should, and the nearest is one of several.
 
     Covariances are multiplied by the reduced chi-square where that is above 1, the scale factor of [1]_: a law between
     two that were fitted is seen in what they leave before it rejects them.
@@ -77,14 +78,15 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     ----------
     .. [1] Particle Data Group, "Review of Particle Physics", Phys. Rev. D 110 (2024) 030001, section 5.2.2.
     """
-    names = damping.admissible or (damping.selected,)
+    if not damping.admissible:
+        return _nearest(damping)
+    names = damping.admissible
     mixed = damping.fits.get(MIXED)
     if mixed is not None and mixed.rejected:
         mixed = None
     stands = mixed is not None and (damping.selected in FAMILY or MIXED in names)
-    if damping.admissible:
-        names = (*names, *_far(damping, names))
-    if mixed is None or not (stands or (damping.admissible and damping.selected == "power")):
+    names = (*names, *_far(damping, names))
+    if mixed is None or not (stands or damping.selected == "power"):
         odds = {name: math.exp(-0.5 * (damping.fits[name].bic - damping.best.bic)) for name in names}
         weighted = [(_scaled(damping.fits[name]), x) for name, x in odds.items()]
     else:
@@ -112,6 +114,17 @@ def _far(damping: Damping, names: tuple[str, ...]) -> list[str]:
     return [
         name for name, fit in others.items() if damping.selected not in fit.law.cases and fit.joint.values.min() >= 0.0
     ]
+
+
+def _nearest(damping: Damping) -> tuple[Weighted, ...]:
+    """Return the laws that come near where none fits, the selected one first."""
+    best = damping.best
+    odds = {best.name: 1.0}
+    for name, fit in damping.fits.items():
+        if name != best.name and fit.rejection == "misfit" and fit.joint.values.min() >= 0.0:
+            odds[name] = math.exp(min(0.5 * (best.bic - fit.bic) / max(best.reduced_chi2, 1.0), 0.0))
+    total = sum(odds.values())
+    return tuple(Weighted(_scaled(damping.fits[name]), odd / total) for name, odd in odds.items())
 
 
 def _scaled(fit: LawFit) -> LawFit:
