@@ -71,6 +71,8 @@ class _Parser(argparse.ArgumentParser):
             word, *choices = message.partition("invalid choice: ")[2].split("'")[1::2]
             if near := get_close_matches(word, choices, n=1):
                 message += f"; did you mean {near[0]}?"
+        elif message.endswith("required: COMMAND"):
+            message = "which command? springmass --help lists them, springmass demo shows what comes of them"
         super().error(message)
 
 

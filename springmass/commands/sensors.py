@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import textwrap
 
 from acquisition.decoders.registry import families
 from springmass.errors import OK, suggest
+from springmass.terminal.printing import wrapped
 
 __all__ = ["run"]
 
@@ -17,12 +17,12 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps([family.describe() for family in families()]))
         return OK
-    print(f"{'name':<18} {'rate / Hz':>9} {'step / mm':>9} {'range / m':>13} {'baud':>7}  title")
+    print(f"{'name':<18} {'rate / Hz':>9} {'step / mm':>9} {'range / m':>13} {'baud':>7}")
     for family in families():
         near, far = family.range_m
         reach = f"{near:g} to {far:g}"
         step = f"{family.resolution_m * 1e3:.3g}"
-        print(f"{family.name:<18} {family.rate_hz:>9.3g} {step:>9} {reach:>13} {family.baud:>7}  {family.title}")
-        print(textwrap.fill(family.limits, 96, initial_indent=" " * 19, subsequent_indent=" " * 19))
+        print(f"{family.name:<18} {family.rate_hz:>9.3g} {step:>9} {reach:>13} {family.baud:>7}")
+        print(wrapped(f"    {family.title}. {family.limits}", "    "))
     suggest("springmass ports tells which of them speaks, and where")
     return OK

@@ -25,8 +25,8 @@ SPREAD = 0.03  # of a wave, by which a transducer's frequency and the air differ
 MOST_NOISE = 1.0 / 8.0  # of a wave: noise beyond it reaches from one to the next
 WIDEST = 0.35  # of a wave, half the width in which a slip is told
 LEAST = 3
-HEAVY = 0.1  # of all samples
 CLUSTERED = 2.0  # by how much echoes in clusters of many may exceed what as many single ones leave
+HEAVY = 0.1  # of all samples
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,8 +62,8 @@ def find_wave_slips(track: Track, demodulated: Demodulated) -> WaveSlips:
     A slip lies within four standard deviations of the noise and 3 % of a wave, at most 0.35 of it, of
     :math:`c\\,\\tau/2` beside the motion, with :math:`\\tau` = 25 us. Slips are told where three at least lie there,
     and more by three standard deviations of the count than twice what the other false echoes within two waves, spread
-    evenly, would leave there: those come in clusters, and scatter more than counts do. Noise of more than an eighth of
-    a wave hides slips.
+    evenly, would leave there. Counted are moments, not samples: an object that the bob passes gives many in a row,
+    wherever it stands. Noise of more than an eighth of a wave hides slips.
     """
     wave_m = 0.5 * WAVE_S * (track.speed_of_sound_m_per_s or SPEED_M_PER_S)
     noise_m = demodulated.noise_m
@@ -74,12 +74,16 @@ def find_wave_slips(track: Track, demodulated: Demodulated) -> WaveSlips:
     off = demodulated.residual[rows] / wave_m
     width = min(4.0 * noise_m / wave_m + SPREAD, WIDEST)
     slipped = np.abs(np.abs(off) - 1.0) <= width
-    beside = np.count_nonzero((np.abs(off) <= 2.0) & ~slipped)
-    by_chance = beside * 2.0 * width / (2.0 - 2.0 * width)
-    found = int(np.count_nonzero(slipped))
+    by_chance = _moments(rows[(np.abs(off) <= 2.0) & ~slipped]) * 2.0 * width / (2.0 - 2.0 * width)
+    found = _moments(rows[slipped])
     if found < LEAST or found <= CLUSTERED * by_chance + 3.0 * np.sqrt(by_chance):
         return none
     return WaveSlips(rows[slipped], int(np.count_nonzero(off[slipped] < 0.0)), wave_m)
+
+
+def _moments(rows: NDArray[np.int64]) -> int:
+    """Return the number of samples (k,), those that follow one another counted once."""
+    return int(np.count_nonzero(np.diff(rows) > 1)) + min(rows.size, 1)
 
 
 def judge_wave_slips(slips: WaveSlips, samples: int, unit: str) -> Iterator[Finding]:

@@ -61,6 +61,14 @@ def test_the_wave_is_as_long_as_the_sound_that_made_the_distances() -> None:
     assert 60 <= int(found["false_echoes"].message.split()[0]) <= 66
 
 
+def test_an_object_that_the_bob_passes_is_no_slip() -> None:
+    """Eleven samples in a row by chance a wave off, beside clusters that are not: one moment of three."""
+    off_m = np.zeros(2500)
+    for start, samples, size_m in ((37, 5, 3.5e-3), (1854, 11, 4.6e-3), (1930, 12, 5.1e-3)):
+        off_m[start : start + samples] = size_m
+    assert "wave_slips" not in findings_of(off_m, 8e-5)[0]
+
+
 def test_false_echoes_anywhere_are_no_slips() -> None:
     """Spread evenly about the motion, some of them lie a wave off by chance; two alone tell nothing."""
     off_m = slips(120)
