@@ -134,6 +134,16 @@ class Solution:
         inverse[self.good] = np.linalg.inv(self.normal[self.good])
         return inverse
 
+    @property
+    def pair_variance(self) -> F8:
+        """(w,): sum of the variances of a and b for samples of variance 1, as the inverse holds them; 0 where not good."""
+        count = np.where(self.good, self.normal[:, 0, 0], 1.0)
+        c, s = self.normal[:, 0, 1] / count, self.normal[:, 0, 2] / count
+        cc, cs = self.normal[:, 1, 1] / count - c * c, self.normal[:, 1, 2] / count - c * s
+        ss = self.normal[:, 2, 2] / count - s * s
+        determinant = np.where(self.good, cc * ss - cs * cs, 1.0)
+        return np.asarray(np.where(self.good, (cc + ss) / (count * determinant), 0.0))
+
     def put(self, rows: NDArray[np.int64], other: Solution) -> None:
         """Replace the fits of some windows by those of another solution, which holds these alone."""
         self.coefficients[rows], self.normal[rows] = other.coefficients, other.normal
@@ -252,8 +262,7 @@ def _u_amplitude(windows: Windows, solution: Solution) -> F8:
     """Standard uncertainty of each window's amplitude, m, at the noise that is typical of the record."""
     counts = np.maximum(windows.usable.sum(axis=1), 4.0)
     squares = np.sum(windows.usable * solution.residual**2, axis=1) / (counts - 3.0)
-    typical, inverse = median(squares[solution.good]), solution.inverse
-    return np.asarray(np.sqrt(0.5 * typical * (inverse[:, 1, 1] + inverse[:, 2, 2])))
+    return np.asarray(np.sqrt(0.5 * median(squares[solution.good]) * solution.pair_variance))
 
 
 def _retune_short(windows: Windows, omega: float) -> Tuning:

@@ -239,14 +239,16 @@ def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
     >>> print(joint_of({"period": period, "frequency": estimate_of(1 / period, "Hz")}).correlation.round(6).tolist())
     [[1.0, -1.0], [-1.0, 1.0]]
     """
-    from uncertainties import covariance_matrix
-
     each = list(estimates.values())
-    # What is exact varies with nothing; the package takes none of it.
-    uncertain = [i for i, estimate in enumerate(each) if estimate.u > 0]
-    covariance = np.zeros((len(each), len(each)))
-    if uncertain:
-        covariance[np.ix_(uncertain, uncertain)] = covariance_matrix([each[i].ufloat for i in uncertain])
+    # One row an estimate, one column a variable: the package's own matrix goes through all pairs of pairs. What is
+    # exact varies with nothing.
+    components = [estimate.ufloat.derivatives if estimate.u > 0 else {} for estimate in each]
+    column = {variable: k for k, variable in enumerate(dict.fromkeys(v for slopes in components for v in slopes))}
+    parts = np.zeros((len(each), len(column)))
+    for row, slopes in zip(parts, components, strict=True):
+        for variable, slope in slopes.items():
+            row[column[variable]] = slope * variable.std_dev
+    covariance = parts @ parts.T
     values = np.array([estimate.value for estimate in each])
     return Joint(tuple(estimates), values, covariance, tuple(estimate.unit for estimate in each))
 

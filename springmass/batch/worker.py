@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -159,7 +160,7 @@ def _fill(row: dict[str, Any], loaded: Loaded, analysis: Analysis) -> None:
         row["estimates"] |= _numbers({k: x for k, x in derived.coefficients.items() if k not in row["estimates"]})
         row["correlations"] = {
             "names": list(derived.joint.names),
-            "matrix": [[_number(round(x, DIGITS)) for x in line] for line in derived.joint.correlation.tolist()],
+            "matrix": [[_number(x) for x in line] for line in derived.joint.correlation.round(DIGITS).tolist()],
         }
         row["drag_points"] = _drag_points(analysis, motion)
         try:
@@ -177,7 +178,7 @@ def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, list[float | None]]
 
 
 def _number(x: Any) -> float | None:
-    return float(x) if np.isfinite(x) else None
+    return float(x) if math.isfinite(x) else None
 
 
 def _drag_points(analysis: Analysis, motion: Oscillation) -> list[list[float]]:
@@ -219,7 +220,8 @@ def _thumbnail(t: F8, y: F8, period_s: float) -> str:
     ends = np.searchsorted(t, t[0] + span * np.arange(count + 1) / count)
     filled = np.flatnonzero(np.diff(ends))
     low, high = (edge.reduceat(y, ends[filled]) for edge in (np.minimum, np.maximum))
-    bottom, top = np.quantile(y, (0.005, 0.995))  # a false echo does not flatten the motion
+    beyond = y.size // 200  # a false echo does not flatten the motion
+    bottom, top = np.partition(y, (beyond, -1 - beyond))[[beyond, -1 - beyond]]
     scale = 28.0 / max(top - bottom, 1e-300)
     above, below = (np.clip(29.0 - (edge - bottom) * scale, 0.0, 30.0).round() for edge in (high, low))
     x = ((filled + 0.5) * 120.0 / count).round(1).tolist()

@@ -22,7 +22,7 @@ _ERROR = {f"{name} error ({unit})": unit for unit in LENGTHS for name in ("dist"
 _VELOCITY = {f"velocity ({unit}/s)": unit for unit in LENGTHS}
 _CHANNELS: dict[str, Quantity] = {"distance": "distance", "position": "distance", "velocity": "velocity"}
 _HEADER_LINES = 20
-_ROWS_OF_SHAPE = 100
+_ROWS_BELOW, _ROWS_OF_SHAPE = 10, 100  # read below a heading that says what they are, and to tell without
 _REMEDY = 'put the column line "Time (s)<TAB>Distance (cm)" or "Time (s)<TAB>Velocity (cm/s)" above the rows'
 
 
@@ -70,12 +70,14 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
     FormatError
         If there are no rows, or ``channel`` or ``unit`` contradict the file.
     """
-    head = text.head(_HEADER_LINES + _ROWS_OF_SHAPE)
+    head = text.head(_HEADER_LINES + _ROWS_BELOW)
     lines = [line.text for line in head]
     if channel is not None and channel.lower() not in _CHANNELS:
         raise FormatError(path, f'channel must be distance or velocity, got "{channel}"', "name one of these")
     asked = None if channel is None else _CHANNELS[channel.lower()]
-    found = _column_line(lines)
+    if not (found := _column_line(lines)):
+        head = text.head(_HEADER_LINES + _ROWS_OF_SHAPE)
+        lines = [line.text for line in head]
     if found:
         at, layout = found
         if unit is not None and _plain(unit) != layout.unit:
