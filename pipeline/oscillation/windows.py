@@ -136,7 +136,7 @@ class Solution:
 
     @property
     def pair_variance(self) -> F8:
-        """(w,): sum of the variances of a and b for samples of variance 1, as the inverse holds them; 0 where not good."""
+        """(w,): sum of the variances of a and b for samples of variance 1, as in the inverse; 0 where not good."""
         count = np.where(self.good, self.normal[:, 0, 0], 1.0)
         c, s = self.normal[:, 0, 1] / count, self.normal[:, 0, 2] / count
         cc, cs = self.normal[:, 1, 1] / count - c * c, self.normal[:, 1, 2] / count - c * s
