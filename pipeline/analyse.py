@@ -33,6 +33,7 @@ from pipeline.oscillation.condition import Conditioned, coarsest_step, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
 from pipeline.results import derive as derivation
 from pipeline.results.checks.clock_findings import judge_clock
+from pipeline.results.checks.contact import find_contact
 from pipeline.results.checks.finding import Checked, Finding, by_severity
 from pipeline.results.checks.halves import judge_halves
 from pipeline.results.checks.modulation import judge_modulation
@@ -300,7 +301,7 @@ def _oscillation(
     slips = find_wave_slips(track, demodulated)
     clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]), slips)
     findings = by_severity(
-        judge_segments(windows.segments),
+        judge_segments(windows.segments, find_contact(windows.conditioned, windows.segments, cycles.frequency_hz)),
         judge(cycles, demodulated, damping, phase, rest, waveform, disturbances, derived.coefficients),
         checked.findings,
         judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters, slips),

@@ -27,7 +27,7 @@ from pipeline.oscillation.demodulate import Params as DemodulateParams
 from pipeline.oscillation.disturbances import Disturbances, separate
 from pipeline.oscillation.disturbances import Params as DisturbancesParams
 from pipeline.oscillation.kinks import find_kink
-from pipeline.oscillation.rows import are_interleaved
+from pipeline.oscillation.rows import are_interleaved, hum_in_turn
 from pipeline.oscillation.segments import Params as SegmentsParams
 from pipeline.oscillation.segments import Segments, Span, find_segments
 from pipeline.track import UNUSABLE, Quality, Track
@@ -135,6 +135,13 @@ def see_windows(
         Options of the stages.
     """
     if are_interleaved(conditioned.track):
+        if (hum := hum_in_turn(conditioned.track)) is not None:
+            return NoOscillation(
+                f"the {noun(conditioned.track.unit)} goes to and fro by {amount(hum, conditioned.track.unit, '.2g')} "
+                "from row to row: mains hum at half the sampling rate, which hides what else may be wrong, or two "
+                "sensors in turn; see to the sensor's supply, or record at another rate",
+                "mains_hum",
+            )
         return NoOscillation(
             "the rows are of two records in turn: no estimate is made of both together; separate every other row",
             "interleaved_records",

@@ -279,4 +279,11 @@ def _words_on_rest(rest: Rest) -> str:
     shown = [f"{amount(step.height.value, unit, '+.2g')} at {step.time.value:.4g} s" for step in rest.steps[:5]]
     more = f" and {len(rest.steps) - 5} more" if len(rest.steps) > 5 else ""
     jumps = f"jumps {len(rest.steps)} time{'s' * (len(rest.steps) > 1)}: {', '.join(shown)}{more}" if shown else ""
-    return f"the rest position {' and '.join(part for part in (drift, jumps) if part)}"
+    said = f"the rest position {' and '.join(part for part in (drift, jumps) if part)}"
+    if not rest.drifts or unit != "m" or not rest.mean.value > 0.0:
+        return said
+    share, seconds = rest.drift_m / rest.mean.value, float(np.ptp(rest.t))
+    return (
+        f"{said}; if it is the scale that drifts, as of a sensor or air that warms, amplitudes go along by "
+        f"{share:.2g} of themselves, and the damping rate is off by some {share / seconds:.1g} 1/s"
+    )

@@ -22,10 +22,11 @@ LAW_CODES = frozenset({"law_rejected", "laws_not_separable", "mixed_drag", "no_l
 _WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}
 _BESIDE = {
     "position": (
-        "at_rest handled restarted touched phase_jump clipped false_echoes locked_echoes missing_samples "
-        "duplicate_time non_monotonic_time quantised held_samples smoothed_sensor not_sinusoidal undersampled "
-        "rest_drift correlated_residuals lost_target rows_lost interleaved_records zero_filled_tail no_oscillation "
-        "two_modes overdamped mains_hum implausible_motion implausible_distance implausible_sag sensor_lost wave_slips"
+        "at_rest handled restarted touched phase_jump contact rows_doubled clipped false_echoes locked_echoes "
+        "missing_samples duplicate_time non_monotonic_time quantised held_samples smoothed_sensor not_sinusoidal "
+        "undersampled rest_drift correlated_residuals lost_target rows_lost interleaved_records zero_filled_tail "
+        "no_oscillation two_modes overdamped mains_hum implausible_motion implausible_distance implausible_sag "
+        "sensor_lost wave_slips"
     ),
     "amplitude": "sideways_mode strongly_damped short_record not_converged",
     "phase": "amplitude_dependent_frequency",
@@ -39,6 +40,8 @@ ADVICE = {
     "restarted": "Analyse the other parts with --from and --to.",
     "touched": "Analyse the other parts with --from and --to.",
     "phase_jump": "Analyse the other parts with --from and --to, and see how times were made.",
+    "contact": "Take away what the bob hits.",
+    "rows_doubled": "Record with measured times; use no time of this record.",
     "rows_lost": "Record with measured times; use no time of this record.",
     "interleaved_records": "Separate every other row.",
     "overdamped": "If the bob does not move in oil, see what it rubs against.",

@@ -9,12 +9,12 @@ import numpy as np
 from pipeline.motion.phase import PhaseFit
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
+from pipeline.oscillation.rows import MAINS_HZ
 from pipeline.results.checks.finding import GRAVITY_M_PER_S2, Checked, Finding, Misfit
 from pipeline.track import UNUSABLE
 
 __all__ = ["judge_plausibility"]
 
-MAINS_HZ = (50.0, 60.0, 100.0, 120.0)
 FARTHEST_M = 11.0  # that ultrasonic sensors of the bench reach
 MOST_GRAVITIES = 1.2
 LONGEST_SAG_M = 25.0  # that a spring of the bench is stretched by its bob: a period of 10 s

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from pipeline.numerics.quantity import noun
 from pipeline.oscillation.condition import Conditioned
-from pipeline.oscillation.rows import count_lost
+from pipeline.oscillation.rows import count_doubled, count_lost
 from pipeline.oscillation.segments import Break, Segments, Span
+from pipeline.results.checks.contact import Contact
 from pipeline.results.checks.finding import Checked, Finding, Misfit
 
 __all__ = ["judge_rows", "judge_segments"]
@@ -17,18 +18,22 @@ LEFT = 3.0  # times the neighbours' noise that a fit must leave for lost rows to
 SHOWN = 5  # spans that are told by their times
 
 
-def judge_segments(segments: Segments | None) -> Iterator[Finding]:
+def judge_segments(segments: Segments | None, contact: Contact | None = None) -> Iterator[Finding]:
     """Yield which seconds were left out, and why.
 
     Parameters
     ----------
     segments : Segments or None
         None: the whole record was analysed.
+    contact : Contact, optional
+        With what the bob came into contact: then that is why the motion breaks.
     """
     if segments is None:
         return
     others = [span for span in segments.left_out if span.kind == "free"]
-    for kind in dict.fromkeys(one.kind for one in segments.breaks):
+    if contact is not None:
+        yield contact.finding(_part(segments))
+    for kind in dict.fromkeys(one.kind for one in segments.breaks if contact is None):
         breaks = [one for one in segments.breaks if one.kind == kind]
         times = _listed([f"at {one.time_s:.1f} s ({_words_on(one)})" for one in breaks])
         what = {
@@ -64,7 +69,7 @@ def judge_segments(segments: Segments | None) -> Iterator[Finding]:
 
 
 def judge_rows(conditioned: Conditioned, rms_m: float) -> Checked:
-    """Return whether rows were lost all over the record while their times were counted on.
+    """Return whether rows were lost or doubled all over the record while their times were counted on.
 
     Parameters
     ----------
@@ -74,8 +79,24 @@ def judge_rows(conditioned: Conditioned, rms_m: float) -> Checked:
 
     Notes
     -----
-    All times are too short by the share of the rows that is gone: that is what they are uncertain by.
+    All times are too short by the share of the rows that is gone, or too long by that of rows written twice: that is
+    what they are uncertain by.
     """
+    if doubled := count_doubled(conditioned):
+        what = noun(conditioned.track.unit)
+        return Checked(
+            (
+                Finding(
+                    "rows_doubled",
+                    "error",
+                    f"about {doubled} rows repeat the {what} before them while the motion goes on, and times count "
+                    "them as new: rows written twice, or a sensor asked more often than it measures; period, "
+                    "frequency, spring constant and damping rate are wrong by as much as the times, which their "
+                    "uncertainties hold",
+                ),
+            ),
+            (Misfit(name="rows_doubled", clock=doubled / len(conditioned.track)),),
+        )
     if rms_m <= LEFT * conditioned.noise_m or not (lost := count_lost(conditioned)):
         return Checked()
     return Checked(

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.trials.troubles.motion import F8, GRAVITY_M_PER_S2, swing
-from tests.trials.troubles.record import Bench, Kind, Make, Record
+from tests.trials.troubles.record import Bench, Kind, Make, Record, Truth
 
 __all__ = ["KINDS"]
 
@@ -140,6 +140,26 @@ def _moving(
     return make
 
 
+def _hitting(seed: int) -> Record:
+    """A stop in the bob's way that throws it back at a little less speed, until it does not reach there any more."""
+    b = Bench(seed, "hitting", seconds=30.0, beta=0.0)
+    omega, gamma, level = b.bob.omega, b.bob.gamma, -0.9 * b.bob.amplitude
+    x, v, h, rows = b.bob.amplitude * math.cos(b.bob.phase), 0.0, 1e-3, []
+    v = -b.bob.amplitude * omega * math.sin(b.bob.phase)
+    last_hit = 0.0
+    for k in range(10 * b.t.size):
+        if k % 10 == 0:
+            rows.append(x)
+        v -= h * (omega * omega * x + 2.0 * gamma * v)
+        x += h * v
+        if x < level:
+            x, v, last_hit = 2.0 * level - x, 0.97 * abs(v), k * h
+    # A stop shortens every period; after its last hit the bob is free, and loses what drag takes.
+    truth: dict[str, Truth] = {"offset": b.rest_m, "period": 2.0 * math.pi / math.sqrt(omega**2 - gamma**2)}
+    truth["damping_rate"] = lambda t: gamma if t >= last_hit - 1.0 else math.nan
+    return Record(t=b.t, y=b.rest_m + np.array(rows) + b.noise(), truth=truth)
+
+
 def _slack(excess: float) -> Make:
     """A bob that rises to where its spring hangs slack, by so much of the sag more than that, at the start."""
 
@@ -222,6 +242,12 @@ def _warming_air(seed: int) -> Record:
     return b.record(b.distance() * scale + b.noise(), "period", "amplitude", "offset")
 
 
+def _warming_sensor(seed: int) -> Record:
+    """A sensor that warms up: the scale of all distances grows by a hundredth, most of it at first."""
+    b = Bench(seed, "warming sensor", seconds=30.0)
+    return b.record(b.distance() * (1.0 + 0.01 * (1.0 - np.exp(-b.t / 20.0))) + b.noise())
+
+
 def _steered(how: str) -> Make:
     """A periodic force: near its resonance, away from there, or sweeping through."""
 
@@ -297,12 +323,14 @@ KINDS = (
     Kind(name="shape: triangle", cause="shape", make=_shape("triangle")),
     Kind(name="shape: bouncing", cause="shape", make=_shape("bouncing")),
     Kind(name="shape: between two stops", cause="stops", make=_shape("stops")),
+    Kind(name="shape: one stop, hit until out of reach", cause="contact", make=_hitting),
     Kind(name="slack spring: by 10 %", cause="slack", make=_slack(0.10)),
     Kind(name="slack spring: by 30 %", cause="slack", make=_slack(0.30)),
     Kind(name="spring: hardens", cause="backbone", make=_moving("hard", cubic=3.0, gamma=0.02, seconds=60.0)),
     Kind(name="spring: softens with amplitude", cause="backbone", make=_moving("soft", cubic=-6.0, seconds=60.0)),
     Kind(name="spring: warms", cause="frequency_drift", make=_warming_spring),
     Kind(name="air: warms", cause="rest_or_scale", make=_warming_air),
+    Kind(name="sensor: warms", cause="rest_or_scale", make=_warming_sensor, spread=("offset",)),
     Kind(name="rest: drifts by 5 mm", cause="rest", make=_drifting_rest("line", 5e-3), cure=True, spread=("offset",)),
     Kind(name="rest: goes to and fro", cause="rest", make=_drifting_rest("wave", 3e-3), cure=True, spread=("offset",)),
     Kind(name="rest: one step of 3 mm", cause="rest", make=_drifting_rest("step", 3e-3), cure=True),

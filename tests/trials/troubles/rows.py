@@ -79,6 +79,14 @@ def _rows_lost(share: float, *, times: str) -> Make:
     return make
 
 
+def _doubled(seed: int) -> Record:
+    """One row in five written twice, and times counted by rows."""
+    b = Bench(seed, "doubled", seconds=30.0)
+    rows = np.sort(np.concatenate([np.arange(b.t.size), b.rng.choice(b.t.size, b.t.size // 5, replace=False)]))
+    y = (b.distance() + b.noise())[rows]
+    return b.record(y, t=np.arange(rows.size) / b.rate_hz)
+
+
 def _slipped(seed: int) -> Record:
     """The clock stands still for a tenth of a second: the phase slips."""
     b = Bench(seed, "slip", seconds=30.0)
@@ -190,6 +198,7 @@ KINDS = (
     Kind(name="rows lost: 30 %, times counted", cause="rows_lost", make=_rows_lost(0.30, times="counted")),
     Kind(name="rows lost: 20 %, true times", cause="missing", make=_rows_lost(0.20, times="true"), cure=True),
     Kind(name="rows lost: half a period at once", cause="rows_lost", make=_rows_lost(0.5, times="block"), cure=True),
+    Kind(name="rows doubled: 20 %, times counted", cause="rows_doubled", make=_doubled),
     Kind(name="phase slips by 0.1 s", cause="rows_lost", make=_slipped, cure=True),
     Kind(name="interleaved: two bobs", cause="interleaved", make=_interleaved(same=False)),
     Kind(name="interleaved: two places", cause="interleaved", make=_interleaved(same=True)),

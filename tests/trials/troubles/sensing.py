@@ -162,6 +162,14 @@ def _hum(size_m: float, *, still: bool, rate_hz: float = 120.0, mains_hz: float 
     return make
 
 
+def _hum_and_clip(seed: int) -> Record:
+    """Mains hum near half the sampling rate, and crests cut off at the near end."""
+    b = Bench(seed, "hum and clip", seconds=30.0)
+    y = b.distance() + 2e-3 * np.sin(2 * math.pi * 49.98 * b.t + b.rng.uniform(0, 6)) + b.noise()
+    level = b.rest_m - 0.8 * b.bob.amplitude
+    return b.record(np.maximum(y, level + 1e-4 * b.rng.standard_normal(b.t.size)))
+
+
 def _growing_noise(seed: int) -> Record:
     """Noise that grows steeply with the distance."""
     b = Bench(seed, "growing noise")
@@ -249,6 +257,7 @@ KINDS = (
     Kind(name="hum: of a still bob", cause="hum", make=_hum(0.5e-3, still=True)),
     Kind(name="hum: of a still bob, 3 mm", cause="hum", make=_hum(3e-3, still=True)),
     Kind(name="hum: beside the motion", cause="hum", make=_hum(0.5e-3, still=False), cure=True),
+    Kind(name="hum: and crests cut off", cause="hum_and_clip", make=_hum_and_clip),
     Kind(name="noise: grows with distance", cause="noise", make=_growing_noise, cure=True),
     Kind(name="noise: correlated, 0.9", cause="correlated", make=_coloured(0.9)),
     Kind(name="noise: correlated, 0.98", cause="correlated", make=_coloured(0.98)),
