@@ -238,7 +238,7 @@ def _motion_findings(
     # What a computed record's rest position does within its digits disturbs no number.
     errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
     if rest.moves and rest.range_m > float(np.max(errors)):
-        yield Finding("rest_drift", "warning", _words_on_rest(rest))
+        yield Finding("rest_drift", "warning", _words_on_rest(rest, phase.damping.best.damping_rate().u))
     ratio = waveform.rms_m / demodulated.noise_m if demodulated.noise_m > 0 else 1.0
     excess, unit = phase.damping.scatter.excess, rest.mean.unit
     if ratio > 1.5:
@@ -273,7 +273,7 @@ def _mode_findings(
     )
 
 
-def _words_on_rest(rest: Rest) -> str:
+def _words_on_rest(rest: Rest, u_rate: float) -> str:
     unit = rest.mean.unit
     drift = f"drifts by {amount(rest.drift_m, unit)} during the record" if rest.drifts else ""
     shown = [f"{amount(step.height.value, unit, '+.2g')} at {step.time.value:.4g} s" for step in rest.steps[:5]]
@@ -283,6 +283,8 @@ def _words_on_rest(rest: Rest) -> str:
     if not rest.drifts or unit != "m" or not rest.mean.value > 0.0:
         return said
     share, seconds = rest.drift_m / rest.mean.value, float(np.ptp(rest.t))
+    if share < u_rate * seconds:
+        return said
     return (
         f"{said}; if it is the scale that drifts, as of a sensor or air that warms, amplitudes go along by "
         f"{share:.2g} of themselves, and the damping rate is off by some {share / seconds:.1g} 1/s"

@@ -96,7 +96,7 @@ def find_contact(conditioned: Conditioned, segments: Segments | None, frequency_
 
 
 def _turns(t: F8, y: F8, frequency_hz: float) -> F8:
-    """(periods, 2): where each of the first hundred periods turns at its lower end, and by how much 10 % of it lie above 2 %."""
+    """(periods, 2): where each of the first hundred periods turns at its lower end, and its 10 % quantile less 2 %."""
     if not t.size:
         return np.empty((0, 2))
     periods = min(int(t[-1] * frequency_hz), MOST)

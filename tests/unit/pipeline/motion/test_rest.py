@@ -85,3 +85,29 @@ def test_step_widens_the_mean(windows: Windows) -> None:
     found = fit_rest(points(windows, offset))
     assert found.drifts
     assert found.mean.u > 1e-4
+
+
+def test_a_beat_does_not_make_the_mean_uncertain(windows: Windows) -> None:
+    """Rest positions that a beat takes to and fro count singly: their mean holds, its u is at most twice its error."""
+    errors, stated = [], []
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        beat = 1.5e-4 * np.cos(2.0 * np.pi * T / rng.uniform(8.0, 16.0) + rng.uniform(0.0, 6.3))
+        found = fit_rest(points(windows, 0.2 + beat + rng.normal(0.0, 4e-5, T.size), 4e-5))
+        errors.append(found.mean.value - 0.2)
+        stated.append(found.mean.u)
+    rms = np.sqrt(np.mean(np.square(errors)))
+    assert rms < np.median(stated) < 3.0 * rms
+
+
+def test_slow_wandering_makes_the_mean_uncertain(windows: Windows) -> None:
+    """Of rest positions that remember the one before the intervals are wide: they do not pass for a beat."""
+    inside = []
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        walk = rng.normal(0.0, 1e-4, T.size)
+        for k in range(1, T.size):
+            walk[k] = 0.8 * walk[k - 1] + 0.6 * walk[k]
+        found = fit_rest(points(windows, 0.2 + walk))
+        inside.append(abs(found.mean.value - 0.2) < 2.0 * found.mean.u)
+    assert np.mean(inside) > 0.85
