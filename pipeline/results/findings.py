@@ -228,13 +228,17 @@ def _motion_findings(
     if phase.backbone is not None:
         start = phase.damping.best.joint["A0"].value
         shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
-        yield Finding(
-            "amplitude_dependent_frequency",
-            "warning",
-            f"the frequency depends on amplitude: it is {abs(shift):.2%} {'higher' if shift > 0 else 'lower'} at "
-            f"{amount(start, rest.mean.unit, '.0f')} than at rest and shifts with {words_on_exponent(phase.exponent)}; "
-            "the period given is the record's mean, its uncertainty covers the bend",
-        )
+        # A computed record shows how drag itself bends the phase, by the square of what it damps within a radian.
+        by_drag = (phase.damping.best.rate_at_start() / phase.angular_frequency.value) ** 2
+        if abs(shift) > by_drag:
+            yield Finding(
+                "amplitude_dependent_frequency",
+                "warning",
+                f"the frequency depends on amplitude: it is {100.0 * abs(shift):.2g}% "
+                f"{'higher' if shift > 0 else 'lower'} at {amount(start, rest.mean.unit, '.0f')} than at rest and "
+                f"shifts with {words_on_exponent(phase.exponent)}; the period given is the record's mean, its "
+                "uncertainty covers the bend",
+            )
     # What a computed record's rest position does within its digits disturbs no number.
     errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
     if rest.moves and rest.range_m > float(np.max(errors)):

@@ -344,6 +344,17 @@ def test_readings_are_a_recording_like_any_other(cli: Callable, bench: Path, tmp
     assert "add -o RUN.h5" in cli("simulate", "--scene", bench, "--noise-m", "1e-4").complaint
 
 
+@pytest.mark.parametrize("tolerance", ["1e-3", "1e-9"])
+def test_what_is_read_without_noise_gets_no_warning(cli: Callable, bench: Path, tmp_path: Path, tolerance: str) -> None:
+    """Of the motion itself no echo is false, no residual correlated, and no frequency bends but as drag bends it."""
+    run = tmp_path / "exact.h5"
+    wanted = ("--sensor", "ideal", "--seconds", "60", "--tolerance", tolerance)
+    assert cli("simulate", "--scene", bench, "-o", run, *wanted).code == 0
+    found = cli("analyse", run, "--json").results[0]["findings"]
+    assert [each["code"] for each in found if each["severity"] != "info"] == []
+    assert "false_echoes" not in {each["code"] for each in found}
+
+
 def test_a_record_outside_the_band_names_what_would_have_to_move(cli: Callable, bench: Path, tmp_path: Path) -> None:
     """A run of another spring leaves the band, and the spring constant is named with the value that it had."""
     other = tmp_path / "other.toml"

@@ -53,8 +53,8 @@ def test_every_scene_is_solved_within_its_tolerance_or_refused() -> None:
         try:
             choice = choose(problem, scene["spacing_s"], scene["count"], tolerance)
             run = choice.run(scene["count"])
-        except DynamicsError as error:
-            refused.append((number, scene["kind"], str(error)))
+        except DynamicsError as why:
+            refused.append((number, scene["kind"], str(why)))
             continue
         off = float(np.max(np.abs(run.y[scene["rows"]] - np.array(scene["y"]))))
         error = off / size if size > 0.0 else off
@@ -64,8 +64,8 @@ def test_every_scene_is_solved_within_its_tolerance_or_refused() -> None:
         if radians(scene) <= CHECKED:
             try:
                 told["measured"] = checked(problem, choice, run, scene["spacing_s"], scene["count"]).error
-            except DynamicsError as error:
-                refused.append((number, scene["kind"], f"check: {error}"))
+            except DynamicsError as why:
+                refused.append((number, scene["kind"], f"check: {why}"))
         for name, value in told.items():
             ratios[name].append((max(value, ROUNDING) / max(error, ROUNDING), number))
     off_by_ten = {name: [each for each in all_ if not 0.1 <= each[0] <= 10.0] for name, all_ in ratios.items()}
