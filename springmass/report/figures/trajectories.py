@@ -257,7 +257,7 @@ def _phase(simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory]) 
         panel.plot(run.y[rows] * 1e3, run.v[rows], color=colour, lw=1.2, label="computed")
         panel.plot(exact.y[rows] * 1e3, exact.v[rows], color="#000000", lw=0.6, label=beside.words)
         panel.plot(run.y[:1] * 1e3, run.v[:1], "o", ms=3.0, color="#000000", label="start")
-        legend_row(panel, 3, pad=0.15, columnspacing=1.0)
+        legend_row(panel, 3, pad=0.15, columnspacing=0.8, handlelength=1.1, handletextpad=0.4)
     return figure
 
 
