@@ -9,15 +9,13 @@ import numpy as np
 
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.regression import correlation_length, scatter, solve_weighted
+from pipeline.numerics.regression import beating_length, correlation_length, scatter, solve_weighted
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
 from pipeline.oscillation.steps import Step, staircase
 from pipeline.track import F8, UNUSABLE, Track
 
 __all__ = ["Rest", "Waveform", "fit_rest", "reconstruct"]
-
-OPPOSITE, SLOWEST = 0.5, 4  # correlation half a period and a whole one later; windows of half the shortest period
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +102,8 @@ def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.
     mean = float(constant.values[0])
     order = min(degree, t.size // 4 - 1)
     left = constant.residual / spread.u[kept]
-    length = 1.0 if _comes_back(left) else max(spread.correlation, correlation_length(left))
+    if (length := beating_length(left)) is None:
+        length = max(spread.correlation, correlation_length(left))
     widened = length * max(1.0, constant.chi2 / max(constant.residual.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(float(constant.covariance[0, 0]) * widened), "m")
     if order < 1:
@@ -116,23 +115,6 @@ def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.
     )
     smooth = design @ curve.values
     return Rest(estimate, float(np.ptp(smooth)), bool(gain > evidence), t, smooth)
-
-
-def _comes_back(residual: F8) -> bool:
-    """Whether residuals go to and fro at a period of their own, twice and more: then their mean is as of single ones.
-
-    A beating mode does that to the windows' rest positions. Half a period later they are the opposite, a whole one
-    later the same again; of noise that remembers they are neither.
-    """
-    n = residual.size
-    centred = residual - residual.mean()
-    power = float(centred @ centred)
-    if n < 4 * SLOWEST or not power > 0.0:
-        return False
-    rho = np.correlate(centred, centred, "full")[n - 1 :] / power / (1.0 - np.arange(n) / n)
-    half = int(np.argmin(rho[: n // 4 + 1]))
-    # Both ends of what is looked at are no turn.
-    return 2 < half < n // 4 and rho[half] < -OPPOSITE and float(np.max(rho[2 * half - 1 : 2 * half + 2])) > OPPOSITE
 
 
 @dataclass(frozen=True, slots=True, eq=False)

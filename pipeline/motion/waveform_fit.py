@@ -18,7 +18,7 @@ from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_model import Chooser, Record, Rows, State, WaveformModel
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.numerics.regression import correlation_length, solve_weighted
+from pipeline.numerics.regression import beating_length, correlation_length, solve_weighted
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, UNUSABLE, Quality, Track
@@ -312,7 +312,10 @@ def _covariance(solved: _Solved, demodulated: Demodulated) -> tuple[F8, F8]:
             ratio = float(squares.sum())
             independent = ratio**2 / max(float(squares @ squares), 1e-300)
             significant = ratio > 1.0 + 3.3 * math.sqrt(2.0 / max(independent, 1.0))
-            factors[k] = math.sqrt((ratio if significant else 1.0) * correlation_length(pull))
+            # The last is the rest position's constant, which a beat takes to and fro.
+            beats = beating_length(pull) if solved.state.constant and k == u.size - 1 else None
+            length = correlation_length(pull) if beats is None else beats
+            factors[k] = math.sqrt((ratio if significant else 1.0) * length)
     return inverse * solved.noise_m**2 * np.outer(factors, factors), factors
 
 

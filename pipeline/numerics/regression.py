@@ -14,6 +14,7 @@ from pipeline.track import F8
 __all__ = [
     "Line",
     "Scatter",
+    "beating_length",
     "chi2_quantile",
     "correlation_length",
     "covariance_of",
@@ -21,6 +22,8 @@ __all__ = [
     "scatter",
     "solve_weighted",
 ]
+
+OPPOSITE, SLOWEST = 0.5, 4  # correlation half a period and a whole one later; points of half the shortest period
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,6 +202,29 @@ def correlation_length(residual: F8) -> float:
             break
         total += 2.0 * rho
     return total
+
+
+def beating_length(residual: F8) -> float | None:
+    """How many points count as one where residuals go to and fro at a period of their own; None where they do not.
+
+    A beating mode does that to the rest positions of periods. Half a period later they are the opposite, a whole one
+    later the same again, by the share r of their power; of noise that remembers they are neither. Over c periods in n
+    points the mean of a wave is off by :math:`\\sin(\\pi c)/(\\pi c)` of its size, whatever its phase, so that its
+    share counts :math:`n/(\\pi c)^2` and the rest, white, once.
+    """
+    n = residual.size
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    if n < 4 * SLOWEST or not power > 0.0:
+        return None
+    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    rho = np.fft.irfft(spectrum, 2 * n)[:n] / power / (1.0 - np.arange(n) / n)
+    half = int(np.argmin(rho[: n // 4 + 1]))
+    # Both ends of what is looked at are no turn.
+    if not 2 < half < n // 4 or rho[half] > -OPPOSITE:
+        return None
+    share = min(float(np.max(rho[2 * half - 1 : 2 * half + 2])), 1.0)
+    return 1.0 - share * (1.0 - (2 * half / math.pi) ** 2 / n) if share > OPPOSITE else None
 
 
 def chi2_quantile(probability: float, dof: float) -> float:
