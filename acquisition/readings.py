@@ -54,6 +54,8 @@ COLUMNS = (*Reading._fields, "flags")
 
 def carried(values: F8, known: NDArray[np.bool_], before: float) -> F8:
     """Return values (n,) with the last known one in place of each that is not, and ``before`` in front of the first."""
+    if known.all():
+        return values
     latest = np.maximum.accumulate(np.where(known, np.arange(values.size), -1))
     return np.where(latest >= 0, values[latest], before)
 

@@ -3,6 +3,7 @@
 Prints a line for each figure. The recording is a simulated bench at 100 Hz behind a pseudo-terminal; viewers are
 sockets that read all they are sent, in this process, or a browser (``--browser``), whose screen is drawn.
 ``--history H`` plays so many hours in a browser and tells the time from frame to frame.
+``--floor`` tells what the server alone costs, without springmass, that sends one viewer as many bytes as often.
 ``--suspend S`` lets one viewer read nothing for so long; ``--slip`` compares the sampler with and without the page.
 """
 
@@ -56,6 +57,22 @@ DRAWN = """() => {
   };
   requestAnimationFrame(look);
 }"""
+
+BARE = """
+import asyncio, socket, sys, uvicorn
+
+async def bare(scope, receive, send):
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.accept"})
+        while True:
+            await send({"type": "websocket.send", "bytes": bytes(int(sys.argv[2]))})
+            await asyncio.sleep(float(sys.argv[1]))
+
+with socket.create_server(("127.0.0.1", 0)) as listener:
+    print(listener.getsockname()[1], flush=True)
+    uvicorn.run(bare, fd=listener.fileno(), lifespan="off", log_level="error", ws_per_message_deflate=False)
+"""
 
 FRAMES = """(count) => new Promise((done) => {
   const each = [];
@@ -186,6 +203,26 @@ def _watch(bench: Bench, seconds: float, viewers: int, suspended_s: float) -> di
     return {**found, "p50_s": float(np.median(lag)), "p95_s": float(np.quantile(lag, 0.95))}
 
 
+def floor(seconds: float) -> float:
+    """Return the share of a core of a server that does nothing but send samples to one viewer at the page's pace."""
+    from websockets.sync.client import connect
+
+    from springmass.page.server import TURN_S
+
+    size = 16 + 16 * round(100 * TURN_S)
+    command = [sys.executable, "-c", BARE, str(TURN_S), str(size)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        bench = Bench("", process.pid)
+        with connect(f"ws://127.0.0.1:{process.stdout.readline().strip()}/", compression=None) as run:
+            before, start = bench.cpu_s(), time.perf_counter()
+            while time.perf_counter() < start + seconds:
+                assert len(run.recv()) == size
+            share = (bench.cpu_s() - before) / (time.perf_counter() - start)
+        process.terminate()
+    return share
+
+
 def screen(seconds: float) -> dict[str, float]:
     """Return the time from the host's stamp of a sample to the frame that shows it, in headless Chromium, s."""
     from playwright.sync_api import sync_playwright
@@ -275,11 +312,14 @@ def main() -> None:
     parser.add_argument("--viewers", type=int, default=1)
     parser.add_argument("--suspend", type=float, default=0.0, metavar="S")
     parser.add_argument("--browser", action="store_true")
+    parser.add_argument("--floor", action="store_true")
     parser.add_argument("--slip", action="store_true")
     parser.add_argument("--history", type=float, default=0.0, metavar="HOURS")
     options = parser.parse_args()
     if options.browser:
         print(f"page in a browser, sample to screen: {_told(screen(options.seconds))}")
+    elif options.floor:
+        print(f"a bare server that sends as much as often: {100 * floor(options.seconds):.1f} % of a core")
     elif options.history:
         told = ", ".join(f"{name[:-2]} {1e3 * each:.0f} ms" for name, each in history(options.history).items())
         print(f"from frame to frame while {options.history:g} h at 100 Hz are played: {told}")

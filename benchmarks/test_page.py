@@ -23,3 +23,4 @@ def test_the_page_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 0.0 <= found["p50_s"] <= found["p95_s"]
     assert 0.0 <= found["serving"] < 1.5
     assert found["current_s"] > 0.0
+    assert 0.0 <= page.floor(1.0) < 1.5

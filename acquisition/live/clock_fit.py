@@ -74,27 +74,28 @@ class ClockSamples:
 
     def __init__(self) -> None:
         self._step = 1
-        self._kept: list[tuple[F8, I8]] = []
+        self._t, self._host_ns = np.empty(1024), np.empty(1024, np.int64)
         self._count = 0
 
     def take(self, first: int, t: F8, host_ns: I8) -> None:
         """Take the next samples: the index of the first, sensor times in s, host stamps in ns."""
-        start = -first % self._step
-        self._kept.append((t[start :: self._step].copy(), host_ns[start :: self._step].copy()))
-        self._count += self._kept[-1][0].size
+        kept = slice(-first % self._step, None, self._step)
+        t, host_ns = t[kept], host_ns[kept]
+        before, self._count = self._count, self._count + t.size
+        if self._count > self._t.size:  # room grows by doubling; an array a read would take ten times as much
+            room = max(self._count, 2 * self._t.size) - before
+            self._t = np.concatenate([self._t[:before], np.empty(room)])
+            self._host_ns = np.concatenate([self._host_ns[:before], np.empty(room, np.int64)])
+        self._t[before : self._count], self._host_ns[before : self._count] = t, host_ns
         if self._count > MOST:
-            t, host_ns = self.columns()
             self._step *= 2
-            self._kept = [(t[::2].copy(), host_ns[::2].copy())]
-            self._count = self._kept[0][0].size
+            t, host_ns = self.columns()
+            self._t, self._host_ns = t[::2].copy(), host_ns[::2].copy()
+            self._count = self._t.size
 
     def columns(self) -> tuple[F8, I8]:
         """Return sensor times in s and host stamps in ns."""
-        if not self._kept:
-            return np.empty(0), np.empty(0, np.int64)
-        t, host_ns = zip(*self._kept, strict=True)
-        self._kept = [(np.concatenate(t), np.concatenate(host_ns))]
-        return self._kept[0]
+        return self._t[: self._count], self._host_ns[: self._count]
 
 
 def fit_clock(t: F8, host_ns: I8) -> ClockFit:

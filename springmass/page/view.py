@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import secrets
 import struct
 from dataclasses import dataclass, field
@@ -13,11 +15,12 @@ from acquisition.block import Block
 from acquisition.source import ClockKind
 from pipeline.track import F8, U8
 
-__all__ = ["VERSION", "Series", "View"]
+__all__ = ["VERSION", "Series", "View", "json_of"]
 
 VERSION = 1
 """Of the messages."""
 MOST_PER_MESSAGE = 50_000
+_HEAD, _F8 = struct.Struct("<4I"), np.dtype("<f8")
 SAMPLES = 1
 """First number of a binary message: what follows are samples."""
 
@@ -28,6 +31,7 @@ class Series:
     def __init__(self) -> None:
         self._t, self._y, self._flags = np.empty(1024), np.empty(1024), np.empty(1024, np.uint8)
         self._count = 0
+        self._missing = self._looked_at = 0
         self._moment_ns: float | None = None
 
     def __len__(self) -> int:
@@ -46,6 +50,12 @@ class Series:
         if self._moment_ns is None and block.host_ns is not None and len(block):
             self._moment_ns = float(block.host_ns[0]) - 1e9 * float(block.t[0])
 
+    def missing(self) -> int:
+        """Return how many samples measured nothing."""
+        self._missing += int(np.count_nonzero(np.isnan(self._y[self._looked_at : self._count])))
+        self._looked_at = self._count
+        return self._missing
+
     def columns(self) -> tuple[F8, F8, U8]:
         """Return times in s, distances in m and flags, (n,) each, as they are now."""
         return self._t[: self._count], self._y[: self._count], self._flags[: self._count]
@@ -61,9 +71,8 @@ class Series:
         ``count`` values as 64-bit floats; a missing sample is NaN.
         """
         stop = min(self._count, first + MOST_PER_MESSAGE)
-        head = struct.pack("<4I", SAMPLES, sensor, first, stop - first)
-        columns = (column[first:stop].astype("<f8").tobytes() for column in (self._t, self._y))
-        return b"".join((head, *columns))
+        t, y = (column[first:stop].astype(_F8, copy=False).tobytes() for column in (self._t, self._y))
+        return _HEAD.pack(SAMPLES, sensor, first, stop - first) + t + y
 
 
 @dataclass(eq=False)
@@ -127,13 +136,28 @@ class View:
 
     def state(self) -> dict[str, Any]:
         """Return where the run stands, as the log has it."""
-        missing = sum(int(np.count_nonzero(np.isnan(series.columns()[1]))) for series in self.series)
         return {
             "type": "state",
             "samples": [len(series) for series in self.series],
-            "missing": missing,
+            "missing": sum(series.missing() for series in self.series),
             "marks": [[t, text] for t, text in self.marks],
             "notes": self.notes[-20:],
             "ended": self.ended,
             "error": self.error,
         }
+
+
+def json_of(content: Any) -> str:
+    """Return JSON that browsers read: what is no number is null."""
+    try:
+        return json.dumps(content, allow_nan=False)
+    except ValueError:  # rarely: to look at every number before takes as long again
+        return json.dumps(_finite(content), allow_nan=False)
+
+
+def _finite(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {key: _finite(value) for key, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_finite(value) for value in content]
+    return None if isinstance(content, float) and not math.isfinite(content) else content

@@ -12,6 +12,9 @@ from storage.wire_log.window import LONGEST, STRETCH, NotALog
 
 __all__ = ["LogFollower"]
 
+_DATA, _HEADER, _GOES_ON = Kind.DATA, Kind.HEADER, int(Parts.GOES_ON)  # looked up once, and not for each record
+LOOK = 1 << 14
+"""Bytes asked for at first: room for a long stretch, taken and given back at each look, costs more than the look."""
 PASSED_OVER = 100
 """The writer passes over so many names that are taken when it goes on in another file."""
 
@@ -42,7 +45,7 @@ class LogFollower:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._files = 1
-        self._data, self._offset = b"", 0
+        self._data, self._offset, self._ask = b"", 0, LOOK
         self._parts: list[bytes] = []
         self._log: int | None = None
         self.ended = False
@@ -82,9 +85,11 @@ class LogFollower:
 
     def _read(self) -> bytes:
         try:
-            return self._file.read(STRETCH) or b""
+            data = self._file.read(self._ask) or b""
         except OSError as error:
             raise NotALog(self._path, f"it cannot be read ({one_line(error)})", "look at the disk") from error
+        self._ask = STRETCH if len(data) == self._ask else LOOK
+        return data
 
     def _take(self, found: list[Record]) -> None:
         at = 0
@@ -92,16 +97,18 @@ class LogFollower:
             sequence, mono_ns, self._log, kind, channel, parts, payload = unframed
             size = HEAD_BYTES + len(payload)
             at += size
-            copy = kind is Kind.HEADER and bool(self._offset)
             offset, self._offset = self._offset, self._offset + size
-            if copy:
-                continue
-            self._parts.append(payload)
-            if parts & Parts.GOES_ON:
-                continue
-            found.append(Record(offset, sequence, mono_ns, kind, channel, b"".join(self._parts)))
-            self._parts.clear()
-            self.ended = kind is Kind.END
+            if kind is _HEADER and offset:
+                continue  # a copy
+            if parts & _GOES_ON or self._parts:
+                self._parts.append(payload)
+                if parts & _GOES_ON:
+                    continue
+                payload = b"".join(self._parts)
+                self._parts.clear()
+            found.append(Record(offset, sequence, mono_ns, kind, channel, payload))
+            if kind is not _DATA:
+                self.ended = kind is Kind.END
         self._data = self._data[at:]
 
     def _go_on(self) -> bool:

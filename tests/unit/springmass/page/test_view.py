@@ -14,8 +14,8 @@ from acquisition.clock import VirtualClock
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from springmass.page.feeds import LogFeed, view_of
-from springmass.page.view import MOST_PER_MESSAGE, Series
-from springmass.page.watching import motion_of, spectrum
+from springmass.page.view import MOST_PER_MESSAGE, Series, json_of
+from springmass.page.watching import drawn, motion_of, spectrum
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
 
@@ -29,6 +29,7 @@ def test_messages_hold_every_sample_once() -> None:
     for start in range(0, count, 999):
         part = slice(start, start + 999)
         series.push(Block(start, t[part], y[part], np.zeros(t[part].size, np.uint8)))
+        assert series.missing() == np.count_nonzero(np.isnan(y[: len(series)]))
     found_t, found_y, first = [], [], 0
     while first < len(series):
         message = series.message(3, first)
@@ -112,6 +113,17 @@ def test_what_cuts_the_motion_says_how_far_to_move(far: bool, told: str) -> None
     message = motion_of(Track(t, y, np.zeros(t.size, np.uint8), 100.0, clock="device"), Scene.from_mapping({}))
     (finding,) = (each for each in message["findings"] if each["code"] == "clipped")
     assert finding["advice"] == f"Move the sensor 3 cm {told}."
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e6])
+def test_curves_are_told_to_seven_digits(size: float) -> None:
+    """Of any size; what is no number stays none, and JSON calls it null."""
+    values = size * np.concatenate([np.random.default_rng(5).standard_normal(500), [0.0, np.nan, np.inf]])
+    told = drawn(values)
+    np.testing.assert_allclose(told, values, rtol=6e-7)
+    text = json_of(told)
+    assert text.endswith("0.0, null, null]")
+    assert len(text) < 16 * len(told)
 
 
 def test_a_bob_at_rest_has_numbers_too() -> None:
