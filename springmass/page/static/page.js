@@ -24,7 +24,9 @@ function connect() {
 
 function lost() {
   if (bench().phase === "over" || bench().phase === "ended" || bench().phase === "built") {
-    trouble("The recording has ended and its page with it; what is shown stays. springmass page RUN.h5 shows the run again.");
+    trouble(`The recording has ended and its page with it; what is shown stays. springmass page ${run.name} shows the run again.`);
+    chip("stage", PHASES.over);
+    $("stage").className = "chip over";
     return;
   }
   const network = run && run.role === "viewer" ? " Is this device still in the same network, and does that let its members reach one another? Guest networks often do not." : "";

@@ -22,20 +22,22 @@ function begin_anew() {
   dirty = true;
 }
 
+const signed = (text) => text.replaceAll("-", "−");
+
 // Value and uncertainty as people write them: two digits of the uncertainty in brackets.
 function short(estimate) {
   let { value, u, unit: name } = estimate, factor = 1;
   const prefixes = { m: [1e3, "mm"], s: [1, "s"] };
   if (prefixes[name]) [factor, name] = prefixes[name];
   value *= factor;
-  if (u === null || !(u > 0)) return `${Number(value.toPrecision(5))} ${name}`;
+  if (u === null || !(u > 0)) return signed(`${Number(value.toPrecision(5))} ${name}`);
   u *= factor;
   let digits = 1 - Math.floor(Math.log10(u));
   if (Math.round(u * 10 ** digits) >= 100) digits -= 1;
-  if (digits <= 0) return `${value.toFixed(0)}(${u.toFixed(0)}) ${name}`;
-  if (digits > 7) return `${value.toExponential(3)} ± ${u.toExponential(1)} ${name}`;
+  if (digits <= 0) return signed(`${value.toFixed(0)}(${u.toFixed(0)}) ${name}`);
+  if (digits > 7) return signed(`${value.toExponential(3)} ± ${u.toExponential(1)} ${name}`);
   const bracket = digits === 1 && u >= 1 ? u.toFixed(1) : String(Math.round(u * 10 ** digits));
-  return `${value.toFixed(digits)}(${bracket}) ${name}`;
+  return signed(`${value.toFixed(digits)}(${bracket}) ${name}`);
 }
 
 function list(box, estimates) {
@@ -117,7 +119,9 @@ function draw_marks(plot) {
     ctx.moveTo(x, bbox.top);
     ctx.lineTo(x, bbox.top + bbox.height);
     ctx.stroke();
-    ctx.fillText(text.slice(0, 30), x + 4, bbox.top + 12 * devicePixelRatio);
+    const far = x > bbox.left + bbox.width / 2;
+    ctx.textAlign = far ? "right" : "left";
+    ctx.fillText(text.slice(0, 30), x + (far ? -4 : 4), bbox.top + 12 * devicePixelRatio);
   }
   ctx.restore();
 }
