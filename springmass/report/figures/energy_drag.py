@@ -20,6 +20,7 @@ from springmass.report.figures.canvas import (
     GREEN,
     SKY,
     VERMILLION,
+    error_bars,
     legend_above,
     moving,
     panels,
@@ -205,4 +206,4 @@ def _draw(panel: Axes, curve: Curve, x: float, y: float, points: str, law: str) 
 
 
 def _draw_points(panel: Axes, x: F8, y: F8, u: F8, label: str | None) -> None:
-    panel.errorbar(x, y, yerr=u, fmt="o", ms=2.6, mew=0, color=BLUE, elinewidth=0.7, label=label)
+    error_bars(panel, x, y, u, label, size=2.6, width=0.7, color=BLUE)
