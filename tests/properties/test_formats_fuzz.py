@@ -65,9 +65,10 @@ def read(name: str, data: bytes, options: dict[str, Any]) -> Recording | str:
 
 
 def printed(data: bytes) -> np.ndarray:
-    """Return every number that stands in a text, sorted, with the decimal mark read either way."""
+    """Return every number that stands in a text, sorted, with the decimal mark read either way and thousands apart."""
     text = decode(data)
     cells = {cell for marks in (r"[;\t\s<>]+", r"[,;\t\s<>]+") for cell in re.split(marks, text)}
+    cells |= {cell.replace(mark, "") for cell in cells for mark in "',."}
     found = np.array([value for cell in cells if (value := parse_number(cell.strip('"\0\x1a'))) is not None])
     return np.unique(found[np.isfinite(found)])  # a NaN among them would spoil the order that is searched
 
