@@ -170,7 +170,7 @@ def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Rows:
         cut,
         table.last_cell,
         decimals,
-        table.values[own + 1 :],
+        tuple(_kept(column, kept) for column in table.values[own + 1 :]),
     )
 
 

@@ -210,3 +210,23 @@ def test_times_that_repeat_by_the_thousand_are_all_flagged() -> None:
     recording = get_format("csv").read("run.csv", f"Time (s),Distance (m)\n{rows}\n".encode())
     assert len(recording.samples) == 6206
     assert [trap.count for trap in recording.traps if trap.code == "duplicate_time"] == [2904]
+
+
+def test_a_row_that_is_left_out_leaves_all_columns() -> None:
+    """Behind a damaged heading time stands after the value, and rows of another run are left out of both."""
+    heading = (
+        b'\xef\xbb\xbf"Time (s) Run #1";\x00\x00osition (mm) Run #1";"Time (s) Run #1";"Poss) Run #'
+        b'1s;i""Potion (\xccmm) Run #1";"Time (s) Run #2";"Position (mition (mm) Run #2"'
+    )
+    rows = (
+        b"0,0000;200,0000;0,0000;200,0000",
+        b"0,0100;210,0000;0,0100;220,0020",
+        b"0,0200;220,0000;0,0200;220,0000",
+        b"0,0300;230,0000;0,0300;230,0000",
+        b"\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b\x8b0;250,0000;0,0500;250,0000",
+        b";;3,0000;1,0000",
+        b";;3,0100;2,0000",
+        b"",
+    )
+    found = get_format("capstone").read("run.csv", b"\r\n".join((heading, *rows)), run="Run #1").samples
+    assert found.t.size == found.distance.size == found.flags.size
