@@ -75,21 +75,22 @@ def write_report(
         raise ValueError("a report needs one run at least, got none")
     directory, names = Path(directory), [run.name for run in runs]
     stems = _stems(names)
-    with whole_folder(directory, _names(stems), PAGE) as folder, _rarely_collected():
+    with whole_folder(directory, _names(stems), PAGE) as folder, _collected_afterwards():
         _write(folder, runs, stems, compared, summary, KINDS if pdf else KINDS[:1])
     detail(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
     return directory / PAGE
 
 
 @contextmanager
-def _rarely_collected() -> Iterator[None]:
-    """Look for cycles of dead objects rarely: figures are many small living ones, a tenth of the time went there."""
-    before = gc.get_threshold()
-    gc.set_threshold(50_000, *before[1:])
+def _collected_afterwards() -> Iterator[None]:
+    """Look for cycles of dead objects at the end: figures are many small living ones, a tenth of the time went so."""
+    before = gc.isenabled()
+    gc.disable()
     try:
         yield
     finally:
-        gc.set_threshold(*before)
+        if before:
+            gc.enable()
 
 
 PAGE = "report.html"

@@ -173,12 +173,18 @@ def panels(
     rows: Sequence[tuple[float, float]], *, width: float = WIDTH, right: float = RIGHT, top: float = 0.12
 ) -> tuple[Figure, list[Axes]]:
     """Make panels under each other, each of a height and a gap above it in inches, left edges aligned."""
+    from matplotlib import rc_context
+
+    from springmass.report.figures.rules import rule
+
     height = BOTTOM + top + sum(sum(row) for row in rows)
     figure = blank(width, height)
     axes, at = [], height - top
     for tall, gap in rows:
         at -= tall + gap
-        panel = figure.add_axes((LEFT / width, at / height, (width - LEFT - right) / width, tall / height))
+        with rc_context({"axes.grid": False, "xtick.bottom": False, "ytick.left": False}):
+            panel = figure.add_axes((LEFT / width, at / height, (width - LEFT - right) / width, tall / height))
+        rule(panel, colour=_SETTINGS["grid.color"], width=_SETTINGS["grid.linewidth"])
         panel.yaxis.set_label_coords(-0.5 / (width - LEFT - right), 0.5)
         axes.append(panel)
     return figure, axes
@@ -233,7 +239,7 @@ def finish_residual(panel: Axes, residual: F8, label: str) -> None:
 def share(above: Axes, below: Axes, start: float, end: float) -> None:
     """Let two panels share their axis of time, numbered beneath the lower one."""
     below.sharex(above)
-    above.tick_params(labelbottom=False)
+    above.xaxis.set_visible(False)
     above.set_xlim(start, end)
 
 

@@ -85,7 +85,7 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
         if long:
             axes[2].axvspan(start, detail, color="#000000", alpha=0.07, lw=0)
         else:
-            axes[1].tick_params(labelbottom=False)
+            axes[1].xaxis.set_visible(False)
         if long:
             legend_row(axes[0], 3)
         else:
