@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -60,7 +61,8 @@ _QUANTITIES = (
 QUANTITIES = {name: quantity for name, quantity, *_ in _QUANTITIES}
 
 _PAGE_UNITS = {"1": "", "degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUPERSCRIPT = str.maketrans("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
+_POWER = re.compile(r"\^\(?([\dn-]+)\)?")
 NOTHING = "-"
 
 
@@ -195,8 +197,16 @@ def pretty_number(value: float | None, digits: int = 2) -> str:
 
 
 def page_unit(unit: str) -> str:
-    """Return a unit as the page writes it."""
-    return _PAGE_UNITS.get(unit, unit)
+    """Return a unit as the page writes it.
+
+    Examples
+    --------
+    >>> page_unit("1/(m s)"), page_unit("rad/s^2"), page_unit("m^(1-n)/s")
+    ('m⁻¹ s⁻¹', 'rad/s²', 'm¹⁻ⁿ/s')
+    """
+    if unit in _PAGE_UNITS:
+        return _PAGE_UNITS[unit]
+    return _POWER.sub(lambda power: power[1].translate(_SUPERSCRIPT), unit)
 
 
 def law_status(damping: Damping, name: str) -> str:

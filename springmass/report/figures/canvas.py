@@ -21,6 +21,7 @@ from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.quantity import SHOWN, in_unit
 from pipeline.track import F8
+from springmass.report.tables import page_unit
 from storage.atomic import write_whole
 
 if TYPE_CHECKING:
@@ -281,11 +282,8 @@ def derivative_label(what: tuple[str, str], form: str, unit: str) -> str:
 
 
 def _in_brackets(unit: str) -> str:
-    shown = re.sub(r"\^(\d)", lambda power: _POWERS[power[1]], unit)
+    shown = page_unit(unit)
     return f"({shown})" if "/" in shown else shown
-
-
-_POWERS = {"2": "²", "3": "³", "4": "⁴"}
 
 
 def model_phase(motion: Oscillation, t: F8) -> tuple[F8, F8]:
