@@ -23,7 +23,8 @@ from springmass.errors import ProgramError
 
 RUN = springmass.sample_data() / "damped_simulated_position.txt"
 
-FRONT = """<!doctype html><title>widget</title><div id="out" style="width: 640px"></div><script type="module">
+FRONT = """<!doctype html><title>widget</title><link rel="stylesheet" href="/widget.css">
+<div id="out" style="width: 640px"></div><script type="module">
 import widget from "/widget.js";
 const listeners = [], asked = [];
 const model = { get: () => 0, on: (name, call) => listeners.push(call), send: (content) => asked.push(content) };
@@ -54,6 +55,7 @@ def served(tmp_path: Path) -> Iterator[str]:
     """Return the address of a page that shows the widget as a notebook's front end does."""
     (tmp_path / "index.html").write_text(FRONT)
     (tmp_path / "widget.js").write_text(script())
+    (tmp_path / "widget.css").write_text(springmass.live(RUN)._css)
 
     class Quiet(http.server.SimpleHTTPRequestHandler):
         def log_message(self, *_: object) -> None:
@@ -86,6 +88,8 @@ def test_a_browser_draws_what_the_kernel_sends(
       let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i + 2] > 120 && d[i + 3] > 0 && d[i] < 80) n++;
       return n; }"""
     page.wait_for_function(f"() => ({dark})() > 500")
+    drawn, below = page.locator("#out canvas").bounding_box(), page.get_by_text("SIMULATED").bounding_box()
+    assert drawn is not None and below is not None and below["y"] >= drawn["y"] + drawn["height"]
     count = np.frombuffer(sent.messages[1][1][0], "<u4", 4)[3]
     assert count == len(springmass.load(RUN).samples)
     widget.stop()

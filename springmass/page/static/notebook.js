@@ -7,12 +7,13 @@ function render({ model, el }) {
   const seconds = model.get("seconds");
   function begin(hello) {
     scale = hello.unit === "m" ? 1e3 : 1;
-    const unit = hello.unit === "m" ? "mm" : hello.unit, kind = hello.simulated ? "SIMULATED" : hello.source;
+    const what = hello.quantity === "length" ? "distance" : hello.quantity, unit = hello.unit === "m" ? "mm" : hello.unit;
+    const kind = hello.simulated ? "SIMULATED" : hello.source;
     said.textContent = `${kind}: ${hello.title || hello.name}`;
     chart = new uPlot({
       width: box.clientWidth || 640, height: 260, legend: { show: false }, scales: { x: { time: false } },
       series: [{}, { stroke: "#0072b2", width: 1, points: { show: false } }],
-      axes: [{ label: "time / s", stroke: "#808080" }, { label: `${hello.quantity} / ${unit}`, stroke: "#808080", size: 60 }],
+      axes: [{ label: "time / s", stroke: "#808080" }, { label: `${what} / ${unit}`, stroke: "#808080", size: 60 }],
     }, [[], []], box);
   }
   function draw() {
