@@ -18,6 +18,7 @@ References
 
 from __future__ import annotations
 
+import functools
 import math
 
 from pipeline.numerics.estimate import Estimate
@@ -115,6 +116,7 @@ def air_viscosity(temperature_c: float, pressure_pa: float = 101325.0) -> float:
     return float(1e-6 * (dilute + dense))
 
 
+@functools.lru_cache(64)
 def speed_of_sound(temperature_c: float, pressure_pa: float = 101325.0, relative_humidity: float = 0.0) -> float:
     """Return the speed of sound in humid air, m/s, by Cramer's equation [2]_ (0 to 30 degC, 75 to 102 kPa).
 

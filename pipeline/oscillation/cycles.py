@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -158,12 +159,20 @@ def _spectral_line(
     values -= centred * (float(centred @ values) / float(centred @ centred))
     threshold = math.log(n / false_alarm)
     # Without a window lines are narrow, and between two bins one may be lost: they must lie closer.
-    for taper, finer in ((np.hanning, 1), (np.ones, 4)):
+    for taper, finer in ((_hann, 1), (np.ones, 4)):
         window = taper(n)
         frequency_hz, power, ratio = _peak(values * window, rate_hz, finer)
         if ratio >= threshold:
             return frequency_hz, 2.0 * math.sqrt(power) / float(window.sum())
     return NoOscillation("no line stands out of the spectrum's noise: there is no oscillation to be seen")
+
+
+@functools.lru_cache(2)
+def _hann(n: int) -> F8:
+    """The window of n samples: the runs of a course are of one length."""
+    window = np.hanning(n)
+    window.setflags(write=False)
+    return window
 
 
 def _bridged(grid: F8, t: F8, y: F8, recorded: F8, hole_s: float) -> F8:

@@ -130,33 +130,42 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     basis = windows.basis(tuning.turning, tuning.decay)
     rough = retune(windows, solve(basis, windows.usable), tuning.angular_frequency, degree=1)
     basis = windows.decaying(basis, rough.decay)
-    solution = _let_go(windows, basis, conditioned.noise_m, params)
-    _rescue(windows, basis, solution, tuning, params)
-    solution, weights = _clip(windows, basis, solution, rough, params)
+    solution, spread = _let_go(windows, basis, conditioned.noise_m, params)
+    _rescue(windows, basis, solution, spread, tuning, params)
+    solution, weights = _clip(windows, basis, solution, spread, rough, params)
     if conditioned.clipped_from_m:
-        level = _typical(_spread(windows, solution), windows, solution)
+        level = _typical(_spread(windows.usable, solution.residual), windows, solution)
         crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
         windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
         weights = np.where(crest, 0.0, weights)
     # Once more in a basis that turns and decays in each window as the record does there.
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
-    solution, weights = _clip(windows, basis, solve(basis, weights), tuning, params)
+    solution = solve(basis, weights)
+    spread = _spread(windows.usable, solution.residual)
+    solution, weights = _clip(windows, basis, solution, spread, tuning, params)
     return _finish(conditioned, windows, solution, weights, tuning)
 
 
-def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> Solution:
-    """Fit every window; those that scatter more than noise does, with weights that let go of clusters of echoes."""
+def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tuple[Solution, F8]:
+    """Fit every window; those that scatter more than noise does, with weights that let go of clusters of echoes.
+
+    Returns the fits and the spreads about them (w,).
+    """
     solution = solve(basis, windows.usable)
-    odd = np.flatnonzero(_spread(windows, solution) > 1.3 * noise_m)
+    spread = _spread(windows.usable, solution.residual)
+    odd = np.flatnonzero(spread > 1.3 * noise_m)
     if odd.size:
         size, least = np.abs(solution.residual[odd]), noise_m + windows.tiny
         solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, HALF, least, params.rounds))
-    return solution
+        spread[odd] = _spread(windows.usable[odd], solution.residual[odd])
+    return solution, spread
 
 
-def _rescue(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, params: Params) -> None:
+def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
     """Fit windows that disagree with their neighbours again, starting from what the neighbours predict.
+
+    Puts what it finds into the solution and its spreads.
 
     Where false echoes hold half of a window its own fit may have settled on them; the amplitude, phase and rest
     position of the windows around it tell which half to believe.
@@ -174,7 +183,7 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, par
     smooth = (pair[0] + 1j * pair[1]) * turning
     expected = np.stack([rest, smooth.real, smooth.imag], axis=1)
     away = np.abs(solution.coefficients - expected).max(axis=1)
-    level = _typical(_spread(windows, solution), windows, solution)
+    level = _typical(spread, windows, solution)
     bound = params.clip_sigmas * level
     before = np.sum((np.abs(solution.residual) <= bound) * windows.usable, axis=1)
     few = before < 0.7 * windows.usable.sum(axis=1)
@@ -188,6 +197,7 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, par
     after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
     better = trial.good & ((after > before[odd]) | ~solution.good[odd])
     solution.put(odd[better], trial.part(better))
+    spread[odd[better]] = _spread(usable[better], trial.residual[better])
 
 
 def _reweighted(basis: F8, usable: F8, size: F8, believed: tuple[float, float], least: float, rounds: int) -> Solution:
@@ -212,9 +222,9 @@ def _neighbours(n: int) -> NDArray[np.int64]:
     return others
 
 
-def _spread(windows: Windows, solution: Solution) -> F8:
+def _spread(usable: F8, residual: F8) -> F8:
     """(w,): standard deviation of each window's samples about its fit, from their median."""
-    return quantile(np.abs(solution.residual), windows.usable, HALF[0]) / HALF[1]
+    return quantile(np.abs(residual), usable, HALF[0]) / HALF[1]
 
 
 def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
@@ -222,9 +232,10 @@ def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
     return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
 
 
-def _clip(windows: Windows, basis: F8, solution: Solution, tuning: Tuning, params: Params) -> tuple[Solution, F8]:
+def _clip(
+    windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params
+) -> tuple[Solution, F8]:
     """Take residuals beyond the clip out and fit again."""
-    spread = _spread(windows, solution)
     level = _typical(spread, windows, solution)
     # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
     size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])

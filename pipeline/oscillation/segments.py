@@ -205,7 +205,8 @@ class _Seen:
         # A break within a window leaves it more scatter than others, or samples that were taken for false echoes.
         count = demodulated.count
         sound = (demodulated.noise <= 1.3 * median(demodulated.noise)) & (count >= 0.95 * np.median(count))
-        around = np.max([np.roll(size, shift) for shift in (-2, -1, 0, 1, 2)], axis=0)
+        wrapped = np.concatenate([size[-2:], size, size[:2]])
+        around = np.max([wrapped[i : i + size.size] for i in range(5)], axis=0)
         return cls(t, plane, logarithm, u, sound, around)
 
     @property

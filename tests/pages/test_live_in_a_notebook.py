@@ -89,7 +89,9 @@ def test_a_browser_draws_what_the_kernel_sends(
       return n; }"""
     page.wait_for_function(f"() => ({dark})() > 500")
     drawn, below = page.locator("#out canvas").bounding_box(), page.get_by_text("SIMULATED").bounding_box()
-    assert drawn is not None and below is not None and below["y"] >= drawn["y"] + drawn["height"]
+    assert drawn is not None
+    assert below is not None
+    assert below["y"] >= drawn["y"] + drawn["height"]
     count = np.frombuffer(sent.messages[1][1][0], "<u4", 4)[3]
     assert count == len(springmass.load(RUN).samples)
     widget.stop()

@@ -28,6 +28,7 @@ References
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -127,13 +128,19 @@ class Drag:
 
     def rescaled(self, theta: F8, length_m: float) -> F8:
         """Return theta with lengths divided by ``length_m``."""
-        powers = {"A0": -1.0, "mu": -1.0, "gamma": 0.0, "beta": 1.0}
-        return np.asarray(theta * length_m ** np.array([powers[name] for name in self.parameters]))
+        return np.asarray(theta * _scales(self.parameters, length_m))
 
     def _full(self, theta: F8) -> tuple[float, float, float, float]:
         """A0, mu, gamma and beta, absent ones zero."""
         values = dict(zip(self.parameters, theta.tolist(), strict=True))
         return values["A0"], values.get("mu", 0.0), values.get("gamma", 0.0), values.get("beta", 0.0)
+
+
+@functools.lru_cache(16)
+def _scales(parameters: tuple[str, ...], length_m: float) -> F8:
+    """Factors on the parameters where lengths are divided by ``length_m``; derivatives ask for the same again."""
+    powers = {"A0": -1.0, "mu": -1.0, "gamma": 0.0, "beta": 1.0}
+    return length_m ** np.array([powers[name] for name in parameters])
 
 
 class _Flow(NamedTuple):
