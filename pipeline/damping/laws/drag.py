@@ -92,10 +92,8 @@ class Drag:
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
         """Return mu + gamma A + beta A^2; nothing where there is no amplitude left."""
-        rate = np.zeros_like(amplitude)
-        for name, value in zip(self.parameters[1:], theta[1:].tolist(), strict=True):
-            rate += value * amplitude ** POWERS[name]
-        return np.asarray(np.where(amplitude > 0.0, rate, 0.0))
+        _, mu, gamma, beta = self._full(theta)
+        return np.asarray(np.where(amplitude > 0.0, mu + amplitude * (gamma + beta * amplitude), 0.0))
 
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return start values (p,) from points in the order of time, at least one.
