@@ -10,9 +10,10 @@ from typing import Literal
 import numpy as np
 
 from pipeline.damping.laws import Law
+from pipeline.damping.laws.drag import Drag
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.numerics.regression import covariance_of
+from pipeline.numerics.regression import covariance_of, solve_weighted
 from pipeline.track import F8
 
 __all__ = ["LawFit", "Minimum", "Rejection", "mean_squared_rate", "minimum_of", "rates_of"]
@@ -172,6 +173,9 @@ def minimum_of(law: Law, t: F8, y: F8, u: F8) -> Minimum:
     -----
     Amplitudes are counted in units of their root mean square, so that no power of a metre disturbs the search.
     """
+    if isinstance(law, Drag) and not law.parameters[1:]:  # without a coefficient it is a mean: nothing to search
+        line = solve_weighted(np.ones((t.size, 1)), y, u)
+        return Minimum(line.values, line.covariance, line.chi2, True, "")
     length = math.sqrt(float(y @ y) / y.size) or 1.0
     at, inverse_u = y / u, length / u
 
