@@ -193,15 +193,15 @@ class Inputs:
         from uncertainties import UFloat
 
         # Ordered by name: sums of floats depend on their order, and a mapping's order on addresses.
-        components = x.error_components() if isinstance(x, UFloat) else {}
-        parts = sorted(components.items(), key=lambda part: (part[0].tag, part[1]))
-        if not any(error for _, error in parts):
+        by_input = x.derivatives if isinstance(x, UFloat) else {}
+        parts = sorted((of.tag, abs(float(slope) * of.std_dev), float(slope)) for of, slope in by_input.items())
+        if not any(error for _, error, _ in parts):
             return Budget(quantity, estimate_of(x, unit), ())
         variances: dict[str, float] = {}
         slopes: dict[str, float] = {}
-        for variable, error in parts:
-            variances[variable.tag] = variances.get(variable.tag, 0.0) + float(error) ** 2
-            slopes[variable.tag] = float(x.derivatives[variable])
+        for name, error, derivative in parts:
+            variances[name] = variances.get(name, 0.0) + error**2
+            slopes[name] = derivative
         whole = sum(variances.values())
         lines = []
         for name, variance in sorted(variances.items(), key=lambda item: (-item[1], item[0])):

@@ -209,7 +209,8 @@ def _period_s(analysis: Analysis) -> float:
 def _thumbnail(t: F8, y: F8, period_s: float) -> str:
     """Return an outline of the record, an SVG path in a box of 120 by 30; empty where nothing was measured."""
     there = np.isfinite(t) & np.isfinite(y)
-    t, y = t[there], y[there]
+    if not there.all():
+        t, y = t[there], y[there]
     if t.size < 2 or not np.ptp(t) > 0:
         return ""
     if np.any(np.diff(t) < 0):
