@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import sys
 import time
@@ -13,7 +14,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from pipeline.dynamics import Equation, Problem, get_integrator
-from pipeline.dynamics.choose import AUTO, choose, cost_ns
+from pipeline.dynamics.choose import AUTO, choose, cost_ns, fit_step
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrators.solve_ivp import LSODA, SolveIvp
 from pipeline.dynamics.integrators.taylor import TAYLOR
@@ -41,6 +42,13 @@ def main() -> int:
         )
     for name, error in errors().items():
         print(f"      {error:.2g}  error over the amplitude of {name}")
+    for scenes in (mixed_scenes(60), spread_scenes(60)):
+        shares = over_cheapest(time.process_time, scenes)
+        middle, worst = np.quantile(shares, (0.5, 1.0))
+        what = "two minutes of mixed drag at 1e-6" if scenes[0][2] == COUNT else "scenes of all kinds and lengths"
+        print(
+            f"      {middle:.2f} (worst {worst:.1f})  choosing and running over the cheapest run, {len(shares)} {what}"
+        )
     off = costs(time.process_time)
     middle = float(np.median(np.concatenate(list(off.values()))))
     for name, ratios in off.items():
@@ -118,6 +126,46 @@ def spread_scenes(number: int) -> list[Scene]:
         count = int(spread(6.0, 600.0) / radians) + 1
         found.append((Problem(equation, 0.05), radians / 8.66, count, spread(1e-9, 1e-2)))
     return found
+
+
+def mixed_scenes(number: int) -> list[Scene]:
+    """Return benches with linear and quadratic drag together, two minutes at 100 Hz, to be solved to 1e-6."""
+    rng = np.random.default_rng(5)
+
+    def between(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    found = []
+    for _ in range(number):
+        gamma, beta, omega = between(1e-4, 0.1), between(1e-2, 10.0), between(3.0, 15.0)
+        equation = Equation.from_laws(omega, gamma_per_s=gamma, beta_per_m_s=beta)
+        found.append((Problem(equation, between(0.01, 0.2)), STEP_S, COUNT, 1e-6))
+    return found
+
+
+def over_cheapest(timer: Callable[[], float], scenes: list[Scene], rounds: int = 3) -> F8:
+    """Return what choosing and running takes over the cheapest run that keeps the tolerance, choosing left out."""
+
+    def least(call: Callable[[], object]) -> float:
+        taken = []
+        for _ in range(rounds):
+            start = timer()
+            call()
+            taken.append(timer() - start)
+        return min(taken)
+
+    found = []
+    for scene in scenes:
+        problem, spacing, count, tolerance = scene
+        choice = choose(*scene)
+        ran = least(functools.partial(choice.run, count))
+        fits = (fit_step(each, problem, spacing, count, tolerance) for each in AUTO)
+        # What is thought to be three times as dear is not the cheapest.
+        others = [fit for fit in fits if fit is not None and fit.cost_ns < 3.0 * choice.cost_ns]
+        cheapest = min([ran, *(least(functools.partial(fit.run, count)) for fit in others)])
+        chose = least(lambda scene=scene: choose(*fresh(scene)))  # type: ignore[misc]
+        found.append((chose + ran) / cheapest)
+    return np.array(found)
 
 
 def fresh(scene: Scene) -> Scene:

@@ -47,6 +47,12 @@ def test_every_ratio_can_be_taken(dynamics):
     assert [len(run.y) for run in runs] == [scene[2] + 1 for scene in dynamics.spread_scenes(60)]
 
 
+def test_what_choosing_costs_can_be_compared_with_the_cheapest(dynamics):
+    """By a timer that counts calls every one takes 1, so that to choose and to run takes 2."""
+    scenes = [*dynamics.mixed_scenes(2), *dynamics.spread_scenes(4)]
+    assert dynamics.over_cheapest(iter(range(10_000)).__next__, scenes, rounds=1).tolist() == [2.0] * 6
+
+
 def test_the_cost_of_a_run_can_be_compared_with_its_time(dynamics):
     """By a timer that counts calls every run takes one, over a cost that is positive."""
     ratios = dynamics.costs(iter(range(10_000)).__next__, number=6, rounds=1)
