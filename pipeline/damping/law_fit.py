@@ -137,7 +137,10 @@ class LawFit:
 
 def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
     """Return a law's -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
-    gradient = least_squares.central_differences(lambda at: law.rate(amplitude, at), theta)
+    if isinstance(law, Drag):  # whose rate is linear in its coefficients
+        gradient = law.powers(amplitude)
+    else:
+        gradient = least_squares.central_differences(lambda at: law.rate(amplitude, at), theta)
     variance = np.einsum("ni,ij,nj->n", gradient, covariance, gradient)
     return law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
