@@ -75,15 +75,15 @@ def write_report(
         raise ValueError("a report needs one run at least, got none")
     directory, names = Path(directory), [run.name for run in runs]
     stems = _stems(names)
-    with whole_folder(directory, _names(stems), PAGE) as folder, _collected_afterwards():
+    with whole_folder(directory, _names(stems), PAGE) as folder, _collected_once_a_run():
         _write(folder, runs, stems, compared, summary, KINDS if pdf else KINDS[:1])
     detail(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
     return directory / PAGE
 
 
 @contextmanager
-def _collected_afterwards() -> Iterator[None]:
-    """Look for cycles of dead objects at the end: figures are many small living ones, a tenth of the time went so."""
+def _collected_once_a_run() -> Iterator[None]:
+    """Look for dead objects in cycles once a run: figures are many living ones, and a tenth of the time went so."""
     before = gc.isenabled()
     gc.disable()
     try:
@@ -125,6 +125,8 @@ def _write(
         if not isinstance(smoothed, str):
             write_whole(folder / f"{stem}motion.csv", motion_csv(run.analysis, smoothed))
         pictures.append({name: files["svg"] for name, files in drawn.items()})
+        del figures
+        gc.collect(0)  # the youngest alone: what was made for this run
     results = [run.result for run in runs]
     content = plain(summary if summary is not None else results[0] if len(results) == 1 else results)
     text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
