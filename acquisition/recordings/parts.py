@@ -121,6 +121,8 @@ def members(path: str, data: bytes, most_bytes: int = MOST_BYTES) -> Iterator[tu
 
 
 def _wanted(listed: Sequence[zipfile.ZipInfo]) -> list[zipfile.ZipInfo]:
+    if not all(each.filename for each in listed):
+        raise zipfile.BadZipFile("a file in it has no name")
     return [
         each
         for each in listed

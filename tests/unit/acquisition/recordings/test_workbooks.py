@@ -123,6 +123,14 @@ def test_an_encrypted_archive_is_refused_in_one_line(writer: ModuleType) -> None
         ZIP.read("run.zip", bytes(data))
 
 
+def test_a_file_without_a_name_is_damage(writer: ModuleType) -> None:
+    """An archive whose directory starts a name with a zero byte is refused in one line."""
+    data = writer.packed({"run.csv": b"t (s),y (m)\n0,1\n1,2\n2,3\n"})
+    at = data.rindex(b"run.csv")
+    with pytest.raises(FormatError, match=r"cannot be unpacked \(a file in it has no name\)"):
+        ZIP.read("run.zip", data[:at] + b"\0" + data[at + 1 :])
+
+
 def test_an_archive_of_several_runs_asks_which(writer: ModuleType) -> None:
     """Pictures are passed over and named; each file is read as what it is."""
     csv, picture = b"Time (s),Position (m)\n0.0,0.1\n0.1,0.2\n0.2,0.4\n0.3,0.1\n", b"\x89PNG" + bytes(99)
