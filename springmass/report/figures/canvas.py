@@ -176,18 +176,18 @@ def panels(
     """Make panels under each other, each of a height and a gap above it in inches, left edges aligned."""
     from matplotlib import rc_context
 
-    from springmass.report.figures.rules import rule
+    from springmass.report.figures.grid import draw_grid
 
     height = BOTTOM + top + sum(sum(row) for row in rows)
     figure = blank(width, height)
     axes, at = [], height - top
-    for tall, gap in rows:
-        at -= tall + gap
-        with rc_context({"axes.grid": False, "xtick.bottom": False, "ytick.left": False}):
+    with rc_context({"axes.grid": False, "xtick.bottom": False, "ytick.left": False}):
+        for tall, gap in rows:
+            at -= tall + gap
             panel = figure.add_axes((LEFT / width, at / height, (width - LEFT - right) / width, tall / height))
-        rule(panel, colour=_SETTINGS["grid.color"], width=_SETTINGS["grid.linewidth"])
-        panel.yaxis.set_label_coords(-0.5 / (width - LEFT - right), 0.5)
-        axes.append(panel)
+            draw_grid(panel, colour=_SETTINGS["grid.color"], width=_SETTINGS["grid.linewidth"])
+            panel.yaxis.set_label_coords(-0.5 / (width - LEFT - right), 0.5)
+            axes.append(panel)
     return figure, axes
 
 

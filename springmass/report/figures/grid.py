@@ -1,4 +1,4 @@
-"""Lines across a panel at the numbers of its axes, all of them one path.
+"""The grid of a panel, lines across it at the numbers of its axes: all of them one path.
 
 matplotlib's grid and marks are artists of their own, three a number: drawing them took a fifth of a report's time.
 """
@@ -12,15 +12,15 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.path import Path
 from matplotlib.transforms import IdentityTransform
 
-__all__ = ["rule"]
+__all__ = ["draw_grid"]
 
 
-def rule(panel: Axes, *, colour: str, width: float) -> None:
+def draw_grid(panel: Axes, *, colour: str, width: float) -> None:
     """Draw lines at a panel's major numbers below all else, wherever those are when it is drawn."""
-    panel.add_artist(_Rules(colour, width))
+    panel.add_artist(_Grid(colour, width))
 
 
-class _Rules(Artist):
+class _Grid(Artist):
     """The lines, laid anew at each drawing: where an axis has its numbers shows only then."""
 
     zorder = 0.4
