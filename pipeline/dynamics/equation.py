@@ -65,6 +65,11 @@ class Equation:
         """Whether spring and viscous drag are all there is."""
         return not (self.drag_per_m or self.friction_m_per_s2 or self.cubic_per_m2_s2)
 
+    @property
+    def is_kinked(self) -> bool:
+        """Whether a force has a kink where the velocity is 0."""
+        return self.drag_per_m > 0.0 or self.friction_m_per_s2 > 0.0
+
     def spring(self, y: Real) -> Real:
         """Return the spring's pull per mass at displacement y, m/s^2, positive towards positive y."""
         pull = self.angular_frequency_per_s**2 * y

@@ -162,7 +162,7 @@ def test_uncertainties_of_the_scene_make_a_band(cli: Callable, tmp_path: Path) -
     assert "by linear propagation of the uncertainties of start_displacement_m" in done.err
     band = done.results[0]["band"]
     assert band["quantities"] == ["start_displacement_m"]
-    assert (band["members"], band["seed"], band["linear"]) == (1000, 0, True)
+    assert (band["members"], band["seed"], band["linear"]) == (2500, 0, True)
     assert band["displacement_half_width_68_m"] == pytest.approx(1e-3, rel=0.02)
     assert band["amplitude_half_width_95_m"] == pytest.approx(1.96e-3, rel=0.02)
     folder = tmp_path / "vague.simulated"

@@ -13,7 +13,6 @@ from operator import mul
 
 from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.prediction.left_out import Piece
-from pipeline.dynamics.prediction.pilot import is_kinked
 from pipeline.dynamics.problem import Problem
 
 __all__ = ["fastest", "local_error", "pieces", "polynomial", "terms_of"]
@@ -57,7 +56,7 @@ def pieces(problem: Problem, local: float, longest: float, *, spare: bool = Fals
     """
     eq = problem.equation
     y, v = problem.displacement_m, problem.velocity_m_per_s
-    fast, order, kinked = fastest(problem), terms_of(local, longest), is_kinked(eq)
+    fast, order, kinked = fastest(problem), terms_of(local, longest), eq.is_kinked
     lacks = (0.0, 0.0)
     while True:
         way = eq.direction(y, v) if kinked else 1

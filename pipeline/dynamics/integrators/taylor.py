@@ -26,7 +26,7 @@ from pipeline.dynamics.integrator import Integrator, demand_times
 from pipeline.dynamics.integrators.series import fastest, local_error, pieces, terms_of
 from pipeline.dynamics.prediction.envelope import frequency
 from pipeline.dynamics.prediction.left_out import Piece, left_out
-from pipeline.dynamics.prediction.pilot import bounded, in_own_units, is_kinked
+from pipeline.dynamics.prediction.pilot import bounded, in_own_units
 from pipeline.dynamics.prediction.rounding import rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
@@ -75,7 +75,7 @@ class Taylor(Integrator):
         moving = min(seconds, 1.1 * _held(problem))
         turns = moving * float(frequency(eq, np.array([problem.amplitude_m()]))[0]) / math.pi
         longest = (fastest(problem) * stiff + eq.gamma_per_s) * moving / self.longest
-        if longest + (turns if is_kinked(eq) else 0.0) > MOST_STEPS:
+        if longest + (turns if eq.is_kinked else 0.0) > MOST_STEPS:
             return math.inf
         return max(self.tolerance, rounding_error(problem, seconds))
 
@@ -91,7 +91,7 @@ class Taylor(Integrator):
         bound = self.bound(problem, step_s, seconds)
         if math.isinf(bound) or self.refusal(problem):
             return math.inf
-        return min(bound, bounded(lambda: _left_out(self, in_own_units(problem), seconds)[of_velocity]))
+        return min(bound, bounded(lambda: _left_out(self, in_own_units(problem), step_s, seconds)[of_velocity]))
 
     def order_of(self, problem: Problem, seconds: float) -> int:
         """Return the number of terms of its series."""
@@ -107,10 +107,10 @@ TAYLOR = Taylor()
 
 
 @functools.lru_cache(maxsize=8)
-def _left_out(method: Taylor, problem: Problem, seconds: float) -> tuple[float, float]:
+def _left_out(method: Taylor, problem: Problem, spacing_s: float, seconds: float) -> tuple[float, float]:
     """Return the errors of displacement and velocity; remembered, as they come together."""
     local = local_error(problem, seconds, method.tolerance)
-    return left_out(problem, lambda each: pieces(each, local, method.longest, spare=True), seconds)
+    return left_out(problem, lambda each: pieces(each, local, method.longest, spare=True), spacing_s, seconds)
 
 
 def _held(problem: Problem) -> float:

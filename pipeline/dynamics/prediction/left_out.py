@@ -52,7 +52,7 @@ Looks = Callable[[Problem], Iterator[Piece]]
 """A problem to the steps of its run, each with what it lacks."""
 
 
-def left_out(problem: Problem, looks: Looks, seconds: float) -> tuple[float, float]:
+def left_out(problem: Problem, looks: Looks, spacing_s: float, seconds: float) -> tuple[float, float]:
     """Return the errors that the terms left out, and the rounding, make of a whole run.
 
     Parameters
@@ -61,7 +61,8 @@ def left_out(problem: Problem, looks: Looks, seconds: float) -> tuple[float, flo
         With its own amplitude as the unit.
     looks : callable
         In the steps of the run that is planned.
-    seconds : float
+    spacing_s, seconds : float
+        The first time that is kept, and the last.
 
     Returns
     -------
@@ -77,7 +78,7 @@ def left_out(problem: Problem, looks: Looks, seconds: float) -> tuple[float, flo
     if start == 0.0:
         return 0.0, 0.0
     since = slow_from(problem, seconds)
-    displacement, velocity = (each / start for each in _lacking(problem, looks, since)[0])
+    displacement, velocity = (each / start for each in _lacking(problem, looks, since, spacing_s)[0])
 
     def rate(level: Problem) -> tuple[float, float]:
         cycle = 2.0 * math.pi / float(frequency(eq, np.array([level.displacement_m]))[0])
@@ -91,8 +92,10 @@ def left_out(problem: Problem, looks: Looks, seconds: float) -> tuple[float, flo
     return displacement + rounding, velocity + rounding
 
 
-def _lacking(problem: Problem, looks: Looks, seconds: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the largest errors of displacement and of velocity per radian, and what a second adds.
+def _lacking(
+    problem: Problem, looks: Looks, seconds: float, first: float = 0.0
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the largest errors of displacement and of velocity per radian from a time on, and what a second adds.
 
     Along the motion an error is one of time, across it one of size. Another size is another pace under a cubic spring.
     """
@@ -102,9 +105,9 @@ def _lacking(problem: Problem, looks: Looks, seconds: float) -> tuple[tuple[floa
     stiff = omega**2 + eq.cubic_per_m2_s2 * reach**2
     steps = itertools.islice(looks(problem), MOST_LOOKS)
     if eq.drag_per_m * reach > STRONG:
-        return _carried(eq, problem.displacement_m, steps, seconds), (0.0, 0.0)
+        return _carried(eq, problem.displacement_m, steps, seconds, first), (0.0, 0.0)
     time = of_size = of_time = 0.0
-    most = [0.0, 0.0]
+    most = 0.0, 0.0
     for piece in steps:
         if piece.long == math.inf:
             break
@@ -117,26 +120,27 @@ def _lacking(problem: Problem, looks: Looks, seconds: float) -> tuple[tuple[floa
         of_size += (v * dv + pull * dy) / (reach * reach * stiff)
         time += piece.long
         size = abs(of_size) * max(abs(y), abs(v) / omega)
-        most[0] = max(most[0], abs(of_time * v) + size)
-        most[1] = max(most[1], abs(of_time * pull / omega) + size)
+        before = most if time > first else (0.0, 0.0)
+        most = max(before[0], abs(of_time * v) + size), max(before[1], abs(of_time * pull / omega) + size)
         if time >= seconds * (1.0 - 1e-9):
             break
-    return (most[0], most[1]), (of_size / time if time else 0.0, of_time * pace / time if time else 0.0)
+    return most, (of_size / time if time else 0.0, of_time * pace / time if time else 0.0)
 
 
-def _carried(eq: Equation, y: float, steps: Iterator[Piece], seconds: float) -> tuple[float, float]:
-    """Return the largest errors where drag outweighs the spring and damps them too, each step's by its own drag."""
+def _carried(eq: Equation, y: float, steps: Iterator[Piece], seconds: float, first: float) -> tuple[float, float]:
+    """Return the largest errors from a time on where drag outweighs the spring and damps them too, by its own drag."""
     omega = eq.angular_frequency_per_s
     off_y = off_v = time = 0.0
-    most = [0.0, 0.0]
+    most = 0.0, 0.0
     for piece in steps:
         if piece.long == math.inf:
             break
         drag = eq.gamma_per_s + eq.drag_per_m * abs(piece.end[0] - y) / piece.long
         a, b, c, d = flow(omega, drag, piece.long)
         off_y, off_v = a * off_y + b * off_v + piece.lacks[0], c * off_y + d * off_v + piece.lacks[1]
-        most = [max(most[0], abs(off_y)), max(most[1], abs(off_v) / omega)]
         y, time = piece.end[0], time + piece.long
+        before = most if time > first else (0.0, 0.0)
+        most = max(before[0], abs(off_y)), max(before[1], abs(off_v) / omega)
         if time >= seconds:
             break
-    return most[0], most[1]
+    return most

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.dynamics.amplitude import stopping_time
-from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
@@ -26,7 +25,6 @@ __all__ = [
     "compared",
     "fine_step",
     "in_own_units",
-    "is_kinked",
     "predicted_by_pilot",
     "resonance",
     "scatter",
@@ -34,6 +32,7 @@ __all__ = [
 
 FINE = 0.25  # radians a step, of the spring, of drag and of quadratic drag together: there the power law holds
 FAR = 0.1  # of the amplitude: an error beyond it follows the power law no more
+LOOKS = 6  # times at which a resonance is looked at, each twice the one before
 PLAIN_SHARES = (1.0, 0.9, 0.5)  # of a pilot's step: where in it a bob turns sets the error of a method that is not told
 STIFF = 10.0  # drag over spring beyond which a pilot cannot have steps that fine all along
 MOST_STIFF_STEPS = 20_000
@@ -97,7 +96,7 @@ def predicted_by_pilot(
     start, omega = problem.amplitude_m(), problem.equation.angular_frequency_per_s
     fine = fine_step(problem)
     pilot = max(step_s, min(fine, seconds / 4.0)) if integrator.order else min(fine, seconds / 4.0)
-    kinked, plain = is_kinked(problem.equation), integrator is not solver and integrator.order > 0
+    kinked, plain = problem.equation.is_kinked, integrator is not solver and integrator.order > 0
     # The kink of drag at a turning point keeps a high order from what its power promises.
     order = min(integrator.order, 3) if kinked else integrator.order
     if plain and omega * pilot * MOST_STIFF_STEPS < 2.0 * math.pi:
@@ -141,31 +140,40 @@ def scatter(problem: Problem, step_s: float, seconds: float) -> float:
     return float(force * step_s * math.sqrt(turns))
 
 
-def is_kinked(eq: Equation) -> bool:
-    """Whether a force of the equation has a kink where the velocity is 0."""
-    return bool(eq.drag_per_m > 0.0 or eq.friction_m_per_s2 > 0.0)
-
-
 def resonance(problem: Problem, step_s: float, seconds: float) -> float:
     """Return the most that quadratic drag in kicks adds up where N steps make a cycle, N next to an even number.
 
     The kicks see the harmonics of |sin| sin, 8 / (pi k (k^2 - 4)) for odd k. Those next to N act as the first one does:
-    they turn the phase by up to 8 / (pi N^3) of the drag, for as long as they stay in step. Next to 2 N and so on too.
-    Where turning points are located, with friction, there is no such harmonic.
+    they turn the phase by up to 8 / (pi N^3) of the drag, for as long as they stay in step and the drag lasts. Next to
+    2 N and so on too. From a start at rest they begin as a sine of how far they are out of step, of which nothing comes
+    where N is even. A cubic spring changes N as the amplitude falls, by an even number too: there they are in step for
+    a time that goes as the root of how fast N changes. Where turning points are located, with friction, there is no
+    such harmonic.
     """
     eq, start = problem.equation, problem.amplitude_m()
-    pace = eq.angular_frequency_per_s**2 - eq.gamma_per_s**2 + 0.75 * eq.cubic_per_m2_s2 * start * start
-    if eq.friction_m_per_s2 or not eq.drag_per_m or pace <= 0.0:
+    square = eq.angular_frequency_per_s**2 - eq.gamma_per_s**2
+    bend = 0.75 * eq.cubic_per_m2_s2 * start * start
+    if eq.friction_m_per_s2 or not eq.drag_per_m or square <= 0.0 or square + bend <= 0.0:
         return 0.0
-    pace = math.sqrt(pace)
-    gamma, beta, _ = eq.laws()
-    longest = pace * min(seconds, 1.0 / (gamma + beta * start))
-    total = 0.0
+    pace, last = math.sqrt(square + bend), math.sqrt(square)
+    fall = eq.gamma_per_s + eq.laws()[1] * start
+    from_rest = problem.velocity_m_per_s == 0.0 and not bend
+    times = [min(seconds, 0.1 * 2.0**k / fall) for k in range(LOOKS)]
+    turned = [0.0] * LOOKS
     for multiple in (1, 2, 3):
-        steps = multiple * 2.0 * math.pi / (pace * step_s)
-        off = abs(steps - 2.0 * round(0.5 * steps))
-        total += 8.0 / (math.pi * steps**3) * min(longest, 2.0 / off if off else math.inf)
-    return float(total * eq.drag_per_m * start)
+        steps, later = (multiple * 2.0 * math.pi / (each * step_s) for each in (pace, last))
+        size = 8.0 / (math.pi * steps**3)
+        even = 2.0 * round(0.5 * steps)
+        off = max(abs(steps - even), 1e-12)
+        slips = 2.0 * fall / pace * abs(steps - later)
+        passing = math.sqrt(2.0 * math.pi / slips) if slips else math.inf
+        longest = passing if (steps - even) * (later - even) <= 0.0 else min(passing, 2.0 / off)
+        for k, t in enumerate(times):
+            lasting = (1.0 - math.cos(min(off * pace * t, math.pi))) / off if from_rest else min(pace * t, longest)
+            turned[k] += size * lasting
+    # What is left of the amplitude then, and the root of it for the drag on the way.
+    most = max(each / (1.0 + fall * t) ** 1.5 for each, t in zip(turned, times, strict=True))
+    return float(most * eq.drag_per_m * start)
 
 
 def fine_step(problem: Problem) -> float:

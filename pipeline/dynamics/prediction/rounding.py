@@ -15,6 +15,7 @@ __all__ = ["expected_rounding", "rounding_error", "sheared_rounding", "stepped_r
 EPS = float(np.finfo(np.float64).eps)
 A_STEP = 0.08  # of the relative rounding: what a step adds whose coefficients are rounded
 A_SHEAR = 0.1  # of the relative rounding, times the root of the phase: what scatters in the amplitude
+A_SHEAR_AT_TURNS = 0.006  # the same times the phase: what repeats where a step ends at every turning point
 TYPICAL = 0.3  # of a product's largest rounding: what it has on the average
 
 
@@ -74,11 +75,15 @@ def stepped_rounding(problem: Problem, seconds: float, step_s: float) -> float:
 
 
 def sheared_rounding(problem: Problem, seconds: float) -> float:
-    """Return what rounding that scatters in the amplitude adds to the phase under a cubic spring, as another pace."""
+    """Return what rounding of the amplitude adds to the phase under a cubic spring, as another pace.
+
+    It scatters from step to step. Where steps begin anew at each turning point half a cycle is rounded like the next.
+    """
     eq, start = problem.equation, problem.amplitude_m()
     if not eq.cubic_per_m2_s2:
         return 0.0
     left = Envelope.of(problem, seconds)
     pace, shear = pace_and_shear(eq, left.amplitude)
-    drift = float(np.max(np.abs(shear) * (pace * left.t) ** 1.5 * left.amplitude))
-    return EPS * A_SHEAR * drift / start
+    radians = pace * left.t
+    off = A_SHEAR_AT_TURNS * radians if eq.is_kinked else A_SHEAR * np.sqrt(radians)
+    return EPS * float(np.max(np.abs(shear) * off * radians * left.amplitude)) / start

@@ -14,7 +14,6 @@ from pipeline.dynamics.prediction.pilot import (
     compared,
     fine_step,
     in_own_units,
-    is_kinked,
     predicted_by_pilot,
     resonance,
     scatter,
@@ -73,7 +72,7 @@ def predicted(
     at, own, unscaled = _added_up(
         integrator, solver, problem, step_s if pilot > fine else 0.0, seconds, since, of_velocity
     )
-    order = min(integrator.order, 3) if is_kinked(problem.equation) else integrator.order
+    order = min(integrator.order, 3) if problem.equation.is_kinked else integrator.order
     power = (step_s / own) ** order if order else 1.0
     if unscaled * max(power, 1.0) > FAR:  # no longer in proportion
         rates = Rates(at.amplitude, at.of_amplitude * power, at.of_phase * power)
