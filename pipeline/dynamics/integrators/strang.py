@@ -27,7 +27,7 @@ from pipeline.dynamics.equation import Equation, Real
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrator import Integrator, demand_times, kept, with_start
 from pipeline.dynamics.integrators.turning import Friction
-from pipeline.dynamics.prediction.leading import STRANG_TERMS, leading, strength
+from pipeline.dynamics.prediction.leading import STRANG_TERMS, is_weak, leading
 from pipeline.dynamics.prediction.pilot import bounded, in_own_units, resonance
 from pipeline.dynamics.prediction.rounding import stepped_rounding
 from pipeline.dynamics.prediction.stretch import predicted
@@ -84,15 +84,16 @@ class Strang(Integrator):
         eq = problem.equation
         if not eq.friction_m_per_s2:
             states = _kicked if eq.cubic_per_m2_s2 else _dragged
-            share = _correction_share(problem, step_s)
-            begun = _corrected(problem, step_s, share) if share else problem
+            # Beyond that the correction is no better than what it corrects: there it ends, by a jump as small as these.
+            corrects = is_weak(problem) and eq.angular_frequency_per_s * step_s < SHORT_STEP
+            begun = _corrected(problem, step_s) if corrects else problem
             y, v = kept(states(begun, step_s, every), steps // every, 1).T
             # What is kept is half an oscillator short of the end of its step.
             a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * step_s)
             y, v = a * y + b * v, c * y + d * v
-            if share:
+            if corrects:
                 of_y, of_v = _correction(eq, step_s, y, v)
-                y, v = y + share * of_y, v + share * of_v
+                y, v = y + of_y, v + of_v
             return with_start(problem, y, v)
         # Within a step a bob may turn once: no step longer than a radian.
         radians = eq.angular_frequency_per_s * step_s
@@ -109,21 +110,11 @@ class Strang(Integrator):
         return with_start(problem, y, v)
 
 
-def _correction_share(problem: Problem, h: float) -> float:
-    """How much of the correction is made: all where it helps, nothing where drag is strong or a step is long.
-
-    Between, it falls without a jump, so that a small change of a problem is a small change of its motion.
-    """
-    weak = min(max(1.5 - 0.5 * strength(problem), 0.0), 1.0)
-    short = min(max(2.0 - problem.equation.angular_frequency_per_s * h / SHORT_STEP, 0.0), 1.0)
-    return weak * short
-
-
-def _corrected(problem: Problem, h: float, share: float) -> Problem:
+def _corrected(problem: Problem, h: float) -> Problem:
     """The start whose correction is the problem's own."""
     y, v = problem.displacement_m, problem.velocity_m_per_s
     of_y, of_v = _correction(problem.equation, h, y, v)
-    return Problem(problem.equation, y - share * of_y, v - share * of_v)
+    return Problem(problem.equation, y - of_y, v - of_v)
 
 
 def _correction(eq: Equation, h: float, y: Real, v: Real) -> tuple[Real, Real]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from pipeline.dynamics.problem import Problem
 
-__all__ = ["AVERAGED_TERMS", "STRANG_TERMS", "Terms", "leading", "strength"]
+__all__ = ["AVERAGED_TERMS", "STRANG_TERMS", "Terms", "is_weak", "leading"]
 
 WEAK = 0.03  # of each small number, up to which their products tell
 SHORTEST, LONGEST = 12.0, 1e9  # radians of a run
@@ -49,9 +49,9 @@ STRANG_TERMS = Terms((0.0, 0.013), (0.0, 0.036, 0.075), ((0.0, 0.013), (0.0, 0.0
 AVERAGED_TERMS = Terms((-0.2664, -0.0059), (0.1275, -0.0107, 0.072), ((0.1, 0.12), (0.12, 0.2)))
 
 
-def strength(problem: Problem) -> float:
-    """Return the largest of the small numbers over what is weak: up to 1 their products tell."""
-    return max(abs(each) for each in _small(problem)) / WEAK
+def is_weak(problem: Problem) -> bool:
+    """Whether viscous drag, quadratic drag and the cubic term change little within a cycle."""
+    return max(abs(each) for each in _small(problem)) <= WEAK
 
 
 def _small(problem: Problem) -> tuple[float, float, float]:
@@ -81,7 +81,7 @@ def leading(
     omega = eq.angular_frequency_per_s
     g, q, s = _small(problem)
     end = omega * seconds
-    if eq.friction_m_per_s2 or strength(problem) > 1.0 or not SHORTEST < end < LONGEST:
+    if eq.friction_m_per_s2 or not is_weak(problem) or not SHORTEST < end < LONGEST:
         return None
     fall = eq.laws()[1] * start / omega
     time = 1.0 / max(g + fall, 1e-12)
