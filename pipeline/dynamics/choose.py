@@ -133,8 +133,11 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     room = tolerance - left_out
     best: Choice | None = None
     # First those whose error is known without a pilot, then by what each costs at least: the dear need no prediction.
-    for integrator in sorted(AUTO, key=lambda each: (each not in KNOWN, cost_ns(each, reduced, 1, count, seconds))):
+    least = {each: cost_ns(each, reduced, 1, count, seconds) for each in AUTO}
+    for integrator in sorted(AUTO, key=lambda each: (each not in KNOWN, least[each])):
         most = math.inf if best is None else best.cost_ns
+        if integrator not in KNOWN and least[integrator] >= most:
+            continue
         safety = SAFETY_UNLOCATED if integrator is RK4 else SAFETY
         if integrator is RK4 and not _may_pay(reduced, spacing_s, count, room / safety, most):
             continue

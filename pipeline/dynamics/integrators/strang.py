@@ -39,6 +39,7 @@ __all__ = ["STRANG", "Strang"]
 
 
 LONGEST_WITH_FRICTION = 1e6  # radians a step
+LEAST_DRAG = 1e-30  # of a step, over the inverse velocity: below it nothing changes, and units of it may leave numbers
 SHORT_STEP = 0.5  # radians up to which the leading term of the error tells
 
 
@@ -83,11 +84,10 @@ class Strang(Integrator):
         """Split every step; with friction, from turning point to turning point."""
         eq = problem.equation
         if not eq.friction_m_per_s2:
-            states = _kicked if eq.cubic_per_m2_s2 else _dragged
             # Beyond that the correction is no better than what it corrects: there it ends, by a jump as small as these.
             corrects = is_weak(problem) and eq.angular_frequency_per_s * step_s < SHORT_STEP
             begun = _corrected(problem, step_s) if corrects else problem
-            y, v = kept(states(begun, step_s, every), steps // every, 1).T
+            y, v = _states(begun, step_s, steps, every)
             # What is kept is half an oscillator short of the end of its step.
             a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * step_s)
             y, v = a * y + b * v, c * y + d * v
@@ -129,32 +129,41 @@ def _correction(eq: Equation, h: float, y: Real, v: Real) -> tuple[Real, Real]:
     return share * kick, share * turned
 
 
-def _dragged(problem: Problem, h: float, every: int) -> Iterator[float]:
-    """Yield displacement and velocity in turn, between the drag of a step and the half oscillator that ends it.
+def _states(problem: Problem, h: float, steps: int, every: int) -> tuple[F8, F8]:
+    """Return displacements and velocities (n,) between the drag of every so manyth step and the end of that step.
 
-    The half steps of neighbours are joined into whole ones: half the time. Of so many steps the last is told.
+    The half steps of neighbours are joined into whole ones: half the time.
     """
-    eq = problem.equation
+    slow = problem.equation.drag_per_m * h
+    if problem.equation.cubic_per_m2_s2 or slow < LEAST_DRAG:
+        y, v = kept(_kicked(problem, h, every), steps // every, 1).T
+        return y, v
+    y, v = kept(_dragged(problem, h, every, slow), steps // every, 1).T
+    return y, v / slow
+
+
+def _dragged(problem: Problem, h: float, every: int, slow: float) -> Iterator[float]:
+    """Yield displacement and velocity in turn, the latter in units of that which drag halves in a step."""
     y, v, a, b, c, d = _begun(problem, h)
-    slow, between = eq.drag_per_m * h, range(every - 1)
+    v, b, c, between = v * slow, b / slow, c * slow, range(every - 1)
     if not between:
         while True:
-            v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+            v = v / (1.0 + v) if v > 0.0 else v / (1.0 - v)
             yield y
             yield v
             y, v = a * y + b * v, c * y + d * v
     while True:
         for _ in between:
-            v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+            v = v / (1.0 + v) if v > 0.0 else v / (1.0 - v)
             y, v = a * y + b * v, c * y + d * v
-        v = v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)
+        v = v / (1.0 + v) if v > 0.0 else v / (1.0 - v)
         yield y
         yield v
         y, v = a * y + b * v, c * y + d * v
 
 
 def _kicked(problem: Problem, h: float, every: int) -> Iterator[float]:
-    """Yield the same of a cubic spring, whose force is a kick before and after the drag."""
+    """Yield displacement and velocity of a cubic spring, whose force is a kick before and after the drag."""
     eq = problem.equation
     y, v, a, b, c, d = _begun(problem, h)
     slow, half, between = eq.drag_per_m * h, 0.5 * h * eq.cubic_per_m2_s2, range(every - 1)

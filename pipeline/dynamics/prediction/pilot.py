@@ -140,6 +140,7 @@ def scatter(problem: Problem, step_s: float, seconds: float) -> float:
     return float(force * step_s * math.sqrt(turns))
 
 
+@functools.lru_cache(maxsize=8)
 def resonance(problem: Problem, step_s: float, seconds: float) -> float:
     """Return the most that quadratic drag in kicks adds up where N steps make a cycle, N next to an even number.
 
