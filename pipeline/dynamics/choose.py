@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -232,6 +233,7 @@ def _least_parts(integrator: Integrator, problem: Problem, spacing_s: float) -> 
     return max(1, math.ceil(min(spacing_s / limit, MOST_PARTS + 1.0)))
 
 
+@functools.lru_cache(maxsize=32)
 def cost_ns(integrator: Integrator, problem: Problem, parts: int, count: int, seconds: float) -> float:
     """Return what a run of one trajectory costs, ns, on the machine that the figures were taken on.
 

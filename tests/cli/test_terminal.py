@@ -40,7 +40,9 @@ def test_several_runs_on_a_terminal_share_a_table_and_leave_no_bar_behind(
     assert terminal.screen.wrapped == 0
 
 
-@pytest.mark.parametrize("environment", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "ascii"}])
+@pytest.mark.parametrize(
+    "environment", [{"TERM": "dumb"}, pytest.param({"PYTHONIOENCODING": "ascii"}, marks=pytest.mark.trials)]
+)
 def test_a_poor_terminal_gets_ascii(
     screen: ModuleType, data: Path, tmp_path: Path, environment: dict[str, str]
 ) -> None:
@@ -66,7 +68,7 @@ displacement_m = 0.05
 """
 
 
-@pytest.mark.parametrize("columns", [80, 50])
+@pytest.mark.parametrize("columns", [80, pytest.param(50, marks=pytest.mark.trials)])
 def test_a_recording_stays_in_its_lines_and_takes_marks(screen: ModuleType, tmp_path: Path, columns: int) -> None:
     """Progress, trace and keys are rewritten in place; space marks at once, a word with Enter, Ctrl-C stops."""
     (tmp_path / "bench.toml").write_text(SCENE)

@@ -29,7 +29,7 @@ from pipeline.dynamics.integrator import Integrator, demand_times, kept, with_st
 from pipeline.dynamics.integrators.turning import Friction
 from pipeline.dynamics.prediction.leading import STRANG_TERMS, is_weak, leading
 from pipeline.dynamics.prediction.pilot import bounded, in_own_units, resonance
-from pipeline.dynamics.prediction.rounding import stepped_rounding
+from pipeline.dynamics.prediction.rounding import rounding_error, stepped_rounding
 from pipeline.dynamics.prediction.stretch import predicted
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
@@ -40,6 +40,7 @@ __all__ = ["STRANG", "Strang"]
 
 LONGEST_WITH_FRICTION = 1e6  # radians a step
 LEAST_DRAG = 1e-30  # of a step, over the inverse velocity: below it nothing changes, and units of it may leave numbers
+SMALL = 1e-3  # of an error
 SHORT_STEP = 0.5  # radians up to which the leading term of the error tells
 
 
@@ -69,15 +70,19 @@ class Strang(Integrator):
 
     def _predicted(self, problem: Problem, step_s: float, seconds: float, *, of_velocity: bool) -> float:
         demand_times(step_s, seconds)
-        rounding = stepped_rounding(in_own_units(problem), seconds, step_s)
-        if not (problem.equation.drag_per_m or problem.equation.cubic_per_m2_s2):
-            return rounding  # between turning points its flow is exact
         problem = in_own_units(problem)
         radians = problem.equation.angular_frequency_per_s * step_s
-        if radians < SHORT_STEP:
+        acts = problem.equation.drag_per_m or problem.equation.cubic_per_m2_s2
+        if acts and radians < SHORT_STEP:
             known = leading(STRANG_TERMS, problem, radians, seconds, of_velocity=of_velocity)
             if known is not None:
-                return rounding + known + resonance(problem, step_s, seconds)
+                known += resonance(problem, step_s, seconds)
+                most = rounding_error(problem, seconds, seconds / step_s)
+                # Rounding that is nothing beside it need not be told closely.
+                return known + (most if most < SMALL * known else stepped_rounding(problem, seconds, step_s))
+        rounding = stepped_rounding(problem, seconds, step_s)
+        if not acts:
+            return rounding  # between turning points its flow is exact
         return rounding + bounded(lambda: predicted(self, self, problem, step_s, seconds, of_velocity=of_velocity))
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
