@@ -10,7 +10,6 @@ from typing import Literal
 import numpy as np
 
 from pipeline.damping.laws import Law
-from pipeline.damping.laws.drag import Drag
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import covariance_of, solve_weighted
@@ -137,10 +136,7 @@ class LawFit:
 
 def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
     """Return a law's -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
-    if isinstance(law, Drag):  # whose rate is linear in its coefficients
-        gradient = law.powers(amplitude)
-    else:
-        gradient = least_squares.central_differences(lambda at: law.rate(amplitude, at), theta)
+    gradient = law.rate_jacobian(amplitude, theta)
     variance = np.einsum("ni,ij,nj->n", gradient, covariance, gradient)
     return law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
@@ -176,7 +172,7 @@ def minimum_of(law: Law, t: F8, y: F8, u: F8) -> Minimum:
     -----
     Amplitudes are counted in units of their root mean square, so that no power of a metre disturbs the search.
     """
-    if isinstance(law, Drag) and not law.parameters[1:]:  # without a coefficient it is a mean: nothing to search
+    if len(law.parameters) == 1 and not law.rate(y, y[:1]).any():  # what stays as it is has a mean: nothing to search
         line = solve_weighted(np.ones((t.size, 1)), y, u)
         return Minimum(line.values, line.covariance, line.chi2, True, "")
     length = math.sqrt(float(y @ y) / y.size) or 1.0

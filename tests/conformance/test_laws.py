@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from pipeline.damping import select as damping
 from pipeline.damping.laws import LAWS, Drag, Law
 from pipeline.damping.laws.drag import amplitudes
+from pipeline.numerics.least_squares import central_differences
 from pipeline.oscillation.demodulate import Demodulated
 
 # Rows of coefficients; a law takes those that its parameters name.
@@ -96,6 +97,16 @@ def test_rate_is_the_equation(law: Law, bench: dict[str, float]) -> None:
     assert rate.shape == a.shape
     assert rate[0] == 0.0
     np.testing.assert_allclose(rate[1:], np.broadcast_to(fall(law, bench)(a), a.shape)[1:], rtol=1e-12)
+
+
+@pytest.mark.parametrize("bench", [*BENCHES, *STOPPING])
+def test_rate_jacobian_is_the_derivative_of_the_rate(law: Law, bench: dict[str, float]) -> None:
+    """Each column equals the central difference of the rate; where there is no amplitude nothing changes it."""
+    a, theta = np.array([0.0, 0.001, 0.02, 0.05]), theta_of(law, bench)
+    expected = central_differences(lambda at: law.rate(a, at), theta)
+    found = law.rate_jacobian(a, theta)
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-7 * np.abs(expected).max())
+    assert not found[0].any()
 
 
 @pytest.mark.parametrize("bench", [*BENCHES, *STOPPING])

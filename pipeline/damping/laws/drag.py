@@ -95,7 +95,7 @@ class Drag:
         _, mu, gamma, beta = self._full(theta)
         return np.asarray(np.where(amplitude > 0.0, mu + amplitude * (gamma + beta * amplitude), 0.0))
 
-    def powers(self, amplitude: F8) -> F8:
+    def rate_jacobian(self, amplitude: F8, theta: F8) -> F8:  # noqa: ARG002 - it is linear in theta
         """Return the derivatives (n, p) of :meth:`rate` by A0, on which it does not depend, and the coefficients."""
         columns = [np.zeros(amplitude.size), *(amplitude ** POWERS[name] for name in self.parameters[1:])]
         return np.where(amplitude > 0.0, columns, 0.0).T

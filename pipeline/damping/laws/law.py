@@ -53,6 +53,10 @@ class Law(Protocol):
         """Return -dA/dt, (n,) float64, m/s, at amplitudes (n,) in m."""
         ...
 
+    def rate_jacobian(self, amplitude: F8, theta: F8) -> F8:
+        """Return (n, p) float64: derivatives of the rate at amplitudes (n,) in m by each parameter."""
+        ...
+
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return start values (p,) from points."""
         ...

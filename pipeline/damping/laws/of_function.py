@@ -126,6 +126,10 @@ class FunctionLaw:
         each = [self.amplitude(t, np.append(start, theta[1:])) @ (3.0, -4.0, 1.0) for start in amplitude.tolist()]
         return np.array(each) / (2.0 * STEP_S)
 
+    def rate_jacobian(self, amplitude: F8, theta: F8) -> F8:
+        """Return central differences."""
+        return central_differences(lambda at: self.rate(amplitude, at), theta)
+
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return what ``start`` gives.
 

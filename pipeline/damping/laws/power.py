@@ -61,6 +61,14 @@ class Power:
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(np.where(left, theta[1] * np.where(left, amplitude, 1.0) ** theta[2], 0.0))
 
+    def rate_jacobian(self, amplitude: F8, theta: F8) -> F8:
+        """Return the derivatives (n, p) of :meth:`rate` by A0, on which it does not depend, c and n."""
+        left = amplitude > 0.0
+        logarithm = np.log(np.where(left, amplitude, 1.0))
+        with np.errstate(over="ignore", invalid="ignore"):
+            power = np.where(left, np.exp(theta[2] * logarithm), 0.0)
+            return np.stack([np.zeros(amplitude.size), power, theta[1] * power * logarithm], axis=1)
+
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return the power that linear and quadratic drag together have in the middle of the points."""
         level = max(float(amplitude.mean()), 1e-3 * float(amplitude.max()), 1e-300)
