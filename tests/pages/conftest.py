@@ -44,9 +44,11 @@ displacement_m = 0.05
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    """Headless Chromium, offline."""
+    """Headless Chromium, offline. Where it is not installed the pages are not looked at; in CI that is a failure."""
     chromium = shutil.which("chromium")
-    assert chromium is not None, "no chromium on the PATH; apt-get install chromium, as .ci/run does"
+    if chromium is None:
+        absent = "no chromium on the PATH; apt-get install chromium, as .ci/run does"
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(absent)
     with sync_playwright() as playwright:
         launched = playwright.chromium.launch(executable_path=chromium, args=QUIET.split())
         yield launched

@@ -60,13 +60,23 @@ def test_precision_is_in_standard_uncertainties() -> None:
     assert np.all(np.abs(rough.values - fine.values) < 2e-3 * u)
 
 
-@pytest.mark.parametrize("scale", [1e-12, 1e-3, 1e9])
-def test_units_do_not_matter(scale: float) -> None:
-    """Lengths in other units take the same steps to the same relative values."""
+@pytest.mark.parametrize("scale", [2.0**-40, 2.0**-10, 2.0**30])
+def test_no_step_hangs_on_the_unit(scale: float) -> None:
+    """In units that differ by a power of two, so that nothing rounds otherwise, every bit is the same."""
     y, _ = exponential(2, 1e-4)
     plain = fit_decay(y, 1e-4, (0.04, 0.01))
     other = fit_decay(y * scale, 1e-4 * scale, (0.04 * scale, 0.01))
     assert other.steps == plain.steps
+    assert (other.values / [scale, 1.0]).tolist() == plain.values.tolist()
+    assert (other.covariance / np.outer([scale, 1], [scale, 1])).tolist() == plain.covariance.tolist()
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-3, 1e9])
+def test_units_do_not_matter(scale: float) -> None:
+    """Lengths in other units end at the same relative values."""
+    y, _ = exponential(2, 1e-4)
+    plain = fit_decay(y, 1e-4, (0.04, 0.01))
+    other = fit_decay(y * scale, 1e-4 * scale, (0.04 * scale, 0.01))
     assert other.values / [scale, 1.0] == pytest.approx(plain.values, rel=1e-9)
     assert other.covariance / np.outer([scale, 1], [scale, 1]) == pytest.approx(plain.covariance, rel=1e-6)
 
