@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+import itertools
 import sys
 import time
 from collections.abc import Callable
@@ -25,6 +26,7 @@ Scene = tuple[Problem, float, int, float]
 MIXED = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
 LINEAR = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.0073), 0.05)
 STEP_S, COUNT = 0.01, 12_000
+FELT_S = 5e-3  # of a run
 
 
 def main() -> int:
@@ -49,6 +51,10 @@ def main() -> int:
         print(
             f"      {middle:.2f} (worst {worst:.1f})  choosing and running over the cheapest run, {len(shares)} {what}"
         )
+    shares, most_s = planning(time.process_time, [*mixed_scenes(60), *spread_scenes(60), *long_scenes()])
+    felt = f"{len(shares)} runs that take {FELT_S * 1e3:g} ms and more"
+    print(f"      {shares.max():.2f}  planning over running, the most of {felt}")
+    print(f"      {most_s * 1e3:.1f} ms  the longest that planning takes where running takes less")
     off = costs(time.process_time)
     middle = float(np.median(np.concatenate(list(off.values()))))
     for name, ratios in off.items():
@@ -143,6 +149,21 @@ def mixed_scenes(number: int) -> list[Scene]:
     return found
 
 
+def long_scenes() -> list[Scene]:
+    """Return weakly damped benches over 1e5 periods, with each of drag, cubic term and friction in turn."""
+    found = []
+    for friction, cubic, tolerance in itertools.product((0.0, 1e-6), (0.0, 100.0), (1e-3, 1e-6)):
+        equation = Equation(
+            angular_frequency_per_s=8.66,
+            gamma_per_s=1e-5,
+            drag_per_m=0.01,
+            friction_m_per_s2=friction,
+            cubic_per_m2_s2=cubic,
+        )
+        found.append((Problem(equation, 0.05), 1e5 * 2.0 * np.pi / 8.66 / 20_000, 20_000, tolerance))
+    return found
+
+
 def over_cheapest(timer: Callable[[], float], scenes: list[Scene], rounds: int = 3) -> F8:
     """Return what choosing and running takes over the cheapest run that keeps the tolerance, choosing left out."""
 
@@ -166,6 +187,23 @@ def over_cheapest(timer: Callable[[], float], scenes: list[Scene], rounds: int =
         chose = least(lambda scene=scene: choose(*fresh(scene)))  # type: ignore[misc]
         found.append((chose + ran) / cheapest)
     return np.array(found)
+
+
+def planning(timer: Callable[[], float], scenes: list[Scene]) -> tuple[F8, float]:
+    """Return what planning takes over running where that can be felt, and the longest plan, s, where it cannot."""
+    felt, most_s = [], 0.0
+    for scene in scenes:
+        start = timer()
+        choice = choose(*scene)
+        planned = timer() - start
+        start = timer()
+        choice.run(scene[2])
+        ran = timer() - start
+        if ran >= FELT_S:
+            felt.append(planned / ran)
+        else:
+            most_s = max(most_s, planned)
+    return np.array(felt), most_s
 
 
 def fresh(scene: Scene) -> Scene:

@@ -53,6 +53,14 @@ def test_what_choosing_costs_can_be_compared_with_the_cheapest(dynamics):
     assert dynamics.over_cheapest(iter(range(10_000)).__next__, scenes, rounds=1).tolist() == [2.0] * 6
 
 
+def test_planning_can_be_compared_with_running(dynamics):
+    """By a timer that counts calls every plan and every run takes one: both are felt."""
+    shares, most_s = dynamics.planning(iter(range(10_000)).__next__, dynamics.mixed_scenes(3))
+    assert shares.tolist() == [1.0] * 3
+    assert most_s == 0.0
+    assert all(len(scene) == 4 for scene in dynamics.long_scenes())
+
+
 def test_the_cost_of_a_run_can_be_compared_with_its_time(dynamics):
     """By a timer that counts calls every run takes one, over a cost that is positive."""
     ratios = dynamics.costs(iter(range(10_000)).__next__, number=6, rounds=1)

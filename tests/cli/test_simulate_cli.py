@@ -328,6 +328,17 @@ def test_a_tolerance_far_below_the_band_is_pointed_out(cli: Callable, bench: Pat
     assert "1e-03 is enough here" in told
 
 
+def test_without_noise_the_last_reading_is_as_good_as_the_others(cli: Callable, bench: Path, tmp_path: Path) -> None:
+    """Its sound meets the bob after the time is up, where the motion goes on: nothing is a false echo."""
+    run = tmp_path / "exact.h5"
+    arguments = ("simulate", "--scene", bench, "--seconds", "20", "-o", run, "--noise-m", "0", "--echoes", "0")
+    assert cli(*arguments).code == 0
+    found = json.loads(cli("analyse", "--json", run).out)
+    assert found["quality"]["used"] == found["input"]["samples"] == 2001
+    codes = {each["code"] for each in found["findings"]}
+    assert not codes & {"false_echoes", "rest_drift", "correlated_residuals", "missing_samples"}
+
+
 def test_readings_are_a_recording_like_any_other(cli: Callable, bench: Path, tmp_path: Path) -> None:
     """With noise and echoes by choice, of kind simulated, and its analysis finds the scene's spring again."""
     run = tmp_path / "bench.h5"

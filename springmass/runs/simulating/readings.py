@@ -27,13 +27,18 @@ def plain_block(trajectory: Trajectory, name: str) -> tuple[Block, SourceInfo]:
     return block, SourceInfo("simulated", name, 1.0 / trajectory.spacing_s)
 
 
-def readings(trajectory: Trajectory, sensor: VirtualSensor, name: str, seed: int) -> tuple[Block, SourceInfo]:
+def readings(
+    trajectory: Trajectory, seconds: float, sensor: VirtualSensor, name: str, seed: int
+) -> tuple[Block, SourceInfo]:
     """Return what a rangefinder reads of a motion.
 
     Parameters
     ----------
     trajectory : Trajectory
-        In states fine enough to interpolate between.
+        In states fine enough to interpolate between, to some readings after the end: the sound of the last reading
+        meets the bob later than it was sent.
+    seconds : float
+        Until when it reads, s.
     sensor : VirtualSensor
         Its rate, resolution, noise and false echoes.
     name : str
@@ -41,10 +46,9 @@ def readings(trajectory: Trajectory, sensor: VirtualSensor, name: str, seed: int
         Of its chance.
     """
     rest = rest_m(trajectory)
-    end = float(trajectory.t[-1])
     # All moments at which it may look, interpolated at once: its own, the ones beside them, and after the end; and
     # those at which the sound of each meets the bob.
-    grid = np.arange(math.ceil(end * sensor.rate_hz) + 3) / sensor.rate_hz
+    grid = np.arange(math.ceil(seconds * sensor.rate_hz) + 3) / sensor.rate_hz
     distances = rest + trajectory.at(grid)
     met = grid + distances / sensor.speed_of_sound_m_per_s
     there = dict(zip(met.tolist(), (rest + trajectory.at(met)).tolist(), strict=True))
@@ -57,4 +61,4 @@ def readings(trajectory: Trajectory, sensor: VirtualSensor, name: str, seed: int
         return there[t] if t in there else rest + float(trajectory.at(np.array([t]))[0])
 
     finder = VirtualRangefinder(position, sensor, np.random.default_rng(seed))
-    return finder.block(end + 1.0 / sensor.rate_hz), finder.info(name)
+    return finder.block(seconds + 1.0 / sensor.rate_hz), finder.info(name)

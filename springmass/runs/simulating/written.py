@@ -23,6 +23,7 @@ from springmass.runs.simulating.prepared import Prepared
 from springmass.runs.simulating.readings import plain_block, readings, rest_m
 from springmass.runs.simulating.simulation import FINE, Against, Simulation, count_of, plan
 from springmass.runs.simulating.told import band_columns
+from springmass.session.simulated_bench import REST_M
 
 __all__ = ["write_folder", "write_readings"]
 
@@ -121,7 +122,11 @@ def write_readings(
         virtual = VirtualSensor(
             rate_hz=1.0 / spacing_s, **{key: value for key, value in chosen.items() if value is not None}
         )
-        block, info = readings(_fine(ready.problem, method, seconds, spacing_s, parts), virtual, name, seed)
+        # The last reading's sound is on its way to the bob when the time is up.
+        way_s = max(REST_M, 3.0 * ready.problem.amplitude_m()) / virtual.speed_of_sound_m_per_s
+        longer = seconds + (2 + math.ceil(way_s / spacing_s)) * spacing_s
+        motion = _fine(ready.problem, method, longer, spacing_s, parts)
+        block, info = readings(motion, seconds, virtual, name, seed)
     configuration = {"sensor": sensor, "seed": seed, **told}
     _write_run(path, block, info, ready.solved, f"{name}, as a {sensor} sensor reads it", configuration)
 
