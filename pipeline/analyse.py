@@ -225,8 +225,9 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
         found = _oscillation(windows, by_equation(windows, solved), solved, scene, params)
     else:
         fitted = by_windows(windows, params.phase, params.full)
-        why = incoherent(fitted, conditioned.track)
-        two = find_two_modes(conditioned) if why is not None or astray(fitted) > BEATING else None
+        typical = astray(fitted)
+        why = incoherent(fitted, conditioned.track, typical)
+        two = find_two_modes(conditioned) if why is not None or typical > BEATING else None
         if two is not None:
             found = _two_modes(conditioned, two)
         elif why is not None:

@@ -22,6 +22,7 @@ from pipeline.motion.waveform import Rest, Waveform
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.quantity import amount
+from pipeline.numerics.robust import median
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8, U8, Quality
@@ -159,7 +160,7 @@ def _stop_row(conditioned: Conditioned) -> int | None:
     if count < 8 or not noise > 0.0:
         return None
     y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
-    end = float(np.median(y[blocks[-max(count // 10, 2) :]]))
+    end = median(y[blocks[-max(count // 10, 2) :]].ravel())
     # Of a sensor that counts, distances are whole steps: two of them are two in every unit, however that rounds.
     least = (2.0 + 1e-6) * noise
     # Most bobs move at the end of their record, and the last blocks say so.

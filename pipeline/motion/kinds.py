@@ -259,7 +259,7 @@ def _repeats(conditioned: Conditioned, demodulated: Demodulated) -> bool:
     return demodulated.t.size >= 4 and float(np.var(left - means[bins])) < ALIKE * float(np.var(left))
 
 
-def incoherent(fitted: Fitted, track: Track) -> NoOscillation | None:
+def incoherent(fitted: Fitted, track: Track, typical: float) -> NoOscillation | None:
     """Return why a motion is no oscillation although single periods look like one: they do not follow one another.
 
     Parameters
@@ -267,6 +267,8 @@ def incoherent(fitted: Fitted, track: Track) -> NoOscillation | None:
     fitted : Fitted
     track : Track
         The record.
+    typical : float
+        What :func:`astray` says of the fit.
 
     Notes
     -----
@@ -284,7 +286,6 @@ def incoherent(fitted: Fitted, track: Track) -> NoOscillation | None:
     gain = 0.5 * left.size * (float(swing @ swing) / max(float(left @ left), 1e-300) - 1.0)
     if gain < SEEN * math.log(left.size / ALONE):
         return NoOscillation(f"what oscillates in the {noun(track.unit)} explains no more of it than noise may")
-    typical = astray(fitted)
     if typical < ASTRAY:
         return None
     return NoOscillation(

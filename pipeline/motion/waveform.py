@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.regression import beating_length, correlation_length, scatter, solve_weighted
+from pipeline.numerics.regression import beating_length, correlation_length, scatter, smooth_columns, solve_weighted
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
 from pipeline.oscillation.steps import Step, staircase
@@ -108,7 +108,7 @@ def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.
     estimate = Estimate(mean, math.sqrt(float(constant.covariance[0, 0]) * widened), "m")
     if order < 1:
         return Rest(estimate, 0.0, False, t, np.full(t.size, mean))
-    design = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, order)
+    design = smooth_columns(t, order)
     curve = solve_weighted(design[kept], offset[kept], spread.u[kept])
     gain = (constant.chi2 - curve.chi2) / spread.correlation - order * math.log(
         max(kept.sum() / spread.correlation, 2.0)

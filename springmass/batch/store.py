@@ -118,16 +118,20 @@ class Store:
             offset += len(line)
 
     def put_together(self, rows: Iterable[Mapping[str, Any]]) -> Path:
-        """Write the file of all rows, in this order."""
-        with whole_file(self.parts / WHOLE) as temporary, temporary.open("wb") as file:
-            file.writelines(map(_line, rows))
-        return self.parts / WHOLE
-
-    def drop_parts(self) -> None:
-        """Take away what the file of all holds by now."""
+        """Write the file of all rows, in this order; from here on they are read from it, and the parts are gone."""
+        whole, offset = self.parts / WHOLE, 0
+        places: dict[str, list[_Place]] = {}
+        with whole_file(whole) as temporary, temporary.open("wb") as file:
+            for row in rows:
+                line = _line(row)
+                file.write(line)
+                places.setdefault(key_of(row), []).append((whole, offset, len(line)))
+                offset += len(line)
+        self._places = places
         for path in self._files():
-            if path.name != WHOLE:
+            if path != whole:
                 path.unlink(missing_ok=True)
+        return whole
 
     def mark(self, told: Mapping[str, Any]) -> None:
         """Say that all was made of this; before it changes, it is to be taken away by :meth:`unmark`."""

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pipeline.motion.phase import PhaseFit
+from pipeline.numerics.robust import median
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.rows import MAINS_HZ
@@ -44,7 +45,7 @@ def judge_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
     omega = phase.angular_frequency.value
     f = omega / (2.0 * math.pi)
     amplitude = float(np.max(np.abs(demodulated.amplitude)))
-    rate_hz = 1.0 / float(np.median(np.diff(t))) if t.size > 1 else math.nan
+    rate_hz = 1.0 / median(np.diff(t)) if t.size > 1 else math.nan
     found, misfits = [], []
     if rate_hz < FEWEST * f:
         found.append(

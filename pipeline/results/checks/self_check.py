@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.quantity import amount, noun, plural
+from pipeline.numerics.robust import median
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.demodulate import Demodulated, model_error
 from pipeline.oscillation.disturbances import Disturbances
@@ -83,7 +84,7 @@ def check_residuals(
     found = []
     wave, folded = _fold(residual, phase.total(t[rows]), demodulated.noise_m, turn)
     # Drag bends a sinusoid by itself, and a computed record is exact to its digits only.
-    least = float(np.median(model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)))
+    least = median(model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency))
     if folded is not None and wave.peak > max(0.5 * quantum_m, least):
         found.append(_not_sinusoidal(wave, amplitude, seconds, unit))
         residual = residual - folded
@@ -136,9 +137,9 @@ def _fold(residual: F8, angle: F8, noise_m: float, turn: float) -> tuple[_Wave, 
     turns = angle * (1.0 / (2.0 * math.pi))
     bins = ((turns - np.floor(turns)) * BINS).astype(np.int64)
     np.minimum(bins, BINS - 1, out=bins)
-    parts = np.arange(residual.size) * BLOCKS // residual.size
-    sums = np.bincount(parts * BINS + bins, residual, BLOCKS * BINS).reshape(BLOCKS, BINS)
-    counts = np.bincount(parts, minlength=BLOCKS)
+    counts = np.diff(-(-np.arange(BLOCKS + 1) * residual.size // BLOCKS))  # of parts as long as each other
+    sums = np.bincount(np.repeat(BINS * np.arange(BLOCKS), counts) + bins, residual, BLOCKS * BINS)
+    sums = sums.reshape(BLOCKS, BINS)
     centre = 2.0 * math.pi * (np.arange(BINS) + 0.5) / BINS
     orders = np.arange(2, min(HIGHEST, int(math.pi / turn) - 1) + 1)
     if not orders.size:
