@@ -11,6 +11,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import SHOWN, noun
 from springmass.report.figures.phase_plot import turn_step
 from springmass.report.figures.position import ZOOM_PERIODS, has_error_bars, is_long
+from springmass.report.figures.rest_position import rest_moves
 from springmass.report.motion_table import row_step
 from springmass.report.tables import page_unit, pretty, raised
 
@@ -127,10 +128,11 @@ def _subject(analysis: Analysis) -> str:
 def _position(analysis: Analysis, _: Oscillation) -> str:
     bars = "shown as error bars" if has_error_bars(analysis) else "too small for error bars to show"
     detail = f" Above the whole record, below its first {ZOOM_PERIODS} periods (shaded above)."
+    rest = " At the bottom the rest position of single windows less its mean, with u, and the curve that it follows."
     return (
         f"{_subject(analysis)} with the fitted motion; beneath, what the fit leaves, over the noise of "
         f"one sample, σ\u00a0=\u00a0{_sigma(analysis)}, {bars}.{detail if is_long(analysis) else ''}"
-        " Flagged samples were left out of the fit and of the residuals."
+        f" Flagged samples were left out of the fit and of the residuals.{rest if rest_moves(analysis) else ''}"
     )
 
 

@@ -29,6 +29,7 @@ from springmass.report.figures.canvas import (
     thinned,
     value_label,
 )
+from springmass.report.figures.rest_position import draw_rest, rest_moves
 from springmass.report.recorded import Note
 
 if TYPE_CHECKING:
@@ -66,7 +67,8 @@ def position_figure(analysis: Analysis, notes: Sequence[Note] = ()) -> Figure:
     """Draw the distance with its fit, and beneath it the residual over the noise of one sample.
 
     Flagged samples have markers of their own; those off the axis stand at its edge. A long record is followed
-    by a detail of its first periods. Where nothing oscillates the distance stands alone.
+    by a detail of its first periods, a rest position that moves stands at the end. Where nothing oscillates the
+    distance stands alone.
 
     Parameters
     ----------
@@ -85,18 +87,20 @@ def position_figure(analysis: Analysis, notes: Sequence[Note] = ()) -> Figure:
             only.set_xlabel("time / s")
             return figure
         long = is_long(analysis)
-        rows = [(1.75, 0.0), (0.85, 0.08)]
-        figure, axes = panels([*rows, (1.9, 0.58), (0.85, 0.08)] if long else [(2.3, 0.0), (1.0, 0.08)])
+        rows = [(1.75, 0.0), (0.85, 0.08), (1.9, 0.58), (0.85, 0.08)] if long else [(2.3, 0.0), (1.0, 0.08)]
+        figure, axes = panels([*rows, (0.95, 0.42)] if rest_moves(analysis) else rows)
         _draw_pair(axes[:2], analysis, motion, start, end)
         _draw_notes(axes[0], notes)
         legend_above(axes[0])
         if long:
             first = float(track.t[analysis.conditioned.used][0])
             last = first + ZOOM_PERIODS / motion.cycles.frequency_hz
-            _draw_pair(axes[2:], analysis, motion, first, last)
+            _draw_pair(axes[2:4], analysis, motion, first, last)
             for panel in axes[:2]:
                 panel.axvspan(first, last, color="#000000", alpha=0.07, lw=0)
             axes[2].set_title(f"the first {ZOOM_PERIODS} periods", loc="left", fontsize=8.5, pad=3)
+        if rest_moves(analysis):
+            draw_rest(axes[-1], motion, track.unit, start, end)
         axes[-1].set_xlabel("time / s")
         return figure
 

@@ -526,6 +526,23 @@ def test_a_relaxation_is_drawn_with_its_fit(shape: Any) -> None:
     assert "nothing oscillates" not in caption("position", analysis)
 
 
+def test_a_rest_position_that_moves_is_drawn_by_itself() -> None:
+    """A step of 0.8 mm, which the whole position hides, stands in a panel with its windows; a constant has none."""
+    t = np.arange(2000) / 100
+    noise_m = 1e-4 * np.random.default_rng(2).standard_normal(t.size)
+    steady_m = 0.25 + 0.05 * np.exp(-0.01 * t) * np.cos(8.3 * t) + noise_m
+    steady, stepping = (analyse(Track.from_arrays(t, y)) for y in (steady_m, steady_m + 8e-4 * (t > 8.2)))
+    assert len(draw(steady)["position"].axes) == 4
+    assert "rest position" not in caption("position", steady)
+    panel = draw(stepping)["position"].axes[4]
+    _, windows, curve = panel.lines
+    x, y = np.asarray(windows.get_xdata()), np.asarray(windows.get_ydata())
+    assert float(np.mean(y[x > 8.2]) - np.mean(y[x < 8.2])) == pytest.approx(0.8, abs=0.02)
+    assert np.max(np.abs(y - np.interp(x, curve.get_xdata(), curve.get_ydata()))) < 0.1
+    assert panel.get_ylabel() == "rest / mm"
+    assert "rest position of single windows" in caption("position", stepping)
+
+
 @pytest.mark.parametrize("seconds", [1.6, 3.0])
 def test_a_very_short_record_can_be_drawn(tmp_path: Path, seconds: float) -> None:
     """Two and four periods give every figure."""

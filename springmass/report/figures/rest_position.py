@@ -1,0 +1,44 @@
+"""The rest position window by window, where it moves: a tenth of a millimetre does not show in the whole position."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline.analyse import Analysis, Oscillation
+from pipeline.numerics.quantity import SHOWN
+from pipeline.oscillation.steps import staircase
+from springmass.report.figures.canvas import error_bars, value_label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["draw_rest", "rest_moves"]
+
+
+def rest_moves(analysis: Analysis) -> bool:
+    """Return whether the rest position drifts or steps, so that it is drawn by itself."""
+    return isinstance(analysis.motion, Oscillation) and analysis.motion.rest.moves
+
+
+def draw_rest(panel: Axes, motion: Oscillation, unit: str, start: float, end: float) -> None:
+    """Draw the windows' rest positions less their mean, with u, and the curve that was fitted to them.
+
+    Parameters
+    ----------
+    panel : Axes
+    motion : Oscillation
+    unit : str
+        Of the record's values.
+    start, end : float, s
+    """
+    factor, rest, windows = SHOWN[unit].factor, motion.rest, motion.demodulated
+    mean = rest.mean.value
+    own = windows.offset + staircase(rest.steps, windows.t) - mean
+    error_bars(panel, windows.t, own * factor, np.sqrt(windows.covariance[:, 2, 2]) * factor, None, size=2.6)
+    grid = np.linspace(start, end, 800)
+    panel.plot(grid, (rest.at(grid) - mean) * factor, color="#000000", lw=0.9)
+    panel.margins(y=0.15)
+    panel.set_xlim(start, end)
+    panel.set_ylabel(value_label("rest", unit))
