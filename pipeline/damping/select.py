@@ -20,8 +20,8 @@ from pipeline.track import F8
 __all__ = ["Damping", "LawFit", "Params", "fit_damping"]
 
 TINY = 1e-100  # stands for zero where something is divided by an uncertainty
-DOUBTED = 0.95  # share of records in which a law that holds leaves less
-MIXED, BENT = "linear+quadratic", 2.0  # standard uncertainties below zero at which a term stands for another law
+DOUBTED = 0.99  # share of records in which a law that holds leaves less
+MIXED, BENT = "linear+quadratic", 2.6  # standard uncertainties below zero at which a term stands for another law
 LOOSEST_POWER = 3.0  # standard uncertainty of a power that still says anything: known ones lie between 0 and 2
 
 
@@ -40,7 +40,7 @@ class Params:
         :func:`pipeline.damping.laws.of_function.make_law` makes.
     otherwise : tuple of str or Law
         The laws to try where the record rejects all of ``laws``, or knows a curvature of the decay that none of them
-        with one term makes, or leaves more than 19 in 20 do: where few are tried to save time, a wrong one must not be
+        with one term makes, or leaves more than 99 in 100 do: where few are tried to save time, a wrong one must not be
         stated.
 
     References

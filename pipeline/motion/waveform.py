@@ -9,7 +9,8 @@ import numpy as np
 
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.regression import beating_length, correlation_length, scatter, smooth_columns, solve_weighted
+from pipeline.numerics.regression import beating_length, correlation_length
+from pipeline.numerics.smooth_curve import fit_curve
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
 from pipeline.oscillation.steps import Step, staircase
@@ -96,25 +97,16 @@ def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.
     """
     t, offset = demodulated.t, demodulated.offset
     u = np.maximum(np.sqrt(demodulated.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
-    spread = scatter(t, offset, u, degree=degree)
-    kept = spread.kept
-    constant = solve_weighted(np.ones((int(kept.sum()), 1)), offset[kept], spread.u[kept])
+    found = fit_curve(t, offset, u, degree=degree, evidence=evidence)
+    constant, spread = found.constant, found.spread
     mean = float(constant.values[0])
-    order = min(degree, t.size // 4 - 1)
-    left = constant.residual / spread.u[kept]
+    left = constant.residual / spread.u[spread.kept]
     if (length := beating_length(left)) is None:
         length = max(spread.correlation, correlation_length(left))
     widened = length * max(1.0, constant.chi2 / max(constant.residual.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(float(constant.covariance[0, 0]) * widened), "m")
-    if order < 1:
-        return Rest(estimate, 0.0, False, t, np.full(t.size, mean))
-    design = smooth_columns(t, order)
-    curve = solve_weighted(design[kept], offset[kept], spread.u[kept])
-    gain = (constant.chi2 - curve.chi2) / spread.correlation - order * math.log(
-        max(kept.sum() / spread.correlation, 2.0)
-    )
-    smooth = design @ curve.values
-    return Rest(estimate, float(np.ptp(smooth)), bool(gain > evidence), t, smooth)
+    curve = found.at(t)
+    return Rest(estimate, float(np.ptp(curve)), found.bends, t, curve)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.robust import MAD_TO_SIGMA, mad_sigma, median
+from pipeline.numerics.smooth_curve import fit_curve
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.windows import Solution, Tuning, Windows, quantile, retune, solve, unwrap
@@ -25,6 +26,8 @@ from pipeline.track import F8, U8, Quality
 __all__ = ["Demodulated", "Params", "demodulate", "model_error", "polar"]
 
 WEAK = 7.0  # standard uncertainties of an amplitude under which its phase is known to 0.14 rad and less well
+DISTURBING, DRIFTING = 0.1, 0.5  # of the amplitudes' uncertainty; of amplitude and scatter, within a window
+FEWEST_STEADIED = 8  # windows
 FINEST = 1e-4  # of the amplitude: scatter below it is a computed record's
 HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, and their quantiles of a normal |x|
 
@@ -138,7 +141,8 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
         crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
         windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
         weights = np.where(crest, 0.0, weights)
-    # Once more in a basis that turns and decays in each window as the record does there.
+    # Once more in a basis that turns and decays in each window as the record does there, about a rest that moves so.
+    windows = _steadied(windows, solution, spread, tuning.angular_frequency)
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
@@ -225,6 +229,32 @@ def _neighbours(n: int) -> NDArray[np.int64]:
 def _spread(usable: F8, residual: F8) -> F8:
     """(w,): standard deviation of each window's samples about its fit, from their median."""
     return quantile(np.abs(residual), usable, HALF[0]) / HALF[1]
+
+
+def _steadied(windows: Windows, solution: Solution, spread: F8, omega: float) -> Windows:
+    """Take out by how much a drifting rest position moves within each window, where that would disturb amplitudes.
+
+    A window fits a constant, so that of a rest that moves by R over a record of length T all amplitudes are off by up
+    to :math:`2R/\\omega T`, alike where windows begin alike. With X by which a straight line through the N rest
+    positions, of standard deviation :math:`\\sigma`, lowers chi-square, that is :math:`\\sqrt{24 X}/\\omega T` of
+    their mean's uncertainty, :math:`\\sqrt{2/N}\\sigma`.
+    """
+    good = solution.good
+    if np.count_nonzero(good) < FEWEST_STEADIED:
+        return windows
+    t, rest = windows.centre[good], solution.coefficients[good, 0]
+    u = _typical(spread, windows, solution) / np.sqrt(solution.normal[good, 0, 0])
+    deviation = (rest - rest.mean()) / u
+    if 24.0 * (float(deviation @ deviation) - t.size) < (DISTURBING * omega * (t[-1] - t[0])) ** 2:
+        return windows
+    curve = fit_curve(t, rest, u)
+    if not curve.bends:
+        return windows
+    moved = curve.at(windows.centre[:, None] + windows.tau) - curve.at(windows.centre)[:, None]
+    size = np.hypot(solution.coefficients[good, 1], solution.coefficients[good, 2])
+    if np.any(np.abs(moved[good]).max(axis=1) > DRIFTING * np.hypot(size, spread[good])):
+        return windows  # a hand, or another motion: no drift of this one's rest
+    return replace(windows, y=np.where(windows.placed, windows.y - moved, 0.0))
 
 
 def _typical(spread: F8, windows: Windows, solution: Solution) -> float:

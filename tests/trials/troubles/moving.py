@@ -202,6 +202,8 @@ def _drifting_rest(how: str, size_m: float) -> Make:
             moved += size_m * (s - 0.5)
         elif how == "wave":
             moved += 0.5 * size_m * np.sin(2 * math.pi * (1.3 * s + b.rng.uniform()))
+        elif how == "creep":  # a spring or a clamp that gives, fastest at first
+            moved += size_m * (1.0 - np.exp(-b.t / 8.0))
         else:
             moved += np.where(s > b.rng.uniform(0.3, 0.7), 0.5, -0.5) * size_m
         return b.record(b.distance() + moved + b.noise(), offset=b.rest_m + float(np.mean(moved)))
@@ -333,6 +335,13 @@ KINDS = (
     Kind(name="sensor: warms", cause="rest_or_scale", make=_warming_sensor, spread=("offset",)),
     Kind(name="rest: drifts by 5 mm", cause="rest", make=_drifting_rest("line", 5e-3), cure=True, spread=("offset",)),
     Kind(name="rest: goes to and fro", cause="rest", make=_drifting_rest("wave", 3e-3), cure=True, spread=("offset",)),
+    Kind(
+        name="rest: creeps by 20 mm",
+        cause="rest",
+        make=_drifting_rest("creep", 20e-3),
+        cure=True,
+        spread=("offset",),
+    ),
     Kind(name="rest: one step of 3 mm", cause="rest", make=_drifting_rest("step", 3e-3), cure=True),
     Kind(name="mode: sideways, 2 mm", cause="mode", make=_second_mode(0.71, 2e-3), cure=True),
     Kind(name="mode: sideways, 6 mm", cause="mode", make=_second_mode(0.62, 6e-3), cure=True),

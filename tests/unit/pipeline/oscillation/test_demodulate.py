@@ -197,6 +197,29 @@ def test_clipped_crest_leaves_the_rest_of_the_cycle(synthetic: ModuleType) -> No
     assert np.mean(np.abs(pulls(found, truth)) <= 3.0) > 0.97
 
 
+@pytest.mark.parametrize("phase", [0.0, 0.8, 1.6, 2.4])
+def test_a_rest_position_that_creeps_moves_no_amplitude(synthetic: ModuleType, phase: float) -> None:
+    """Of 20 mm within seconds, by which windows of a constant rest had amplitudes wrong by 0.6 mm, none is left."""
+    truth = synthetic.Truth(gamma=0.0065, phase=phase)
+    t = synthetic.times(60)
+    y = synthetic.noisy(truth, t, 2e-4, 14)
+    still, creeping = demodulated(t, y), demodulated(t, y + 0.02 * (1.0 - np.exp(-t / 8.0)))
+    u = np.sqrt(still.covariance[:, 0, 0])
+    assert np.max(np.abs(creeping.amplitude - still.amplitude) / u) < 2.0
+    assert abs(np.mean((creeping.amplitude - still.amplitude)[:10] / u[:10])) < 0.3
+    np.testing.assert_allclose(wrapped(creeping.phase - still.phase), 0.0, atol=2.0 * np.max(u) / truth.amplitude)
+    np.testing.assert_allclose(creeping.offset - still.offset, 0.02 * (1.0 - np.exp(-still.t / 8.0)), atol=2e-4)
+
+
+def test_a_rest_position_that_stays_changes_nothing(synthetic: ModuleType) -> None:
+    """A drift that moves amplitudes by less than a tenth of their uncertainty is left to the windows' constants."""
+    truth = synthetic.Truth(gamma=0.0065)
+    t = synthetic.times(60)
+    y = synthetic.noisy(truth, t, 2e-4, 15)
+    still, drifting = demodulated(t, y), demodulated(t, y + 1e-4 * t / 60.0)
+    np.testing.assert_allclose(drifting.amplitude, still.amplitude, atol=1e-6)
+
+
 def test_missing_blocks_cost_their_windows_only(synthetic: ModuleType) -> None:
     """Windows without samples carry no point and are counted; the others are right and in phase."""
     truth = synthetic.Truth(gamma=0.003)
