@@ -319,7 +319,8 @@ def _fit_whole(windows: Windows, fitted: Fitted, params: Params) -> Callable[[],
     if not params.settle or fitted.full is not None or len(windows.conditioned.track) > MOST_ROWS:
         return None
     unit = windows.conditioned.track.unit
-    return lambda: by_windows(windows, params.phase, fullfits.Params()).in_unit(unit)
+    # What it is asked for depends on no law that the windows speak against.
+    return lambda: by_windows(windows, params.phase, fullfits.Params(besides=())).in_unit(unit)
 
 
 def _overdamped(conditioned: Conditioned, scene: Scene, found: Overdamped) -> Found:

@@ -42,11 +42,15 @@ class Params:
         Most rounds of clipping and fitting again.
     steps : int
         Most evaluations of the model in one fit.
+    besides : tuple of str
+        Laws that are fitted besides the selected one and the admissible ones, though the windows speak against them:
+        everyone compares with the one exponential.
     """
 
     clip_sigmas: float = 4.0
     rounds: int = 5
     steps: int = 25
+    besides: tuple[str, ...] = ("linear",)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +87,7 @@ class FullFit:
     widening: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Solved:
     """One law fitted to the samples used."""
 
@@ -112,6 +116,7 @@ class _Solved:
         """Amplitude at every sample of the record (n,), m."""
         return self.state.amplitude(self.record.elapsed)
 
+    @functools.cached_property
     def position(self) -> F8:
         """Distance at every sample of the record (n,), m, less the record's level."""
         linear = self.record.basis @ self.model.linear(self.state.values)
@@ -175,8 +180,7 @@ def fit_record(
         return FullFit(False, solved, damping, phase, rest, waveform, demodulated.flags, noise_m, {})
     covariance, factors = _covariance(solved, demodulated)
     fits = dict(damping.fits)
-    # The one exponential too, for it is what everyone compares with, admissible or not.
-    for name in {damping.selected, *damping.admissible, "linear"} & fits.keys():
+    for name in {damping.selected, *damping.admissible, *params.besides} & fits.keys():
         if name == damping.selected:
             fits[name] = _with_joint(fits[name], solved, covariance)
             continue
@@ -260,7 +264,7 @@ def _settled(
         solved = _solve(record, state, rows, params)
         if not solved.fit.converged:
             return solved.fit.tried
-        chosen = chooser.near(record.y - solved.position(), rows)
+        chosen = chooser.near(record.y - solved.position, rows)
         if np.count_nonzero(chosen != rows) <= STEADY * rows.size:
             break
         rows, state = chooser.settled(solved.state, chosen)
@@ -329,7 +333,7 @@ def _flags(conditioned: Conditioned, chooser: Chooser, solved: _Solved) -> NDArr
     """Flags with those of the samples that left the fit."""
     flags = conditioned.flags.copy()
     out = ((flags & UNUSABLE) == 0) & ~solved.rows
-    crest = out & chooser.on_plateau(solved.position())
+    crest = out & chooser.on_plateau(solved.position)
     flags[crest] |= np.uint8(Quality.CLIPPED)
     flags[out & ~crest] |= np.uint8(Quality.FALSE_ECHO)
     return flags
@@ -375,7 +379,7 @@ def _refined_rest(solved: _Solved, rest: Rest, middle: float, covariance: F8) ->
 def _refined_waveform(solved: _Solved, track: Track) -> Waveform:
     """Return the model at every sample; its velocity is that of the oscillation, without drift and extra columns."""
     state, amplitude = solved.state, solved.amplitude()
-    position = solved.record.level + solved.position()
+    position = solved.record.level + solved.position
     angle, rate = state.angle(solved.record.tau), state.turning[1]
     if state.area is not None:
         rate = rate + state.turning[2] * np.abs(amplitude) ** state.exponent

@@ -122,7 +122,7 @@ class Conditioned:
         noise_m : float
         """
         near = np.zeros(model_m.shape, np.bool_)
-        middle = float(np.median(model_m))
+        middle = float(np.median(model_m)) if self.clipped_from_m else 0.0
         for bottom in self.clipped_from_m:
             sign = 1.0 if bottom > middle else -1.0
             near |= sign * model_m > sign * bottom - CREST_SIGMAS * noise_m
