@@ -319,7 +319,7 @@ def test_parameters_that_determine_each_other_count_once() -> None:
     )
     for one, expected in ((x, u[0]), (y, u[1]), (z, u[2])):
         assert one.std_dev == pytest.approx(expected, rel=1e-12)
-    # The package takes the matrix apart by its eigenvalues: of three variables these are known to 9 eps, at worst.
+    # The package takes the matrix apart by its eigenvalues, which err by about n eps of its norm, here 3: 9 eps.
     assert (x / u[0] + y / u[1]).std_dev < np.sqrt(9.0 * np.finfo(np.float64).eps)
     assert (x / u[0] + z / u[2]).std_dev == pytest.approx(2.0, rel=1e-12)
 
