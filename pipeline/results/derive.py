@@ -15,7 +15,7 @@ from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
-from pipeline.damping.average import Weighted, average_over_laws
+from pipeline.damping.average import Weighted, average_over_laws, between_laws
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
@@ -207,7 +207,8 @@ def derive(
     :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`, and with it everything that needs a length, as of an angular velocity the
     angle's; of angles, voltages, forces and numbers no such thing is given. The spring constant needs none.
     What depends on the damping law is an average over laws (:func:`pipeline.damping.average.average_over_laws`):
-    :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
+    :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + s (x_i - x)^2)`, where s is what the spread
+    between laws counts (:func:`pipeline.damping.average.between_laws`).
 
     References
     ----------
@@ -358,11 +359,13 @@ class _Laws:
         slopes = math.sqrt(weights[0]) * each[0][1]
         quantities = self.values + slopes @ np.array(departures)
         if weights.size > 1:
-            covariance = np.zeros((3, 3))
-            for (values, by_parameters), one, weight in zip(each, self.weighted, weights, strict=True):
-                covariance += weight * np.outer(values - self.values, values - self.values)
+            factors = [
+                slopes @ _root(one.fit.joint.covariance) for (_, slopes), one in zip(each, self.weighted, strict=True)
+            ]
+            variances = np.array([np.einsum("qp,qp->q", factor, factor) for factor in factors])
+            covariance = between_laws(weights, np.array([values for values, _ in each]), variances)
+            for factor, one, weight in zip(factors, self.weighted, weights, strict=True):
                 if one.fit is not self.stated:
-                    factor = by_parameters @ _root(one.fit.joint.covariance)
                     covariance += weight * factor @ factor.T
             joint = Joint(("amplitude", "damping_rate", "displacement"), np.zeros(3), covariance, ("m", "1/s", "m"))
             quantities = quantities + np.array(inputs.add_joint("choice_of_law", joint, "A"))

@@ -1,6 +1,7 @@
 """Amplitude, damping rate, gamma and beta hold the truth as often as stated, whatever a record can tell of its law.
 
-``python -m tests.trials.test_law_coverage --seeds 2000 --jobs 2`` prints the table of docs/explanation/accuracy.md.
+``python -m tests.trials.test_law_coverage --seeds 700 --first 800 --jobs 2`` prints the table of
+docs/explanation/accuracy.md, of records none of which the weights of laws were chosen by.
 The records are decaying cosines whose amplitude is integrated here, step by step; no code of the estimators is in it.
 """
 
@@ -39,8 +40,7 @@ WITHIN = ("linear", "quadratic", "linear+quadratic")
 SECONDS, NOISES_M = (10.0, 30.0, 120.0), (3e-4, 2.39e-3)
 QUANTITIES = ("amplitude", "damping_rate", "gamma", "beta")
 LEAST_68, LEAST_95 = 0.64, 0.93
-# A record that cannot tell both drags from a free power, whose rates at the start lie three u apart, holds both.
-WIDEST = {"amplitude": 1.2, "damping_rate": 1.5, "gamma": 1.2, "beta": 1.2}
+WIDEST = 1.2
 
 pytestmark = pytest.mark.trials
 
@@ -91,7 +91,7 @@ class Cell:
                 doubt = 3.3 * math.sqrt(least * (1.0 - least) / count)
                 if self.covered(k, sigmas) < least - doubt:
                     found.append(f"{name}: {self.covered(k, sigmas):.3f} at {sigmas:.2f} u")
-            if self.width(k) > WIDEST[name] * (1.0 + 3.3 / math.sqrt(count)):
+            if self.width(k) > WIDEST * (1.0 + 3.3 / math.sqrt(count)):
                 found.append(f"{name}: u is {self.width(k):.2f} of the fit's")
         return found
 
@@ -148,9 +148,9 @@ def one_record(job: tuple[str, float, float, int]) -> tuple[list[float], list[fl
     return errors, [stated.get(name, nothing)[1] for name in QUANTITIES], [own.get(n, math.nan) for n in QUANTITIES]
 
 
-def measured(drag: str, seconds: float, noise_m: float, trials: int, map_: Any = map) -> Cell:
+def measured(drag: str, seconds: float, noise_m: float, trials: int, map_: Any = map, first: int = 0) -> Cell:
     """Return one cell."""
-    jobs = [(drag, seconds, noise_m, seed) for seed in range(trials)]
+    jobs = [(drag, seconds, noise_m, seed) for seed in range(first, first + trials)]
     return Cell(drag, seconds, noise_m, *(np.array(x) for x in zip(*map_(one_record, jobs), strict=True)))
 
 
@@ -158,7 +158,7 @@ def measured(drag: str, seconds: float, noise_m: float, trials: int, map_: Any =
 @pytest.mark.parametrize("seconds", SECONDS)
 @pytest.mark.parametrize("drag", WITHIN)
 def test_intervals_hold_whatever_law_was_selected(drag: str, seconds: float, noise_m: float) -> None:
-    """68 % intervals hold in 64 % of records, 95 % ones in 93 %, at 1.2 of both drags' u, rates at 1.5."""
+    """68 % intervals hold in 64 % of records, 95 % ones in 93 %, at 1.2 of both drags' u."""
     cell = measured(drag, seconds, noise_m, TRIALS)
     print(cell.row())
     assert not cell.failures(), cell.row()
@@ -179,6 +179,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--seeds", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="seed to begin with")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", choices=sorted(DRAGS), action="append")
     options = parser.parse_args()
@@ -188,7 +189,7 @@ def main() -> None:
             def in_processes(work: Any, jobs: list[Any]) -> Any:
                 return pool.map(work, jobs, chunksize=20)
 
-            cell = measured(drag, seconds, noise_m, options.seeds, in_processes)
+            cell = measured(drag, seconds, noise_m, options.seeds, in_processes, options.first)
             print(cell.row(), "; ".join(cell.failures()), flush=True)
 
 

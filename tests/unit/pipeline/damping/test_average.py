@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.damping.average import FREE_POWER, SPREAD_OF_POWER, Weighted, average_over_laws
+from pipeline.damping.average import FREE_POWER, SPREAD_OF_POWER, Weighted, average_over_laws, between_laws
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping, Params, fit_damping
 from pipeline.oscillation.demodulate import Demodulated
@@ -84,14 +84,15 @@ def test_the_prior_is_that_of_one_more_measurement(synthetic: ModuleType, window
 def test_other_laws_weigh_by_their_evidence_and_by_what_the_record_knows(
     synthetic: ModuleType, windows: Windows
 ) -> None:
-    """A power beside linear and quadratic drag has 0.5 w exp(-dBIC/2) of its weight; all add up to one."""
+    """A power beside linear and quadratic drag has 0.5 w exp(-dBIC) of its weight; all add up to one."""
     damping, weighted, _ = of_truth(synthetic, windows, "linear+quadratic", 40, 1e-4)
     assert {"power", "linear+quadratic"} <= set(damping.admissible)
     by_name = {one.fit.name: one.weight for one in weighted}
     assert sum(by_name.values()) == pytest.approx(1.0)
     assert not {"none", "linear", "quadratic"} & set(by_name)
-    evidence = np.exp(-0.5 * (damping.fits["power"].bic - damping.fits["linear+quadratic"].bic))
-    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(FREE_POWER * evidence, rel=0.1)
+    prior, sharpness = FREE_POWER
+    evidence = np.exp(-0.5 * sharpness * (damping.fits["power"].bic - damping.fits["linear+quadratic"].bic))
+    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(prior * evidence, rel=0.1)
 
 
 @pytest.mark.parametrize("name", ["friction", "power", "linear+friction"])
@@ -138,5 +139,28 @@ def test_a_law_that_is_no_longer_admissible_still_weighs(synthetic: ModuleType, 
             break
     weighted = average_over_laws(damping, float(np.mean(amplitude)))
     by_name = {one.fit.name: one.weight for one in weighted}
-    evidence = np.exp(-0.5 * (damping.fits["power"].bic - damping.fits["linear+quadratic"].bic))
-    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(FREE_POWER * evidence, rel=0.1)
+    prior, sharpness = FREE_POWER
+    evidence = np.exp(-0.5 * sharpness * (damping.fits["power"].bic - damping.fits["linear+quadratic"].bic))
+    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(prior * evidence, rel=0.1)
+
+
+def test_laws_that_nearly_agree_add_hardly_anything() -> None:
+    """Two laws a fifth of their u apart add a ten-thousandth of their variance; with B alone it were a hundredth."""
+    covariance = between_laws(np.array([0.5, 0.5]), np.array([[1.0], [1.2]]), np.ones((2, 1)))
+    assert covariance[0, 0] == pytest.approx(2.0 * 0.01**2.5)
+
+
+def test_laws_far_apart_add_three_times_their_spread() -> None:
+    """Two laws twenty u apart add three times the variance of the two values, whatever the unit."""
+    weights, values = np.array([0.25, 0.75]), np.array([[1.0, 3e3], [21.0, -17e3]])
+    covariance = between_laws(weights, values, np.array([[1.0, 1e6], [1.0, 1e6]]))
+    spread = 0.25 * 0.75 * 20.0**2
+    np.testing.assert_allclose(covariance, 3.0 * spread * np.array([[1.0, -1e3], [-1e3, 1e6]]))
+
+
+def test_quantities_that_laws_agree_on_stay_as_they_are() -> None:
+    """What laws agree on gets nothing, not even where neither has an uncertainty; the matrix stays a covariance."""
+    weights, values = np.array([0.2, 0.3, 0.5]), np.array([[1.0, 5.0, 0.1], [2.0, 5.0, 0.1], [4.0, 5.0, 0.3]])
+    covariance = between_laws(weights, values, np.array([[1.0, 0.0, 1e-4]] * 3))
+    assert not covariance[1].any()
+    assert np.linalg.eigvalsh(covariance).min() > -1e-12
