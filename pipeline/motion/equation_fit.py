@@ -295,4 +295,4 @@ def _described(search: Search, damping: Damping, fit: least_squares.Fit) -> Equa
         + f": the equation of motion with {law} was fitted to the samples; it leaves "
         + amount(rms, search.conditioned.track.unit)
     )
-    return EquationFit(why, damping, state, Waveform(position, velocity, residual, rms), flags)
+    return EquationFit(why, damping, state, Waveform(position, lambda: velocity, residual, rms), flags)

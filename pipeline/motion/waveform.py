@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -109,7 +111,7 @@ def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.
     return Rest(estimate, float(np.ptp(curve)), found.bends, t, curve)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Waveform:
     """The fitted motion at every sample.
 
@@ -117,8 +119,8 @@ class Waveform:
     ----------
     position : (n,) float64, m
         Rest position + A(t) cos(phase(t)).
-    velocity : (n,) float64, m/s
-        Its derivative.
+    moving : callable
+        Gives :attr:`velocity`, which figures alone ask for.
     residual : (n,) float64, m
         Distance less position; NaN where unmeasured.
     rms_m : float
@@ -126,9 +128,14 @@ class Waveform:
     """
 
     position: F8
-    velocity: F8
+    moving: Callable[[], F8]
     residual: F8
     rms_m: float
+
+    @cached_property
+    def velocity(self) -> F8:
+        """Derivative of the oscillation, (n,) float64, m/s."""
+        return self.moving()
 
     def with_disturbances(self, disturbances: Disturbances) -> Waveform:
         """Return the waveform of the whole record, from that of the record without its disturbances."""
@@ -158,8 +165,11 @@ def reconstruct(track: Track, demodulated: Demodulated, phase: PhaseFit, rest: R
     elapsed = np.clip(track.t, phase.t0, float(np.max(track.t[used]))) - phase.t0
     amplitude = law.amplitude(elapsed)
     angle = phase.total(track.t)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    position = rest.at(track.t) + amplitude * cosine
-    velocity = -law.law.rate(amplitude, law.joint.values) * cosine - amplitude * phase.rate(amplitude) * sine
+    position = rest.at(track.t) + amplitude * np.cos(angle)
     residual = track.y - position
-    return Waveform(position, velocity, residual, float(np.sqrt(np.mean(residual[used] ** 2))))
+
+    def moving() -> F8:
+        falling = law.law.rate(amplitude, law.joint.values)
+        return np.asarray(-falling * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))
+
+    return Waveform(position, moving, residual, float(np.sqrt(np.mean(residual[used] ** 2))))

@@ -135,7 +135,7 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     basis = windows.decaying(basis, rough.decay)
     solution, spread = _let_go(windows, basis, conditioned.noise_m, params)
     _rescue(windows, basis, solution, spread, tuning, params)
-    solution, weights = _clip(windows, basis, solution, spread, rough, params)
+    solution, weights = _clip(windows, basis, solution, None, spread, rough, params)
     if conditioned.clipped_from_m:
         level = _typical(_spread(windows.usable, solution.residual), windows, solution)
         crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
@@ -147,7 +147,7 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
     spread = _spread(windows.usable, solution.residual)
-    solution, weights = _clip(windows, basis, solution, spread, tuning, params)
+    solution, weights = _clip(windows, basis, solution, weights, spread, tuning, params)
     return _finish(conditioned, windows, solution, weights, tuning)
 
 
@@ -263,16 +263,21 @@ def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
 
 
 def _clip(
-    windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params
+    windows: Windows, basis: F8, solution: Solution, fitted: F8 | None, spread: F8, tuning: Tuning, params: Params
 ) -> tuple[Solution, F8]:
-    """Take residuals beyond the clip out and fit again."""
+    """Take residuals beyond the clip out and fit again: all windows, or those whose weights are not the fitted ones."""
     level = _typical(spread, windows, solution)
     # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
     size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
     least = model_error(size, tuning.decay, tuning.angular_frequency)
     bound = params.clip_sigmas * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
     weights = np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0)
-    return solve(basis, weights), weights
+    if fitted is None:
+        return solve(basis, weights), weights
+    changed = np.flatnonzero((weights != fitted).any(axis=1))
+    if changed.size:
+        solution.put(changed, solve(basis[changed], weights[changed]))
+    return solution, weights
 
 
 def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:

@@ -18,6 +18,7 @@ from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.errors import AnalysisError, PipelineError
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.threads import one_thread
 from pipeline.results.compare import SpringRun
 from pipeline.track import F8
 from springmass.batch.plan import Job, code_sha256
@@ -38,7 +39,8 @@ DIGITS = 6  # of a correlation
 
 def analyse_many(jobs: Sequence[Job]) -> list[dict[str, Any]]:
     """Analyse runs one after the other; one that fails is a row as well."""
-    with hushed():  # what a recording has to say stands in its row
+    # What a recording has to say stands in its row. Threads are set once, not by each analysis.
+    with hushed(), one_thread:
         return [analyse_one(job) for job in jobs]
 
 
