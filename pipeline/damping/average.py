@@ -24,10 +24,10 @@ MIXED = "linear+quadratic"
 FAMILY = (*LAWS[MIXED].cases, MIXED)
 SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0 and quadratic drag's 2 are well inside
 OTHER_LAW = 0.15  # prior odds of each law beyond linear and quadratic drag, against these two
-# The same of a free power, for edges shed drag that no two terms describe, and how much what the record says counts.
-FREE_POWER = 0.5, 2.0
+FREE_POWER = 0.5  # the same of a free power: boundary layers and edges shed drag that no two terms describe
+SHARPER, APART = 0.7, 5.0  # what evidence on a power counts more, and how many u apart the rates are where half of it
 # How the variance between laws counts by its ratio to their own, chosen with the odds for what intervals then hold.
-NEAR, STEEPNESS, FAR = 2.0, 1.5, 3.0
+NEAR, STEEPNESS, FAR = 2.0, 1.5, 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,12 +69,14 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     the exponential's where the record knows no curvature, and with an uncertainty that covers every drag from
     friction to quadratic; those of the fit where it does. The other admissible laws weigh
     :math:`p\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it, with p of 0.15 for those with friction, and a free
-    power :math:`0.5\\,w\\,e^{-\\Delta\\mathrm{BIC}}`: it has as many parameters as both drags, and where a record tells
-    the two apart at all, the other is soon left out, for its share would widen every interval. So do laws that are
-    not rejected and no longer admissible, for a small weight counts where the rates lie far apart. Laws that only add
-    a term to the selected one are not among these. Where linear and quadratic drag is out of reach, the laws are
-    weighed by their BIC; where chi-square rejects them all, by their BIC over the reduced chi-square of the best: the
-    points scatter by so much more than they should, and the nearest is one of several.
+    power :math:`0.5\\,w\\,e^{-s\\Delta\\mathrm{BIC}/2}`. It has as many parameters as both drags, and where a record
+    tells the two apart at all the other is soon left out, or its share would widen the interval of nearly every
+    record: :math:`s = 1 + 0.7/(1 + (d/5)^4)` for rates at the start that lie d standard uncertainties apart. Far apart
+    s is 1, for there the rare record that speaks for the wrong one would be wrong by as much. So do laws that are not
+    rejected and no longer admissible, for a small weight counts where the rates lie far apart. Laws that only add a
+    term to the selected one are not among these. Where linear and quadratic drag is out of reach, the laws are weighed
+    by their BIC; where chi-square rejects them all, by their BIC over the reduced chi-square of the best: the points
+    scatter by so much more than they should, and the nearest is one of several.
 
     Covariances are multiplied by the reduced chi-square where that is above 1, the scale factor of [1]_: a law between
     two that were fitted is seen in what they leave before it rejects them.
@@ -99,9 +101,12 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
         evidence = [(fit, -0.5 * mixed.bic)]
         for name in names:
             if name not in FAMILY and share > 0.0:
-                prior, sharpness = _prior(name) if stands else (1.0, 1.0)
-                against = 0.5 * (damping.fits[name].bic - mixed.bic)
-                evidence.append((damping.fits[name], math.log(share * prior) - sharpness * against - 0.5 * mixed.bic))
+                other = damping.fits[name]
+                against, prior = 0.5 * (other.bic - mixed.bic), 1.0
+                if stands:
+                    prior = FREE_POWER if name == "power" else OTHER_LAW
+                    against *= _sharpness(other, _scaled(fit)) if name == "power" else 1.0
+                evidence.append((other, math.log(share * prior) - against - 0.5 * mixed.bic))
     # The coefficients of a power or of a function are stated where it is selected; else both drags', within reach.
     first = MIXED if stands and isinstance(damping.best.law, Drag) else damping.selected
     evidence.sort(key=lambda one: one[0].name != first)
@@ -110,8 +115,11 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     return tuple(Weighted(_scaled(fit), odd / sum(odds)) for (fit, _), odd in zip(evidence, odds, strict=True))
 
 
-def _prior(name: str) -> tuple[float, float]:
-    return FREE_POWER if name == "power" else (OTHER_LAW, 1.0)
+def _sharpness(power: LawFit, mixed: LawFit) -> float:
+    """By how much the evidence on a power counts more than it says; 1 where the rates at the start lie far apart."""
+    rate = mixed.damping_rate()
+    apart = abs(power.rate_at_start() - rate.value)
+    return 1.0 + SHARPER / (1.0 + (apart / (APART * rate.u)) ** 4) if rate.u > 0.0 else 1.0
 
 
 def between_laws(weights: F8, values: F8, variances: F8) -> F8:
@@ -127,8 +135,8 @@ def between_laws(weights: F8, values: F8, variances: F8) -> F8:
     Notes
     -----
     With the mean own variance :math:`W` and the variance :math:`B = \\sum_i w_i (x_i - x)^2` between laws, :math:`B`
-    counts by :math:`\\min(2 (B/W)^{3/2}, 3)`: hardly where laws agree within their own uncertainties, for an interval
-    of these holds the neighbours too; and threefold where they do not, for then the truth is one law's value and not
+    counts by :math:`\\min(2 (B/W)^{3/2}, 4)`: hardly where laws agree within their own uncertainties, for an interval
+    of these holds the neighbours too; and fourfold where they do not, for then the truth is one law's value and not
     a mean, and the interval has to reach the one that weighs less. With :math:`B` alone intervals hold too often in
     the first case and too seldom in the second (``tests/trials/test_law_coverage.py``).
     """

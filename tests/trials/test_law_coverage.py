@@ -1,6 +1,6 @@
 """Amplitude, damping rate, gamma and beta hold the truth as often as stated, whatever a record can tell of its law.
 
-``python -m tests.trials.test_law_coverage --seeds 700 --first 800 --jobs 2`` prints the table of
+``python -m tests.trials.test_law_coverage --seeds 600 --first 800 --jobs 2`` prints the table of
 docs/explanation/accuracy.md, of records none of which the weights of laws were chosen by.
 The records are decaying cosines whose amplitude is integrated here, step by step; no code of the estimators is in it.
 """

@@ -81,18 +81,24 @@ def test_the_prior_is_that_of_one_more_measurement(synthetic: ModuleType, window
     np.testing.assert_allclose(stated.covariance, expected, rtol=0.05, atol=0.0)
 
 
+def evidence(damping: Damping) -> float:
+    """Return what a record says for a power, which counts more where its rate lies near that of both drags."""
+    power, mixed = damping.fits["power"], damping.fits["linear+quadratic"]
+    rate = mixed.damping_rate()
+    apart = (power.rate_at_start() - rate.value) / (5.0 * rate.u)
+    return float(np.exp(-0.5 * (1.0 + 0.7 / (1.0 + apart**4)) * (power.bic - mixed.bic)))
+
+
 def test_other_laws_weigh_by_their_evidence_and_by_what_the_record_knows(
     synthetic: ModuleType, windows: Windows
 ) -> None:
-    """A power beside linear and quadratic drag has 0.5 w exp(-dBIC) of its weight; all add up to one."""
+    """A power beside linear and quadratic drag has 0.5 w exp(-s dBIC/2) of its weight; all add up to one."""
     damping, weighted, _ = of_truth(synthetic, windows, "linear+quadratic", 40, 1e-4)
     assert {"power", "linear+quadratic"} <= set(damping.admissible)
     by_name = {one.fit.name: one.weight for one in weighted}
     assert sum(by_name.values()) == pytest.approx(1.0)
     assert not {"none", "linear", "quadratic"} & set(by_name)
-    prior, sharpness = FREE_POWER
-    evidence = np.exp(-0.5 * sharpness * (damping.fits["power"].bic - damping.fits["linear+quadratic"].bic))
-    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(prior * evidence, rel=0.1)
+    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(FREE_POWER * evidence(damping), rel=0.1)
 
 
 @pytest.mark.parametrize("name", ["friction", "power", "linear+friction"])
@@ -139,9 +145,7 @@ def test_a_law_that_is_no_longer_admissible_still_weighs(synthetic: ModuleType, 
             break
     weighted = average_over_laws(damping, float(np.mean(amplitude)))
     by_name = {one.fit.name: one.weight for one in weighted}
-    prior, sharpness = FREE_POWER
-    evidence = np.exp(-0.5 * sharpness * (damping.fits["power"].bic - damping.fits["linear+quadratic"].bic))
-    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(prior * evidence, rel=0.1)
+    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(FREE_POWER * evidence(damping), rel=0.1)
 
 
 def test_laws_that_nearly_agree_add_hardly_anything() -> None:
@@ -150,12 +154,12 @@ def test_laws_that_nearly_agree_add_hardly_anything() -> None:
     assert covariance[0, 0] == pytest.approx(2.0 * 0.01**2.5)
 
 
-def test_laws_far_apart_add_three_times_their_spread() -> None:
-    """Two laws twenty u apart add three times the variance of the two values, whatever the unit."""
+def test_laws_far_apart_add_four_times_their_spread() -> None:
+    """Two laws twenty u apart add four times the variance of the two values, whatever the unit."""
     weights, values = np.array([0.25, 0.75]), np.array([[1.0, 3e3], [21.0, -17e3]])
     covariance = between_laws(weights, values, np.array([[1.0, 1e6], [1.0, 1e6]]))
     spread = 0.25 * 0.75 * 20.0**2
-    np.testing.assert_allclose(covariance, 3.0 * spread * np.array([[1.0, -1e3], [-1e3, 1e6]]))
+    np.testing.assert_allclose(covariance, 4.0 * spread * np.array([[1.0, -1e3], [-1e3, 1e6]]))
 
 
 def test_quantities_that_laws_agree_on_stay_as_they_are() -> None:
