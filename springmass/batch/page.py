@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -12,7 +12,7 @@ from springmass.batch.reports import REPORTS, need_of, report_name
 from springmass.batch.rows import FAILED
 from storage.atomic import write_whole
 
-__all__ = ["PAGE", "write_page"]
+__all__ = ["PAGE", "line_of", "write_page"]
 
 PAGE = "index.html"
 SHOWN = (
@@ -25,17 +25,15 @@ SHOWN = (
 """Estimates with a column of their own."""
 
 
-def write_page(
-    folder: Path, runs: Iterable[tuple[str, Mapping[str, Any]]], tags: Sequence[str], reports: set[str]
-) -> Path:
+def write_page(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequence[str], reports: set[str]) -> Path:
     """Write ``index.html``.
 
     Parameters
     ----------
     folder : Path
         Of the course.
-    runs : iterable of (str, mapping)
-        Names and rows.
+    lines : sequence of mapping
+        Of :func:`line_of`, one a run.
     tags : sequence of str
         Columns of the course's own.
     reports : set of str
@@ -43,24 +41,29 @@ def write_page(
     """
     from springmass.report.html import template
 
-    every = [_line(name, row, tags, reports) for name, row in runs]
-    there = [i for i in range(len(SHOWN)) if any(line["cells"][i][1] for line in every)]  # no column without a number
-    lines = [{**line, "cells": [line["cells"][i] for i in there]} for line in every]
-    lines.sort(key=lambda line: (*(-x for x in line["need"]), line["name"]))
-    told = {kind: sum(line["look"] == kind for line in lines) for kind in ("failed", "error", "warning", "fine")}
+    there = [i for i in range(len(SHOWN)) if any(line["cells"][i][1] for line in lines)]  # no column without a number
+    shown = [
+        {**line, "cells": [line["cells"][i] for i in there], "link": _link(line["name"], reports)} for line in lines
+    ]
+    shown.sort(key=lambda line: (*(-x for x in line["need"]), line["name"]))
+    told = {kind: sum(line["look"] == kind for line in shown) for kind in ("failed", "error", "warning", "fine")}
     page = template("course.html.j2").render(
-        title=folder.resolve().name, lines=lines, tags=tags, quantities=[SHOWN[i] for i in there], told=told
+        title=folder.resolve().name, lines=shown, tags=tags, quantities=[SHOWN[i] for i in there], told=told
     )
     return write_whole(folder / PAGE, page.encode("utf-8", "backslashreplace"))
 
 
-def _line(name: str, row: Mapping[str, Any], tags: Sequence[str], reports: set[str]) -> dict[str, Any]:
+def _link(name: str, reports: set[str]) -> str:
     report = report_name(name)
+    return f"{REPORTS}/{quote(report)}/report.html" if report in reports else ""
+
+
+def line_of(name: str, row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
+    """Return what the page shows of a run, from its name, its row and the course's own columns."""
     failed = row["status"] in FAILED
     look = "failed" if failed else "error" if row["errors"] else "warning" if row["warnings"] else "fine"
     return {
         "name": name,
-        "link": f"{REPORTS}/{quote(report)}/report.html" if report in reports else "",
         "look": look,
         "need": need_of(row),
         "why": row["error"] if failed else "; ".join(message for _, message in row["messages"][:2]),

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from springmass.batch.engines import by_dask, by_processes, here
-from springmass.batch.page import PAGE, write_page
+from springmass.batch.page import PAGE, line_of, write_page
 from springmass.batch.plan import Job, Plan, code_sha256, names_of, shard_of
 from springmass.batch.reports import linked, need_of, worst, write_reports
 from springmass.batch.results_table import CSV, PARQUET, write_tables
@@ -173,17 +173,18 @@ def make(plan: Plan, store: Store, folder: Path, *, reports: int, jobs: int | No
             yield {**(row or next(store.rows(job.key))), "job": job.told()}
 
     store.put_together(kept())  # the rows of this plan in its order
-    needs = []
+    needs, lines = [], []
 
     def rows() -> Iterator[dict[str, Any]]:
         for row, name in zip(store.all(), names, strict=True):
             needs.append((need_of(row), name, row["status"]))
+            lines.append(line_of(name, row, plan.tags))
             yield flat(row, name, plan.tags)
 
     write_tables(folder, rows(), plan.tags)
     chosen = worst(needs, reports)
     write_reports(folder, [(name, job) for name, job in zip(names, plan.jobs, strict=True) if name in chosen], jobs)
-    write_page(folder, zip(names, store.all(), strict=True), plan.tags, linked(folder))
+    write_page(folder, lines, plan.tags, linked(folder))
     store.mark(made_of)
     return True
 

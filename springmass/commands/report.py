@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from springmass.batch.page import write_page
+from springmass.batch.page import line_of, write_page
 from springmass.batch.plan import names_of
 from springmass.batch.reports import REPORTS, find_run, jobs_of, linked, report_name, write_one
 from springmass.batch.store import demand_course
@@ -25,7 +25,8 @@ def run(options: argparse.Namespace) -> int:
     make_folder(folder / REPORTS)
     page = write_one(name, job, folder / REPORTS / report_name(name))
     tags = list(dict.fromkeys(tag for each in jobs for tag in each.tags))
-    write_page(folder, zip(names, store.all(), strict=True), tags, linked(folder))
+    lines = [line_of(name, row, tags) for name, row in zip(names, store.all(), strict=True)]
+    write_page(folder, lines, tags, linked(folder))
     tell(f"report: {page}")
     suggest(f"open {page} in a browser")
     return OK
