@@ -18,7 +18,7 @@ from pipeline.damping.laws import LAWS, Drag
 from pipeline.damping.select import Damping
 from pipeline.track import F8
 
-__all__ = ["Weighted", "average_over_laws", "between_laws"]
+__all__ = ["Weighted", "average_over_laws", "spread_counts"]
 
 MIXED = "linear+quadratic"
 FAMILY = (*LAWS[MIXED].cases, MIXED)
@@ -26,7 +26,7 @@ SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0
 OTHER_LAW = 0.15  # prior odds of each law beyond linear and quadratic drag, against these two
 FREE_POWER = 0.5  # the same of a free power: boundary layers and edges shed drag that no two terms describe
 SHARPER, APART = 0.7, 5.0  # what evidence on a power counts more, and how many u apart the rates are where half of it
-# How the variance between laws counts by its ratio to their own, chosen with the odds for what intervals then hold.
+# How the spread between laws counts by its ratio to their own, chosen with the odds for what intervals then hold.
 NEAR, STEEPNESS, FAR = 2.0, 1.5, 4.0
 
 
@@ -122,30 +122,28 @@ def _sharpness(power: LawFit, mixed: LawFit) -> float:
     return 1.0 + SHARPER / (1.0 + (apart / (APART * rate.u)) ** 4) if rate.u > 0.0 else 1.0
 
 
-def between_laws(weights: F8, values: F8, variances: F8) -> F8:
-    """Return the covariance (q, q) of quantities that laws do not agree on, beside what each says of itself.
+def spread_counts(weights: F8, rates: F8, variances: F8) -> float:
+    """Return by how much the spread of quantities between laws counts in their variances.
 
     Parameters
     ----------
     weights : (k,) float64
         Of the laws; their sum is 1.
-    values, variances : (k, q) float64
-        Quantities by each law and their variances.
+    rates, variances : (k,) float64
+        Damping rate at the start by each law, 1/s, and its variance: what laws differ in most.
 
     Notes
     -----
-    With the mean own variance :math:`W` and the variance :math:`B = \\sum_i w_i (x_i - x)^2` between laws, :math:`B`
-    counts by :math:`\\min(2 (B/W)^{3/2}, 4)`: hardly where laws agree within their own uncertainties, for an interval
-    of these holds the neighbours too; and fourfold where they do not, for then the truth is one law's value and not
-    a mean, and the interval has to reach the one that weighs less. With :math:`B` alone intervals hold too often in
-    the first case and too seldom in the second (``tests/trials/test_law_coverage.py``).
+    With the mean own variance :math:`W` and the variance :math:`B = \\sum_i w_i (x_i - x)^2` between laws it is
+    :math:`\\min(2 (B/W)^{3/2}, 4)`: hardly anything where laws agree within their own uncertainties, for an interval of
+    these holds the neighbours too; and more than all of it where they do not, for then the truth is one law's value
+    and not a mean, and the interval has to reach the one that weighs less. With 1 throughout intervals hold too often
+    in the first case and too seldom in the second (``tests/trials/test_law_coverage.py``).
     """
-    apart = values - weights @ values
-    own, between = weights @ variances, weights @ apart**2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        counted = np.minimum(NEAR * (between / own) ** STEEPNESS, FAR)
-    scaled = apart * np.sqrt(np.where(between > 0.0, counted, 0.0))
-    return np.asarray((weights[:, None] * scaled).T @ scaled)
+    own, between = float(weights @ variances), float(weights @ (rates - weights @ rates) ** 2)
+    if between == 0.0:
+        return 0.0
+    return min(NEAR * (between / own) ** STEEPNESS, FAR) if own > 0.0 else FAR
 
 
 def _far(damping: Damping, names: tuple[str, ...]) -> list[str]:

@@ -15,7 +15,7 @@ from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
-from pipeline.damping.average import Weighted, average_over_laws, between_laws
+from pipeline.damping.average import Weighted, average_over_laws, spread_counts
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
@@ -208,7 +208,7 @@ def derive(
     angle's; of angles, voltages, forces and numbers no such thing is given. The spring constant needs none.
     What depends on the damping law is an average over laws (:func:`pipeline.damping.average.average_over_laws`):
     :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + s (x_i - x)^2)`, where s is what the spread
-    between laws counts (:func:`pipeline.damping.average.between_laws`).
+    between laws counts (:func:`pipeline.damping.average.spread_counts`).
 
     References
     ----------
@@ -362,8 +362,9 @@ class _Laws:
             factors = [
                 slopes @ _root(one.fit.joint.covariance) for (_, slopes), one in zip(each, self.weighted, strict=True)
             ]
-            variances = np.array([np.einsum("qp,qp->q", factor, factor) for factor in factors])
-            covariance = between_laws(weights, np.array([values for values, _ in each]), variances)
+            apart = np.array([values for values, _ in each]) - self.values
+            counts = spread_counts(weights, apart[:, 1], np.array([factor[1] @ factor[1] for factor in factors]))
+            covariance = counts * (weights[:, None] * apart).T @ apart
             for factor, one, weight in zip(factors, self.weighted, weights, strict=True):
                 if one.fit is not self.stated:
                     covariance += weight * factor @ factor.T

@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.damping.average import FREE_POWER, SPREAD_OF_POWER, Weighted, average_over_laws, between_laws
+from pipeline.damping.average import FREE_POWER, SPREAD_OF_POWER, Weighted, average_over_laws, spread_counts
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping, Params, fit_damping
 from pipeline.oscillation.demodulate import Demodulated
@@ -148,23 +148,21 @@ def test_a_law_that_is_no_longer_admissible_still_weighs(synthetic: ModuleType, 
     assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(FREE_POWER * evidence(damping), rel=0.1)
 
 
-def test_laws_that_nearly_agree_add_hardly_anything() -> None:
-    """Two laws a fifth of their u apart add a ten-thousandth of their variance; with B alone it were a hundredth."""
-    covariance = between_laws(np.array([0.5, 0.5]), np.array([[1.0], [1.2]]), np.ones((2, 1)))
-    assert covariance[0, 0] == pytest.approx(2.0 * 0.01**2.5)
+def test_the_spread_of_laws_that_nearly_agree_counts_hardly_anything() -> None:
+    """Of two laws a fifth of their u apart it counts by 0.002, of those that agree by nothing."""
+    half = np.array([0.5, 0.5])
+    assert spread_counts(half, np.array([1.0, 1.2]), np.ones(2)) == pytest.approx(2.0 * 0.01**1.5)
+    assert spread_counts(half, np.array([1.0, 1.0]), np.zeros(2)) == 0.0
 
 
-def test_laws_far_apart_add_four_times_their_spread() -> None:
-    """Two laws twenty u apart add four times the variance of the two values, whatever the unit."""
-    weights, values = np.array([0.25, 0.75]), np.array([[1.0, 3e3], [21.0, -17e3]])
-    covariance = between_laws(weights, values, np.array([[1.0, 1e6], [1.0, 1e6]]))
-    spread = 0.25 * 0.75 * 20.0**2
-    np.testing.assert_allclose(covariance, 4.0 * spread * np.array([[1.0, -1e3], [-1e3, 1e6]]))
+def test_the_spread_of_laws_far_apart_counts_fourfold() -> None:
+    """Of two laws twenty u apart it counts by 4, in any unit, and where neither has an uncertainty."""
+    weights, rates = np.array([0.25, 0.75]), np.array([1.0, 21.0])
+    assert spread_counts(weights, rates, np.ones(2)) == 4.0
+    assert spread_counts(weights, 1e-6 * rates, np.full(2, 1e-12)) == 4.0
+    assert spread_counts(weights, rates, np.zeros(2)) == 4.0
 
 
-def test_quantities_that_laws_agree_on_stay_as_they_are() -> None:
-    """What laws agree on gets nothing, not even where neither has an uncertainty; the matrix stays a covariance."""
-    weights, values = np.array([0.2, 0.3, 0.5]), np.array([[1.0, 5.0, 0.1], [2.0, 5.0, 0.1], [4.0, 5.0, 0.3]])
-    covariance = between_laws(weights, values, np.array([[1.0, 0.0, 1e-4]] * 3))
-    assert not covariance[1].any()
-    assert np.linalg.eigvalsh(covariance).min() > -1e-12
+def test_the_spread_counts_by_its_ratio_to_what_laws_say_of_themselves() -> None:
+    """Where both variances are alike it counts twice."""
+    assert spread_counts(np.array([0.5, 0.5]), np.array([1.0, 3.0]), np.ones(2)) == pytest.approx(2.0)
