@@ -190,7 +190,8 @@ def _by_pilots(best: Choice | None, problem: Problem, spacing_s: float, count: i
             continue
         first = 1
         if best is not None:
-            if best.integrator is integrator:
+            # Where a motion dies out from one kept state to the next a bound counts errors that none of them shows.
+            if best.integrator is integrator and problem.equation.gamma_per_s * spacing_s <= 1.0:
                 first = max(1, round(best.parts / LIKELY))
             pilot = _pilot_ns(integrator, problem, spacing_s / first, seconds)
             # Of Strang a bound is known: no prediction makes its run much shorter.
