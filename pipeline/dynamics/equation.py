@@ -50,12 +50,16 @@ class Equation:
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
-            object.__setattr__(self, name, double(getattr(self, name), name))
+            given = getattr(self, name)
+            if type(given) is not float or not math.isfinite(given):  # rarely, and it takes ten times as long
+                object.__setattr__(self, name, double(given, name))
         omega = self.angular_frequency_per_s
         if not _SMALLEST < omega < _LARGEST:
             raise DynamicsError(
                 f"angular_frequency_per_s must be between {_SMALLEST:g} and {_LARGEST:g}, got {omega:g}"
             )
+        if self.gamma_per_s >= 0.0 and self.drag_per_m >= 0.0 and self.friction_m_per_s2 >= 0.0:
+            return
         for name in ("gamma_per_s", "drag_per_m", "friction_m_per_s2"):
             if getattr(self, name) < 0.0:
                 raise DynamicsError(f"{name} must be 0 or more, got {getattr(self, name):g}")

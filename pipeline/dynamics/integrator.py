@@ -61,9 +61,13 @@ class Integrator(ABC):
         """Return an error that it has at least, over the amplitude: what it need not be predicted for."""
         return 0.0
 
-    def bound(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return what a choice of a step goes by: the predicted error, or a bound of it that costs less."""
-        return self.predicted_error(problem, step_s, seconds)
+    def bound(self, problem: Problem, step_s: float, seconds: float) -> float:  # noqa: ARG002 - some have one
+        """Return a bound of that error which costs microseconds; inf where it takes a pilot to tell."""
+        return math.inf
+
+    def keeping(self, tolerance: float) -> Integrator:  # noqa: ARG002 - some go by their step
+        """Return the method set to a tolerance, the error over the amplitude at the end of a run, if it takes one."""
+        return self
 
     def predicted_velocity_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the same of the velocity, over the amplitude times the angular frequency."""

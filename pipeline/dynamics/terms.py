@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import numpy as np
-
+from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.problem import Problem
 
-__all__ = ["SHARE", "Term", "required"]
+__all__ = ["SHARE", "Term", "reduced", "required"]
 
 SHARE = 0.1  # of the tolerance, for all terms left out together
+
+_COEFFICIENTS = {
+    "viscous_drag": "gamma_per_s",
+    "quadratic_drag": "drag_per_m",
+    "friction": "friction_m_per_s2",
+    "amplitude_dependent_frequency": "cubic_per_m2_s2",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,38 +66,63 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
     >>> reduced.equation.is_linear, [term.name for term in terms if term.included]
     (True, ['viscous_drag'])
     """
+    sizes = _sizes(problem, seconds)
+    kept, _ = _kept(sizes, tolerance)
+    terms = []
+    for name in _COEFFICIENTS:
+        size = min(sizes.get(name, 0.0), 1.0)
+        terms.append(Term(name, size, name in kept, _why(name in sizes, name in kept, size, tolerance)))
+    return reduced(problem, seconds, tolerance)[0], tuple(terms)
+
+
+def reduced(problem: Problem, seconds: float, tolerance: float) -> tuple[Problem, float]:
+    """Return the same problem, and the most that what was left out changes the displacement, over the amplitude.
+
+    It is all that a run needs to know: a short one takes less time than what became of each term does to tell.
+    """
+    sizes = _sizes(problem, seconds)
+    kept, left_out = _kept(sizes, tolerance)
+    if len(kept) == len(sizes):
+        return problem, 0.0
+    eq = problem.equation
+    equation = Equation(
+        angular_frequency_per_s=eq.angular_frequency_per_s,
+        **{each: getattr(eq, each) for name, each in _COEFFICIENTS.items() if name in kept},
+    )
+    return Problem(equation, problem.displacement_m, problem.velocity_m_per_s), left_out
+
+
+def _sizes(problem: Problem, seconds: float) -> dict[str, float]:
+    """What leaving out each term that acts could change the displacement by, over the starting amplitude."""
     eq, start = problem.equation, problem.amplitude_m()
     gamma, beta, mu = eq.laws()
-    omega = eq.angular_frequency_per_s
-    time = seconds + 1.0 / omega
-    with np.errstate(over="ignore"):
+    omega, cubic = eq.angular_frequency_per_s, abs(eq.cubic_per_m2_s2)
+    time, drift = seconds + 1.0 / omega, 1.0
+    found = {}
+    if cubic:
         # Under a cubic spring another amplitude is another pace, and the phase drifts for all the time that is left.
-        bend = 0.75 * abs(eq.cubic_per_m2_s2) * (start / omega) * (start / omega)
-        drift = 1.0 + bend / math.sqrt(1.0 + bend) * omega * time if math.isfinite(bend) else 1e100
-        sizes = {
-            "viscous_drag": ("gamma_per_s", gamma * time * (1.0 + 0.5 * gamma / omega) * drift),
-            "quadratic_drag": ("drag_per_m", beta * start * time * drift),
-            "friction": ("friction_m_per_s2", mu * time / start * drift if start > 0 else 0.0),
-            "amplitude_dependent_frequency": (
-                "cubic_per_m2_s2",
-                0.375 * abs(eq.cubic_per_m2_s2) * start * start / omega * time,
-            ),
-        }
-    sizes = {name: (attribute, math.inf if math.isnan(size) else size) for name, (attribute, size) in sizes.items()}
-    room = SHARE * tolerance
-    terms, dropped = [], {}
-    for name, (attribute, size) in sorted(sizes.items(), key=lambda item: item[1][1]):
-        acts = getattr(eq, attribute) != 0.0
-        # Least first: what fits into the room together stays out. Friction always holds a bob in the end.
-        kept = bool(acts and size > room)
-        if not kept:
-            room -= size
-            dropped[attribute] = 0.0
-        terms.append(Term(name, min(size, 1.0), kept, _why(acts, kept, size, tolerance)))
-    order = list(sizes)
-    return replace(problem, equation=replace(eq, **dropped)), tuple(
-        sorted(terms, key=lambda term: order.index(term.name))
-    )
+        bend = 0.75 * cubic * (start / omega) * (start / omega)
+        drift += bend / math.sqrt(1.0 + bend) * omega * time if bend < math.inf else 1e100
+        found["amplitude_dependent_frequency"] = 0.375 * cubic * start * start / omega * time
+    if gamma:
+        found["viscous_drag"] = gamma * time * (1.0 + 0.5 * gamma / omega) * drift
+    if eq.drag_per_m:
+        found["quadratic_drag"] = beta * start * time * drift
+    if eq.friction_m_per_s2:
+        found["friction"] = mu * time / start * drift if start > 0.0 else 0.0
+    return found
+
+
+def _kept(sizes: dict[str, float], tolerance: float) -> tuple[set[str], float]:
+    """Return the terms that are kept, and what the others change together."""
+    room, left_out, kept = SHARE * tolerance, 0.0, set()
+    # Least first: what fits into the room together stays out. Friction always holds a bob in the end.
+    for size, name in sorted((size if size >= 0.0 else math.inf, name) for name, size in sizes.items()):
+        if left_out + size <= room:
+            left_out += size
+        else:
+            kept.add(name)  # with what is beyond numbers
+    return kept, left_out
 
 
 def _why(acts: bool, kept: bool, size: float, tolerance: float) -> str:

@@ -137,7 +137,10 @@ def by_scipy(problem: Problem, t: F8, rtol: float) -> F8:
 
 
 def test_auto_keeps_its_tolerance_and_is_cheap() -> None:
-    """The error is within the tolerance on 99.9 % of the scenes, the cost within twice the least on 99, five on all."""
+    """The error is within the tolerance on 99.9 % of the scenes, the cost within twice the least on 99, six on all.
+
+    Of runs alone: what is cheaper by less than it takes to predict its error is not looked for.
+    """
     missed, ratios = [], []
     for seed in range(SCENES):
         case = problem, spacing, count, tolerance = random_case(seed)
@@ -158,7 +161,7 @@ def test_auto_keeps_its_tolerance_and_is_cheap() -> None:
     )
     assert len(missed) <= 0.001 * SCENES
     assert len(dear) <= max(1.0, 0.01 * SCENES)
-    assert max(ratios)[0] <= 5.0
+    assert max(ratios)[0] <= 6.0
 
 
 def test_the_truth_is_that_of_another_solver() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.dynamics.amplitude import amplitude
 from pipeline.dynamics.integrator import Integrator, demand_times
 from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.dynamics.prediction.bounds import averaged_bound
 from pipeline.dynamics.prediction.leading import AVERAGED_TERMS, leading
 from pipeline.dynamics.prediction.pilot import bounded, in_own_units
 from pipeline.dynamics.prediction.rounding import expected_rounding
@@ -47,6 +48,10 @@ class Averaged(Integrator):
     def least_error(self, problem: Problem) -> float:
         """Return a quarter of the third harmonic that a cycle has and a cosine has not."""
         return 0.25 * max(0.1 * problem.equation.drag_per_m * problem.amplitude_m(), _hardness(problem) / 32.0)
+
+    def bound(self, problem: Problem, step_s: float, seconds: float) -> float:  # noqa: ARG002 - it has no step
+        """Return a fitted bound; see :func:`pipeline.dynamics.prediction.bounds.averaged_bound`."""
+        return averaged_bound(problem, seconds)
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what a pilot run shows."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.dynamics.flow import flows
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
-from pipeline.dynamics.prediction.rounding import expected_rounding
+from pipeline.dynamics.prediction.rounding import expected_rounding, rounding_error
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 
@@ -38,6 +38,10 @@ class Exact(Integrator):
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Evaluate the solution at every kept time; rates beyond all bounds end at rest."""
         return _states(problem, step_s * every, steps // every + 1)
+
+    def bound(self, problem: Problem, step_s: float, seconds: float) -> float:  # noqa: ARG002 - it has no step
+        """Return the most that rounding leaves."""
+        return rounding_error(problem, seconds)
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the rounding that is expected of the phase."""

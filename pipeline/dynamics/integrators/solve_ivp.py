@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,10 @@ class SolveIvp(Integrator):
     method: str
     grows: float
     tolerance: float = 1e-6
+
+    def keeping(self, tolerance: float) -> SolveIvp:
+        """Return the method at that tolerance, a thousandth at most."""
+        return replace(self, tolerance=min(tolerance, 1e-3))
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what the local tolerance grows to."""

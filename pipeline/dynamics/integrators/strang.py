@@ -27,7 +27,8 @@ from pipeline.dynamics.equation import Equation, Real
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrator import Integrator, demand_times, kept, with_start
 from pipeline.dynamics.integrators.turning import Friction
-from pipeline.dynamics.prediction.leading import STRANG_TERMS, is_weak, leading
+from pipeline.dynamics.prediction.bounds import strang_bound
+from pipeline.dynamics.prediction.leading import SHORT_STEP, STRANG_TERMS, is_weak, leading, small_numbers
 from pipeline.dynamics.prediction.pilot import bounded, in_own_units, resonance
 from pipeline.dynamics.prediction.rounding import rounding_error, stepped_rounding
 from pipeline.dynamics.prediction.stretch import predicted
@@ -42,7 +43,6 @@ LONGEST_WITH_FRICTION = 1e6  # radians a step
 LEAST_DRAG = 1e-30  # of a step, over the inverse velocity: below it nothing changes, and units of it may leave numbers
 LEAST_TURN = 0.05  # sine of a step's angle: above it velocities from displacements err by no more than 20 roundings
 SMALL = 1e-3  # of an error
-SHORT_STEP = 0.5  # radians up to which the leading term of the error tells
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +60,10 @@ class Strang(Integrator):
             return math.inf
         added = 3.0 * abs(eq.cubic_per_m2_s2) * problem.amplitude_m() * problem.amplitude_m()
         return 1.0 / math.sqrt(added + eq.angular_frequency_per_s**2)
+
+    def bound(self, problem: Problem, step_s: float, seconds: float) -> float:
+        """Return a fitted bound; see :func:`pipeline.dynamics.prediction.bounds.strang_bound`."""
+        return strang_bound(problem, step_s, seconds)
 
     def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return what a pilot run in coarser steps shows, and the rounding."""
@@ -91,7 +95,7 @@ class Strang(Integrator):
         eq = problem.equation
         if not eq.friction_m_per_s2:
             # Beyond that the correction is no better than what it corrects: there it ends, by a jump as small as these.
-            corrects = is_weak(problem) and eq.angular_frequency_per_s * step_s < SHORT_STEP
+            corrects = is_weak(small_numbers(problem)) and eq.angular_frequency_per_s * step_s < SHORT_STEP
             begun = _corrected(problem, step_s) if corrects else problem
             y, v = _states(begun, step_s, steps, every)
             # What is kept is half an oscillator short of the end of its step.

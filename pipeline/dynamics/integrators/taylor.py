@@ -65,6 +65,10 @@ class Taylor(Integrator):
             return "viscous drag this stiff needs a step far below the motion's own time; take strang, exact or auto"
         return ""
 
+    def keeping(self, tolerance: float) -> Taylor:
+        """Return the series of that tolerance, a thousandth at most."""
+        return Taylor(tolerance=min(tolerance, 1e-3), longest=self.longest)
+
     def bound(self, problem: Problem, step_s: float, seconds: float) -> float:
         """Return the tolerance, or the rounding where that is more; inf for more steps than it takes."""
         demand_times(step_s, seconds)

@@ -15,9 +15,19 @@ from dataclasses import dataclass
 
 from pipeline.dynamics.problem import Problem
 
-__all__ = ["AVERAGED_TERMS", "STRANG_TERMS", "Terms", "is_weak", "leading"]
+__all__ = [
+    "AVERAGED_TERMS",
+    "SHORT_STEP",
+    "STRANG_TERMS",
+    "Terms",
+    "has_leading_terms",
+    "is_weak",
+    "leading",
+    "small_numbers",
+]
 
 WEAK = 0.03  # of each small number, up to which their products tell
+SHORT_STEP = 0.5  # radians up to which the leading term of Strang's error tells
 SHORTEST, LONGEST = 12.0, 1e9  # radians of a run
 POINTS = 14
 MARGIN = 1.15
@@ -49,16 +59,25 @@ STRANG_TERMS = Terms((0.0, 0.013), (0.0, 0.036, 0.075), ((0.0, 0.013), (0.0, 0.0
 AVERAGED_TERMS = Terms((-0.2664, -0.0059), (0.1275, -0.0107, 0.072), ((0.1, 0.12), (0.12, 0.2)))
 
 
-def is_weak(problem: Problem) -> bool:
+def is_weak(numbers: tuple[float, float, float, float]) -> bool:
     """Whether viscous drag, quadratic drag and the cubic term change little within a cycle."""
-    return max(abs(each) for each in _small(problem)) <= WEAK
+    g, q, _, s = numbers
+    return g <= WEAK and q <= WEAK and s <= WEAK
 
 
-def _small(problem: Problem) -> tuple[float, float, float]:
-    """The small numbers g, q and s."""
+def small_numbers(problem: Problem) -> tuple[float, float, float, float]:
+    """Return g, q, friction over the spring's pull at the starting amplitude, and the size of s."""
     eq, start = problem.equation, problem.amplitude_m()
     omega = eq.angular_frequency_per_s
-    return eq.gamma_per_s / omega, eq.drag_per_m * start, eq.cubic_per_m2_s2 * start * start / omega**2
+    reach = start / omega
+    held = eq.friction_m_per_s2 / omega / omega / start if start > 0.0 else 0.0
+    return eq.gamma_per_s / omega, eq.drag_per_m * start, held, abs(eq.cubic_per_m2_s2) * reach * reach
+
+
+def has_leading_terms(problem: Problem, seconds: float) -> bool:
+    """Whether the error of a run is known in closed form."""
+    weak = is_weak(small_numbers(problem)) and not problem.equation.friction_m_per_s2
+    return weak and SHORTEST < problem.equation.angular_frequency_per_s * seconds < LONGEST
 
 
 def leading(
@@ -79,10 +98,10 @@ def leading(
     """
     eq, start = problem.equation, problem.amplitude_m()
     omega = eq.angular_frequency_per_s
-    g, q, s = _small(problem)
-    end = omega * seconds
-    if eq.friction_m_per_s2 or not is_weak(problem) or not SHORTEST < end < LONGEST:
+    if not has_leading_terms(problem, seconds):
         return None
+    g, q, _, s = small_numbers(problem)
+    s, end = math.copysign(s, eq.cubic_per_m2_s2), omega * seconds
     fall = eq.laws()[1] * start / omega
     time = 1.0 / max(g + fall, 1e-12)
     long = math.log1p(end / time)

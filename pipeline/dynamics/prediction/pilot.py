@@ -152,28 +152,38 @@ def resonance(problem: Problem, step_s: float, seconds: float) -> float:
     such harmonic.
     """
     eq, start = problem.equation, problem.amplitude_m()
+    if eq.friction_m_per_s2 or not eq.drag_per_m:
+        return 0.0
     square = eq.angular_frequency_per_s**2 - eq.gamma_per_s**2
     bend = 0.75 * eq.cubic_per_m2_s2 * start * start
-    if eq.friction_m_per_s2 or not eq.drag_per_m or square <= 0.0 or square + bend <= 0.0:
+    fall = eq.gamma_per_s + eq.laws()[1] * start
+    if square <= 0.0 or square + bend <= 0.0 or fall == 0.0:
         return 0.0
     pace, last = math.sqrt(square + bend), math.sqrt(square)
-    fall = eq.gamma_per_s + eq.laws()[1] * start
     from_rest = problem.velocity_m_per_s == 0.0 and not bend
-    times = [min(seconds, 0.1 * 2.0**k / fall) for k in range(LOOKS)]
-    turned = [0.0] * LOOKS
-    for multiple in (1, 2, 3):
-        steps, later = (multiple * 2.0 * math.pi / (each * step_s) for each in (pace, last))
-        size = 8.0 / (math.pi * steps**3)
+    harmonics = []
+    for multiple in (1.0, 2.0, 3.0):
+        steps = multiple * 2.0 * math.pi / (pace * step_s)
+        later = steps * pace / last
         even = 2.0 * round(0.5 * steps)
         off = max(abs(steps - even), 1e-12)
         slips = 2.0 * fall / pace * abs(steps - later)
         passing = math.sqrt(2.0 * math.pi / slips) if slips else math.inf
         longest = passing if (steps - even) * (later - even) <= 0.0 else min(passing, 2.0 / off)
-        for k, t in enumerate(times):
-            lasting = (1.0 - math.cos(min(off * pace * t, math.pi))) / off if from_rest else min(pace * t, longest)
-            turned[k] += size * lasting
-    # What is left of the amplitude then, and the root of it for the drag on the way.
-    most = max(each / (1.0 + fall * t) ** 1.5 for each, t in zip(turned, times, strict=True))
+        harmonics.append((8.0 / (math.pi * steps * steps * steps), off, longest))
+    most, t, next_t = 0.0, 0.0, 0.1 / fall
+    for _ in range(LOOKS):
+        t, next_t = min(seconds, next_t), 2.0 * next_t
+        turned = 0.0
+        for size, off, longest in harmonics:
+            if from_rest:
+                turned += size * (1.0 - math.cos(min(off * pace * t, math.pi))) / off
+            else:
+                turned += size * min(pace * t, longest)
+        # What is left of the amplitude then, and the root of it for the drag on the way.
+        most = max(most, turned / (1.0 + fall * t) ** 1.5)
+        if t == seconds:
+            break
     return float(most * eq.drag_per_m * start)
 
 

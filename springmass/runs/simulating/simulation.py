@@ -188,17 +188,13 @@ def plan(problem: Problem, method: str, spacing_s: float, count: int, tolerance:
         why = integrator.refusal(problem)
         if why:
             raise DynamicsError(f"{method} cannot solve this: {why}")
-        error = integrator.predicted_error(problem, spacing_s, seconds)
-        velocity = integrator.predicted_velocity_error(problem, spacing_s, seconds)
-        cost = cost_ns(integrator, problem, 1, count, seconds)
-        return Choice(integrator, 1, spacing_s, error, cost, problem, predicted_velocity_error=velocity)
+        return Choice(integrator, 1, spacing_s, seconds, cost_ns(integrator, problem, 1, count, seconds), problem)
     demand_tolerance(problem, seconds, tolerance)
     found = fit_step(integrator, problem, spacing_s, count, tolerance / SAFETY)
     if found is None:
         why = integrator.refusal(problem) or "no step of it is predicted to; take auto or a larger tolerance"
         raise DynamicsError(f"{method} cannot keep a tolerance of {tolerance:g} here: {why}")
-    velocity = integrator.predicted_velocity_error(problem, found.step_s, seconds)
-    return replace(found, predicted_velocity_error=velocity)
+    return found
 
 
 def default_tolerance(band: Band | None) -> float:
