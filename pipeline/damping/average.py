@@ -23,11 +23,11 @@ __all__ = ["Weighted", "average_over_laws", "spread_counts"]
 MIXED = "linear+quadratic"
 FAMILY = (*LAWS[MIXED].cases, MIXED)
 SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0 and quadratic drag's 2 are well inside
-OTHER_LAW = 0.15  # prior odds of each law beyond linear and quadratic drag, against these two
-FREE_POWER = 0.5  # the same of a free power: boundary layers and edges shed drag that no two terms describe
-SHARPER, APART = 0.7, 5.0  # what evidence on a power counts more, and how many u apart the rates are where half of it
+OTHER_LAW = 0.17  # prior odds of each law beyond linear and quadratic drag, against these two
+FREE_POWER = 0.85  # the same of a free power: boundary layers and edges shed drag that no two terms describe
+SHARPER, APART = 1.6, 3.7  # what evidence on a power counts more, and how many u apart the rates are where half of it
 # How the spread between laws counts by its ratio to their own, chosen with the odds for what intervals then hold.
-NEAR, STEEPNESS, FAR = 2.0, 1.5, 4.0
+NEAR, STEEPNESS, FAR = 3.0, 2.5, 4.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,15 +68,15 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
 
     the exponential's where the record knows no curvature, and with an uncertainty that covers every drag from
     friction to quadratic; those of the fit where it does. The other admissible laws weigh
-    :math:`p\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it, with p of 0.15 for those with friction, and a free
-    power :math:`0.5\\,w\\,e^{-s\\Delta\\mathrm{BIC}/2}`. It has as many parameters as both drags, and where a record
+    :math:`p\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it, with p of 0.17 for those with friction, and a free
+    power :math:`0.85\\,w\\,e^{-s\\Delta\\mathrm{BIC}/2}`. It has as many parameters as both drags, and where a record
     tells the two apart at all the other is soon left out, or its share would widen the interval of nearly every
-    record: :math:`s = 1 + 0.7/(1 + (d/5)^4)` for rates at the start that lie d standard uncertainties apart. Far apart
-    s is 1, for there the rare record that speaks for the wrong one would be wrong by as much. So do laws that are not
-    rejected and no longer admissible, for a small weight counts where the rates lie far apart. Laws that only add a
-    term to the selected one are not among these. Where linear and quadratic drag is out of reach, the laws are weighed
-    by their BIC; where chi-square rejects them all, by their BIC over the reduced chi-square of the best: the points
-    scatter by so much more than they should, and the nearest is one of several.
+    record: :math:`s = 1 + 1.6/(1 + (d/3.7)^4)` for rates at the start that lie d standard uncertainties apart. Far
+    apart s is 1, for there the rare record that speaks for the wrong one would be wrong by as much. So do laws that
+    are not rejected and no longer admissible, for a small weight counts where the rates lie far apart. Laws that only
+    add a term to the selected one are not among these. Where linear and quadratic drag is out of reach, the laws are
+    weighed by their BIC; where chi-square rejects them all, by their BIC over the reduced chi-square of the best: the
+    points scatter by so much more than they should, and the nearest is one of several.
 
     Covariances are multiplied by the reduced chi-square where that is above 1, the scale factor of [1]_: a law between
     two that were fitted is seen in what they leave before it rejects them.
@@ -135,10 +135,10 @@ def spread_counts(weights: F8, rates: F8, variances: F8) -> float:
     Notes
     -----
     With the mean own variance :math:`W` and the variance :math:`B = \\sum_i w_i (x_i - x)^2` between laws it is
-    :math:`\\min(2 (B/W)^{3/2}, 4)`: hardly anything where laws agree within their own uncertainties, for an interval of
-    these holds the neighbours too; and more than all of it where they do not, for then the truth is one law's value
-    and not a mean, and the interval has to reach the one that weighs less. With 1 throughout intervals hold too often
-    in the first case and too seldom in the second (``tests/trials/test_law_coverage.py``).
+    :math:`\\min(3 (B/W)^{5/2}, 4.2)`: hardly anything where laws agree within their own uncertainties, for an
+    interval of these holds the neighbours too; and more than all of it where they do not, for then the truth is one
+    law's value and not a mean, and the interval has to reach the one that weighs less. With 1 throughout intervals
+    hold too often in the first case and too seldom in the second (``tests/trials/test_law_coverage.py``).
     """
     own, between = float(weights @ variances), float(weights @ (rates - weights @ rates) ** 2)
     if between == 0.0:

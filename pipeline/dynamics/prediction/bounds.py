@@ -2,7 +2,8 @@
 
 A short run is over before a pilot has shown its error. What a step is then chosen by was fitted to lie above all of the
 errors of 24,000 random motions of 6 to 2,000 radians, and lies within 2.3 times the error of half of them; of 340 more
-it lay above those of up to 100,000 radians too. A run that is long enough is chosen by its pilot.
+it lay above those of up to 100,000 radians too, and of 12 of up to a million. A run that is long enough is chosen by
+its pilot.
 """
 
 from __future__ import annotations
