@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -295,4 +296,4 @@ def _described(search: Search, damping: Damping, fit: least_squares.Fit) -> Equa
         + f": the equation of motion with {law} was fitted to the samples; it leaves "
         + amount(rms, search.conditioned.track.unit)
     )
-    return EquationFit(why, damping, state, Waveform(position, lambda: velocity, residual, rms), flags)
+    return EquationFit(why, damping, state, Waveform(position, partial(np.asarray, velocity), residual, rms), flags)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -162,14 +162,18 @@ def reconstruct(track: Track, demodulated: Demodulated, phase: PhaseFit, rest: R
     law = phase.damping.best
     used = (demodulated.flags & UNUSABLE) == 0
     # A law holds where it was fitted: before and after the samples used its last values stand.
-    elapsed = np.clip(track.t, phase.t0, float(np.max(track.t[used]))) - phase.t0
+    last = float(np.max(track.t, where=used, initial=-np.inf))
+    elapsed = np.clip(track.t, phase.t0, last) - phase.t0
     amplitude = law.amplitude(elapsed)
     angle = phase.total(track.t)
     position = rest.at(track.t) + amplitude * np.cos(angle)
     residual = track.y - position
+    moving = partial(_velocity, phase, amplitude, angle)
+    left = residual if used.all() else residual[used]
+    return Waveform(position, moving, residual, math.sqrt(float(left @ left) / left.size))
 
-    def moving() -> F8:
-        falling = law.law.rate(amplitude, law.joint.values)
-        return np.asarray(-falling * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))
 
-    return Waveform(position, moving, residual, float(np.sqrt(np.mean(residual[used] ** 2))))
+def _velocity(phase: PhaseFit, amplitude: F8, angle: F8) -> F8:
+    law = phase.damping.best
+    falling = law.law.rate(amplitude, law.joint.values)
+    return np.asarray(-falling * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))

@@ -378,13 +378,14 @@ def _refined_rest(solved: _Solved, rest: Rest, middle: float, covariance: F8) ->
 
 def _refined_waveform(solved: _Solved, track: Track) -> Waveform:
     """Return the model at every sample; its velocity is that of the oscillation, without drift and extra columns."""
-    state, amplitude, tau = solved.state, solved.amplitude(), solved.record.tau
+    state, amplitude = solved.state, solved.amplitude()
     position = solved.record.level + solved.position
-
-    def moving() -> F8:
-        angle, rate = state.angle(tau), state.turning[1]
-        if state.area is not None:
-            rate = rate + state.turning[2] * np.abs(amplitude) ** state.exponent
-        return np.asarray(-state.law.rate(amplitude, state.theta) * np.cos(angle) - amplitude * rate * np.sin(angle))
-
+    moving = functools.partial(_velocity, state, amplitude, solved.record.tau)
     return Waveform(position, moving, track.y - position, solved.noise_m)
+
+
+def _velocity(state: State, amplitude: F8, tau: F8) -> F8:
+    angle, rate = state.angle(tau), state.turning[1]
+    if state.area is not None:
+        rate = rate + state.turning[2] * np.abs(amplitude) ** state.exponent
+    return np.asarray(-state.law.rate(amplitude, state.theta) * np.cos(angle) - amplitude * rate * np.sin(angle))

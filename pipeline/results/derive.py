@@ -446,7 +446,9 @@ def _noise(demodulated: Demodulated, unit: str) -> Estimate:
     clean = not flags.any()
     if not clean:
         residual = residual[(flags & UNUSABLE) == 0]
-    residual = residual[np.isfinite(residual)]
+    finite = np.isfinite(residual)
+    if not finite.all():
+        residual = residual[finite]
     used = residual.size
     dof = float(max(used - 3 * demodulated.count.size, demodulated.count.size))
     value = mad_sigma(residual) * math.sqrt(used / dof)
