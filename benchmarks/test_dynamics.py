@@ -54,10 +54,9 @@ def test_what_choosing_costs_can_be_compared_with_the_cheapest(dynamics):
 
 
 def test_planning_can_be_compared_with_running(dynamics):
-    """By a timer that counts calls every plan and every run takes one: both are felt."""
-    shares, most_s = dynamics.planning(iter(range(10_000)).__next__, dynamics.mixed_scenes(3))
+    """By a timer that counts calls every plan and every run takes one: their ratio is 1 in each scene."""
+    shares = dynamics.planning(iter(range(10_000)).__next__, dynamics.mixed_scenes(3))
     assert shares.tolist() == [1.0] * 3
-    assert most_s == 0.0
     assert all(len(scene) == 4 for scene in dynamics.long_scenes())
 
 
