@@ -102,10 +102,12 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
         for name in names:
             if name not in FAMILY and share > 0.0:
                 other = damping.fits[name]
-                against, prior = 0.5 * (other.bic - mixed.bic), 1.0
-                if stands:
-                    prior = FREE_POWER if name == "power" else OTHER_LAW
-                    against *= _sharpness(other, _scaled(fit)) if name == "power" else 1.0
+                prior = sharpness = 1.0
+                if stands and name == "power":
+                    prior, sharpness = FREE_POWER, _sharpness(other, _scaled(fit))
+                elif stands:
+                    prior = OTHER_LAW
+                against = 0.5 * sharpness * (other.bic - mixed.bic)
                 evidence.append((other, math.log(share * prior) - against - 0.5 * mixed.bic))
     # The coefficients of a power or of a function are stated where it is selected; else both drags', within reach.
     first = MIXED if stands and isinstance(damping.best.law, Drag) else damping.selected

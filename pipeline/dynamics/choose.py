@@ -159,10 +159,8 @@ def choose(problem: Problem, spacing_s: float, count: int, tolerance: float) -> 
     demand_tolerance(problem, seconds, tolerance)
     solved, left_out = reduced(problem, seconds, tolerance)
     room = tolerance - left_out
-    within, radians = (
-        room / SAFETY_BOUND,
-        math.ceil(min(problem.equation.angular_frequency_per_s * spacing_s, MOST_PARTS)),
-    )
+    within = room / SAFETY_BOUND
+    radians = math.ceil(min(problem.equation.angular_frequency_per_s * spacing_s, MOST_PARTS))
     best: Choice | None = None
     for integrator in BOUNDED:
         most = math.inf if best is None else best.cost_ns

@@ -350,19 +350,17 @@ class _Laws:
         self.weighted = tuple(one for one, *_ in found)
         self.stated = self.weighted[0].fit
         self.squared_rate = mean_squared_rate(best, best.amplitude(elapsed))
-        each = [(values, slopes) for _, values, slopes in found]
+        each = np.array([values for _, values, _ in found])
         weights = np.array([one.weight for one in self.weighted])
         weights /= weights.sum()
-        self.values: F8 = weights @ np.array([values for values, _ in each])
+        self.values: F8 = weights @ each
         self.variables = inputs.add_joint("damping_law", self.stated.joint, "A", self.stated.dof)
         departures = [x - value for x, value in zip(self.variables, self.stated.joint.values.tolist(), strict=True)]
-        slopes = math.sqrt(weights[0]) * each[0][1]
+        slopes = math.sqrt(weights[0]) * found[0][2]
         quantities = self.values + slopes @ np.array(departures)
         if weights.size > 1:
-            factors = [
-                slopes @ _root(one.fit.joint.covariance) for (_, slopes), one in zip(each, self.weighted, strict=True)
-            ]
-            apart = np.array([values for values, _ in each]) - self.values
+            factors = [by_parameters @ _root(one.fit.joint.covariance) for one, _, by_parameters in found]
+            apart = each - self.values
             counts = spread_counts(weights, apart[:, 1], np.array([factor[1] @ factor[1] for factor in factors]))
             covariance = counts * (weights[:, None] * apart).T @ apart
             for factor, one, weight in zip(factors, self.weighted, weights, strict=True):
