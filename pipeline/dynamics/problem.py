@@ -46,9 +46,7 @@ class Problem:
 
     def __post_init__(self) -> None:
         for name in ("displacement_m", "velocity_m_per_s"):
-            given = getattr(self, name)
-            if type(given) is not float or not math.isfinite(given):
-                object.__setattr__(self, name, double(given, name))
+            object.__setattr__(self, name, double(getattr(self, name), name))
         self._demand_amplitude()
         self._demand_bound()
 
