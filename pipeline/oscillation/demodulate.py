@@ -135,7 +135,8 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     basis = windows.decaying(basis, rough.decay)
     solution, spread = _let_go(windows, basis, conditioned.noise_m, params)
     _rescue(windows, basis, solution, spread, tuning, params)
-    solution, weights = _clip(windows, basis, solution, None, spread, rough, params)
+    _clip(windows, basis, solution, spread, rough, params)
+    weights = solution.weights
     if conditioned.clipped_from_m:
         level = _typical(_spread(windows.usable, solution.residual), windows, solution)
         crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
@@ -147,8 +148,8 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
     spread = _spread(windows.usable, solution.residual)
-    solution, weights = _clip(windows, basis, solution, weights, spread, tuning, params)
-    return _finish(conditioned, windows, solution, weights, tuning)
+    _clip(windows, basis, solution, spread, tuning, params)
+    return _finish(conditioned, windows, solution, tuning)
 
 
 def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tuple[Solution, F8]:
@@ -156,7 +157,7 @@ def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tupl
 
     Returns the fits and the spreads about them (w,).
     """
-    solution = solve(basis, windows.usable)
+    solution = solve(basis, windows.usable.copy())
     spread = _spread(windows.usable, solution.residual)
     odd = np.flatnonzero(spread > 1.3 * noise_m)
     if odd.size:
@@ -262,22 +263,17 @@ def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
     return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
 
 
-def _clip(
-    windows: Windows, basis: F8, solution: Solution, fitted: F8 | None, spread: F8, tuning: Tuning, params: Params
-) -> tuple[Solution, F8]:
-    """Take residuals beyond the clip out and fit again: all windows, or those whose weights are not the fitted ones."""
+def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
+    """Take residuals beyond the clip out and fit again where others were in; put that into the solution."""
     level = _typical(spread, windows, solution)
     # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
     size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
     least = model_error(size, tuning.decay, tuning.angular_frequency)
     bound = params.clip_sigmas * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
     weights = np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0)
-    if fitted is None:
-        return solve(basis, weights), weights
-    changed = np.flatnonzero((weights != fitted).any(axis=1))
+    changed = np.flatnonzero((weights != solution.weights).any(axis=1))
     if changed.size:
         solution.put(changed, solve(basis[changed], weights[changed]))
-    return solution, weights
 
 
 def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:
@@ -288,8 +284,8 @@ def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:
     return (FINEST + np.abs(decay) / (10.0 * angular_frequency)) * np.abs(amplitude)
 
 
-def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, weights: F8, tuning: Tuning) -> Demodulated:
-    good = solution.good
+def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuning: Tuning) -> Demodulated:
+    good, weights = solution.good, solution.weights
     if not good.any():
         raise AnalysisError(
             "no period of the record holds enough usable samples for a fit; see the counts of flagged samples"

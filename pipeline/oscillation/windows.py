@@ -120,12 +120,15 @@ class Solution:
         Of all samples placed, fitted or not.
     good : (w,) bool
         Enough samples, well spread over the period.
+    weights : (w, l) float64
+        That the samples were fitted with.
     """
 
     coefficients: F8
     normal: F8
     residual: F8
     good: NDArray[np.bool_]
+    weights: F8
 
     @property
     def inverse(self) -> F8:
@@ -148,10 +151,12 @@ class Solution:
         """Replace the fits of some windows by those of another solution, which holds these alone."""
         self.coefficients[rows], self.normal[rows] = other.coefficients, other.normal
         self.residual[rows], self.good[rows] = other.residual, other.good
+        self.weights[rows] = other.weights
 
     def part(self, which: NDArray[np.bool_]) -> Solution:
         """Return the fits of some windows."""
-        return Solution(self.coefficients[which], self.normal[which], self.residual[which], self.good[which])
+        each = (self.coefficients, self.normal, self.residual, self.good, self.weights)
+        return Solution(*(values[which] for values in each))
 
 
 def solve(basis: F8, weights: F8) -> Solution:
@@ -164,6 +169,7 @@ def solve(basis: F8, weights: F8) -> Solution:
     basis : (w, 4, l) float64
         Of :meth:`Windows.basis`.
     weights : (w, l) float64
+        The solution holds them as they are, no copy.
     """
     sums = (basis[:, :3] * weights[:, None, :]) @ basis.transpose(0, 2, 1)
     count = np.maximum(sums[:, 0, 0], 1e-300)
@@ -176,7 +182,7 @@ def solve(basis: F8, weights: F8) -> Solution:
     coefficients = np.empty((len(sums), 3))
     coefficients[:, 0], coefficients[:, 1], coefficients[:, 2] = good * (y - a * c - b * s), a, b
     residual = basis[:, 3] - (coefficients[:, None, :] @ basis[:, :3])[:, 0]
-    return Solution(coefficients, sums[:, :, :3], residual, good)
+    return Solution(coefficients, sums[:, :, :3], residual, good, weights)
 
 
 def quantile(size: F8, usable: F8, share: float) -> F8:

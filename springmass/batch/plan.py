@@ -7,7 +7,7 @@ import glob
 import hashlib
 import os
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -73,7 +73,7 @@ class Job:
 
     def told(self) -> dict[str, Any]:
         """Return what a row keeps of it, to analyse the run again: all but the folder, which may be another."""
-        return {name: value for name, value in asdict(self).items() if name != "folder"}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "folder"}
 
     def whole(self, path: str) -> str:
         """Return a path as any process finds it."""

@@ -172,11 +172,10 @@ def make(plan: Plan, store: Store, folder: Path, *, reports: int, jobs: int | No
             # A file that changed while it was analysed, or whose process was ended: the next pass does it again.
             yield {**(row or next(store.rows(job.key))), "job": job.told()}
 
-    store.put_together(kept())  # the rows of this plan in its order
     needs, lines = [], []
 
     def rows() -> Iterator[dict[str, Any]]:
-        for row, name in zip(store.all(), names, strict=True):
+        for row, name in zip(store.put_together(kept()), names, strict=True):
             needs.append((need_of(row), name, row["status"]))
             lines.append(line_of(name, row, plan.tags))
             yield flat(row, name, plan.tags)

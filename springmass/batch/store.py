@@ -117,8 +117,12 @@ class Store:
             self._places.setdefault(key_of(row), []).append((path, offset, len(line)))
             offset += len(line)
 
-    def put_together(self, rows: Iterable[Mapping[str, Any]]) -> Path:
-        """Write the file of all rows, in this order; from here on they are read from it, and the parts are gone."""
+    def put_together(self, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+        """Write the file of all rows, in this order, and yield each when it is written.
+
+        After the last one they are read from that file, and the parts are gone; who stops before it leaves all as it
+        was.
+        """
         whole, offset = self.parts / WHOLE, 0
         places: dict[str, list[_Place]] = {}
         with whole_file(whole) as temporary, temporary.open("wb") as file:
@@ -127,11 +131,11 @@ class Store:
                 file.write(line)
                 places.setdefault(key_of(row), []).append((whole, offset, len(line)))
                 offset += len(line)
+                yield row
         self._places = places
         for path in self._files():
             if path != whole:
                 path.unlink(missing_ok=True)
-        return whole
 
     def mark(self, told: Mapping[str, Any]) -> None:
         """Say that all was made of this; before it changes, it is to be taken away by :meth:`unmark`."""

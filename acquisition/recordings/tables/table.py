@@ -29,7 +29,7 @@ from acquisition.recordings.tables.text import Text, parse_number
 
 __all__ = ["EMPTY", "EXPONENT", "UNREAD", "Table", "read_table"]
 
-_PAGE_BYTES = 1 << 18
+_PAGE_BYTES = 1 << 19
 _KEPT_BYTES = 1 << 22
 _MIXED_ROWS = 512  # more rows that are not all of fixed point are halved: most of them may be
 _SINGLE_ROWS = 32  # so few are read one by one
