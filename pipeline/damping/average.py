@@ -23,11 +23,10 @@ __all__ = ["Weighted", "average_over_laws", "spread_counts"]
 MIXED = "linear+quadratic"
 FAMILY = (*LAWS[MIXED].cases, MIXED)
 SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0 and quadratic drag's 2 are well inside
-OTHER_LAW = 0.17  # prior odds of each law beyond linear and quadratic drag, against these two
-FREE_POWER = 0.85  # the same of a free power: boundary layers and edges shed drag that no two terms describe
-SHARPER, APART = 1.6, 3.7  # what evidence on a power counts more, and how many u apart the rates are where half of it
-# How the spread between laws counts by its ratio to their own, chosen with the odds for what intervals then hold.
-NEAR, STEEPNESS, FAR = 3.0, 2.5, 4.2
+OTHER_LAW = 0.15  # prior odds of a law with friction, or of one that the user made, against linear and quadratic drag
+BELOW_LINEAR = 0.03  # the same of a power below 1: nothing that is known to damp grows so slowly, friction aside
+APART = 5.0  # how many u rates lie apart where evidence on a power counts half as much again, and not twice
+STEEPNESS, FAR = 5.0, 5.0  # of what the spread between laws counts; chosen with the two above for what intervals hold
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,13 +67,15 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
 
     the exponential's where the record knows no curvature, and with an uncertainty that covers every drag from
     friction to quadratic; those of the fit where it does. The other admissible laws weigh
-    :math:`p\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it, with p of 0.17 for those with friction, and a free
-    power :math:`0.85\\,w\\,e^{-s\\Delta\\mathrm{BIC}/2}`. It has as many parameters as both drags, and where a record
-    tells the two apart at all the other is soon left out, or its share would widen the interval of nearly every
-    record: :math:`s = 1 + 1.6/(1 + (d/3.7)^4)` for rates at the start that lie d standard uncertainties apart. Far
-    apart s is 1, for there the rare record that speaks for the wrong one would be wrong by as much. So do laws that
-    are not rejected and no longer admissible, for a small weight counts where the rates lie far apart. Laws that only
-    add a term to the selected one are not among these. Where linear and quadratic drag is out of reach, the laws are
+    :math:`0.15\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it if they have friction, and a free power, which is as
+    likely beforehand, :math:`w\\,e^{-s\\Delta\\mathrm{BIC}/2}`. Wherever it weighs it does so by the probability P that
+    it is above 1, :math:`P + 0.03 (1 - P)`: a smaller one stands for friction beside drag, which has laws of its own,
+    and imitates it so well that records cannot tell. It has as many parameters as both drags, and where a
+    record tells the two apart at all the other is soon left out, or its share would widen the interval of nearly every
+    record: :math:`s = 1 + 1/(1 + (d/5)^4)` for rates at the start that lie d standard uncertainties apart. Far apart s
+    is 1, for there the rare record that speaks for the wrong one would be wrong by as much. So do laws that are not
+    rejected and no longer admissible, for a small weight counts where the rates lie far apart. Laws that only add a
+    term to the selected one are not among these. Where linear and quadratic drag is out of reach, the laws are
     weighed by their BIC; where chi-square rejects them all, by their BIC over the reduced chi-square of the best: the
     points scatter by so much more than they should, and the nearest is one of several.
 
@@ -95,7 +96,7 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     names = (*names, *_far(damping, names))
     evidence: list[tuple[LawFit, float]]  # logarithms of the odds
     if mixed is None or not (stands or damping.selected == "power"):
-        evidence = [(damping.fits[name], -0.5 * damping.fits[name].bic) for name in names]
+        evidence = [(fit, _belief(fit) - 0.5 * fit.bic) for fit in (damping.fits[name] for name in names)]
     else:
         share, fit = _with_prior(mixed, damping.fits.get("linear"), amplitude_m)
         evidence = [(fit, -0.5 * mixed.bic)]
@@ -104,11 +105,11 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
                 other = damping.fits[name]
                 prior = sharpness = 1.0
                 if stands and name == "power":
-                    prior, sharpness = FREE_POWER, _sharpness(other, _scaled(fit))
+                    sharpness = _sharpness(other, _scaled(fit))
                 elif stands:
                     prior = OTHER_LAW
                 against = 0.5 * sharpness * (other.bic - mixed.bic)
-                evidence.append((other, math.log(share * prior) - against - 0.5 * mixed.bic))
+                evidence.append((other, _belief(other) + math.log(share * prior) - against - 0.5 * mixed.bic))
     # The coefficients of a power or of a function are stated where it is selected; else both drags', within reach.
     first = MIXED if stands and isinstance(damping.best.law, Drag) else damping.selected
     evidence.sort(key=lambda one: one[0].name != first)
@@ -117,11 +118,20 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     return tuple(Weighted(_scaled(fit), odd / sum(odds)) for (fit, _), odd in zip(evidence, odds, strict=True))
 
 
+def _belief(fit: LawFit) -> float:
+    """Logarithm of how likely a free power's value is beforehand; 0 of other laws."""
+    if fit.name != "power":
+        return 0.0
+    power = fit.joint["n"]
+    above = 0.5 * math.erfc((1.0 - power.value) / (math.sqrt(2.0) * power.u)) if power.u > 0.0 else 1.0
+    return math.log(above + BELOW_LINEAR * (1.0 - above))
+
+
 def _sharpness(power: LawFit, mixed: LawFit) -> float:
     """By how much the evidence on a power counts more than it says; 1 where the rates at the start lie far apart."""
     rate = mixed.damping_rate()
     apart = abs(power.rate_at_start() - rate.value)
-    return 1.0 + SHARPER / (1.0 + (apart / (APART * rate.u)) ** 4) if rate.u > 0.0 else 1.0
+    return 1.0 + 1.0 / (1.0 + (apart / (APART * rate.u)) ** 4) if rate.u > 0.0 else 1.0
 
 
 def spread_counts(weights: F8, rates: F8, variances: F8) -> float:
@@ -137,7 +147,7 @@ def spread_counts(weights: F8, rates: F8, variances: F8) -> float:
     Notes
     -----
     With the mean own variance :math:`W` and the variance :math:`B = \\sum_i w_i (x_i - x)^2` between laws it is
-    :math:`\\min(3 (B/W)^{5/2}, 4.2)`: hardly anything where laws agree within their own uncertainties, for an
+    :math:`5 \\min(B/W, 1)^5`: hardly anything where laws agree within their own uncertainties, for an
     interval of these holds the neighbours too; and more than all of it where they do not, for then the truth is one
     law's value and not a mean, and the interval has to reach the one that weighs less. With 1 throughout intervals
     hold too often in the first case and too seldom in the second (``tests/trials/test_law_coverage.py``).
@@ -145,7 +155,7 @@ def spread_counts(weights: F8, rates: F8, variances: F8) -> float:
     own, between = float(weights @ variances), float(weights @ (rates - weights @ rates) ** 2)
     if between == 0.0:
         return 0.0
-    return min(NEAR * (between / own) ** STEEPNESS, FAR) if own > 0.0 else FAR
+    return FAR * min(between / own, 1.0) ** STEEPNESS if own > 0.0 else FAR
 
 
 def _far(damping: Damping, names: tuple[str, ...]) -> list[str]:

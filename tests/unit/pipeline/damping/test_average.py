@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.damping.average import FREE_POWER, SPREAD_OF_POWER, Weighted, average_over_laws, spread_counts
+from pipeline.damping.average import SPREAD_OF_POWER, Weighted, average_over_laws, spread_counts
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping, Params, fit_damping
 from pipeline.oscillation.demodulate import Demodulated
@@ -85,20 +85,20 @@ def evidence(damping: Damping) -> float:
     """Return what a record says for a power, which counts more where its rate lies near that of both drags."""
     power, mixed = damping.fits["power"], damping.fits["linear+quadratic"]
     rate = mixed.damping_rate()
-    apart = (power.rate_at_start() - rate.value) / (3.7 * rate.u)
-    return float(np.exp(-0.5 * (1.0 + 1.6 / (1.0 + apart**4)) * (power.bic - mixed.bic)))
+    apart = (power.rate_at_start() - rate.value) / (5.0 * rate.u)
+    return float(np.exp(-0.5 * (1.0 + 1.0 / (1.0 + apart**4)) * (power.bic - mixed.bic)))
 
 
 def test_other_laws_weigh_by_their_evidence_and_by_what_the_record_knows(
     synthetic: ModuleType, windows: Windows
 ) -> None:
-    """A power beside linear and quadratic drag has 0.85 w exp(-s dBIC/2) of its weight; all add up to one."""
+    """A power beside linear and quadratic drag has w exp(-s dBIC/2) of its weight; all add up to one."""
     damping, weighted, _ = of_truth(synthetic, windows, "linear+quadratic", 40, 1e-4)
     assert {"power", "linear+quadratic"} <= set(damping.admissible)
     by_name = {one.fit.name: one.weight for one in weighted}
     assert sum(by_name.values()) == pytest.approx(1.0)
     assert not {"none", "linear", "quadratic"} & set(by_name)
-    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(FREE_POWER * evidence(damping), rel=0.1)
+    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(evidence(damping), rel=0.1)
 
 
 @pytest.mark.parametrize("name", ["friction", "power", "linear+friction"])
@@ -145,24 +145,36 @@ def test_a_law_that_is_no_longer_admissible_still_weighs(synthetic: ModuleType, 
             break
     weighted = average_over_laws(damping, float(np.mean(amplitude)))
     by_name = {one.fit.name: one.weight for one in weighted}
-    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(FREE_POWER * evidence(damping), rel=0.1)
+    assert by_name["power"] / by_name["linear+quadratic"] == pytest.approx(evidence(damping), rel=0.1)
+
+
+def test_a_power_below_linear_drag_hardly_weighs_beside_friction(synthetic: ModuleType, windows: Windows) -> None:
+    """Of linear drag with friction a power of 0.6 fits as well, and has 0.03 of the weight that its evidence gives."""
+    damping, weighted, _ = of_truth(synthetic, windows, "linear+friction", 60, 1e-4)
+    power, drag = damping.fits["power"], damping.fits["linear+friction"]
+    assert {"power", "linear+friction"} <= set(damping.admissible)
+    assert power.joint["n"].value < 1.0 - 5.0 * power.joint["n"].u
+    by_name = {one.fit.name: one.weight for one in weighted}
+    expected = 0.03 * math.exp(-0.5 * (power.bic - drag.bic))
+    assert by_name["power"] / by_name["linear+friction"] == pytest.approx(expected)
 
 
 def test_the_spread_of_laws_that_nearly_agree_counts_hardly_anything() -> None:
-    """Of two laws a fifth of their u apart it counts by 3e-5, of those that agree by nothing."""
+    """Of two laws whose variance is a hundredth of their own it counts by 5e-10, of those that agree by nothing."""
     half = np.array([0.5, 0.5])
-    assert spread_counts(half, np.array([1.0, 1.2]), np.ones(2)) == pytest.approx(3.0 * 0.01**2.5)
+    assert spread_counts(half, np.array([1.0, 1.2]), np.ones(2)) == pytest.approx(5e-10)
     assert spread_counts(half, np.array([1.0, 1.0]), np.zeros(2)) == 0.0
 
 
-def test_the_spread_of_laws_far_apart_counts_four_times() -> None:
-    """Of two laws twenty u apart it counts by 4.2, in any unit, and where neither has an uncertainty."""
+def test_the_spread_of_laws_far_apart_counts_five_times() -> None:
+    """Of two laws twenty u apart it counts by 5, in any unit, and where neither has an uncertainty."""
     weights, rates = np.array([0.25, 0.75]), np.array([1.0, 21.0])
-    assert spread_counts(weights, rates, np.ones(2)) == 4.2
-    assert spread_counts(weights, 1e-6 * rates, np.full(2, 1e-12)) == 4.2
-    assert spread_counts(weights, rates, np.zeros(2)) == 4.2
+    assert spread_counts(weights, rates, np.ones(2)) == 5.0
+    assert spread_counts(weights, 1e-6 * rates, np.full(2, 1e-12)) == 5.0
+    assert spread_counts(weights, rates, np.zeros(2)) == 5.0
 
 
 def test_the_spread_counts_by_its_ratio_to_what_laws_say_of_themselves() -> None:
-    """Where both variances are alike it counts three times."""
-    assert spread_counts(np.array([0.5, 0.5]), np.array([1.0, 3.0]), np.ones(2)) == pytest.approx(3.0)
+    """Where it is half of the mean own variance it counts by 5/32."""
+    rates = np.array([1.0, 1.0 + math.sqrt(2.0)])
+    assert spread_counts(np.array([0.5, 0.5]), rates, np.ones(2)) == pytest.approx(5.0 / 32.0)
