@@ -4,7 +4,8 @@ Run ``python benchmarks/course.py [--runs N] [--filtered N]``; the whole is ``--
 one run. Recordings are made by this script: records of 12,000 samples, and variations of real ones where these are at
 hand (another clock, another scale, noise added; written as tables).
 
-- runs per second and core of ``batch --jobs 1`` over a loop of ``pandas.read_csv`` and one lmfit damped sine;
+- runs per second and core of ``batch --jobs 1`` over a loop of ``pandas.read_csv`` and one lmfit damped sine, taken in
+  turn;
 - the same over a loop of lmfit that gives the same answer: every law of one closed form, their choice, and the
   covariance of the best;
 - what a second pass over unchanged inputs takes of the first;
@@ -41,6 +42,7 @@ from springmass.runs.loading import load
 from storage.catalog import build_catalog, search_catalog
 
 SAMPLES = 12_000
+PART = 500  # runs of a pass, between two looks at the loop
 REAL = (
     ("AyushPandhi__Pandhi_Ayush_PHY224/damped position.txt", {}),
     ("filo0509__smorzamento/molla_durissima_discopieno_14.91945_0.2016_1.csv", {"channel": "position", "unit": "m"}),
@@ -126,16 +128,17 @@ def measure(runs: int, folder: Path) -> Measured:
     inputs.mkdir()
     recordings(inputs, runs)
     files = sorted(inputs.iterdir())
-    some = files[:: max(1, len(files) // max(20, len(files) // 10))]
-    _passed(inputs, folder / "warm", "--jobs", "1", "--accuracy", "fast")  # imports, and the disk's cache
-    took: dict[str, float] = {}
-    fits = [_looped(some)]
-    for tier in ("fast", "standard"):  # the loop before and after each: a machine that slows down slows both sides
-        took[tier] = _passed(inputs, folder / tier, "--jobs", "1", "--accuracy", tier)
-        fits.append(_looped(some))
-    again = _passed(inputs, folder / "standard", "--jobs", "1", "--accuracy", "standard")
+    parts = [files[i :: max(2, runs // PART)] for i in range(max(2, runs // PART))]
+    every = max(1, runs // max(20, runs // 10))
+    _passed(parts[0], folder / "warm", "fast")  # imports, and the disk's cache
+    loop, took, again = 0.0, {"fast": 0.0, "standard": 0.0}, 0.0
+    for i, part in enumerate(parts):  # in turn: a machine that slows down slows every side
+        for tier in took:
+            took[tier] += _passed(part, folder / f"{tier}{i}", tier)
+            loop += 0.5 * _looped(part[::every]) * len(part)
+        again += _passed(part, folder / f"standard{i}", "standard")
     with threadpool_limits(1):
-        few = some[: max(1, min(5, runs // 10))]
+        few = files[: max(1, min(5, runs // 10))]
         every_law = _processor(lambda: [all_laws(*_read(file)) for file in few]) / len(few)
     apart = _processor(lambda: _two_halves(inputs, folder / "jobs1"), *CHILDREN)
     idle: list[float] = []
@@ -144,8 +147,8 @@ def measure(runs: int, folder: Path) -> Measured:
     half_mb, whole_mb = json.loads(done.stdout)
     return Measured(
         runs,
-        0.5 * (fits[0] + fits[1]) * runs / took["fast"],
-        0.5 * (fits[1] + fits[2]) * runs / took["standard"],
+        loop / took["fast"],
+        loop / took["standard"],
         every_law * runs / took["standard"],
         again / took["standard"],
         apart / (two + sum(idle)),
@@ -160,12 +163,13 @@ def _looped(files: Sequence[Path]) -> float:
         return _processor(lambda: [damped_sine(*_read(file)) for file in files]) / len(files)
 
 
-def _passed(inputs: Path, out: Path, *options: str) -> float:
-    """Make a pass; return the seconds of processor that it took, here and in its processes."""
+def _passed(files: Sequence[Path], out: Path, tier: str) -> float:
+    """Make a pass by one process; return the seconds of processor that it took."""
+    options = ["-o", str(out), "--reports", "0", "--jobs", "1", "--accuracy", tier]
 
     def call() -> None:
         with contextlib.redirect_stderr(io.StringIO()):
-            if code := main(["batch", str(inputs), "-o", str(out), "--reports", "0", *options]):
+            if code := main(["batch", *map(str, files), *options]):
                 raise RuntimeError(f"batch ended with {code}")
 
     return _processor(call)
