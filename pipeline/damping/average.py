@@ -70,14 +70,15 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     :math:`0.15\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it if they have friction, and a free power, which is as
     likely beforehand, :math:`w\\,e^{-s\\Delta\\mathrm{BIC}/2}`. Wherever it weighs it does so by the probability P that
     it is above 1, :math:`P + 0.03 (1 - P)`: a smaller one stands for friction beside drag, which has laws of its own,
-    and imitates it so well that records cannot tell. It has as many parameters as both drags, and where a
-    record tells the two apart at all the other is soon left out, or its share would widen the interval of nearly every
-    record: :math:`s = 1 + 1/(1 + (d/5)^4)` for rates at the start that lie d standard uncertainties apart. Far apart s
-    is 1, for there the rare record that speaks for the wrong one would be wrong by as much. So do laws that are not
-    rejected and no longer admissible, for a small weight counts where the rates lie far apart. Laws that only add a
-    term to the selected one are not among these. Where linear and quadratic drag is out of reach, the laws are
-    weighed by their BIC; where chi-square rejects them all, by their BIC over the reduced chi-square of the best: the
-    points scatter by so much more than they should, and the nearest is one of several.
+    and imitates it so well that records cannot tell. A power has as many parameters as both drags, and where a record
+    tells the two apart at all the other is soon left out, or its share would widen the interval of nearly every record:
+    :math:`s = 1 + 1/(1 + (d/5)^4)` for rates at the start that lie d standard uncertainties apart. Far apart s is 1,
+    for there the rare record that speaks for the wrong one would be wrong by as much.
+
+    Laws that are not rejected and no longer admissible weigh too, for a small weight counts where the rates lie far
+    apart; those that only add a term to the selected one do not. Where linear and quadratic drag is out of reach, the
+    laws are weighed by their BIC; where chi-square rejects them all, by their BIC over the reduced chi-square of the
+    best: the points scatter by so much more than they should, and the nearest is one of several.
 
     Covariances are multiplied by the reduced chi-square where that is above 1, the scale factor of [1]_: a law between
     two that were fitted is seen in what they leave before it rejects them.
@@ -123,7 +124,7 @@ def _belief(fit: LawFit) -> float:
     if fit.name != "power":
         return 0.0
     power = fit.joint["n"]
-    above = 0.5 * math.erfc((1.0 - power.value) / (math.sqrt(2.0) * power.u)) if power.u > 0.0 else 1.0
+    above = 0.5 * math.erfc((1.0 - power.value) / (math.sqrt(2.0) * max(power.u, 1e-300)))
     return math.log(above + BELOW_LINEAR * (1.0 - above))
 
 

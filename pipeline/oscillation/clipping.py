@@ -17,7 +17,7 @@ from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.condition import Conditioned, Cut
 from pipeline.oscillation.cycles import Cycles
 from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.windows import Solution, Windows, solve
+from pipeline.oscillation.windows import Solution, Windows, refit, solve
 from pipeline.track import F8, UNUSABLE, Quality
 
 __all__ = ["find_cuts"]
@@ -168,17 +168,14 @@ def _fitted(windows: Windows, basis: F8, solution: Solution, sigma: float) -> _F
 
 def _middle(windows: Windows, basis: F8, usable: Bools, least: float) -> tuple[_Fit, float]:
     """Return the sinusoids through the middle of every swing, and the noise about them, ``least`` at least, m."""
-    chosen, sigma = usable, np.inf
+    sigma = np.inf
     solution = solve(basis, usable.astype(np.float64))
     for step in range(SETTLING):
         before = sigma
         rest, a, b = solution.coefficients.T
         depth = windows.y - solution.residual - rest[:, None]
         inside = usable & (np.abs(depth) < (MIDDLE * np.hypot(a, b))[:, None])
-        chosen, others = inside & (np.abs(solution.residual) < FAR_OFF * sigma), chosen
-        # Windows are fitted each by itself: those in which nothing changed stay as they are.
-        if (changed := np.flatnonzero((chosen != others).any(axis=1))).size:
-            solution.put(changed, solve(basis[changed], chosen[changed].astype(np.float64)))
+        refit(basis, solution, (inside & (np.abs(solution.residual) < FAR_OFF * sigma)).astype(np.float64))
         inside &= solution.good[:, None]
         # False echoes are let go of once the fit has come away from the crests.
         if step > SETTLING // 2 and inside.any():

@@ -20,7 +20,7 @@ from pipeline.numerics.robust import MAD_TO_SIGMA, mad_sigma, median
 from pipeline.numerics.smooth_curve import fit_curve
 from pipeline.oscillation.condition import Conditioned
 from pipeline.oscillation.cycles import Cycles
-from pipeline.oscillation.windows import Solution, Tuning, Windows, quantile, retune, solve, unwrap
+from pipeline.oscillation.windows import Solution, Tuning, Windows, quantile, refit, retune, solve, unwrap
 from pipeline.track import F8, U8, Quality
 
 __all__ = ["Demodulated", "Params", "demodulate", "model_error", "polar"]
@@ -264,16 +264,13 @@ def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
 
 
 def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
-    """Take residuals beyond the clip out and fit again where others were in; put that into the solution."""
+    """Take residuals beyond the clip out and fit again."""
     level = _typical(spread, windows, solution)
     # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
     size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
     least = model_error(size, tuning.decay, tuning.angular_frequency)
     bound = params.clip_sigmas * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
-    weights = np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0)
-    changed = np.flatnonzero((weights != solution.weights).any(axis=1))
-    if changed.size:
-        solution.put(changed, solve(basis[changed], weights[changed]))
+    refit(basis, solution, np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0))
 
 
 def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:

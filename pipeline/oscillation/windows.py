@@ -12,7 +12,7 @@ from pipeline.numerics.robust import median
 from pipeline.oscillation.condition import Conditioned
 from pipeline.track import F8
 
-__all__ = ["Solution", "Tuning", "Windows", "quantile", "retune", "solve", "unwrap"]
+__all__ = ["Solution", "Tuning", "Windows", "quantile", "refit", "retune", "solve", "unwrap"]
 
 # Determinant of the normal matrix per sample: 1/4 for a full period, less where the samples crowd into a part
 # of it, so that rest position and amplitude cannot be told apart.
@@ -155,8 +155,8 @@ class Solution:
 
     def part(self, which: NDArray[np.bool_]) -> Solution:
         """Return the fits of some windows."""
-        each = (self.coefficients, self.normal, self.residual, self.good, self.weights)
-        return Solution(*(values[which] for values in each))
+        coefficients, normal, residual = self.coefficients[which], self.normal[which], self.residual[which]
+        return Solution(coefficients, normal, residual, self.good[which], self.weights[which])
 
 
 def solve(basis: F8, weights: F8) -> Solution:
@@ -183,6 +183,13 @@ def solve(basis: F8, weights: F8) -> Solution:
     coefficients[:, 0], coefficients[:, 1], coefficients[:, 2] = good * (y - a * c - b * s), a, b
     residual = basis[:, 3] - (coefficients[:, None, :] @ basis[:, :3])[:, 0]
     return Solution(coefficients, sums[:, :, :3], residual, good, weights)
+
+
+def refit(basis: F8, solution: Solution, weights: F8) -> None:
+    """Fit again with other weights, and put that into the solution; windows whose weights stay are left as they are."""
+    changed = np.flatnonzero((weights != solution.weights).any(axis=1))
+    if changed.size:
+        solution.put(changed, solve(basis[changed], weights[changed]))
 
 
 def quantile(size: F8, usable: F8, share: float) -> F8:
