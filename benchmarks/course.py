@@ -29,6 +29,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import lmfit
@@ -43,6 +44,7 @@ from storage.catalog import build_catalog, search_catalog
 
 SAMPLES = 12_000
 PART = 500  # runs of a pass, between two looks at the loop
+SHARE = 2500  # runs of a pass by two processes, between two passes side by side
 REAL = (
     ("AyushPandhi__Pandhi_Ayush_PHY224/damped position.txt", {}),
     ("filo0509__smorzamento/molla_durissima_discopieno_14.91945_0.2016_1.csv", {"channel": "position", "unit": "m"}),
@@ -81,7 +83,7 @@ class Measured:
     second_pass : float
         Of the first.
     efficiency : float
-        Of two processes, see :func:`idle_of_two`.
+        Of two processes, with what they leave idle by :func:`idle_of_two`.
     half_mb, whole_mb : float
         Largest memory of a worker after half of the runs, and after all.
     """
@@ -140,9 +142,6 @@ def measure(runs: int, folder: Path) -> Measured:
     with threadpool_limits(1):
         few = files[: max(1, min(5, runs // 10))]
         every_law = _processor(lambda: [all_laws(*_read(file)) for file in few]) / len(few)
-    apart = _processor(lambda: _two_halves(inputs, folder / "jobs1"), *CHILDREN)
-    idle: list[float] = []
-    two = _processor(lambda: idle.append(idle_of_two(inputs, folder / "jobs2")), *CHILDREN)
     done = subprocess.run([sys.executable, "-c", WORKER, str(inputs)], check=True, capture_output=True)
     half_mb, whole_mb = json.loads(done.stdout)
     return Measured(
@@ -151,7 +150,7 @@ def measure(runs: int, folder: Path) -> Measured:
         loop / took["standard"],
         every_law * runs / took["standard"],
         again / took["standard"],
-        apart / (two + sum(idle)),
+        _efficiency(files, folder),
         half_mb,
         whole_mb,
     )
@@ -187,14 +186,15 @@ def _processor(call: Callable[[], object], *of: int) -> float:
     return used() - before
 
 
-def _started(inputs: Path, out: Path, *options: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "springmass", "batch", str(inputs), "-o", str(out), "--reports", "0", *options]
+def _started(files: Sequence[Path], out: Path, *options: str) -> subprocess.Popen[bytes]:
+    named = [str(file) for file in files]
+    command = [sys.executable, "-m", "springmass", "batch", *named, "-o", str(out), "--reports", "0", *options]
     return subprocess.Popen(command, stderr=subprocess.DEVNULL)
 
 
-def _two_halves(inputs: Path, out: Path) -> None:
+def _two_halves(files: Sequence[Path], out: Path) -> None:
     """Make two passes by one process at the same time, each over half of the runs."""
-    halves = [_started(inputs, out, "--jobs", "1", "--shard", f"{i}/2") for i in (1, 2)]
+    halves = [_started(files, out, "--jobs", "1", "--shard", f"{i}/2") for i in (1, 2)]
     for half in halves:
         _whole(half)
 
@@ -204,13 +204,34 @@ def _whole(process: subprocess.Popen[bytes]) -> None:
         raise RuntimeError(f"batch ended with {code}")
 
 
-def idle_of_two(inputs: Path, out: Path) -> float:
+def _efficiency(files: Sequence[Path], folder: Path) -> float:
+    """Return what two passes side by side use of what one by two processes does: of some runs after the others."""
+    apart = two = 0.0
+    count = max(1, len(files) // SHARE)
+    for i in range(count):
+        share = files[i::count]
+        for side_by_side in (True, False) if i % 2 == 0 else (False, True):  # which comes first changes too
+            if side_by_side:
+                apart += _processor(partial(_two_halves, share, folder / f"halves{i}"), *CHILDREN)
+            else:
+                two += _by_two(share, folder / f"both{i}")
+    return apart / two
+
+
+def _by_two(files: Sequence[Path], out: Path) -> float:
+    """Make a pass by two processes; return the seconds of processor that it used and those that it left idle."""
+    idle: list[float] = []
+    used = _processor(lambda: idle.append(idle_of_two(files, out)), *CHILDREN)
+    return used + sum(idle)
+
+
+def idle_of_two(files: Sequence[Path], out: Path) -> float:
     """Make a pass by two processes; return for how long they leave one of two cores idle, s. By Linux's ``/proc``.
 
     That is what the two wait for work, and what the first process uses while it is alone. The time in which a process
     could run and a neighbour on the machine had the core is the neighbour's.
     """
-    process = _started(inputs, out, "--jobs", "2")
+    process = _started(files, out, "--jobs", "2")
     seen: dict[int, tuple[float, float, float]] = {}  # of each worker: first look, last look, not idle by then, s
     alone, mine = 0.0, 0.0
     while process.poll() is None:
