@@ -130,7 +130,7 @@ def measure(runs: int, folder: Path) -> Measured:
     inputs.mkdir()
     recordings(inputs, runs)
     files = sorted(inputs.iterdir())
-    parts = [files[i :: max(2, runs // PART)] for i in range(max(2, runs // PART))]
+    parts = _split(files, max(2, runs // PART))
     every = max(1, runs // max(20, runs // 10))
     _passed(parts[0], folder / "warm", "fast")  # imports, and the disk's cache
     loop, took, again = 0.0, {"fast": 0.0, "standard": 0.0}, 0.0
@@ -154,6 +154,11 @@ def measure(runs: int, folder: Path) -> Measured:
         half_mb,
         whole_mb,
     )
+
+
+def _split(files: Sequence[Path], count: int) -> list[Sequence[Path]]:
+    """Return so many parts, alike in what they hold."""
+    return [files[i::count] for i in range(count)]
 
 
 def _looped(files: Sequence[Path]) -> float:
@@ -207,9 +212,7 @@ def _whole(process: subprocess.Popen[bytes]) -> None:
 def _efficiency(files: Sequence[Path], folder: Path) -> float:
     """Return what two passes side by side use of what one by two processes does: of some runs after the others."""
     apart = two = 0.0
-    count = max(1, len(files) // SHARE)
-    for i in range(count):
-        share = files[i::count]
+    for i, share in enumerate(_split(files, max(1, len(files) // SHARE))):
         for side_by_side in (True, False) if i % 2 == 0 else (False, True):  # which comes first changes too
             if side_by_side:
                 apart += _processor(partial(_two_halves, share, folder / f"halves{i}"), *CHILDREN)

@@ -26,7 +26,7 @@ SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0
 OTHER_LAW = 0.15  # prior odds of a law with friction, or of one that the user made, against linear and quadratic drag
 BELOW_LINEAR = 0.03  # the same of a power below 1: nothing that is known to damp grows so slowly, friction aside
 APART = 5.0  # how many u rates lie apart where evidence on a power counts half as much again, and not twice
-STEEPNESS, FAR = 5.0, 5.0  # of what the spread between laws counts; chosen with the two above for what intervals hold
+STEEPNESS, FAR = 5.0, 5.0  # of what the spread between laws counts; chosen with those above for what intervals hold
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -157,7 +157,7 @@ def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tupl
 
     Returns the fits and the spreads about them (w,).
     """
-    solution = solve(basis, windows.usable.copy())
+    solution = solve(basis, windows.usable.copy())  # what is put into it must not reach the windows
     spread = _spread(windows.usable, solution.residual)
     odd = np.flatnonzero(spread > 1.3 * noise_m)
     if odd.size:

@@ -131,9 +131,8 @@ def rate_of(a: float, drag: Mapping[str, float]) -> float:
 
 def truth(drag: str) -> dict[str, float]:
     """Return what is true at the start."""
-    d = {**NOTHING, **DRAGS[drag]}
-    rate = rate_of(AMPLITUDE_M, d)
-    return {"amplitude": AMPLITUDE_M, "damping_rate": rate, "gamma": d["gamma"], "beta": d["beta"]}
+    rate, d = rate_of(AMPLITUDE_M, DRAGS[drag]), DRAGS[drag]
+    return {"amplitude": AMPLITUDE_M, "damping_rate": rate, "gamma": d.get("gamma", 0.0), "beta": d.get("beta", 0.0)}
 
 
 def one_record(job: tuple[str, float, float, int]) -> tuple[list[float], list[float], list[float]]:

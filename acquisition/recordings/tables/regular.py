@@ -33,7 +33,7 @@ _MOST_DIGITS = 15  # whole numbers of so many and powers of ten up to 10^22 are 
 _MOST_POWER = 22  # quotient is rounded once
 _LONGEST_EXPONENT = len("e-99")
 _QUOTED_COMMA = re.compile(rb'"([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)"')  # a decimal comma where commas separate
-_NEWLINE, _RETURN, _BLANK, _PLUS, _MINUS, _POINT, _ZERO, _NINE, _E, _LOWER = (*(ord(c) for c in "\n\r +-.09e"), 0x20)
+_NEWLINE, _RETURN, _BLANK, _PLUS, _MINUS, _POINT, _ZERO, _E, _LOWER = (*(ord(c) for c in "\n\r +-.0e"), 0x20)
 
 
 class Alike(NamedTuple):
@@ -191,21 +191,18 @@ def _whole(raw: U8, begin: I8, end: I8, places: int) -> F8 | None:
     pointed = places > 0
     if least < 1 + pointed + places or most > _MOST_DIGITS + pointed:
         return None
-    number, at, power = np.zeros(end.size), end - 1, 1.0
-    for place in range(most):
-        byte = raw.take(at)
-        at -= 1
-        if pointed and place == places:
-            if (byte != _POINT).any():
-                return None
-            continue
+    if pointed and (raw.take(end - places - 1) != _POINT).any():
+        return None
+    number = np.zeros(end.size)
+    for digit in range(most - pointed):
+        back = digit + 1 + (pointed and digit >= places)  # bytes from the cell's end, the point among them
+        byte = raw.take(end - back)
         byte -= _ZERO
-        if place >= least:
-            byte *= at >= begin - 1
+        if back > least:
+            byte *= widths >= back
         if byte.max() > 9:  # what lies below "0" has gone beyond all digits
             return None
-        number += byte * np.float64(power)
-        power *= 10.0
+        number += byte * np.float64(10.0**digit)
     return number
 
 
