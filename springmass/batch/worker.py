@@ -23,7 +23,7 @@ from pipeline.results.compare import SpringRun
 from pipeline.track import F8
 from springmass.batch.plan import Job, code_sha256
 from springmass.batch.rows import ESTIMATES
-from springmass.errors import ProgramError, hushed
+from springmass.errors import ProgramError, hushed, internal_error
 from springmass.runs.about import about_path
 from springmass.runs.analysing import scene_of
 from springmass.runs.json_results import all_findings
@@ -59,7 +59,7 @@ def analyse_one(job: Job) -> dict[str, Any]:
     except MemoryError:
         row["error"] = f"{job.path}: more memory was demanded than there is; analyse it with fewer processes"
     except Exception as error:  # a defect: the other runs of a thousand are not to wait for its repair
-        row["error"] = _told(job, f"{job.path}: a defect of the program: {type(error).__name__}: {error}")
+        row["error"] = _told(job, f"{job.path}: {internal_error(error)}")
     return row
 
 

@@ -22,7 +22,19 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
 from springmass.commands import completions
-from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, suggest, tell
+from springmass.errors import (
+    INTERNAL,
+    OK,
+    REJECTED,
+    SOME_FAILED,
+    UNREADABLE,
+    USAGE,
+    ProgramError,
+    complain,
+    internal_error,
+    suggest,
+    tell,
+)
 from springmass.runs.about import remember_scene
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder, scene_of
 from springmass.runs.inputs import Found, files_of
@@ -166,7 +178,14 @@ def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
 
 
 def _work(task: _Task) -> _Done:
-    """Analyse one of several inputs, and write its report where one is asked for."""
+    """Analyse one of several inputs, and write its report; a defect met on one does not keep the others from theirs."""
+    try:
+        return _analyse_and_report(task)
+    except Exception as error:
+        return _Done(task.name, INTERNAL, (f"{task.found.path}: {internal_error(error)}",))
+
+
+def _analyse_and_report(task: _Task) -> _Done:
     from springmass.report.tables import every_number, table_estimates
 
     attempted = _attempt(task)
