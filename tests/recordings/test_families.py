@@ -260,7 +260,7 @@ def test_a_real_file_is_read_as_it_was_counted(recordings: Path, row: Row) -> No
 
 
 def test_no_real_file_is_left_out(recordings: Path) -> None:
-    """The table names every file, but for the dialects under wild/ and the peers' data, which have tests of their own."""
+    """The table names every file, but for those of wild/ and peers/, which have their own tests."""
     there = {p.relative_to(recordings).as_posix() for p in recordings.rglob("*") if p.is_file() and p.suffix != ".md"}
     assert {path for path in there if not path.startswith(("wild/", "peers/"))} == {row.path for row in TABLE}
 
