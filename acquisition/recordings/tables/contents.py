@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from acquisition.block import F8
-from acquisition.errors import NeedsAnswer
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.questions import Missing, Need, Question
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.text import Text
 from acquisition.recordings.units import Measure, measure_of, unit_words
@@ -26,6 +28,7 @@ __all__ = [
     "is_uncertainty",
     "name_and_unit",
     "named",
+    "names_apart",
     "numbered_apart",
     "of_run",
     "split_heading",
@@ -84,7 +87,7 @@ class Sheet:
     width : int or None
         Cells that a row must have, all of them numbers; None where rows may be ragged.
     names : tuple of str
-        What each column is called, times among them, where the family tells; so that ``--time`` may name one.
+        What each column is called, times among them, where the family tells; so that a user may name one as the time.
     """
 
     text: Text
@@ -264,24 +267,22 @@ def candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
     return [each for each in fit if each.is_length] or fit
 
 
-def named(path: str, channels: Sequence[Channel], name: str, what: str = "channel") -> Channel:
+def named(path: str, channels: Sequence[Channel], name: str, what: Missing = Missing.CHANNEL) -> Channel:
     """Return the channel of a name, with or without its unit.
 
     Raises
     ------
     NeedsAnswer
-        If none, or more than one, is called so; the line lists them.
+        If none, or more than one, is called so; the question lists them.
     """
     wanted = _plain(name)
-    exact = [each for each in channels if wanted in (_plain(each.label), _plain(each.name))]
-    if len(exact) == 1:
-        return exact[0]
-    names = _names(channels)
-    if exact:
-        demand = f'{what} "{name}" is the name of {len(exact)} channels of {names}'
-        raise NeedsAnswer(path, demand, f"name the one to take with --{what}")
-    demand = f'{what} "{name}" was asked for, the file holds {names}'
-    raise NeedsAnswer(path, demand, f"name one of these with --{what}, or leave it out")
+    exact = [each for each in channels if each.name == name] or [each for each in channels if each.label == name]
+    alike = exact or [each for each in channels if wanted in (_plain(each.label), _plain(each.name))]
+    if len(alike) == 1:
+        return alike[0]
+    choices = names_apart(channels)
+    reason = f'{what} "{name}" ' + (f"is the name of {len(alike)} columns" if alike else "is not in the file")
+    raise NeedsAnswer(Question(path, (Need(what, choices, choices[0]),), reason=reason))
 
 
 def of_run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
@@ -290,24 +291,34 @@ def of_run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
     Raises
     ------
     NeedsAnswer
-        If none, or more than one, is called so; the line lists them.
+        If none, or more than one, is called so; the question lists them.
+    FormatError
+        If the file holds one run without a name.
     """
     runs = contents.runs
-    listed = ", ".join(f'"{name}"' for name in runs)
     if run is None or run == runs[0]:
         return [each for each in contents.channels if each.run == runs[0]]
     if runs == ("",):
-        raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds one run without a name', "leave --run out")
-    called = [name for name in runs if _plain(name) == _plain(run)]
+        raise FormatError(path, f'run "{run}" is not in the file, which holds one run without a name', "leave run out")
+    called = [name for name in runs if name == run] or [name for name in runs if _plain(name) == _plain(run)]
     # "2" is enough for "Run #2".
     called = called or [name for name in runs if re.fullmatch(rf"\D*#?\s*0*{re.escape(run.strip())}", name)]
     if len(called) != 1:
-        raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds {listed}', "name one of these with --run")
+        reason = f'run "{run}" ' + (f"is the name of {len(called)} runs" if called else "is not in the file")
+        raise NeedsAnswer(Question(path, (Need(Missing.RUN, runs, runs[0]),), reason=reason))
     return [each for each in contents.channels if each.run == called[0]]
 
 
-def _names(channels: Sequence[Channel]) -> str:
-    return ", ".join(f'"{each.label}"' for each in channels)
+def names_apart(channels: Sequence[Channel]) -> tuple[str, ...]:
+    """Return what to call each channel so that :func:`named` finds it: its name, with its unit where others share it.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        Of one run.
+    """
+    names = Counter(each.name for each in channels)
+    return tuple(each.name if names[each.name] == 1 else each.label for each in channels)
 
 
 def _plain(name: str) -> str:
