@@ -33,10 +33,10 @@ class Need:
     ----------
     what : Missing
     choices : tuple of str
-        Every answer that the reader takes: all runs, all channels, all units. Empty for a rate, which is any positive
-        number.
+        Everything to choose from: all runs, all channels that may be meant, all units. Empty for a rate, which is any
+        positive number.
     example : str or float
-        One answer that the reader takes; of a rate a round number in Hz without any basis in the file.
+        One of the choices; of a rate a round number in Hz without any basis in the file.
     of : str
         The column that a unit is asked of; empty where the file does not name it.
     stated : str

@@ -80,7 +80,7 @@ def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | N
     rate = find_rate(printed, resolution, rate_hz=rate_hz)
     if rate is None:
         if rate_hz is None:
-            reason = f"{printed.size} rows at one time give no rate"
+            reason = f"expected times to tell the rate, got {printed.size} rows at one time"
             raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
         origin = float(printed[0]) if printed.size else 0.0
         return Timing(rate_hz, Grid(rate_hz, origin), resolution, certain=False, given=True)

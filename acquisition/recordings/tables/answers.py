@@ -21,7 +21,6 @@ from acquisition.recordings.tables.contents import (
     candidates,
     name_and_unit,
     named,
-    names_apart,
     of_run,
     split_heading,
 )
@@ -79,9 +78,7 @@ def settle(path: str, contents: Contents, said: Answers) -> Channel:
         fit = candidates([each for each in channels if each.name != said.time] or channels)
         chosen = next((each for each in fit if each.measure), fit[0])
         if len(fit) > 1:
-            names = dict(zip(map(id, channels), names_apart(channels), strict=True))
-            choices = tuple(names[id(each)] for each in fit)
-            needs.append(Need(Missing.CHANNEL, choices, names[id(chosen)]))
+            needs.append(Need(Missing.CHANNEL, tuple(each.name for each in fit), chosen.name))
     if said.time is not None:
         chosen = _timed_by(path, channels, chosen, said.time)
     if isinstance(chosen.source, Sheet) and chosen.time is not None and _begins_anew(chosen.source, chosen.time):
@@ -98,7 +95,8 @@ def settle(path: str, contents: Contents, said: Answers) -> Channel:
 
 def _unit(chosen: Channel) -> Need:
     example = "1" if chosen.unit else _likely_unit(chosen.name)
-    return Need(Missing.UNIT, tuple(MEASURES), example, of=chosen.name, stated=chosen.unit)
+    others = (unit for unit in MEASURES if unit != unit_words(example))
+    return Need(Missing.UNIT, (example, *others), example, of=chosen.name, stated=chosen.unit)
 
 
 def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tuple[Trap, ...]]:
@@ -201,9 +199,8 @@ def _of_times(channels: Sequence[Channel], chosen: Channel, said: Answers) -> li
     if none:
         if said.rate_hz is not None:
             return []
-        others = [each for each in channels if each.name != chosen.name]
-        choices = names_apart(others)
-        return [rate_needed(Need(Missing.TIME, choices, choices[0]) if others else None)]
+        others = tuple(each.name for each in channels if each.name != chosen.name)
+        return [rate_needed(Need(Missing.TIME, others, others[0]) if others else None)]
     if time_power(chosen.time_unit) is not None or chosen.formula is not None:
         return []
     times = _times_at_first(chosen)

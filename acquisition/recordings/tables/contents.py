@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -23,12 +22,12 @@ __all__ = [
     "Heading",
     "Sheet",
     "candidates",
+    "channels_apart",
     "channels_of",
     "is_time",
     "is_uncertainty",
     "name_and_unit",
     "named",
-    "names_apart",
     "numbered_apart",
     "of_run",
     "split_heading",
@@ -280,7 +279,7 @@ def named(path: str, channels: Sequence[Channel], name: str, what: Missing = Mis
     alike = exact or [each for each in channels if wanted in (_plain(each.label), _plain(each.name))]
     if len(alike) == 1:
         return alike[0]
-    choices = names_apart(channels)
+    choices = tuple(each.name for each in channels)
     reason = f'{what} "{name}" ' + (f"is the name of {len(alike)} columns" if alike else "is not in the file")
     raise NeedsAnswer(Question(path, (Need(what, choices, choices[0]),), reason=reason))
 
@@ -309,18 +308,6 @@ def of_run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
     return [each for each in contents.channels if each.run == called[0]]
 
 
-def names_apart(channels: Sequence[Channel]) -> tuple[str, ...]:
-    """Return what to call each channel so that :func:`named` finds it: its name, with its unit where others share it.
-
-    Parameters
-    ----------
-    channels : sequence of Channel
-        Of one run.
-    """
-    names = Counter(each.name for each in channels)
-    return tuple(each.name if names[each.name] == 1 else each.label for each in channels)
-
-
 def _plain(name: str) -> str:
     found = _HEADING.fullmatch(name.strip())
     if found and found["name"]:
@@ -337,11 +324,22 @@ def numbered_apart(names: Sequence[str]) -> list[str]:
     ['a', 'b', 'a [2]']
     """
     seen: dict[str, int] = {}
-    apart = []
+    apart: dict[str, None] = {}
     for name in names:
         seen[name] = seen.get(name, 0) + 1
-        apart.append(name if seen[name] == 1 else f"{name} [{seen[name]}]")
-    return apart
+        while (numbered := name if seen[name] == 1 else f"{name} [{seen[name]}]") in apart:
+            seen[name] += 1  # a name of the file looks numbered
+        apart[numbered] = None
+    return list(apart)
+
+
+def channels_apart(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+    """Return channels of which no two of a run share a name, so that each can be chosen."""
+    names: dict[int, str] = {}
+    for run in dict.fromkeys(each.run for each in channels):
+        own = [each for each in channels if each.run == run]
+        names.update(zip(map(id, own), numbered_apart([each.name for each in own]), strict=True))
+    return tuple(replace(each, name=names[id(each)]) for each in channels)
 
 
 def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
