@@ -116,6 +116,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             stream.reconfigure(errors="backslashreplace", line_buffering=True)
     try:
         options = build_parser().parse_args(arguments)
+        options.words = sys.argv[1:] if arguments is None else list(arguments)
         adopt(options.quiet, options.verbose)
         from importlib import import_module
 

@@ -11,13 +11,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from springmass.commands import completions
+from springmass.commands import load_for
 from springmass.errors import OK, USAGE, ProgramError, tell
 from springmass.page.desk import Desk
 from springmass.page.feeds import view_of
 from springmass.page.server import Opening, serve
 from springmass.page.sharing import address_in_network, code_for_terminal
-from springmass.runs.loading import kind_of, load
+from springmass.runs.loading import kind_of
 
 __all__ = ["run"]
 
@@ -51,7 +51,7 @@ def _look_at(desk: Desk, path: Path, options: argparse.Namespace) -> None:
     if kind_of(path) == "wire":
         desk.follow(path)
     else:
-        loaded = load(path, **completions(options))
+        loaded = load_for(options, path)
         desk.show(view_of(loaded), loaded.scene, loaded.path)
 
 

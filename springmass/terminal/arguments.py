@@ -7,14 +7,21 @@ import math
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-__all__ = ["BENCH", "COMMANDS"]
+__all__ = ["BENCH", "COMMANDS", "without_completions"]
 
 
 def _add_input_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--velocity", metavar="FILE", help="velocity file that belongs to the one position file given")
     _add_completions(parser)
+
+
+def without_completions(words: Sequence[str]) -> list[str]:
+    """Return the words of a command line without the options that say how to read a recording."""
+    parser = argparse.ArgumentParser(add_help=False)
+    _add_completions(parser)
+    return parser.parse_known_args(words)[1]
 
 
 def _add_completions(parser: argparse.ArgumentParser) -> None:
@@ -251,7 +258,7 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--force", action="store_true", help="run a step that is unstable")
     parser.add_argument("--against", metavar="RUN", help="measured run to lay the prediction over")
-    _add_unverified(parser)
+    _add_completions(parser)
     parser.add_argument(
         "-o", "--output", metavar="RUN.h5", help="write what a rangefinder would have read to a run file"
     )

@@ -20,6 +20,7 @@ from pylatexenc.latexwalker import LatexWalker
 
 import springmass as sm
 from acquisition.errors import AcquisitionError
+from pipeline.analyse import Oscillation
 from pipeline.errors import AnalysisError, PipelineError
 from pipeline.registry.findings import FINDINGS
 from pipeline.registry.quantities import QUANTITIES
@@ -108,7 +109,9 @@ def _scene(subject: Subject, folder: Path) -> list[str]:
     for table, keys in subject.scene.items():
         lines.append(f"[{table}]")
         for key, value in keys.items():
-            inner = ", ".join(f"{name} = {_toml(one)}" for name, one in value.items()) if isinstance(value, dict) else ""
+            inner = (
+                ", ".join(f"{name} = {_toml(one)}" for name, one in value.items()) if isinstance(value, dict) else ""
+            )
             lines.append(f"{key} = {{ {inner} }}" if inner else f"{key} = {_toml(value)}")
     path.write_text("\n".join(lines), encoding="utf-8")
     return ["--scene", str(path)]
@@ -170,8 +173,12 @@ def _play_in_python(subject: Subject, folder: Path) -> int:
     laws = {"laws": (..., *subject.laws)} if subject.laws else {}
     try:
         found = sm.analyse(subject.path, dict(subject.scene) or None, **laws, **subject.answers)
-    except (AcquisitionError, PipelineError) as error:
-        assert len(str(error).splitlines()) == 1
+    except (AcquisitionError, PipelineError) as refused:
+        why = str(refused)
+    else:
+        why = ""
+    if why:
+        assert len(why.splitlines()) == 1
         return 1
     shown = repr(found)
     assert not NO_NUMBER.search(shown), shown
@@ -181,15 +188,10 @@ def _play_in_python(subject: Subject, folder: Path) -> int:
     dataset = found.to_dataset()
     assert all(math.isfinite(float(dataset[name])) for name in found.keys())  # noqa: SIM118  # its iterator is its keys
     for draw in (found.plot.position, found.plot.amplitude, found.plot.phase, found.plot.energy, found.plot.drag):
-        try:
-            draw().figure.canvas.draw()
-        except (AnalysisError, ValueError) as error:
-            # Documented: nothing oscillates, or the quantity has no energy or drag.
-            assert type(error) in (AnalysisError, ValueError)
-            assert str(error)
-            assert "NaN" not in str(error)
-        finally:
-            pyplot.close("all")
+        if isinstance(found.motion, Oscillation) or draw == found.plot.position:
+            with contextlib.suppress(AnalysisError):  # documented of a record without an energy or a drag
+                draw().figure.canvas.draw()
+        pyplot.close("all")
     if subject.laws:
         from springmass.report.write import write_report
         from springmass.runs.analysing import Analysed

@@ -120,11 +120,16 @@ def specials(folder: Path) -> Iterator[Subject]:
     bench = {"bob": {"mass_kg": {"value": 0.2, "u": 1e-4}}, "disc": {"diameter_m": {"value": 0.1, "u": 1e-3}}}
     bench |= {"air": {"temperature_c": {"value": 21.0, "u": 0.5}}}
     yield _made(folder, "whole bench", t, swing, scene=bench)
-    yield _made(folder, "overdamped", t, 0.3 + 0.05 * (1.2 * np.exp(-0.9 * t) - 0.2 * np.exp(-5.4 * t)) + 3e-4 * _noise(t, 3))
+    yield _made(
+        folder, "overdamped", t, 0.3 + 0.05 * (1.2 * np.exp(-0.9 * t) - 0.2 * np.exp(-5.4 * t)) + 3e-4 * _noise(t, 3)
+    )
     yield _made(folder, "still", t, 0.3 + 3e-4 * _noise(t, 4))
     two = 0.3 + 0.03 * np.cos(6.1 * t) + 0.028 * np.cos(9.7 * t + 1.0) + 3e-4 * _noise(t, 5)
     yield _made(folder, "two modes", t, two)
-    for name, coefficients in (("law of one's own", {"d": "1/(m^1/2 s)"}), ("law with a coefficient n", {"n": "1/(m^1/2 s)"})):
+    for name, coefficients in (
+        ("law of one's own", {"d": "1/(m^1/2 s)"}),
+        ("law with a coefficient n", {"n": "1/(m^1/2 s)"}),
+    ):
         law = sm.make_law("three-halves", _three_halves, coefficients, _guess)
         yield _made(folder, name, t, swing, laws=(law,), scene=bench)
 

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -73,7 +74,7 @@ def test_pairs_are_compared_in_a_report(tmp_path: Path) -> None:
     bench = tmp_path / "bench.toml"
     bench.write_text("[bob]\nmass_kg = { value = 0.2, u = 1e-4 }\n[spring]\nmass_kg = { value = 0.01, u = 1e-3 }\n")
     written = 0
-    for number, (one, other) in enumerate(zip(subjects, subjects[1:], strict=False)):
+    for number, (one, other) in enumerate(itertools.pairwise(subjects)):
         out = tmp_path / f"compared{number}"
         options = one.options if one.options == other.options else []
         done = run("compare", one.path, other.path, *options, "--scene", bench, "--out", out)
