@@ -263,7 +263,7 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
         except RunDamaged as error:
             if unverified:
                 raise
-            remedy = f"{error.remedy}, or look at it as it is: unverified"
+            remedy = f"{error.remedy}, or look at it as it is with --unverified"
             raise RunDamaged(path, error.demand, remedy) from error
         return Loaded(
             path,
