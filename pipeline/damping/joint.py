@@ -179,8 +179,8 @@ def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params |
 
 
 def _determined(fit: JointFit) -> bool:
-    u = [fit.coefficients.covariance, *(amplitude.u for amplitude in fit.amplitudes)]
-    return all(bool(np.isfinite(each).all()) for each in u)
+    coefficients = bool(np.isfinite(fit.coefficients.covariance).all())
+    return coefficients and all(math.isfinite(amplitude.u) for amplitude in fit.amplitudes)
 
 
 def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:
