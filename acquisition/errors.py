@@ -17,6 +17,7 @@ Every message is one line: what was demanded, what was got, where, and what to d
 from __future__ import annotations
 
 import unicodedata
+from typing import Any
 
 __all__ = [
     "AcquisitionError",
@@ -75,6 +76,10 @@ class FormatError(AcquisitionError):
         said = f"{demand} {remedy}" if demand.endswith("?") else f"{demand}; {remedy}"
         # Names and units come out of the file, line ends and all. The path is the user's own and stays as it is.
         super().__init__(f"{where}: {visible(said)}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how it is made again where it arrives from another process."""
+        return type(self), (self.path, self.demand, self.remedy), {"line": self.line, "args": self.args}
 
 
 class UnknownFormat(FormatError):
