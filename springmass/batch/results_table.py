@@ -13,7 +13,7 @@ from typing import Any
 
 from springmass.batch.rows import COLUMNS, NUMBERS, WHOLE, columns_of
 from springmass.errors import USAGE, ProgramError
-from storage.atomic import whole_file
+from storage.atomic import whole_file, writing
 
 __all__ = ["CSV", "PARQUET", "is_course", "read_rows", "table_of", "tags_in", "text_of", "write_tables"]
 
@@ -27,15 +27,21 @@ def write_tables(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence
     """Write the table as CSV in UTF-8 and, where pyarrow is installed, as Parquet: the same bytes for the same rows.
 
     In the CSV numbers keep all their digits, and what is not known is empty.
+
+    Raises
+    ------
+    storage.errors.WriteFailed
+        If one of them cannot be written; the earlier one stands then.
     """
     try:
         import pyarrow as pa
         import pyarrow.parquet as pq
     except ImportError:
         pa = pq = None
-        (folder / PARQUET).unlink(missing_ok=True)  # one of an earlier pass would tell other numbers
+        with writing(folder / PARQUET):
+            (folder / PARQUET).unlink(missing_ok=True)  # one of an earlier pass would state other numbers
     columns = columns_of(tags)
-    with contextlib.ExitStack() as stack:
+    with writing(folder / CSV), contextlib.ExitStack() as stack:
         temporary = stack.enter_context(whole_file(folder / CSV))
         text = csv.writer(stack.enter_context(temporary.open("w", encoding="utf-8", newline="")), lineterminator="\n")
         text.writerow(columns)

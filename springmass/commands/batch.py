@@ -64,6 +64,8 @@ def run(options: argparse.Namespace) -> int:
         )
         with _Progress(quiet=options.quiet) as progress:
             outcome = run_pass(course, store, folder, how, told=progress)
+    for line in outcome.unwritten:
+        complain(line)
     failed = len(outcome.failures)
     tell(f"{outcome.runs} runs: {outcome.kept} unchanged, {outcome.done} analysed, {failed} failed")
     if options.shard is None:
@@ -71,9 +73,9 @@ def run(options: argparse.Namespace) -> int:
         suggest(f"open {folder / PAGE} in a browser")
     else:
         suggest("the same command without --shard, when all shards have ended, puts them together")
-    if not failed:
-        return OK
-    return UNREADABLE if failed == outcome.runs else SOME_FAILED
+    if failed and failed == outcome.runs:
+        return UNREADABLE
+    return SOME_FAILED if failed or outcome.unwritten else OK
 
 
 class _Progress:
