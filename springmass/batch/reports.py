@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from acquisition.errors import visible
 from springmass.batch.plan import Job, job_of
 from springmass.batch.store import Store
 from springmass.errors import UNREADABLE, USAGE, ProgramError
@@ -166,7 +167,8 @@ def find_run(store: Store, names: Mapping[str, Job], run: str) -> tuple[str, Job
     from difflib import get_close_matches
 
     for name, job in names.items():
-        if run in (name, job.path) or os.path.abspath(run) == os.path.abspath(job.whole(job.path)):
+        # The table shows a name with its control characters as escapes, and so it may come back.
+        if run in (name, job.path, visible(name)) or os.path.abspath(run) == os.path.abspath(job.whole(job.path)):
             return name, job
     near = get_close_matches(run, names, n=1)
     hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(list(names)[:5])} ..."

@@ -11,6 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from acquisition.errors import visible
 from springmass.batch.rows import COLUMNS, NUMBERS, WHOLE, columns_of
 from springmass.errors import USAGE, ProgramError
 from storage.atomic import whole_file, writing
@@ -58,10 +59,11 @@ def write_tables(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence
 
 
 def _cell(value: Any) -> Any:
-    if value is None:
-        return ""
+    if not isinstance(value, str):
+        return "" if value is None else value
+    shown = visible(value)
     # A name that begins as a formula does would be one in a spreadsheet.
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+    return f"'{shown}" if shown.startswith(_FORMULA) else shown
 
 
 def _type(name: str, pa: Any) -> Any:
@@ -138,6 +140,6 @@ def text_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
     """Return some columns of rows as CSV text."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(columns)
+    writer.writerow(map(_cell, columns))
     writer.writerows([_cell(row[name]) for name in columns] for row in rows)
     return out.getvalue()
