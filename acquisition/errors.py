@@ -17,7 +17,11 @@ Every message is one line: what was demanded, what was got, where, and what to d
 from __future__ import annotations
 
 import unicodedata
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from acquisition.recordings.questions import Question
 
 __all__ = [
     "AcquisitionError",
@@ -78,8 +82,7 @@ class FormatError(AcquisitionError):
         super().__init__(f"{where}: {visible(said)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how it is made again where it arrives from another process."""
-        return type(self), (self.path, self.demand, self.remedy), {"line": self.line, "args": self.args}
+        return partial(type(self), self.path, self.demand, self.remedy, line=self.line), (), self.__dict__
 
 
 class UnknownFormat(FormatError):
@@ -87,7 +90,28 @@ class UnknownFormat(FormatError):
 
 
 class NeedsAnswer(FormatError):
-    """The file lacks something that is never guessed: the user must name it."""
+    """The file lacks something that is never guessed: the user must name it.
+
+    Parameters
+    ----------
+    question : Question
+        What is missing, and every answer that can be given, as data.
+    remedy : str, optional
+        How the user gives the answer, where somebody knows; left out, the question's own neutral words.
+    line : int, optional
+        One-based line that shows what is missing.
+    """
+
+    def __init__(self, question: Question, remedy: str = "", *, line: int | None = None) -> None:
+        super().__init__(question.path, question.sentence, remedy or question.remedy, line=line)
+        self.question = question
+
+    def with_remedy(self, remedy: str) -> NeedsAnswer:
+        """Return the same question with how the user answers it."""
+        return NeedsAnswer(self.question, remedy, line=self.line)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), self.question, self.remedy, line=self.line), (), self.__dict__
 
 
 class SourceError(AcquisitionError):

@@ -31,6 +31,7 @@ from pipeline.oscillation import disturbances as separation
 from pipeline.oscillation import segments as segmentation
 from pipeline.oscillation.condition import Conditioned, coarsest_step, condition
 from pipeline.oscillation.cycles import Cycles, NoOscillation
+from pipeline.registry.quantities import check_quantity
 from pipeline.results import derive as derivation
 from pipeline.results.checks.clock_findings import judge_clock
 from pipeline.results.checks.contact import find_contact
@@ -123,6 +124,12 @@ class Analysis:
     findings : tuple of Finding
         Gravest first.
     estimates : mapping of str to Estimate
+        By names of :data:`pipeline.registry.quantities.QUANTITIES`.
+
+    Raises
+    ------
+    ValueError
+        If the name of an estimate is not registered.
     """
 
     track: Track
@@ -133,6 +140,10 @@ class Analysis:
     effects: tuple[Effect, ...]
     findings: tuple[Finding, ...]
     estimates: Mapping[str, Estimate]
+
+    def __post_init__(self) -> None:
+        for name in self.estimates:
+            check_quantity(name)
 
     @property
     def flags(self) -> U8:

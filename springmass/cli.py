@@ -6,11 +6,25 @@ Nothing heavier than argparse is imported before a command is known, so that ``-
 from __future__ import annotations
 
 import argparse
+import contextlib
+import errno
 import os
 import sys
 
 from springmass import __version__
-from springmass.errors import INTERRUPTED, OK, SENSOR, SOME_FAILED, UNREADABLE, USAGE, complain, hush, speak_up
+from springmass.errors import (
+    INTERNAL,
+    INTERRUPTED,
+    OK,
+    SENSOR,
+    SOME_FAILED,
+    UNREADABLE,
+    USAGE,
+    adopt,
+    complain,
+    internal_error,
+    manner,
+)
 from springmass.terminal.arguments import COMMANDS
 
 TYPE_CHECKING = False
@@ -28,7 +42,7 @@ def build_parser() -> argparse.ArgumentParser:
         description="From a rangefinder's samples to period, spring constant and damping law, "
         "with uncertainties that hold.",
         epilog="exit codes: 0 done, 1 some inputs failed, 2 usage, 3 unreadable input, 4 sensor, port or recording "
-        "disk, 5 rejected under --strict, 130 Ctrl-C",
+        "disk, 5 rejected under --strict, 70 internal error, 130 Ctrl-C",
         formatter_class=_formatter,
     )
     parser.add_argument("--version", action="version", version=f"springmass {__version__}")
@@ -86,20 +100,26 @@ def _formatter(prog: str) -> argparse.HelpFormatter:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line and return its exit code; a user's mistake is one line on stderr."""
-    options = build_parser().parse_args(arguments)
-    if options.quiet:
-        hush()
-    if options.verbose:
-        speak_up()
-    from importlib import import_module
+    """Run a command line and return its exit code; a user's mistake is one line on stderr, and so is a defect."""
+    before = manner()
+    try:
+        return _run(arguments)
+    finally:
+        adopt(*before)
 
+
+def _run(arguments: Sequence[str] | None) -> int:
     # A title or a name that the terminal's code lacks is shown escaped. Line by line, so that both streams come in the
     # order they were written in where they go to one place.
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace", line_buffering=True)
     try:
+        options = build_parser().parse_args(arguments)
+        options.words = sys.argv[1:] if arguments is None else list(arguments)
+        adopt(options.quiet, options.verbose)
+        from importlib import import_module
+
         return int(import_module(f"springmass.commands.{options.command}").run(options))
     except KeyboardInterrupt:
         complain("interrupted")
@@ -112,21 +132,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return UNREADABLE
     except BrokenPipeError:
         # The reader of our output went away (`| head`): nothing is left to say, not even at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _abandon_output()
         return OK
     except Exception as error:
         if isinstance(error, RuntimeError) and "start new thread" in str(error):
             complain("no memory for another thread; end other programs, or raise the limit")
             return UNREADABLE
+        if isinstance(error, OSError) and error.filename is None and error.errno in _OUTPUT_FULL:
+            _abandon_output()
+            complain(f"standard output cannot be written: {error.strerror}; write to another disk")
+            return USAGE
         code = _exit_code(error)
         if code is None:
-            raise
+            complain(internal_error(error))
+            return INTERNAL
         complain(error)
         return code
 
 
+_OUTPUT_FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+"""Why a system refuses to write to standard output."""
+
+
+def _abandon_output() -> None:
+    """Send what is left of standard output nowhere, so that Python's own exit does not fail on it."""
+    with contextlib.suppress(OSError, ValueError):  # a stream without a descriptor has nothing that could fail
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _exit_code(error: Exception) -> int | None:
-    """Exit code of an error that is meant for the user; None for a defect, which deserves its traceback."""
+    """Exit code of an error that is meant for the user; None for a defect of the program."""
     from springmass.errors import ProgramError
 
     if isinstance(error, ProgramError):

@@ -7,6 +7,7 @@
 3     an input that cannot be read or holds nothing to analyse
 4     sensor or port, or a disk that takes nothing more of a recording
 5     rejected under ``--strict``
+70    internal error: a defect of the program
 130   Ctrl-C, with the file closed cleanly
 ====  ================================================================
 """
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 __all__ = [
+    "INTERNAL",
     "INTERRUPTED",
     "OK",
     "REJECTED",
@@ -32,17 +34,16 @@ __all__ = [
     "adopt",
     "complain",
     "detail",
-    "hush",
     "hushed",
+    "internal_error",
     "manner",
-    "speak_up",
     "suggest",
     "tell",
 ]
 
 _quiet = False
 _verbose = False
-OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERRUPTED = 0, 1, 2, 3, 4, 5, 130
+OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 4, 5, 70, 130
 
 
 class ProgramError(Exception):
@@ -82,25 +83,13 @@ def detail(message: str) -> None:
         _write(message)
 
 
-def speak_up() -> None:
-    """Write from here on what is done, too."""
-    global _verbose
-    _verbose = True
-
-
-def hush() -> None:
-    """Write from here on what is wrong, and nothing else."""
-    global _quiet
-    _quiet = True
-
-
 def manner() -> tuple[bool, bool]:
     """Return whether this process says but what is wrong, and whether it says what is done, too."""
     return _quiet, _verbose
 
 
 def adopt(quiet: bool, verbose: bool) -> None:
-    """Speak as the process does that began this one, by its :func:`manner`."""
+    """Be as quiet or as verbose as :func:`manner` says of another command or of the process that began this one."""
     global _quiet, _verbose
     _quiet, _verbose = quiet, verbose
 
@@ -114,6 +103,30 @@ def hushed() -> Iterator[None]:
         yield
     finally:
         _quiet = before
+
+
+def internal_error(error: BaseException) -> str:
+    """Return one line on a defect of the program; its traceback goes to a file, or to stderr where none can be written.
+
+    Parameters
+    ----------
+    error : BaseException
+        As it was caught.
+    """
+    import tempfile
+    import traceback
+
+    trace = "".join(traceback.format_exception(error))
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", errors="backslashreplace", prefix="springmass-error-", suffix=".txt", delete=False
+        ) as file:
+            file.write(trace)
+    except OSError:
+        _write(trace)
+        return f"internal error: {what}; please report it with the lines above"
+    return f"internal error: {what}; please report it, details in {file.name}"
 
 
 def suggest(command: str) -> None:

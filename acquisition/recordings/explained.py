@@ -62,7 +62,9 @@ def explain(path: str | os.PathLike[str]) -> tuple[str, str, tuple[Layout, ...]]
     # MotionSensor.vi pairs files; one of them is columns as any table's.
     shown = reader if isinstance(reader, ColumnFormat) else get_format("table")
     if not isinstance(shown, ColumnFormat):
-        raise FormatError(name, f"expected a family of columns, got {family}", "leave --explain out")
+        raise FormatError(
+            name, f"expected a family of columns, got {family}", "look at what it holds without its columns"
+        )
     contents = shown.contents(name, read_bytes(path))
     why = getattr(reader, "evidence", shown.evidence)(read_head(path))
     return family, why, tuple(_layouts(contents.channels))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import PurePath
 
@@ -12,10 +13,16 @@ __all__ = ["named", "refuse"]
 
 _TEXT = 'export time and position as text, tab separated, under a line "Time (s)<TAB>Distance (m)"'
 _AS_CSV = "save the sheet as xlsx or CSV"
+_YAML = re.compile(rb"^\s*[^\W\d][\w .]*:[ \t]*\r?\n(?:[ \t]*- +[-+.\d][-+.\deE]*[ \t]*\r?\n){3}", re.MULTILINE)
 
 
 def _is_hdf5(head: bytes) -> bool:
     return any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048, 4096))
+
+
+def _is_yaml(head: bytes) -> bool:
+    """Tell YAML by numbers behind hyphens below a key; one list in line with its key is read as a table."""
+    return bool(_YAML.search(head))
 
 
 def _begins(with_bytes: bytes) -> Callable[[bytes], bool]:
@@ -28,6 +35,7 @@ _CONTENTS = (
     ("an OpenDocument file", lambda head: b"application/vnd.oasis.opendocument" in head[:200], _AS_CSV),
     ("a TDMS index", _begins(b"TDSh"), "name the .tdms file beside it"),
     ("a numpy file", _begins(b"\x93NUMPY"), 'in Python numpy.savetxt("run.csv", array, delimiter=",")'),
+    ("YAML", _is_yaml, "export its lists as columns of a CSV file, times first"),
     ("a page (PDF)", _begins(b"%PDF"), _TEXT),
     ("a picture", lambda head: head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"GIF8")), _TEXT),
     (

@@ -10,9 +10,9 @@ from acquisition.block import UNITS
 
 __all__ = [
     "LENGTHS",
+    "MEASURES",
     "TIMES",
     "Measure",
-    "known_units",
     "measure_of",
     "time_factor",
     "time_power",
@@ -86,16 +86,12 @@ class Measure(NamedTuple):
         return UNITS[self.quantity]
 
 
-_MEASURES = {
+MEASURES = {
     unit: Measure(quantity, unit, power, _FACTORS.get(unit, 1.0))
     for quantity, units in (("length", LENGTHS), *_OTHERS.items())
     for unit, power in units.items()
 }
-
-
-def known_units() -> str:
-    """Return the units that a channel may be given in, listed for a message."""
-    return ", ".join(_MEASURES)
+"""What each unit that a channel may be given in is of."""
 
 
 def unit_words(unit: str) -> str:
@@ -108,14 +104,14 @@ def unit_words(unit: str) -> str:
     """
     plain = " ".join(unit.split()).strip(".")
     lower = plain.lower()
-    if plain in _MEASURES:
+    if plain in MEASURES:
         return plain
     found = _WORDS.get(lower) or _WORDS.get(lower.removesuffix("s")) or _WORDS.get(lower.removesuffix("es"))
     if found:
         return found
     if (per := _PER_SECOND.fullmatch(lower.translate(_PLAIN))) is not None:
         rate = f"{unit_words(per['what'] or per['of'])}/s" + ("^2" if per["two"] or per["power"] == "2" else "")
-        if rate in _MEASURES:
+        if rate in MEASURES:
             return rate
     return lower if lower in LENGTHS or lower in TIMES else plain
 
@@ -128,7 +124,7 @@ def measure_of(unit: str) -> Measure | None:
     >>> measure_of("mm"), measure_of("Volts").quantity, measure_of("Hz")
     (Measure(quantity='length', symbol='mm', power=-3, factor=1.0), 'voltage', None)
     """
-    return _MEASURES.get(unit_words(unit))
+    return MEASURES.get(unit_words(unit))
 
 
 def time_power(unit: str) -> int | None:

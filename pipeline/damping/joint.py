@@ -161,7 +161,8 @@ def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params |
         raise AnalysisError(f"a joint fit needs two runs at least, got {len(runs)}")
     laws = {name: fit.law for _, _, damping in runs for name, fit in damping.fits.items()}
     # Laws of one's own are wanted wherever they were fitted.
-    wanted = [name for name in laws if name in params.laws or name not in LAWS]
+    allowed = {law if isinstance(law, str) else law.name for law in params.laws}
+    wanted = [name for name in laws if name in allowed or name not in LAWS]
     shared = [name for name in wanted if all(name in damping.fits for _, _, damping in runs)]
     if not shared:
         raise AnalysisError("no damping law was fitted to every run; a joint fit has nothing to join")

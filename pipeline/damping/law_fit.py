@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.damping.laws import Law
+from pipeline.damping.laws import Drag, Law
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import covariance_of, solve_weighted
@@ -90,6 +90,13 @@ class LawFit:
     def name(self) -> str:
         """The law's name."""
         return self.law.name
+
+    def drag_term(self, name: str) -> float | None:
+        """Return a coefficient of friction ("mu"), linear ("gamma") or quadratic ("beta") drag.
+
+        None where the law lacks the term, or is no sum of these: another law's parameter may share the name.
+        """
+        return self.joint[name].value if isinstance(self.law, Drag) and name in self.joint.names else None
 
     def amplitude(self, t: F8) -> F8:
         """Return (n,) float64, m, at times since the first sample used, s."""

@@ -15,7 +15,7 @@ from pipeline.numerics.random_walk import Chain
 from pipeline.numerics.spectrum import Blocks, smooth_density
 from pipeline.oscillation.demodulate import Demodulated
 from pipeline.oscillation.disturbances import Disturbances
-from pipeline.track import F8, UNUSABLE, Track
+from pipeline.track import F8, UNUSABLE, Quality, Track
 
 __all__ = ["Params", "Smoothed", "smooth"]
 
@@ -130,7 +130,7 @@ def smooth(
     Returns
     -------
     Smoothed
-        NaN at samples without a finite time.
+        NaN at samples without a finite time, and outside the part that was analysed.
 
     Raises
     ------
@@ -158,7 +158,8 @@ def smooth(
     Clock and speed of sound, which scale everything alike, are not in these uncertainties.
     """
     params = params or Params()
-    known = np.isfinite(track.t)
+    # Beyond the part that was analysed neither law nor phase says anything about the motion.
+    known = np.isfinite(track.t) & ((demodulated.flags & Quality.OUTSIDE) == 0)
     used = known & np.isfinite(track.y) & ((demodulated.flags & UNUSABLE) == 0)
     if np.count_nonzero(used) < 8:
         raise AnalysisError(f"a smoother needs eight usable samples at least, got {np.count_nonzero(used)}")

@@ -281,10 +281,14 @@ class Chooser:
     def settled(self, state: State, before: Rows) -> tuple[Rows, State]:
         """Return the samples (n,) that lie on the model fitted to them, and that fit, on the tangent about a state.
 
-        Both as given where the state is so far from the end that the tangent does not predict what the model leaves.
+        Both as given where the state is so far from the end that the tangent does not predict what the model leaves,
+        or where the law has a pole within the record, so that there is no tangent.
         """
         record, rows = self._record, before
-        position, slopes = state.evaluate(record.elapsed, record.tau)
+        with np.errstate(invalid="ignore", over="ignore"):  # a pole gives infinities, which are looked for
+            position, slopes = state.evaluate(record.elapsed, record.tau)
+        if not (np.isfinite(position).all() and np.isfinite(slopes).all()):
+            return before, state
         left, slope = record.y - position, np.concatenate([slopes, record.basis], axis=1)
         normal, right = slope.T @ slope, slope.T @ left
         scale = _lengths(normal)

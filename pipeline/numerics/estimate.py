@@ -48,6 +48,18 @@ class Estimate:
     unit: str = ""
     variable: Any = field(default=None, compare=False)
 
+    def __post_init__(self) -> None:
+        # ``dataclasses.replace`` passes on the variable of the old value, which would give wrong results.
+        if self.variable is not None and not self._describes(self.variable):
+            object.__setattr__(self, "variable", None)
+
+    def _describes(self, variable: Any) -> bool:
+        value, u = getattr(variable, "nominal_value", variable), getattr(variable, "std_dev", 0.0)
+        return bool(
+            math.isclose(value, self.value, rel_tol=1e-9, abs_tol=1e-9 * abs(self.u))
+            and math.isclose(u, self.u, rel_tol=1e-6, abs_tol=1e-300)
+        )
+
     @property
     def ufloat(self) -> Any:
         """The estimate for calculations: an ``uncertainties.UFloat``, or the value alone where it is exact."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.registry.quantities import check_input
 
 __all__ = ["COVERAGE", "Budget", "Contribution", "Inputs", "Kind", "estimate_of", "function_of", "joint_of"]
 
@@ -130,7 +131,7 @@ class Inputs:
         Parameters
         ----------
         name : str
-            Unique.
+            One of :data:`pipeline.registry.quantities.INPUTS`, used once.
         estimate : Estimate
         kind : {"A", "B"}
         dof : float
@@ -139,7 +140,7 @@ class Inputs:
         Raises
         ------
         ValueError
-            If the name was used before.
+            If the name was used before, or is not registered.
         AnalysisError
             If the uncertainty is negative or no number.
         """
@@ -213,6 +214,7 @@ class Inputs:
         return Budget(quantity, Estimate(float(x.nominal_value), math.sqrt(whole), unit, x), tuple(lines))
 
     def _register(self, name: str, kind: Kind, dof: float = math.inf) -> None:
+        check_input(name)
         if name in self._kinds:
             raise ValueError(f"an input {name!r} is there already")
         self._kinds[name], self._dofs[name] = kind, max(dof, 1.0)

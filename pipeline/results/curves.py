@@ -131,8 +131,7 @@ def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, law
 
 
 def _friction(fit: LawFit, theta: F8) -> float:
-    names = fit.joint.names
-    return float(theta[names.index("mu")]) if "mu" in names else 0.0
+    return 0.0 if fit.drag_term("mu") is None else float(theta[fit.joint.names.index("mu")])
 
 
 def _local_drag(damping: Damping, demodulated: Demodulated, factor: float) -> tuple[F8, F8, F8]:

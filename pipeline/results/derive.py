@@ -17,6 +17,7 @@ from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.damping.average import Weighted, average_over_laws, spread_counts
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
+from pipeline.damping.laws import FunctionLaw, Power
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.waveform import Rest
@@ -281,7 +282,7 @@ def derive(
             # C over beta; the area, the mass and the density are in it once.
             over_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
             parts["drag_length"] = over_beta * rate / scale * filtered.gain, unit
-            if damping.settled and "beta" in damping.best.joint.names:
+            if damping.settled and damping.best.drag_term("beta") is not None:
                 found["drag_coefficient"] = (over_beta * coefficients["beta"][0], "")
     budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
     return Derived(
@@ -403,12 +404,14 @@ def _coefficients(laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, st
     """The stated law's parameters in true seconds and metres."""
     joint = laws.stated.joint
     found: dict[str, tuple[Any, str]] = {}
-    dimensions = {**_DIMENSIONS, **getattr(laws.stated.law, "dimensions", {})}  # a function's law states its own
+    law = laws.stated.law
+    # A law made of a function states its own dimensions; the powers of another law are not numbers beforehand.
+    dimensions = law.dimensions if isinstance(law, FunctionLaw) else _DIMENSIONS
     for name, unit, x in zip(joint.names, joint.units, laws.variables, strict=True):
         if name in dimensions and name != "A0":
             length, per_time = dimensions[name]
             found[name] = (x * scale**length * rate**per_time, unit)
-    if "n" in joint.names:
+    if isinstance(laws.stated.law, Power):
         c, n = (laws.variables[joint.names.index(name)] for name in ("c", "n"))
         found["c"] = (c * rate * scale ** (1 - n), joint.units[joint.names.index("c")])
         found["n"] = (n, "")

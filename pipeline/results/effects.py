@@ -21,6 +21,7 @@ from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.waveform import Rest
 from pipeline.numerics.quantity import amount, in_unit
 from pipeline.oscillation.disturbances import Disturbances
+from pipeline.registry.effects import check_effect
 
 __all__ = ["Effect", "tabulate"]
 
@@ -36,6 +37,7 @@ class Effect:
     Parameters
     ----------
     name : str
+        One of :data:`pipeline.registry.effects.EFFECTS`.
     predicted : float or None
         Size that the scene predicts, in ``unit``; None where the scene says too little.
     measured : float or None
@@ -45,6 +47,11 @@ class Effect:
         Whether the model holds it.
     why : str
         One sentence.
+
+    Raises
+    ------
+    ValueError
+        If the name is not registered.
     """
 
     name: str
@@ -53,6 +60,9 @@ class Effect:
     unit: str
     included: bool
     why: str
+
+    def __post_init__(self) -> None:
+        check_effect(self.name)
 
 
 def tabulate(
@@ -121,9 +131,7 @@ def _mass_effect(name: str, share: float, u_k: float, what: str) -> Effect:
 
 
 def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[Effect]:
-    names = damping.best.joint.names
-    gamma = damping.best.joint["gamma"].value if "gamma" in names else None
-    beta = damping.best.joint["beta"].value if "beta" in names else None
+    gamma, beta, mu = (damping.best.drag_term(name) for name in ("gamma", "beta", "mu"))
     chosen = f"selected law: {damping.selected}; admissible: {', '.join(damping.admissible) or 'none'}"
     predicted_gamma = predicted_beta = None
     if scene.disc_diameter_m is not None and scene.bob_mass_kg is not None:
@@ -137,8 +145,7 @@ def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[
         predicted_beta = None if share is None else 4.0 * b * omega / (3.0 * math.pi * mass) * share
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
     yield Effect("quadratic_drag", predicted_beta, beta, in_unit("1/(m s)", unit), beta is not None, chosen)
-    mu = damping.best.joint["mu"].value if "mu" in names else None
-    tried = any("mu" in fit.joint.names for fit in damping.fits.values())
+    tried = any(fit.drag_term("mu") is not None for fit in damping.fits.values())
     why = chosen if tried else "no law with friction is among those tried"
     yield Effect("friction", None, mu, in_unit("m/s", unit), mu is not None, why)
 

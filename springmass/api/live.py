@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from acquisition.errors import NeedsAnswer
 from springmass.errors import USAGE, ProgramError
 from springmass.page.feeds import LogFeed, view_of
 from springmass.page.view import View
 from springmass.runs.loading import kind_of, load
+from springmass.runs.questions import for_python
 
 if TYPE_CHECKING:
     import anywidget
@@ -29,7 +31,7 @@ def script() -> str:
     return "\n".join((STATIC / name).read_text(encoding="utf-8") for name in names)
 
 
-def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0) -> anywidget.AnyWidget:
+def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0, **completions: Any) -> anywidget.AnyWidget:
     """Return a chart of a recording for a notebook, which goes on as long as the recording does.
 
     Parameters
@@ -38,11 +40,15 @@ def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0) -> any
         The wire log of a recording, or any recording that :func:`springmass.load` reads.
     seconds : float or None
         How much of its end is shown, s; None: all of it. A recording that is over is shown whole.
+    **completions
+        What a recording that is over leaves open, as :func:`springmass.load` takes it.
 
     Raises
     ------
     ProgramError
         If anywidget is not installed.
+    acquisition.errors.NeedsAnswer
+        If the file leaves something open that was not given.
     springmass.errors.ProgramError, storage.errors.StorageError
         If the source cannot be read.
 
@@ -59,7 +65,7 @@ def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0) -> any
             "springmass.live needs anywidget, which is not installed: pip install springmass[notebook]", USAGE
         ) from error
     path = Path(source)
-    view, poll = _opened(path)
+    view, poll = _opened(path, completions)
 
     class Live(anywidget.AnyWidget):
         """The chart in the notebook."""
@@ -106,9 +112,12 @@ def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0) -> any
     return widget
 
 
-def _opened(path: Path) -> tuple[View, Callable[[], None]]:
+def _opened(path: Path, completions: Mapping[str, Any]) -> tuple[View, Callable[[], None]]:
     if kind_of(path) == "wire":
         feed = LogFeed(path)
         feed.poll()
         return feed.view, feed.poll
-    return view_of(load(path)), lambda: None
+    try:
+        return view_of(load(path, **completions)), lambda: None
+    except NeedsAnswer as asked:
+        raise asked.with_remedy(for_python(asked.question, "springmass.live", completions)) from None

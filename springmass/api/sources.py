@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from acquisition.errors import NeedsAnswer
 from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis as Found
 from pipeline.analyse import Params
@@ -26,6 +27,7 @@ from springmass.runs.analysing import Analysed, distinct_names
 from springmass.runs.comparing import Compared, compare_analysed, demand_one_spring
 from springmass.runs.json_results import all_findings
 from springmass.runs.loading import Loaded, cut, load
+from springmass.runs.questions import for_python
 from springmass.runs.scenes import read_scene
 from storage.run_file.reading import Run
 
@@ -84,6 +86,8 @@ def analyse(
         If fewer than eight samples are usable, or a law or an option is not known.
     TrackError
         If the arrays are no track.
+    acquisition.errors.NeedsAnswer
+        If the file leaves something open that was not given. Its ``question`` lists what is missing and every answer.
     acquisition.errors.FormatError, storage.errors.StorageError, springmass.errors.ProgramError
         If a file or a scene cannot be read.
 
@@ -103,7 +107,10 @@ def analyse(
     if isinstance(source, Run):
         source = source.path
     if isinstance(source, str | os.PathLike):
-        source = load(Path(source), **completions)
+        try:
+            source = load(Path(source), **completions)
+        except NeedsAnswer as asked:
+            raise asked.with_remedy(for_python(asked.question, "springmass.analyse", completions)) from None
     elif completions:
         raise TrackError(f"{', '.join(completions)} complete recordings named by a path, got a {type(source).__name__}")
     if isinstance(source, Loaded):

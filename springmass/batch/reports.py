@@ -17,7 +17,7 @@ from typing import Any
 from acquisition.errors import visible
 from springmass.batch.plan import Job, job_of
 from springmass.batch.store import Store
-from springmass.errors import UNREADABLE, USAGE, ProgramError
+from springmass.errors import UNREADABLE, USAGE, ProgramError, internal_error
 from storage.atomic import writing
 from storage.errors import WriteFailed, one_line
 
@@ -120,6 +120,8 @@ def _attempt(run: str, job: Job, folder: Path) -> str:
         return f"{folder}: no report could be written ({one_line(error)}); run batch again"
     except MemoryError:
         return f"{folder}: more memory was demanded than there is; end other programs, or use fewer processes"
+    except Exception as error:  # a defect costs this report, and not those of the other runs
+        return f"{folder}: {internal_error(error)}"
     return ""
 
 

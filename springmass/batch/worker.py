@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.errors import AcquisitionError
+from acquisition.errors import AcquisitionError, NeedsAnswer
 from acquisition.regular_file import open_regular
 from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
@@ -23,11 +23,12 @@ from pipeline.results.compare import SpringRun
 from pipeline.track import F8
 from springmass.batch.plan import Job, code_sha256
 from springmass.batch.rows import ESTIMATES
-from springmass.errors import ProgramError, hushed
+from springmass.errors import ProgramError, hushed, internal_error
 from springmass.runs.about import about_path
 from springmass.runs.analysing import scene_of
 from springmass.runs.json_results import all_findings
 from springmass.runs.loading import Loaded, load
+from springmass.runs.questions import for_course
 from storage.errors import StorageError
 
 __all__ = ["analyse_many", "blank_row", "load_job", "stamps_of", "unchanged"]
@@ -54,12 +55,14 @@ def analyse_one(job: Job) -> dict[str, Any]:
         loaded, given = load_job(job)
         analysis = analyse(loaded.track, scene_of(loaded, given), params_for(job.accuracy))
         _fill(row, loaded, analysis)
+    except NeedsAnswer as asked:
+        row["error"] = _told(job, str(asked.with_remedy(for_course(asked.question))))
     except (ProgramError, AcquisitionError, PipelineError, StorageError, OSError) as error:
         row["error"] = _told(job, str(error))
     except MemoryError:
         row["error"] = f"{job.path}: more memory was demanded than there is; analyse it with fewer processes"
     except Exception as error:  # a defect: the other runs of a thousand are not to wait for its repair
-        row["error"] = _told(job, f"{job.path}: a defect of the program: {type(error).__name__}: {error}")
+        row["error"] = _told(job, f"{job.path}: {internal_error(error)}")
     return row
 
 

@@ -16,13 +16,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from acquisition.errors import AcquisitionError
+from acquisition.errors import AcquisitionError, NeedsAnswer
 from pipeline.analyse import Oscillation, Overdamped
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
-from springmass.commands import completions
-from springmass.errors import OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, suggest, tell
+from springmass.commands import completions, worded_for
+from springmass.errors import (
+    INTERNAL,
+    OK,
+    REJECTED,
+    SOME_FAILED,
+    UNREADABLE,
+    USAGE,
+    ProgramError,
+    complain,
+    internal_error,
+    suggest,
+    tell,
+)
 from springmass.runs.about import remember_scene
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder, scene_of
 from springmass.runs.inputs import Found, files_of
@@ -166,7 +178,14 @@ def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
 
 
 def _work(task: _Task) -> _Done:
-    """Analyse one of several inputs, and write its report where one is asked for."""
+    """Analyse one of several inputs, and write its report; a defect met on one does not keep the others from theirs."""
+    try:
+        return _analyse_and_report(task)
+    except Exception as error:
+        return _Done(task.name, INTERNAL, (f"{task.found.path}: {internal_error(error)}",))
+
+
+def _analyse_and_report(task: _Task) -> _Done:
     from springmass.report.tables import every_number, table_estimates
 
     attempted = _attempt(task)
@@ -203,10 +222,20 @@ def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
         return analysed, _remembered(loaded, scene) if task.writes else None
     except ProgramError as error:
         return _Done(task.name, error.exit_code, (str(error),))
+    except NeedsAnswer as question:
+        return _Done(task.name, UNREADABLE, (str(worded_for(options, question, _words(task))),))
     except (AcquisitionError, StorageError) as error:
         return _Done(task.name, UNREADABLE, (str(error),))
     except PipelineError as error:
         return _Done(task.name, UNREADABLE, (f"{task.found.path}: {error}",))
+
+
+def _words(task: _Task) -> list[str] | None:
+    """Return the command line for one of several inputs by itself; None where it is the only one, as it was typed."""
+    if task.options.input == [task.found.path]:
+        return None
+    velocity = () if task.found.velocity is None else ("--velocity", task.found.velocity)
+    return ["springmass", "analyse", task.found.path, *velocity]
 
 
 def _remembered(loaded: Loaded, scene: Scene | None) -> Path | None:

@@ -8,12 +8,11 @@ import shlex
 
 from acquisition.errors import visible
 from springmass.batch.results_table import is_course
-from springmass.commands import completions
+from springmass.commands import load_for
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
 from springmass.runs.json_results import picked, provenance_of, rejected
-from springmass.runs.loading import load
 from springmass.runs.scenes import read_scenes
 
 __all__ = ["run"]
@@ -36,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     given = read_scenes(options.scene, len(options.input))
     out = None if options.out is None else make_folder(options.out)
     cut = {"from_s": options.from_s, "to_s": options.to_s}
-    loaded = [load(path, **completions(options), **cut) for path in options.input]
+    loaded = [load_for(options, path, **cut) for path in options.input]
     scenes = [scene_of(one, scene) for one, scene in zip(loaded, given, strict=True)]
     demand_one_spring(list(zip(names, scenes, strict=True)))
     time_utc = now_utc()

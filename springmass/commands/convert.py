@@ -10,10 +10,10 @@ from typing import Any
 
 from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
-from springmass.commands import completions
+from springmass.commands import load_for
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, suggest, tell
 from springmass.runs.analysing import made_now
-from springmass.runs.loading import Loaded, load
+from springmass.runs.loading import Loaded
 from springmass.runs.scenes import read_scene
 from storage.atomic import write_whole
 from storage.run_file.writing import write_run
@@ -26,7 +26,7 @@ RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
 def run(options: argparse.Namespace) -> int:
     """Convert one input."""
     scene = None if options.scene is None else read_scene(options.scene).to_mapping()
-    loaded = load(options.input, **completions(options))
+    loaded = load_for(options, options.input)
     out = Path(options.output)
     if out.suffix.lower() in RUN_SUFFIXES:
         written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=scene, overwrite=options.overwrite)

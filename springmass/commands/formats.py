@@ -16,10 +16,10 @@ from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.explained import explain
 from acquisition.recordings.identify import formats, inspect
 from acquisition.recordings.inspection import Inspection, Survey
-from springmass.commands import completions
+from springmass.commands import load_for
 from springmass.errors import OK, USAGE, ProgramError, suggest
 from springmass.runs.json_results import picked, plain
-from springmass.runs.loading import Loaded, kind_of, load
+from springmass.runs.loading import Loaded, kind_of
 from springmass.runs.shelf import Entry, is_shelf, shelf
 
 __all__ = ["run"]
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
         return _explain(Path(options.input), as_json=options.json)
     if is_shelf(Path(options.input)):
         return _shelf(Path(options.input), as_json=options.json)
-    facts = _describe(Path(options.input), completions(options))
+    facts = _describe(Path(options.input), options)
     if options.json:
         print(json.dumps(facts, allow_nan=False))
         return OK
@@ -112,21 +112,22 @@ def _list(options: argparse.Namespace) -> int:
     return OK
 
 
-def _describe(path: Path, answers: dict[str, Any]) -> dict[str, Any]:
+def _describe(path: Path, options: argparse.Namespace) -> dict[str, Any]:
     """Say what a file is; where one channel can be taken as distance, also what its samples are."""
     kind = kind_of(path)
     if kind != "recording":
-        loaded = load(path, **answers)
+        loaded = load_for(options, path)
         samples = loaded.samples
         survey = Survey("", loaded.channel, samples.unit, len(samples), loaded.info.rate_hz, loaded.traps)
         return {**_file(path, Inspection(kind, OURS[kind], _WHY[kind], (survey,))), **_facts(loaded)}
     found = inspect(path)
     facts = _file(path, found)
     try:
-        return {**facts, **_facts(load(path, **answers))}
+        return {**facts, **_facts(load_for(options, path))}
     except NeedsAnswer as error:
         traps = list(dict.fromkeys(trap for survey in found.surveys for trap in survey.traps))
-        return {**facts, "needs": str(error).removeprefix(f"{path}: "), "traps": plain(traps)}
+        question = [plain(need) for need in error.question.needs]
+        return {**facts, "needs": str(error).removeprefix(f"{path}: "), "question": question, "traps": plain(traps)}
 
 
 def _file(path: Path, found: Inspection) -> dict[str, Any]:
@@ -178,7 +179,7 @@ def _lines(facts: dict[str, Any]) -> Iterator[str]:
             for trap in value:
                 where = f" (line {trap['line']})" if trap["line"] else ""
                 yield f"{'trap':<16} {trap['code']}: {trap['message']}{where}"
-        else:
+        elif name != "question":  # what "needs" says, as data
             yield f"{name:<16} {_shown(value)}"
 
 

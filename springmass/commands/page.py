@@ -11,14 +11,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from springmass.commands import completions
+from springmass.commands import load_for
 from springmass.errors import OK, USAGE, ProgramError, tell
 from springmass.page.desk import Desk
 from springmass.page.feeds import view_of
 from springmass.page.web.log_lines import log_to_stderr
 from springmass.page.web.server import Opening, serve
 from springmass.page.web.sharing import address_in_network, code_for_terminal
-from springmass.runs.loading import kind_of, load
+from springmass.runs.loading import kind_of
 
 __all__ = ["run"]
 
@@ -53,7 +53,7 @@ def _look_at(desk: Desk, path: Path, options: argparse.Namespace) -> None:
     if kind_of(path) == "wire":
         desk.follow(path)
     else:
-        loaded = load(path, **completions(options))
+        loaded = load_for(options, path)
         desk.show(view_of(loaded), loaded.scene, loaded.path)
 
 

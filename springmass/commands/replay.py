@@ -13,10 +13,9 @@ import numpy as np
 
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.replay import Replay
-from springmass.commands import completions
+from springmass.commands import load_for
 from springmass.commands.convert import write_loaded
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.runs.loading import load
 
 __all__ = ["run"]
 
@@ -29,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
         from springmass.commands import page
 
         return page.run(options)
-    loaded = load(options.input, **completions(options))
+    loaded = load_for(options, options.input)
     fast = math.isinf(options.speed)
     clock: Clock = VirtualClock() if fast else SystemClock()
     source = Replay(

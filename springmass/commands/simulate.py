@@ -17,9 +17,8 @@ from pipeline.dynamics.choose import Choice
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect
 from pipeline.results.simulated_effects import simulated_effects
-from springmass.commands import completions
+from springmass.commands import load_for
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.runs.loading import load
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.prepared import Prepared, prepare
 from springmass.runs.simulating.simulation import (
@@ -50,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
         from pipeline.analyse import analyse
         from springmass.runs.simulating.against import duration_s
 
-        analysis = analyse(load(options.against, **completions(options)).track, scene)
+        analysis = analyse(load_for(options, options.against).track, scene)
         seconds = max(seconds, duration_s(analysis))
     ready = prepare(scene, seconds, analysis=analysis, without=options.without, where=options.scene)
     if ready.from_run:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.errors import DynamicsError
 from springmass import __version__
-from springmass.commands import completions
+from springmass.commands import load_for
 from springmass.errors import OK, USAGE, ProgramError
 from springmass.runs.analysing import make_folder
 from springmass.runs.scenes import read_scene
@@ -189,12 +189,11 @@ def _write(out: Path, name: str, figure: Figure, content: Mapping[str, Any]) -> 
 
 
 def _own(options: argparse.Namespace) -> int:
-    from springmass.runs.loading import load
     from springmass.trade.measure import own_record
     from springmass.trade.methods import methods
     from springmass.trade.summary import own_json, own_text
 
-    loaded = load(options.input, **completions(options))
+    loaded = load_for(options, options.input)
     loaded.track.demand_length("a comparison of estimators")
     found, absent = methods()
     results = own_record(loaded.track, found, timer=time.perf_counter)

@@ -8,42 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipeline.analyse import Analysis, Oscillation
+from pipeline.registry.quantities import INPUTS, QUANTITIES
 from pipeline.results.budget import Budget, Contribution
-from springmass.report.tables import QUANTITIES, cell
+from springmass.report.tables import cell, table_estimates
 
-__all__ = ["INPUTS", "BudgetRow", "budget_csv", "budget_text", "budgets_of", "correlations_of"]
+__all__ = ["BudgetRow", "budget_csv", "budget_text", "budgets_of", "correlations_of"]
 
-INPUTS = {
-    "angular_frequency": "scatter of the phases",
-    "clock_rate": "rate of the clock",
-    "damping_law": "scatter of the amplitudes",
-    "choice_of_law": "choice among admissible laws",
-    "rest_position": "scatter of the rest position",
-    "phase": "scatter of the phases",
-    "noise": "scatter of the samples",
-    "bob_mass": "mass of the bob",
-    "spring_mass": "mass of the spring",
-    "unstated_spring_mass": "mass of the spring, not stated",
-    "disc_diameter": "diameter of the disc",
-    "air_temperature": "air temperature",
-    "air_pressure": "air pressure",
-    "relative_humidity": "relative humidity",
-    "density_formula": "formula of the air's density",
-    "viscosity_formula": "formula of the air's viscosity",
-    "speed_of_sound_formula": "formula of the speed of sound",
-    "recorded_speed_of_sound": "speed of sound of the record",
-    "calibrated_scale": "calibration of the scale",
-    "sensor_zero": "calibration of the zero",
-    "model_misfit": "what differs from a sinusoid in every period",
-    "sensor_smoothing": "smoothing by the sensor",
-    "sensor_mean_samples": "running mean of the sensor",
-    "sensor_median_samples": "running median of the sensor",
-    "sensor_median_cut": "crests cut by a running median",
-    "sensor_lag": "lag of the sensor",
-    "choice_of_fit": "fit of windows against fit of the whole waveform",
-    "held_samples": "distances held by the sensor",
-}
-"""Every input of :mod:`pipeline.results.derive` in words."""
 SAME = ("frequency", "angular_frequency")  # one number with the period
 CORRELATED = frozenset({"period", "spring_constant", "amplitude", "damping_rate", "gamma", "beta", "mu", "c", "n"})
 """Results whose correlations the page tells: as many as a phone is wide."""
@@ -85,11 +55,13 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
         return ()
     budgets = analysis.motion.derived.budgets
     rows = []
-    for name, quantity in QUANTITIES.items():
+    for name in table_estimates(analysis):
         if name in budgets and name not in SAME and budgets[name].contributions:
             every = budgets[name].contributions
             told = tuple(c for c in every if c.share >= LEAST_SHARE)
-            rows.append(BudgetRow(name, quantity, budgets[name], told, sum(c.share for c in every[len(told) :])))
+            rows.append(
+                BudgetRow(name, QUANTITIES[name].label, budgets[name], told, sum(c.share for c in every[len(told) :]))
+            )
     return tuple(rows)
 
 
@@ -133,7 +105,7 @@ def budget_text(analysis: Analysis) -> str:
     left = max(len(row.quantity) for row in rows) + 2
     lines = ["Where the uncertainty comes from (share of the variance; A: the record's scatter, B: anything else):"]
     for row in rows:
-        greatest = [f"{INPUTS[c.name]} ({c.kind}) {100 * c.share:.0f} %" for c in told[row][:2]]
+        greatest = [f"{INPUTS[c.name].label} ({c.kind}) {100 * c.share:.0f} %" for c in told[row][:2]]
         lines.append(f"  {row.quantity:<{left}}{', '.join(greatest)}")
     return "\n".join(lines)
 

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
+from pipeline.registry.effects import EFFECTS
+from pipeline.registry.quantities import INPUTS
 from pipeline.track import Track
 from springmass.report.advice import ADVICE, sorted_out
-from springmass.report.budgets import INPUTS, budgets_of, correlations_of
+from springmass.report.budgets import budgets_of, correlations_of
 from springmass.report.figures.inline import inline_svg
 from springmass.report.laws import laws_across, laws_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
@@ -123,7 +125,8 @@ def template(name: str) -> Template:
         "pretty": pretty,
         "number": pretty_number,
         "symbol": _symbol,
-        "input": INPUTS.__getitem__,
+        "input": lambda name: INPUTS[name].label,
+        "effect": EFFECTS.__getitem__,
         "unit": page_unit,
         "typeset": typeset,
         "breakable": _breakable,

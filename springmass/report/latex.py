@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate, format_value
-from springmass.report.budgets import INPUTS, budgets_of
+from pipeline.registry.quantities import INPUTS
+from springmass.report.budgets import budgets_of
 from springmass.report.tables import table_rows
 
 __all__ = ["budget_tex", "table_tex"]
@@ -89,7 +90,12 @@ def _budget_table(name: str, analysis: Analysis) -> str:
         lines.append(rf"\multicolumn{{4}}{{l}}{{{result}; {_tex_power(expanded)}}} \\")
         for c in row.contributions:
             given = "--" if c.input is None else _tex_quantity(c.input)
-            cells = [rf"\quad {_tex_text(INPUTS[c.name])}", c.kind, given, rf"\qty{{{100 * c.share:.1f}}}{{\percent}}"]
+            cells = [
+                rf"\quad {_tex_text(INPUTS[c.name].label)}",
+                c.kind,
+                given,
+                rf"\qty{{{100 * c.share:.1f}}}{{\percent}}",
+            ]
             lines.append(" & ".join(cells) + r" \\")
         lines.append(r"\addlinespace")
     caption = (

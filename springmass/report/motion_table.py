@@ -88,8 +88,8 @@ def motion_csv(analysis: Analysis, smoothed: Smoothed) -> str:
     Notes
     -----
     Times keep all their digits, the rest ten: more than any of them is certain to. What is no number, a missing
-    distance or a motion at a sample without a time, is an empty cell. Longer records than a million samples have a line
-    for every second one, or third: see :func:`row_step`.
+    distance or a motion at a sample without a time or outside the analysed part, is an empty cell. Longer records than
+    a million samples have a line for every second one, or third: see :func:`row_step`.
     """
     used = (analysis.flags & UNUSABLE) == 0
     motion = (

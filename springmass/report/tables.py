@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
+from pipeline.damping.laws import FunctionLaw
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate, format_value
+from pipeline.registry.quantities import QUANTITIES
 
 __all__ = [
-    "QUANTITIES",
     "TableRow",
     "cell",
     "every_number",
@@ -27,38 +28,6 @@ __all__ = [
     "table_estimates",
     "table_rows",
 ]
-
-# name, quantity in words, symbol in ASCII, on the page, in LaTeX
-_QUANTITIES = (
-    ("period", "period", "T", "T", "T"),
-    ("first_mode_period", "period of the first mode", "T_1", "T 1", "T_1"),
-    ("second_mode_period", "period of the second mode", "T_2", "T 2", "T_2"),
-    ("first_mode_amplitude", "amplitude of the first mode", "A_1", "A 1", "A_1"),
-    ("second_mode_amplitude", "amplitude of the second mode", "A_2", "A 2", "A_2"),
-    ("frequency", "frequency", "f", "f", "f"),
-    ("angular_frequency", "angular frequency", "omega", "ω", r"\omega"),
-    ("spring_constant", "spring constant", "k", "k", "k"),
-    ("amplitude", "amplitude at the start", "A0", "A₀", "A_0"),
-    ("displacement_amplitude", "amplitude of the displacement", "x0", "x₀", "x_0"),
-    ("angle_amplitude", "amplitude of the angle", "theta0", "θ₀", r"\theta_0"),
-    ("offset", "rest position", "y0", "y₀", "y_0"),
-    ("noise", "noise of one sample", "sigma", "σ", r"\sigma"),
-    ("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda"),
-    ("relaxation_rate", "relaxation rate", "r", "r", "r"),
-    ("relaxation_rate_slow", "slow relaxation rate", "r_1", "r 1", "r_1"),
-    ("relaxation_rate_fast", "fast relaxation rate", "r_2", "r 2", "r_2"),
-    ("quality_factor", "quality factor", "Q", "Q", "Q"),
-    ("velocity_rms", "velocity, root mean square", "v_rms", "v rms", r"v_\mathrm{rms}"),
-    ("reynolds_number", "Reynolds number", "Re", "Re", r"\mathit{Re}"),
-    ("keulegan_carpenter_number", "Keulegan-Carpenter number", "KC", "KC", r"\mathit{KC}"),
-    ("drag_coefficient", "drag coefficient", "C_d", "C d", r"C_\mathrm{d}"),
-    ("gamma", "linear damping", "gamma", "γ", r"\gamma"),
-    ("beta", "quadratic damping", "beta", "β", r"\beta"),
-    ("mu", "dry friction", "mu", "μ", r"\mu"),
-    ("c", "drag by a power of the amplitude", "c", "c", "c"),
-    ("n", "that power", "n", "n", "n"),
-)
-QUANTITIES = {name: quantity for name, quantity, *_ in _QUANTITIES}
 
 _PAGE_UNITS = {"1": "", "degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
 _SUPERSCRIPT = str.maketrans("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
@@ -98,7 +67,7 @@ class TableRow:
 
 def table_estimates(analysis: Analysis) -> dict[str, Estimate]:
     """Return what Table 1 says of a run: its estimates, and the selected law's coefficients, by name."""
-    found = {name: _estimate(analysis, name) for name in QUANTITIES}
+    found = {name: _estimate(analysis, name) for name, quantity in QUANTITIES.items() if quantity.in_table}
     return {name: estimate for name, estimate in found.items() if estimate is not None}
 
 
@@ -111,10 +80,10 @@ def table_rows(runs: Sequence[Analysis | Mapping[str, Estimate]]) -> tuple[Table
     """
     told = [table_estimates(run) if isinstance(run, Analysis) else run for run in runs]
     rows = []
-    for name, quantity, symbol, page_symbol, tex_symbol in _QUANTITIES:
+    for name, q in QUANTITIES.items():
         estimates = tuple(run.get(name) for run in told)
         if any(estimate is not None for estimate in estimates):
-            rows.append(TableRow(name, quantity, symbol, page_symbol, tex_symbol, estimates))
+            rows.append(TableRow(name, q.label, q.symbol, q.page_symbol, q.tex_symbol, estimates))
     return tuple(rows)
 
 
@@ -227,7 +196,9 @@ def law_status(damping: Damping, name: str) -> str:
 def _estimate(analysis: Analysis, name: str) -> Estimate | None:
     if name in analysis.estimates or not isinstance(analysis.motion, Oscillation):
         return analysis.estimates.get(name)
-    return analysis.motion.derived.coefficients.get(name)
+    derived = analysis.motion.derived
+    # A coefficient of a law of the user's own is not ours, even where it has the same name.
+    return None if isinstance(derived.laws[0].fit.law, FunctionLaw) else derived.coefficients.get(name)
 
 
 def _typeset(number: str) -> str:

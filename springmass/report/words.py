@@ -171,7 +171,7 @@ def _of_displacement(analysis: Analysis) -> str:
 
 
 def _drag(analysis: Analysis, motion: Oscillation) -> str:
-    friction = "; friction is left out" if "mu" in motion.damping.best.joint.names else ""
+    friction = "; friction is left out" if motion.damping.best.drag_term("mu") is not None else ""
     return (
         "Drag coefficient against amplitude: what purely quadratic drag on the disc would need to take the energy that "
         f"the record loses, −dA/dt · 3π m/(2 ω ρ S A²){_of_displacement(analysis)}, the spring's own losses "

@@ -10,7 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+from acquisition.recordings.recording import Trap
 from pipeline.analyse import Analysis, Oscillation
+from pipeline.registry.findings import FINDINGS, UNKNOWN_CODE
 from pipeline.results.budget import Contribution
 from pipeline.results.checks.finding import Finding, by_severity
 from pipeline.results.classic import Classic
@@ -29,27 +31,6 @@ __all__ = [
 ]
 
 SCHEMA = 1
-# How grave it is that a reader saw this; what is not named here is for information.
-_SEVERITY = {
-    "unverified": "error",
-    "malformed_rows": "warning",
-    "offset_unknown_after_gap": "warning",
-    "pair_mismatch": "warning",
-    "zero_filled_tail": "warning",
-    "truncated_row": "warning",
-    "duplicate_time": "warning",
-    "non_monotonic_time": "warning",
-    "rate_assumed": "warning",
-    "unit_assumed": "warning",
-    "stale_header": "warning",
-    "time_assumed": "warning",
-    "lost_target": "warning",
-    "quantised": "warning",
-    "sensor_lost": "warning",
-    "readings_dropped": "warning",
-    "other_device": "warning",
-}
-
 _REJECTED_WARNINGS = frozenset({"sensor_lost"})
 
 
@@ -138,9 +119,15 @@ def all_findings(loaded: Loaded, analysis: Analysis) -> tuple[Finding, ...]:
     known = {f.code for f in findings}
     for trap in loaded.traps:
         if trap.code not in known:
-            severity = _SEVERITY.get(trap.code, "info")
-            findings.append(Finding(trap.code, severity, trap.message))  # type: ignore[arg-type]
+            findings.append(_of_reader(trap))
     return by_severity(findings)
+
+
+def _of_reader(trap: Trap) -> Finding:
+    if trap.code in FINDINGS:
+        return Finding(trap.code, FINDINGS[trap.code][0], trap.message)
+    # A run file may come from a version that knows more codes than this one.
+    return Finding(UNKNOWN_CODE, FINDINGS[UNKNOWN_CODE][0], f"{trap.code}: {trap.message}")
 
 
 def _quality(loaded: Loaded, analysis: Analysis) -> dict[str, int]:

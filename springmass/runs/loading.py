@@ -14,13 +14,16 @@ from typing import Any, Literal
 import numpy as np
 
 from acquisition.block import Block
+from acquisition.errors import NeedsAnswer
 from acquisition.recordings.identify import open_recording
+from acquisition.recordings.questions import Missing, Need, Question
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
 from acquisition.source import SourceInfo
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, detail, tell
 from springmass.runs.about import about_of
+from springmass.runs.questions import for_python
 from springmass.runs.tracks import to_track
 from storage.errors import RunDamaged
 from storage.recovery.recover import recover
@@ -145,6 +148,8 @@ def load(
 
     Raises
     ------
+    acquisition.errors.NeedsAnswer
+        If the file leaves something open that was not given. Its ``question`` lists what is missing and every answer.
     acquisition.errors.FormatError, storage.errors.StorageError
         If it cannot be read; one line.
     ProgramError
@@ -152,25 +157,29 @@ def load(
     """
     where = Path(path)
     kind = kind_of(where)
-    answers = {"velocity": velocity, "rate-hz": rate_hz, "unit": unit, "run": run, "time": time, "time-unit": time_unit}
-    if kind == "run":
-        _refuse(where, "a run file", {**answers, "channel": channel})
-        loaded = _load_run(where, unverified=unverified)
-    elif kind == "wire":
-        _refuse(where, "a wire log", answers)
-        loaded = _load_wire(where, channel)
-    else:
-        recording = open_recording(
-            where,
-            channel=channel,
-            rate_hz=rate_hz,
-            unit=unit,
-            run=run,
-            time=time,
-            time_unit=time_unit,
-            velocity_path=velocity,
-        )
-        loaded = _from_recording(where, recording)
+    answers = {"velocity": velocity, "rate_hz": rate_hz, "unit": unit, "run": run, "time": time, "time_unit": time_unit}
+    try:
+        if kind == "run":
+            _refuse(where, "a run file", {**answers, "channel": channel})
+            loaded = _load_run(where, unverified=unverified)
+        elif kind == "wire":
+            _refuse(where, "a wire log", answers)
+            loaded = _load_wire(where, channel)
+        else:
+            recording = open_recording(
+                where,
+                channel=channel,
+                rate_hz=rate_hz,
+                unit=unit,
+                run=run,
+                time=time,
+                time_unit=time_unit,
+                velocity_path=velocity,
+            )
+            loaded = _from_recording(where, recording)
+    except NeedsAnswer as asked:
+        given = {**answers, "channel": channel, "from_s": from_s, "to_s": to_s, "clock_ppm": clock_ppm}
+        raise asked.with_remedy(for_python(asked.question, "springmass.load", given)) from None
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             complain(f"{where}: {trap.message}")
@@ -212,11 +221,9 @@ def kind_of(path: Path) -> Literal["run", "wire", "recording"]:
 
 def _refuse(path: Path, what: str, answers: Mapping[str, object]) -> None:
     """Demand that nothing was said of a file that says it all."""
-    given = [f"--{name}" for name, value in answers.items() if value is not None]
+    given = [name for name, value in answers.items() if value is not None]
     if given:
-        raise ProgramError(
-            f"{path}: {', '.join(given)} complete old recordings; {what} holds all of them, leave them out", USAGE
-        )
+        raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out", USAGE)
 
 
 def _from_recording(path: Path, recording: Recording) -> Loaded:
@@ -256,7 +263,7 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
         except RunDamaged as error:
             if unverified:
                 raise
-            remedy = f"{error.remedy}, or look at it as it is with --unverified"
+            remedy = f"{error.remedy}, or look at it as it is: unverified"
             raise RunDamaged(path, error.demand, remedy) from error
         return Loaded(
             path,
@@ -319,14 +326,12 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
         report = recover(path, Path(folder) / "run.h5")
         names = {str(each.sensor.channel): each for each in report.runs}
-        listed = ", ".join(f'"{number}" ({each.sensor.port})' for number, each in names.items())
-        if channel is None and len(names) > 1:
-            demand = f"the log holds {len(names)} sensors: {listed}; name the one to take with --channel"
-            raise ProgramError(f"{path}: {demand}", UNREADABLE)
         wanted = [each for number, each in names.items() if channel in (None, number, each.sensor.port)]
         if len(wanted) != 1:
-            demand = f'channel "{channel}" was asked for, the log holds {listed}; name one of these'
-            raise ProgramError(f"{path}: {demand}", UNREADABLE)
+            sensors = ", ".join(f"{number} at {each.sensor.port}" for number, each in names.items())
+            refused = "" if channel is None else f'channel "{channel}" is not in the log, '
+            need = Need(Missing.CHANNEL, tuple(names), next(iter(names)))
+            raise NeedsAnswer(Question(str(path), (need,), reason=f"{refused}the log holds the sensors {sensors}"))
         loaded = _load_run(wanted[0].path)
         originals = loaded.originals  # while the run file is there
     return replace(

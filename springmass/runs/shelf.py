@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,13 +13,13 @@ from acquisition.errors import AcquisitionError, FormatError, NeedsAnswer
 from acquisition.recordings.base import read_bytes
 from acquisition.recordings.identify import inspect, sniff
 from acquisition.recordings.parts import members
+from acquisition.recordings.questions import Missing
 from springmass.errors import ProgramError
+from springmass.runs.inputs import is_description
 from springmass.runs.loading import load
 from storage.errors import StorageError
 
 __all__ = ["Entry", "is_shelf", "shelf"]
-
-_OPTION = re.compile(r" --([a-z-]+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +96,12 @@ def _entry(path: Path, name: str) -> Entry:
 
 
 def _asked(path: Path, name: str, asked: NeedsAnswer) -> Entry:
+    if is_description(path):
+        return Entry(name, "", error="JSON without times is no recording among others; name this file to read it")
     found = inspect(path)
-    missing = tuple(dict.fromkeys(_OPTION.findall(str(asked).partition("? springmass analyse")[2])))
+    missing = tuple(each.value.replace("_", "-") for each in asked.question.missing)
     told = [each for each in found.surveys if each.samples]
     channels = tuple(dict.fromkeys(each.channel for each in told))
-    timed = bool(told) and not {"rate-hz", "time-unit"} & {*missing}
+    timed = bool(told) and not {Missing.RATE_HZ, Missing.TIME_UNIT} & {*asked.question.missing}
     rate_hz, span_s = (told[0].rate_hz, told[0].span_s) if timed else (None, None)
     return Entry(name, found.format, channels, rate_hz, span_s, missing)

@@ -7,14 +7,21 @@ import math
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-__all__ = ["BENCH", "COMMANDS"]
+__all__ = ["BENCH", "COMMANDS", "without_completions"]
 
 
 def _add_input_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--velocity", metavar="FILE", help="velocity file that belongs to the one position file given")
     _add_completions(parser)
+
+
+def without_completions(words: Sequence[str]) -> list[str]:
+    """Return the words of a command line without the options that say how to read a recording."""
+    parser = argparse.ArgumentParser(add_help=False)
+    _add_completions(parser)
+    return parser.parse_known_args(words)[1]
 
 
 def _add_completions(parser: argparse.ArgumentParser) -> None:
@@ -195,7 +202,7 @@ def _add_demo(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_page_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--page-port", type=int, default=0, metavar="N", help="port of the page (default: a free one)")
+    parser.add_argument("--page-port", type=_tcp_port, default=0, metavar="N", help="port of the page (default: any)")
     parser.add_argument("--no-browser", action="store_true", help="print the page's address and open no browser")
     parser.add_argument(
         "--want-us",
@@ -251,7 +258,7 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--force", action="store_true", help="run a step that is unstable")
     parser.add_argument("--against", metavar="RUN", help="measured run to lay the prediction over")
-    _add_unverified(parser)
+    _add_completions(parser)
     parser.add_argument(
         "-o", "--output", metavar="RUN.h5", help="write what a rangefinder would have read to a run file"
     )
@@ -265,7 +272,7 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
         "--noise-m", type=_not_negative, metavar="S", help="its noise, m (default the scene's, or 8e-5)"
     )
     parser.add_argument("--echoes", type=_not_negative, metavar="HZ", help="its false echoes a second (default 0.1)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of its noise (default 0)")
+    parser.add_argument("--seed", type=_integer, default=0, metavar="N", help="of its noise (default 0)")
     parser.add_argument(
         "--out", metavar="DIR", help="folder for NAME.simulated (default: here; with --json or -o: none)"
     )
@@ -334,7 +341,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
         "--scene", metavar="FILE", help="scene file stored with the run; its air sets the speed of sound"
     )
     parser.add_argument("--title", default="", metavar="TEXT", help="title of the run")
-    parser.add_argument("--baud", type=int, metavar="B", help="speed of the port (default: the family's)")
+    parser.add_argument("--baud", type=_integer, metavar="B", help="speed of the port (default: the family's)")
     parser.add_argument("--rate-hz", type=_pace, metavar="R", help="readings per second that the sensor is set to")
     parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="option of the decoder")
     parser.add_argument("--still", type=_positive, metavar="S", help="measure rest position and noise first, so long")
@@ -353,7 +360,7 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--roll-mb", type=_positive, metavar="MB", help="begin another log after this (default 1000)")
     parser.add_argument("--roll-hours", type=_positive, metavar="H", help="begin another log after this, too")
     parser.add_argument("--no-trace", action="store_true", help="draw no motion on the terminal")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated bench's noise (default 0)")
+    parser.add_argument("--seed", type=_integer, default=0, metavar="N", help="of the simulated noise (default 0)")
     parser.add_argument(
         "--crystal-ppm", type=_crystal, default=0.0, metavar="PPM", help="of the simulated sensor's clock"
     )
@@ -376,9 +383,11 @@ def _add_firmware(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", metavar="P", help="the board's port; it is asked what it is")
     parser.add_argument("--flash", action="store_true", help="write the firmware that comes with this program")
     settings = parser.add_argument_group("settings, which the board keeps")
-    settings.add_argument("--rate", type=int, metavar="R", help="pings per second, 10 to 125")
+    settings.add_argument("--rate", type=_integer, metavar="R", help="pings per second, 10 to 125")
     settings.add_argument("--gate", type=_gate, metavar="NEAR,FAR", help="times of flight that count, us, from 116")
-    settings.add_argument("--spread", type=int, metavar="US", help="each ping comes up to so much later, 0 to 2000 us")
+    settings.add_argument(
+        "--spread", type=_integer, metavar="US", help="each ping comes up to this much later, 0 to 2000 us"
+    )
     settings.add_argument("--name", metavar="NAME", help="to tell it from others, 12 letters, digits, . _ or - at most")
 
 
@@ -454,17 +463,31 @@ _positive = _where(lambda x: x > 0.0, "must be positive")
 _not_negative = _where(lambda x: x >= 0.0, "must not be negative")
 
 
+def _integer(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a whole number, got {text!r}") from None
+
+
 def _count(text: str) -> int:
-    value = int(text)
+    value = _integer(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f"must be 1 or more, got {text!r}")
     return value
 
 
 def _whole(text: str) -> int:
-    value = int(text)
+    value = _integer(text)
     if value < 0:
         raise argparse.ArgumentTypeError(f"must be 0 or more, got {text!r}")
+    return value
+
+
+def _tcp_port(text: str) -> int:
+    value = _integer(text)
+    if not 0 <= value <= 65535:
+        raise argparse.ArgumentTypeError(f"must be a port from 0 to 65535, got {text!r}")
     return value
 
 

@@ -246,11 +246,11 @@ def test_strict_passes_what_only_warns(cli: Cli, write: Callable[..., Path], row
 
 def test_strict_rejects_an_error(cli: Cli, recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A finding that forbids the use of a number gives exit code 5, but only where strictness was asked for."""
-    error = Finding("law_rejected", "error", "every damping law tried is rejected")
+    error = Finding("rows_lost", "error", "rows are missing")
     monkeypatch.setattr("springmass.runs.json_results.all_findings", lambda *_: (error,))
     done = cli("analyse", "--json", "--strict", recording)
     assert (done.code, len(done.results)) == (5, 1)
-    assert done.complaint.endswith("run.txt: rejected under --strict: law_rejected")
+    assert done.complaint.endswith("run.txt: rejected under --strict: rows_lost")
     assert cli("analyse", "--json", recording).code == 0
 
 

@@ -76,10 +76,10 @@ def test_what_is_no_recording_is_refused(cli: Cli, tmp_path: Path, command: str,
 def test_what_a_file_leaves_open_is_asked_for(
     cli: Cli, tmp_path: Path, command: str, content: bytes, word: str
 ) -> None:
-    """Unit, run and channel are asked for by the option's name; nothing is written."""
+    """Unit, run and channel are asked for by the options of the command that was typed; nothing is written."""
     path = tmp_path / "run.txt"
     path.write_bytes(content)
-    refused(run(cli, command, path, tmp_path / "out.h5"), path, word, "springmass analyse")
+    refused(run(cli, command, path, tmp_path / "out.h5"), path, word, f"springmass {command}")
     assert [file.name for file in tmp_path.iterdir()] == ["run.txt"]
 
 

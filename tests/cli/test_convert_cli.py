@@ -251,7 +251,7 @@ def test_a_run_file_needs_no_answers(cli: Cli, recording: Path, tmp_path: Path, 
     assert cli("convert", recording, tmp_path / "run.h5").code == 0
     done = cli("convert", tmp_path / "run.h5", tmp_path / "back.txt", *option)
     assert done.code == 2
-    assert "a run file holds all of them" in done.complaint
+    assert "a run file states everything" in done.complaint
 
 
 def test_an_angle_goes_into_run_files_only(cli: Cli, recording: Path, tmp_path: Path) -> None:

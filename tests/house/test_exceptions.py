@@ -14,6 +14,8 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 import pytest
 
+from acquisition.recordings.questions import Question
+
 PACKAGES = ("acquisition", "pipeline", "storage", "springmass")
 
 
@@ -47,7 +49,8 @@ def value_of(hint: Any, name: str) -> Any:
         return list(hint)[-1]
     if is_dataclass(hint) and isinstance(hint, type):
         hints = get_type_hints(hint)
-        return hint(**{each.name: value_of(hints[each.name], each.name) for each in fields(hint) if each.init})
+        given = [each.name for each in fields(hint) if each.init and each.default is not None]  # nests without end
+        return hint(**{name: value_of(hints[name], name) for name in given})
     return {str: f"{name} größer 1", int: 3, float: 0.25, bool: True, object: f"{name} of any kind"}[hint]
 
 
@@ -55,7 +58,7 @@ def made(cls: type[Exception]) -> Exception:
     """Return an exception with a value for each parameter of its constructor."""
     if cls.__init__ in (Exception.__init__, ValueError.__init__, KeyError.__init__, ArithmeticError.__init__):
         return cls("run.h5: what is wrong")
-    hints = get_type_hints(cls.__init__)
+    hints = get_type_hints(cls.__init__, localns={"Question": Question})
     positional, named = [], {}
     for name, parameter in list(inspect.signature(cls.__init__).parameters.items())[1:]:
         value = value_of(hints[name], name)

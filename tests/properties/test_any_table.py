@@ -15,6 +15,7 @@ import pytest
 
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
+from acquisition.recordings.questions import Missing
 from acquisition.recordings.recording import Recording
 
 TABLES, RIGHT = 100, 98
@@ -164,12 +165,10 @@ def judge(path: Path, table: Written) -> str:
             recording = open_recording(path, **answers)  # type: ignore[arg-type]
         except NeedsAnswer as error:
             words = str(error)
-            command = words.partition("? springmass analyse ")[2]
-            if not command or "\n" in words or answers:
+            if "\n" in words or answers:
                 return words
-            for option, answer in (("--channel", table.channel), ("--unit", "m"), ("--time-unit", "ms")):
-                if f" {option} " in command:
-                    answers[option[2:].replace("-", "_")] = answer
+            known = {Missing.CHANNEL: table.channel, Missing.UNIT: "m", Missing.TIME_UNIT: "ms"}
+            answers = {what.value: known[what] for what in error.question.missing if what in known}
             if not answers:
                 return words
             continue

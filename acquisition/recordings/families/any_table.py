@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from acquisition.errors import FormatError
+from acquisition.recordings.foreign import named
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.contents import Channel, Contents, Formula, Heading, Sheet, numbered_apart
 from acquisition.recordings.tables.finding import Found, clock_s, find_table
@@ -37,6 +38,8 @@ _BLANKS = bytes.maketrans(b"[];", b"   ")
 def _evidence(head: bytes) -> str:
     if not is_text(head) or head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<"):
         return ""
+    if named("", head) is not None:
+        return ""  # the one who refuses the file says what it is
     try:
         _, found = _find(*_plain("", Text.of(head)))
     except FormatError as error:

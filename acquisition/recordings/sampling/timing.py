@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.questions import Missing, Need, Question
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.nominal import Grid, find_rate
 
-__all__ = ["Timing", "check_rate", "clock_traps", "time_by_column", "time_by_formula", "time_by_rate"]
+__all__ = ["Timing", "check_rate", "clock_traps", "rate_needed", "time_by_column", "time_by_formula", "time_by_rate"]
 
 _SHARE_OF_JITTER = 0.2
-_RATE = "give the rate with --rate-hz"
+_ANY_RATE_HZ = 100.0  # an example of a rate: one that many sensors have
 
 
 class Timing(NamedTuple):
@@ -52,7 +53,18 @@ class Timing(NamedTuple):
 def check_rate(path: str, rate_hz: float | None) -> None:
     """Demand that a rate, if given, is a positive number."""
     if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise NeedsAnswer(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
+        raise FormatError(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
+
+
+def rate_needed(instead: Need | None = None) -> Need:
+    """Return the need for a rate.
+
+    Parameters
+    ----------
+    instead : Need, optional
+        For the column of times that would do as well.
+    """
+    return Need(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)
 
 
 def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
@@ -68,8 +80,8 @@ def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | N
     rate = find_rate(printed, resolution, rate_hz=rate_hz)
     if rate is None:
         if rate_hz is None:
-            demand = f"expected times to tell the rate, got {printed.size} rows at one time"
-            raise NeedsAnswer(path, demand, "record longer, or give rate_hz (--rate-hz)")
+            reason = f"expected times to tell the rate, got {printed.size} rows at one time"
+            raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
         origin = float(printed[0]) if printed.size else 0.0
         return Timing(rate_hz, Grid(rate_hz, origin), resolution, certain=False, given=True)
     steps = _jitter(printed) if rate.grid is None else None
@@ -134,7 +146,7 @@ def time_by_formula(
 def time_by_rate(path: str, rate_hz: float | None, why: str) -> Timing:
     """Take the rate that the user gives, for nothing in the file tells times."""
     if rate_hz is None:
-        raise NeedsAnswer(path, f"expected times, got none: {why}", _RATE)
+        raise NeedsAnswer(Question(path, (rate_needed(),), reason=why))
     return Timing(rate_hz, Grid(rate_hz), 0.0, certain=True, given=True, by_row=True)
 
 

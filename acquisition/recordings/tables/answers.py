@@ -1,9 +1,8 @@
-"""What a user says of a file, and what must be asked because neither file nor user says it: all in one line."""
+"""What a user says of a file, and what must be asked because neither file nor user says it."""
 
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,7 +10,9 @@ import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.questions import Missing, Need, Question, Times
 from acquisition.recordings.recording import Trap
+from acquisition.recordings.sampling.timing import rate_needed
 from acquisition.recordings.tables.contents import (
     Arrays,
     Channel,
@@ -24,7 +25,7 @@ from acquisition.recordings.tables.contents import (
     split_heading,
 )
 from acquisition.recordings.tables.text import parse_number
-from acquisition.recordings.units import TIMES, Measure, known_units, measure_of, time_power, unit_words
+from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_power, unit_words
 
 __all__ = ["Answers", "measure", "settle"]
 
@@ -63,40 +64,39 @@ def settle(path: str, contents: Contents, said: Answers) -> Channel:
     Raises
     ------
     NeedsAnswer
-        With the columns, what is missing of them, and the command line to type.
+        With the columns and everything that is missing of them.
     FormatError
         If what the user says contradicts the file.
     """
-    questions: list[tuple[str, str]] = []
+    needs: list[Need] = []
     if said.run is None and len(contents.runs) > 1:
-        listed = ", ".join(f'"{name}"' for name in contents.runs)
-        questions.append((f"which of the {len(contents.runs)} runs {listed}", f"--run {_quoted(contents.runs[0])}"))
-    channels = of_run(path, contents, contents.runs[0] if questions else said.run)
+        needs.append(Need(Missing.RUN, contents.runs, contents.runs[0]))
+    channels = of_run(path, contents, contents.runs[0] if needs else said.run)
     if said.channel is not None:
         chosen = named(path, channels, said.channel)
     else:
         fit = candidates([each for each in channels if each.name != said.time] or channels)
         chosen = next((each for each in fit if each.measure), fit[0])
         if len(fit) > 1:
-            names = ", ".join(f'"{each.label}"' for each in fit)
-            questions.append((f"which channel of {names}", f"--channel {_quoted(chosen.name)}"))
+            needs.append(Need(Missing.CHANNEL, tuple(each.name for each in fit), chosen.name))
     if said.time is not None:
         chosen = _timed_by(path, channels, chosen, said.time)
     if isinstance(chosen.source, Sheet) and chosen.time is not None and _begins_anew(chosen.source, chosen.time):
         chosen = replace(chosen, time=None, formula=None)  # chunks: what lies between them is told nowhere
     chosen = _with_time_unit(path, chosen, said.time_unit)
-    questions.extend(_of_times(contents, chosen, said))
+    needs.extend(_of_times(channels, chosen, said))
     if chosen.measure is None and said.unit is None:
-        what = f"what does one {chosen.unit} of {chosen.name} count as (1: a plain number)"
-        what = what if chosen.unit else f"what is {chosen.name}'s unit"
-        questions.append((what, f"--unit {1 if chosen.unit else _likely_unit(chosen.name)}"))
-    if questions:
-        demand = f"{_columns(channels, chosen)}: {', and '.join(each for each, _ in questions)}?"
-        given = _given(said)
-        raise NeedsAnswer(
-            path, demand, " ".join([f"springmass analyse {_quoted(path)}", *given, *(q for _, q in questions)])
-        )
+        needs.append(_unit(chosen))
+    if needs:
+        columns = tuple(each.label for each in channels)
+        raise NeedsAnswer(Question(path, tuple(needs), columns, _times(chosen)))
     return chosen
+
+
+def _unit(chosen: Channel) -> Need:
+    example = "1" if chosen.unit else _likely_unit(chosen.name)
+    others = (unit for unit in MEASURES if unit != unit_words(example))
+    return Need(Missing.UNIT, (example, *others), example, of=chosen.name, stated=chosen.unit)
 
 
 def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tuple[Trap, ...]]:
@@ -110,10 +110,10 @@ def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tup
     stated = channel.measure
     given = None if unit is None else measure_of(unit)
     if unit is not None and given is None:
-        raise FormatError(path, f'unit must be one of {known_units()}, got "{unit}"', "name one of these")
+        raise FormatError(path, f'unit must be one of {", ".join(MEASURES)}, got "{unit}"', "name one of these")
     if given is None:
         if stated is None:
-            raise NeedsAnswer(path, f'nothing says the unit of "{channel.name}"', "say it with --unit")
+            raise NeedsAnswer(Question(path, (_unit(channel),), (channel.label,)))
         return stated, ()
     if stated == given:
         return given, ()
@@ -139,11 +139,11 @@ def _timed_by(path: str, channels: Sequence[Channel], chosen: Channel, time: str
     column = _column(source, time)
     if column is None:
         others = [each for each in channels if each.name != chosen.name and each.source is source]
-        column = named(path, others or channels, time, "time").column
+        column = named(path, others or channels, time, Missing.TIME).column
     if column == chosen.time:
         return chosen
     if column == chosen.column:
-        raise FormatError(path, f'"{time}" cannot be both channel and time', "name another with --channel")
+        raise FormatError(path, f'"{time}" cannot be both channel and time', "name another column for one of them")
     units = {each.time: each.time_unit for each in channels} | {each.column: each.unit for each in channels}
     unit = units.get(column, "")
     return replace(chosen, time=column, time_unit=unit if time_power(unit) is not None else "", formula=None)
@@ -169,10 +169,10 @@ def _timed_by_values(path: str, channels: Sequence[Channel], chosen: Channel, so
             t = times.t if isinstance(times, Arrays) else None
             break
     else:
-        found = named(path, [each for each in channels if each.name != chosen.name] or channels, time, "time")
+        found = named(path, [each for each in channels if each.name != chosen.name] or channels, time, Missing.TIME)
         t, unit = (found.source.values if isinstance(found.source, Arrays) else None), found.unit
     if t is None or t.size != source.values.size:
-        raise FormatError(path, f'"{time}" and "{chosen.name}" differ in length', "name another with --time")
+        raise FormatError(path, f'"{time}" and "{chosen.name}" differ in length', "name another column of times")
     unit = unit if time_power(unit) is not None else ""
     return replace(chosen, source=Arrays(t, source.values, time), time_unit=unit, formula=None)
 
@@ -190,7 +190,7 @@ def _with_time_unit(path: str, chosen: Channel, unit: str | None) -> Channel:
     return replace(chosen, time_unit=unit)
 
 
-def _of_times(contents: Contents, chosen: Channel, said: Answers) -> list[tuple[str, str]]:
+def _of_times(channels: Sequence[Channel], chosen: Channel, said: Answers) -> list[Need]:
     source = chosen.source
     if isinstance(source, Arrays):
         none = source.t is None and chosen.formula is None
@@ -199,17 +199,14 @@ def _of_times(contents: Contents, chosen: Channel, said: Answers) -> list[tuple[
     if none:
         if said.rate_hz is not None:
             return []
-        others = [each for each in contents.channels if each.name != chosen.name and each.run == chosen.run]
-        or_time = ", or which column is the time (--time NAME)" if others else ""
-        return [(f"what is the rate{or_time}", "--rate-hz R")]
+        others = tuple(each.name for each in channels if each.name != chosen.name)
+        return [rate_needed(Need(Missing.TIME, others, others[0]) if others else None)]
     if time_power(chosen.time_unit) is not None or chosen.formula is not None:
         return []
     times = _times_at_first(chosen)
-    if chosen.time_unit:
-        what = f"what does one {chosen.time_unit} of {_time_name(chosen) or 'the time'} count as"
-        return [(what, f"--time-unit {_likely_time_unit(times)}")]
-    if times.size > 1 and float(np.median(np.diff(times))) >= _SLOW_S:
-        return [(f"what is {_time_name(chosen) or 'the time'}'s unit", f"--time-unit {_likely_time_unit(times)}")]
+    if chosen.time_unit or (times.size > 1 and float(np.median(np.diff(times))) >= _SLOW_S):
+        example = _likely_time_unit(times)
+        return [Need(Missing.TIME_UNIT, tuple(TIMES), example, of=_time_name(chosen), stated=chosen.time_unit)]
     return []
 
 
@@ -255,54 +252,31 @@ def _time_name(chosen: Channel) -> str:
     return source.names[chosen.time] if chosen.time is not None and chosen.time < len(source.names) else ""
 
 
-def _columns(channels: Sequence[Channel], chosen: Channel) -> str:
-    """Name the columns; of the times also where they run."""
-    labels = [f'"{each.label}"' for each in channels]
+def _times(chosen: Channel) -> Times | str:
+    """Return where the times run; their name alone where no two numbers say so, nothing where there are none."""
     source = chosen.source
-    timed = chosen.time is not None if isinstance(source, Sheet) else source.t is not None
-    if timed and (_time_name(chosen) or isinstance(source, Sheet)):
-        labels.insert(0, f'"{_time_name(chosen) or "time"}"{_span(chosen)}')
-    many = len(labels) > 1
-    return f"column{'s' if many else ''} {', '.join(labels[:-1])}{' and ' if many else ''}{labels[-1]}"
-
-
-def _span(chosen: Channel) -> str:
-    first, source = _times_at_first(chosen), chosen.source
-    if isinstance(source, Arrays):
-        ends = np.empty(0) if source.t is None else source.t
+    if isinstance(source, Sheet):
+        if chosen.time is None:
+            return ""
+        name, ends = (
+            _time_name(chosen) or "time",
+            _last_times(source, max(source.start, source.stop - _LAST_BYTES), chosen.time),
+        )
     else:
-        tail = max(source.start, source.stop - _LAST_BYTES)
-        ends = _last_times(source, tail, chosen.time or 0)
+        if source.t is None or not source.time_name:
+            return ""
+        name, ends = source.time_name, source.t
+    first = _times_at_first(chosen)
     first, ends = first[np.isfinite(first)], ends[np.isfinite(ends)]
-    steps = np.diff(first)
-    if not steps.size or not ends.size:
-        return ""
-    return f" ({first[0]:.6g} to {ends[-1]:.6g}, {float(np.median(steps)):.3g} apart)"
+    if first.size < 2 or not ends.size:
+        return name
+    return Times(name, float(first[0]), float(ends[-1]), float(np.median(np.diff(first))))
 
 
 def _last_times(sheet: Sheet, tail: int, column: int) -> F8:
     """Return the last times, from a byte on: what stands before the first line end is half a line."""
     line = tail if tail == sheet.start else sheet.text.data.find(b"\n", tail, sheet.stop) + 1 or tail
     return _first_times(replace(sheet, start=line), column, _LAST_BYTES)
-
-
-def _given(said: Answers) -> list[str]:
-    """Return what the user said already, as options."""
-    told = {
-        "run": said.run,
-        "channel": said.channel,
-        "time": said.time,
-        "time-unit": said.time_unit,
-        "rate-hz": said.rate_hz,
-        "unit": said.unit,
-    }
-    return [
-        f"--{name} {_quoted(f'{v:g}' if isinstance(v, float) else str(v))}" for name, v in told.items() if v is not None
-    ]
-
-
-def _quoted(word: str) -> str:
-    return word if re.fullmatch(r"[\w.:/@%+=-]+", word) else f'"{word}"' if '"' not in word else shlex.quote(word)
 
 
 def _likely_unit(name: str) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from acquisition.block import F8
-from acquisition.errors import NeedsAnswer
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.questions import Missing, Need, Question
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.text import Text
 from acquisition.recordings.units import Measure, measure_of, unit_words
@@ -21,6 +22,7 @@ __all__ = [
     "Heading",
     "Sheet",
     "candidates",
+    "channels_apart",
     "channels_of",
     "is_time",
     "is_uncertainty",
@@ -84,7 +86,7 @@ class Sheet:
     width : int or None
         Cells that a row must have, all of them numbers; None where rows may be ragged.
     names : tuple of str
-        What each column is called, times among them, where the family tells; so that ``--time`` may name one.
+        What each column is called, times among them, where the family tells; so that a user may name one as the time.
     """
 
     text: Text
@@ -264,24 +266,22 @@ def candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
     return [each for each in fit if each.is_length] or fit
 
 
-def named(path: str, channels: Sequence[Channel], name: str, what: str = "channel") -> Channel:
+def named(path: str, channels: Sequence[Channel], name: str, what: Missing = Missing.CHANNEL) -> Channel:
     """Return the channel of a name, with or without its unit.
 
     Raises
     ------
     NeedsAnswer
-        If none, or more than one, is called so; the line lists them.
+        If none, or more than one, is called so; the question lists them.
     """
     wanted = _plain(name)
-    exact = [each for each in channels if wanted in (_plain(each.label), _plain(each.name))]
-    if len(exact) == 1:
-        return exact[0]
-    names = _names(channels)
-    if exact:
-        demand = f'{what} "{name}" is the name of {len(exact)} channels of {names}'
-        raise NeedsAnswer(path, demand, f"name the one to take with --{what}")
-    demand = f'{what} "{name}" was asked for, the file holds {names}'
-    raise NeedsAnswer(path, demand, f"name one of these with --{what}, or leave it out")
+    exact = [each for each in channels if each.name == name] or [each for each in channels if each.label == name]
+    alike = exact or [each for each in channels if wanted in (_plain(each.label), _plain(each.name))]
+    if len(alike) == 1:
+        return alike[0]
+    choices = tuple(each.name for each in channels)
+    reason = f'{what} "{name}" ' + (f"is the name of {len(alike)} columns" if alike else "is not in the file")
+    raise NeedsAnswer(Question(path, (Need(what, choices, choices[0]),), reason=reason))
 
 
 def of_run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
@@ -290,24 +290,22 @@ def of_run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
     Raises
     ------
     NeedsAnswer
-        If none, or more than one, is called so; the line lists them.
+        If none, or more than one, is called so; the question lists them.
+    FormatError
+        If the file holds one run without a name.
     """
     runs = contents.runs
-    listed = ", ".join(f'"{name}"' for name in runs)
     if run is None or run == runs[0]:
         return [each for each in contents.channels if each.run == runs[0]]
     if runs == ("",):
-        raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds one run without a name', "leave --run out")
-    called = [name for name in runs if _plain(name) == _plain(run)]
+        raise FormatError(path, f'run "{run}" is not in the file, which holds one run without a name', "leave run out")
+    called = [name for name in runs if name == run] or [name for name in runs if _plain(name) == _plain(run)]
     # "2" is enough for "Run #2".
     called = called or [name for name in runs if re.fullmatch(rf"\D*#?\s*0*{re.escape(run.strip())}", name)]
     if len(called) != 1:
-        raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds {listed}', "name one of these with --run")
+        reason = f'run "{run}" ' + (f"is the name of {len(called)} runs" if called else "is not in the file")
+        raise NeedsAnswer(Question(path, (Need(Missing.RUN, runs, runs[0]),), reason=reason))
     return [each for each in contents.channels if each.run == called[0]]
-
-
-def _names(channels: Sequence[Channel]) -> str:
-    return ", ".join(f'"{each.label}"' for each in channels)
 
 
 def _plain(name: str) -> str:
@@ -326,11 +324,22 @@ def numbered_apart(names: Sequence[str]) -> list[str]:
     ['a', 'b', 'a [2]']
     """
     seen: dict[str, int] = {}
-    apart = []
+    apart: dict[str, None] = {}
     for name in names:
         seen[name] = seen.get(name, 0) + 1
-        apart.append(name if seen[name] == 1 else f"{name} [{seen[name]}]")
-    return apart
+        while (numbered := name if seen[name] == 1 else f"{name} [{seen[name]}]") in apart:
+            seen[name] += 1  # a name of the file looks numbered
+        apart[numbered] = None
+    return list(apart)
+
+
+def channels_apart(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+    """Return channels of which no two of a run share a name, so that each can be chosen."""
+    names: dict[int, str] = {}
+    for run in dict.fromkeys(each.run for each in channels):
+        own = [each for each in channels if each.run == run]
+        names.update(zip(map(id, own), numbered_apart([each.name for each in own]), strict=True))
+    return tuple(replace(each, name=names[id(each)]) for each in channels)
 
 
 def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:

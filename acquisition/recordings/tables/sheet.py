@@ -14,7 +14,7 @@ from acquisition.recordings.sampling.samples import value_traps
 from acquisition.recordings.sampling.timing import check_rate
 from acquisition.recordings.tables.answers import Answers, measure, settle
 from acquisition.recordings.tables.channel import pull, sample
-from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet, channels_of
+from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet, channels_apart, channels_of
 from acquisition.recordings.tables.grouped import doubtful, ungrouped
 from acquisition.recordings.tables.text import head_lines, says_simulated, text_of
 from acquisition.source import Kind, SourceInfo
@@ -87,8 +87,9 @@ class ColumnFormat:
         )
 
     def _plain(self, path: str, data: bytes) -> Contents:
-        """Return what a file holds, its numbers without marks of thousands."""
+        """Return what a file holds, its numbers without marks of thousands and its channels with names of their own."""
         contents = self.contents(path, data)
+        contents = replace(contents, channels=channels_apart(contents.channels))
         sheets = {id(each.source): each.source for each in contents.channels if isinstance(each.source, Sheet)}
         plain, traps = {}, []
         for key, sheet in sheets.items():

@@ -14,10 +14,13 @@ from numpy.typing import ArrayLike
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import central_differences
+from pipeline.registry.quantities import QUANTITIES
 from pipeline.track import F8
 
 __all__ = ["FunctionLaw", "make_law"]
 
+COEFFICIENTS = frozenset({"gamma", "beta", "mu", "c", "n"})
+"""Names of estimates that are coefficients of the laws that ship, and may be those of another law too."""
 STEP_S = 1e-3  # over which the rate is a difference: its error is a third of the squared change of the amplitude
 AGREE = 1e-5  # relative; to which a law must hold what is asked of it
 PROBE_S = np.linspace(0.0, 10.0, 21)
@@ -54,7 +57,8 @@ def make_law(
     Raises
     ------
     AnalysisError
-        If the function is no law of damping, or does not have the units stated.
+        If the function is no law of damping, does not have the units stated, or has a coefficient with the name of an
+        estimate.
 
     Examples
     --------
@@ -69,6 +73,8 @@ def make_law(
     >>> print(law.rate(np.array([0.04]), np.array([0.05, 0.5])))
     [0.004]
     """
+    if taken := [each for each in parameters if each in QUANTITIES and each not in COEFFICIENTS]:
+        raise AnalysisError(f"law {name!r}: coefficient {taken[0]!r} has the name of an estimate; give it another name")
     dimensions = {each: _dimensions(each, unit) for each, unit in parameters.items()}
     law = FunctionLaw(
         name,

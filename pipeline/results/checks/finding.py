@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+
+from pipeline.registry.findings import Severity, check_finding
+from pipeline.registry.quantities import check_input
 
 __all__ = ["GRAVITY_M_PER_S2", "Checked", "Finding", "Misfit", "Severity", "by_severity"]
 
 GRAVITY_M_PER_S2 = 9.81
-
-Severity = Literal["info", "warning", "error"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,15 +20,23 @@ class Finding:
     Parameters
     ----------
     code : str
-        From the closed list of the program's findings.
+        One of :data:`pipeline.registry.findings.FINDINGS`.
     severity : {"info", "warning", "error"}
         An error means that a number of the result must not be used.
     message : str
+
+    Raises
+    ------
+    ValueError
+        If the code is not registered with this severity.
     """
 
     code: str
     severity: Severity
     message: str
+
+    def __post_init__(self) -> None:
+        check_finding(self.code, self.severity)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,11 +46,16 @@ class Misfit:
     Parameters
     ----------
     name : str
-        Of the input in every budget.
+        Of the input in every budget, one of :data:`pipeline.registry.quantities.INPUTS`.
     amplitude_m, offset_m, phase_rad, damping_rate : float
         Standard uncertainties that it adds to the estimates of these names, m, m, rad, 1/s.
     clock : float
         Relative standard uncertainty that it adds to all that is measured by the record's times.
+
+    Raises
+    ------
+    ValueError
+        If the name is not registered.
     """
 
     name: str
@@ -51,6 +64,9 @@ class Misfit:
     phase_rad: float = 0.0
     damping_rate: float = 0.0
     clock: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_input(self.name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,10 +67,13 @@ def energy_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
             _draw_parts(axes[2], analysis, *parts)
             axes[2].set_ylabel(above.get_ylabel())
         law = np.interp(curve.x_points, curve.x, curve.y)
-        deviation, scatter = 100.0 * (curve.y_points / law - 1.0), 100.0 * curve.u_points / law
-        width = 100.0 * curve.u / curve.y
-        below.fill_between(curve.x, -width, width, color=SKY, alpha=0.45, lw=0)
-        _draw_points(below, curve.x_points, deviation, scatter, None)
+        # Where friction has stopped the motion, the law leaves no energy to compare with.
+        drawn, moves = law > 0.0, curve.y > 0.0
+        deviation = 100.0 * (curve.y_points[drawn] / law[drawn] - 1.0)
+        scatter = 100.0 * curve.u_points[drawn] / law[drawn]
+        width = 100.0 * curve.u[moves] / curve.y[moves]
+        below.fill_between(curve.x[moves], -width, width, color=SKY, alpha=0.45, lw=0)
+        _draw_points(below, curve.x_points[drawn], deviation, scatter, None)
         below.axhline(0.0, color="#000000", lw=0.8)
         reach = 1.08 * max(float(np.max(np.abs(deviation) + scatter)), float(np.max(width)), 1e-6)
         below.set_ylim(-reach, reach)
@@ -83,7 +86,7 @@ def energy_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
 
 def _parts(motion: Oscillation, smoothed: Smoothed) -> tuple[F8, F8, F8]:
     """Return times in order, and the kinetic and the potential energy at each, J, or J/kg without a mass."""
-    rows = np.flatnonzero(np.isfinite(smoothed.t))
+    rows = np.flatnonzero(np.isfinite(smoothed.position))
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
     stiffness = motion.derived.half_stiffness
     assert stiffness is not None  # there is an energy

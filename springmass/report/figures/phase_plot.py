@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.quantity import SHOWN, noun
-from pipeline.track import F8, UNUSABLE
+from pipeline.track import F8, UNUSABLE, Quality
 from springmass.report.figures.canvas import (
     RASTER_POINTS,
     derivative_label,
@@ -75,7 +75,8 @@ def phase_panel(panel: Axes, analysis: Analysis) -> ScalarMappable:
     motion, track = moving(analysis), analysis.track
     unit, factor = track.unit, SHOWN[track.unit].factor
     period = 2.0 * np.pi / motion.phase.angular_frequency.value
-    first, end = motion.damping.t0, float(np.nanmax(track.t))
+    inside = (analysis.flags & Quality.OUTSIDE) == 0
+    first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
     # The map's pale end would drown in the paper.
     colours = ListedColormap(colormaps["cividis"](np.linspace(0.0, 0.88, 64)))
     scale = Normalize(first, end)

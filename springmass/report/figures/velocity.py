@@ -52,7 +52,7 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
     motion, unit = moving(analysis), analysis.track.unit
     factor = SHOWN[unit].factor
     smoothed = analysis.smoothed() if smoothed is None else smoothed
-    rows = np.flatnonzero(np.isfinite(smoothed.t))
+    rows = np.flatnonzero(np.isfinite(smoothed.position))
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
     t, velocity, u_velocity = smoothed.t[rows], smoothed.velocity[rows], smoothed.u_velocity[rows]
     start, end = float(t[0]), float(t[-1])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.block import F8
-from acquisition.recordings.families.motion_sensor.layout import Layout, ask_columns, find_layout
+from acquisition.recordings.families.motion_sensor.layout import Layout, find_layout, no_column_line
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.samples import value_traps
 from acquisition.recordings.sampling.timing import check_rate
@@ -86,7 +86,7 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
             )
             traps.append(Trap("stated_error_is_not_noise", message))
         elif stated is not None and layout.assumed:
-            raise ask_columns(path, "three columns that all vary", sheet.first_line)
+            raise no_column_line(path, "three columns that all vary", sheet.first_line)
     quantum = samples.resolution
     if not is_velocity:
         quantum, found = value_traps(samples.value, samples.flags, samples.resolution, samples.line)

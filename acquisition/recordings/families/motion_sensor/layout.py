@@ -8,11 +8,12 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.questions import Missing, Need, Question
 from acquisition.recordings.tables.contents import Sheet, is_time, name_and_unit
 from acquisition.recordings.tables.text import Text, guess_delimiter, parse_number, split_cells
 from acquisition.recordings.units import LENGTHS
 
-__all__ = ["Layout", "Quantity", "ask_columns", "evidence", "find_layout"]
+__all__ = ["Layout", "Quantity", "evidence", "find_layout", "no_column_line"]
 
 Quantity = Literal["distance", "velocity"]
 
@@ -66,9 +67,9 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
     Raises
     ------
     NeedsAnswer
-        If there is no column line and the rows do not show what they are.
+        If there is no column line above two columns and the rows do not show what they are.
     FormatError
-        If there are no rows, or ``channel`` or ``unit`` contradict the file.
+        If there are no rows, if these are other columns, or ``channel`` or ``unit`` contradict the file.
     """
     head = text.head(_HEADER_LINES + _ROWS_BELOW)
     lines = [line.text for line in head]
@@ -106,9 +107,9 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
     return layout._replace(title=title), sheet
 
 
-def ask_columns(path: str, got: str, line: int | None = None) -> NeedsAnswer:
-    """Return the error that asks for a column line."""
-    return NeedsAnswer(path, f"no column line says what the numbers are, got {got}", _REMEDY, line=line)
+def no_column_line(path: str, got: str, line: int | None = None) -> FormatError:
+    """Return the error for rows that nothing but a column line can explain."""
+    return FormatError(path, f"no column line says what the numbers are, got {got}", _REMEDY, line=line)
 
 
 def _no_rows(path: str, lines: Sequence[str], demand: str) -> FormatError:
@@ -195,7 +196,11 @@ def _by_shape(path: str, rows: Sequence[str], titled: bool, asked: Quantity | No
     columns = len(_numbers(rows[0]))
     if columns == 2 and asked:
         return Layout(asked, 2, "cm", f"{asked}, as asked for")
-    raise ask_columns(path, f"{columns} columns" + (" under the title" if titled else ""), line)
+    got = f"{columns} columns" + (" under the title" if titled else "")
+    if columns != 2:
+        raise no_column_line(path, got, line)
+    need = Need(Missing.CHANNEL, ("distance", "velocity"), "distance")
+    raise NeedsAnswer(Question(path, (need,), reason=f"no column line says what the numbers are, got {got}"), line=line)
 
 
 def _plain(unit: str) -> str:

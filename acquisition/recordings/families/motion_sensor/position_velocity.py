@@ -20,8 +20,9 @@ import numpy as np
 from acquisition.block import I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.families.motion_sensor.column import Column, read_column
-from acquisition.recordings.families.motion_sensor.layout import evidence
+from acquisition.recordings.families.motion_sensor.layout import evidence, no_column_line
 from acquisition.recordings.inspection import Survey
+from acquisition.recordings.questions import Missing
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.nominal import time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
@@ -79,10 +80,10 @@ class MotionSensor:
         (100.0, [0.165, 0.16509, 0.16565])
         """
         if run is not None:
-            raise NeedsAnswer(path, f'run "{run}" was asked for, the file holds one run', "leave --run out")
+            raise FormatError(path, f'run "{run}" is not in the file, which holds one run', "leave run out")
         if time is not None or time_unit not in (None, "s"):
             demand = f'the times of this family are its first column, in s; got "{time or time_unit}"'
-            raise NeedsAnswer(path, demand, "leave --time and --time-unit out")
+            raise FormatError(path, demand, "leave time and time_unit out")
         column = read_column(path, data, channel, rate_hz, unit)
         return _position_alone(column) if column.layout.quantity == "distance" else _velocity_alone(column)
 
@@ -96,11 +97,21 @@ class MotionSensor:
         FormatError
             If they are not one of each, differ in rate, or have no time in common.
         """
-        a, b = (read_column(path, data, None, rate_hz, None) for path, data in (position, velocity))
+        a, b = (_of_pair(path, data, rate_hz) for path, data in (position, velocity))
         if a.layout.quantity == b.layout.quantity:
             demand = f"expected a position and a velocity file, got {a.layout.quantity} in both ({a.name} too)"
             raise FormatError(b.path, demand, "name the other file of the pair")
         return _join(a, b) if a.layout.quantity == "distance" else _join(b, a)
+
+
+def _of_pair(path: str, data: bytes, rate_hz: float | None) -> Column:
+    """Read one file of a pair, of which nobody can say whether it is of position or of velocity."""
+    try:
+        return read_column(path, data, None, rate_hz, None)
+    except NeedsAnswer as asked:
+        if Missing.CHANNEL in asked.question.missing:
+            raise no_column_line(path, "two columns in a file of a pair", asked.line) from None
+        raise
 
 
 FORMAT = MotionSensor()

@@ -270,16 +270,18 @@ def test_correlated_parameters_count_together() -> None:
     """x + y of two parameters with correlation -1/2 has u = 1 where u(x) = u(y) = 1, and one line in the budget."""
     inputs = Inputs()
     joint = Joint(("x", "y"), np.array([1.0, 2.0]), np.array([[1.0, -0.5], [-0.5, 1.0]]), ("m", "m"))
-    x, y = inputs.add_joint("fit", joint, "A")
+    x, y = inputs.add_joint("damping_law", joint, "A")
     budget = inputs.budget("sum", x + y, "m")
     assert budget.estimate.u == pytest.approx(1.0)
-    assert [(c.name, c.kind, c.input, c.sensitivity) for c in budget.contributions] == [("fit", "A", None, None)]
+    assert [(c.name, c.kind, c.input, c.sensitivity) for c in budget.contributions] == [
+        ("damping_law", "A", None, None)
+    ]
 
 
 def test_exact_inputs_leave_an_empty_budget() -> None:
     """What has no uncertainty is exact, and so is what is made of it."""
     inputs = Inputs()
-    x = inputs.add("length", Estimate(2.0, 0.0, "m"), "B")
+    x = inputs.add("disc_diameter", Estimate(2.0, 0.0, "m"), "B")
     budget = inputs.budget("area", x**2, "m^2")
     assert (budget.estimate, budget.contributions) == (Estimate(4.0, 0.0, "m^2"), ())
     assert budget.u_of("B") == 0.0
@@ -295,16 +297,16 @@ def test_impossible_uncertainties_are_refused(u: float) -> None:
 def test_one_name_is_one_input() -> None:
     """Two inputs of one name would hide each other in the table."""
     inputs = Inputs()
-    inputs.add("mass", Estimate(0.2, 1e-4), "B")
-    with pytest.raises(ValueError, match="'mass' is there already"):
-        inputs.add("mass", Estimate(0.3, 1e-4), "B")
+    inputs.add("bob_mass", Estimate(0.2, 1e-4), "B")
+    with pytest.raises(ValueError, match="'bob_mass' is there already"):
+        inputs.add("bob_mass", Estimate(0.3, 1e-4), "B")
 
 
 def test_parameters_fitted_together_are_the_packages_correlated_values() -> None:
     """Their sums and differences have the uncertainties that correlated_values gives, with an exact one among them."""
     covariance = np.array([[4e-10, -3e-9, 0.0], [-3e-9, 9e-8, 0.0], [0.0, 0.0, 0.0]])
     joint = Joint(("A0", "gamma", "mu"), np.array([0.05, 0.01, 0.0]), covariance, ("m", "1/s", "m/s"))
-    ours = Inputs().add_joint("law", joint, "A")
+    ours = Inputs().add_joint("damping_law", joint, "A")
     theirs = correlated_values(joint.values, covariance)
     for weights in ([1.0, 0.0, 0.0], [0.0, 1.0, 2.0], [3.0, 0.5, -1.0], [1.0, -1.0, 0.0]):
         mine, other = (sum(w * x for w, x in zip(weights, some, strict=True)) for some in (ours, theirs))
@@ -317,7 +319,7 @@ def test_parameters_that_determine_each_other_count_once() -> None:
     u = np.array([1e-6, 2e3, 0.5])
     sign = np.array([1.0, -1.0, 1.0])
     x, y, z = Inputs().add_joint(
-        "law", Joint(("x", "y", "z"), np.ones(3), np.outer(sign * u, sign * u), ("",) * 3), "A"
+        "damping_law", Joint(("x", "y", "z"), np.ones(3), np.outer(sign * u, sign * u), ("",) * 3), "A"
     )
     for one, expected in ((x, u[0]), (y, u[1]), (z, u[2])):
         assert one.std_dev == pytest.approx(expected, rel=1e-12)
@@ -329,7 +331,7 @@ def test_parameters_that_determine_each_other_count_once() -> None:
 def test_degrees_of_freedom_of_the_guides_example() -> None:
     """JCGM 100, G.4.1: a product of three means of 10, 5 and 15 observations, 0.25, 0.57 and 0.82 %, has 19.0."""
     inputs = Inputs()
-    share = {"a": (0.0025, 9), "b": (0.0057, 4), "c": (0.0082, 14)}
+    share = {"bob_mass": (0.0025, 9), "disc_diameter": (0.0057, 4), "noise": (0.0082, 14)}
     product = math.prod(inputs.add(name, Estimate(1.0, u), "A", dof) for name, (u, dof) in share.items())
     budget = inputs.budget("product", product, "")
     assert budget.estimate.u == pytest.approx(0.0103, rel=2e-3)
@@ -343,7 +345,7 @@ def test_degrees_of_freedom_of_the_guides_example() -> None:
 def test_coverage_factors_are_those_of_ea_4_02(dof: float, factor: float) -> None:
     """Student's t for 95.45 %, table E.1 there."""
     inputs = Inputs()
-    x = inputs.add("x", Estimate(1.0, 0.1), "A", dof)
+    x = inputs.add("noise", Estimate(1.0, 0.1), "A", dof)
     assert inputs.budget("x", x, "").coverage_factor == pytest.approx(factor, abs=0.005)
 
 

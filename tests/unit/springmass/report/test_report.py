@@ -21,12 +21,13 @@ import pytest
 from pipeline.analyse import Analysis, Oscillation, Overdamped, Still, analyse
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
+from pipeline.registry.quantities import INPUTS
 from pipeline.results.checks.finding import Finding
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import UNITS, UNUSABLE, Track
 from springmass.report.advice import ADVICE, LAW_CODES
-from springmass.report.budgets import INPUTS, budget_csv, budget_text, budgets_of, correlations_of
+from springmass.report.budgets import budget_csv, budget_text, budgets_of, correlations_of
 from springmass.report.figures import comparison_figure, draw, motion_figure, render
 from springmass.report.figures.inline import inline_svg
 from springmass.report.html import render_html
@@ -404,7 +405,7 @@ def test_budget_tables_hold_every_input() -> None:
     page, tex = html.unescape(page_of(run_of(damped()))), budget_tex(["50%"], [damped()])
     for row in budgets_of(damped()):
         assert row.rest + sum(c.share for c in row.contributions) == pytest.approx(1.0)
-        assert all(INPUTS[c.name] in page and INPUTS[c.name] in tex for c in row.contributions)
+        assert all(INPUTS[c.name].label in page and INPUTS[c.name].label in tex for c in row.contributions)
     plain = re.sub(r"\\[\\{}%_#&$]", "", tex)
     assert plain.count("{") == plain.count("}")
     lines = [line for line in tex.splitlines() if line.endswith(r"\\") and r"\caption" not in line]

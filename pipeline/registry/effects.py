@@ -1,0 +1,37 @@
+"""The effects that the table of effects can list, with their labels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+__all__ = ["EFFECTS", "check_effect"]
+
+EFFECTS: Mapping[str, str] = {
+    "spring_mass": "mass of the spring",
+    "added_mass": "air that the disc carries along",
+    "disc_drag": "drag of the disc",
+    "bob_drag": "drag of the bob",
+    "viscous_drag": "viscous drag",
+    "quadratic_drag": "quadratic drag",
+    "friction": "dry friction",
+    "amplitude_dependent_frequency": "frequency that depends on the amplitude",
+    "rest_drift": "drift of the rest position",
+    "sideways_mode": "sideways mode",
+    "harmonics": "harmonics",
+    "buoyancy": "buoyancy",
+    "speed_of_sound": "speed of sound",
+    "temperature": "air temperature",
+    "clock_rate": "rate of the clock",
+}
+
+
+def check_effect(name: str) -> None:
+    """Refuse an effect that is not in the list.
+
+    Raises
+    ------
+    ValueError
+        If the name is not registered.
+    """
+    if name not in EFFECTS:
+        raise ValueError(f"effect {name!r} is not registered in pipeline.registry.effects")

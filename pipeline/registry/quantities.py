@@ -1,0 +1,172 @@
+"""Estimates and the inputs of their uncertainty budgets: label, symbols and unit of each, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pipeline.numerics.quantity import in_unit
+
+__all__ = ["INPUTS", "QUANTITIES", "Input", "Quantity", "check_input", "check_quantity"]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """An estimate.
+
+    Parameters
+    ----------
+    name : str
+        In JSON, tables of numbers and Python.
+    label : str
+        In words.
+    symbol, page_symbol, tex_symbol : str
+        In ASCII, in Unicode (an index stands after a space) and as the inside of ``$...$``.
+    unit : str
+        SI unit; where ``of_record``, that for a recorded length, which other recorded quantities replace.
+    of_record : bool
+        Whether the unit depends on what was recorded.
+    in_table : bool
+        Whether Table 1 shows it.
+    """
+
+    name: str
+    label: str
+    symbol: str
+    page_symbol: str
+    tex_symbol: str
+    unit: str
+    of_record: bool = False
+    in_table: bool = True
+
+    def unit_in(self, record_unit: str) -> str:
+        """Return the unit of the estimate in a run recorded in ``record_unit``.
+
+        Examples
+        --------
+        >>> QUANTITIES["beta"].unit_in("m"), QUANTITIES["beta"].unit_in("V"), QUANTITIES["period"].unit_in("V")
+        ('1/(m s)', '1/(V s)', 's')
+        """
+        return in_unit(self.unit, record_unit) if self.of_record else self.unit
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """An input of an uncertainty budget.
+
+    Parameters
+    ----------
+    label : str
+        In words.
+    symbol : str
+        In ASCII; "" where the input is a group of parameters or a possible error without a symbol.
+    unit : str
+        As :attr:`Quantity.unit`; "" for a ratio or a group.
+    of_record : bool
+        Whether the unit depends on what was recorded.
+    """
+
+    label: str
+    symbol: str = ""
+    unit: str = ""
+    of_record: bool = False
+
+
+_QUANTITIES = (
+    Quantity("period", "period", "T", "T", "T", "s"),
+    Quantity("first_mode_period", "period of the first mode", "T_1", "T 1", "T_1", "s"),
+    Quantity("second_mode_period", "period of the second mode", "T_2", "T 2", "T_2", "s"),
+    Quantity("first_mode_amplitude", "amplitude of the first mode", "A_1", "A 1", "A_1", "m", of_record=True),
+    Quantity("second_mode_amplitude", "amplitude of the second mode", "A_2", "A 2", "A_2", "m", of_record=True),
+    Quantity("frequency", "frequency", "f", "f", "f", "Hz"),
+    Quantity("angular_frequency", "angular frequency", "omega", "ω", r"\omega", "rad/s"),
+    Quantity("spring_constant", "spring constant", "k", "k", "k", "N/m"),
+    Quantity("amplitude", "amplitude at the start", "A0", "A₀", "A_0", "m", of_record=True),
+    Quantity("displacement_amplitude", "amplitude of the displacement", "x0", "x₀", "x_0", "m"),
+    Quantity("angle_amplitude", "amplitude of the angle", "theta0", "θ₀", r"\theta_0", "rad"),
+    Quantity("phase", "phase at the start", "phi0", "φ₀", r"\varphi_0", "rad", in_table=False),
+    Quantity("offset", "rest position", "y0", "y₀", "y_0", "m", of_record=True),
+    Quantity("noise", "noise of one sample", "sigma", "σ", r"\sigma", "m", of_record=True),
+    Quantity("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda", "1/s"),
+    Quantity("relaxation_rate", "relaxation rate", "r", "r", "r", "1/s"),
+    Quantity("relaxation_rate_slow", "slow relaxation rate", "r_1", "r 1", "r_1", "1/s"),
+    Quantity("relaxation_rate_fast", "fast relaxation rate", "r_2", "r 2", "r_2", "1/s"),
+    Quantity("quality_factor", "quality factor", "Q", "Q", "Q", ""),
+    # Of whatever moves: an angle's is in rad/s, whether the angle or its rate was recorded.
+    Quantity("velocity_rms", "velocity, root mean square", "v_rms", "v rms", r"v_\mathrm{rms}", "m/s"),
+    Quantity("reynolds_number", "Reynolds number", "Re", "Re", r"\mathit{Re}", ""),
+    Quantity("keulegan_carpenter_number", "Keulegan-Carpenter number", "KC", "KC", r"\mathit{KC}", ""),
+    Quantity("drag_coefficient", "drag coefficient", "C_d", "C d", r"C_\mathrm{d}", ""),
+    Quantity("gamma", "linear damping", "gamma", "γ", r"\gamma", "1/s"),
+    Quantity("beta", "quadratic damping", "beta", "β", r"\beta", "1/(m s)", of_record=True),
+    Quantity("mu", "dry friction", "mu", "μ", r"\mu", "m/s", of_record=True),
+    Quantity("c", "drag by a power of the amplitude", "c", "c", "c", "m^(1-n)/s", of_record=True),
+    Quantity("n", "that power", "n", "n", "n", ""),
+)
+QUANTITIES: Mapping[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
+"""Every estimate by name, in the order of Table 1."""
+
+INPUTS: Mapping[str, Input] = {
+    # Estimated from the recording.
+    "angular_frequency": Input("scatter of the phases", "omega", "rad/s"),
+    "phase": Input("scatter of the phases", "phi0", "rad"),
+    "rest_position": Input("scatter of the rest position", "y0", "m", of_record=True),
+    "noise": Input("scatter of the samples", "sigma", "m", of_record=True),
+    "damping_law": Input("scatter of the amplitudes"),
+    "choice_of_law": Input("choice among admissible laws"),
+    # Stated in the scene, or a property of the instrument.
+    "clock_rate": Input("rate of the clock", "r"),
+    "bob_mass": Input("mass of the bob", "m", "kg"),
+    "spring_mass": Input("mass of the spring", "m_s", "kg"),
+    "unstated_spring_mass": Input("mass of the spring, not stated", "m_s", "kg"),
+    "disc_diameter": Input("diameter of the disc", "D", "m"),
+    "air_temperature": Input("air temperature", "t", "degC"),
+    "air_pressure": Input("air pressure", "p", "Pa"),
+    "relative_humidity": Input("relative humidity", "h"),
+    "density_formula": Input("formula of the air's density"),
+    "viscosity_formula": Input("formula of the air's viscosity"),
+    "speed_of_sound_formula": Input("formula of the speed of sound"),
+    "recorded_speed_of_sound": Input("speed of sound of the record"),
+    "calibrated_scale": Input("calibration of the scale"),
+    "sensor_zero": Input("calibration of the zero", "z", "m", of_record=True),
+    "sensor_mean_samples": Input("running mean of the sensor"),
+    "sensor_median_samples": Input("running median of the sensor"),
+    "sensor_median_cut": Input("crests cut by a running median"),
+    "sensor_lag": Input("lag of the sensor", "tau", "s"),
+    # What the recording contradicts in its own model.
+    "model_misfit": Input("what differs from a sinusoid in every period"),
+    "choice_of_fit": Input("fit of windows against fit of the whole waveform"),
+    "held_samples": Input("distances held by the sensor"),
+    "sensor_smoothing": Input("smoothing by the sensor"),
+    "modulation": Input("a second oscillation that beats slowly"),
+    "rows_lost": Input("rows that are missing"),
+    "rows_doubled": Input("rows that repeat the one before"),
+    "mains_hum": Input("hum of the mains"),
+    "implausible_motion": Input("motion that no bob on a spring makes"),
+    "implausible_distance": Input("distances that no sensor measures"),
+}
+"""Every input of :mod:`pipeline.results.derive` by name."""
+
+
+def check_quantity(name: str) -> None:
+    """Refuse an estimate that is not in the list.
+
+    Raises
+    ------
+    ValueError
+        If the name is not registered.
+    """
+    if name not in QUANTITIES:
+        raise ValueError(f"estimate {name!r} is not registered in pipeline.registry.quantities")
+
+
+def check_input(name: str) -> None:
+    """Refuse an input of a budget that is not in the list.
+
+    Raises
+    ------
+    ValueError
+        If the name is not registered.
+    """
+    if name not in INPUTS:
+        raise ValueError(f"budget input {name!r} is not registered in pipeline.registry.quantities")

@@ -1,0 +1,111 @@
+"""What a recording leaves out is asked as the command that was typed, and the line that is suggested works."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springmass.runs.loading import sample_data
+
+Cli = Callable[..., Any]
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    """Return a table in a folder with a blank in its name: channel and unit of a decaying oscillation are missing."""
+    folder = tmp_path / "my runs"
+    folder.mkdir()
+    t = np.arange(1200) / 50
+    noise = np.random.default_rng(1).normal(0, 1e-4, (2, t.size))
+    x, y = 0.2 + 0.05 * np.exp(-0.02 * t) * np.cos(8.3 * t + np.array([[0.0], [1.0]])) + noise
+    path = folder / "run.csv"
+    rows = "".join(f"{a:.2f},{b:.5f},{c:.5f}\n" for a, b, c in zip(t, x, y, strict=True))
+    path.write_text("t,height of bob,y\n" + rows, encoding="utf-8")
+    return path
+
+
+SCENE = str(sample_data() / "damped.scene.toml")
+COMMANDS = {
+    "analyse": ["analyse", "FILE", "--no-report"],
+    "analyse with a scene": ["analyse", "--scene", SCENE, "FILE", "--json"],
+    "a channel that is not there": ["analyse", "FILE", "--json", "--channel=z"],
+    "an abbreviation": ["analyse", "FILE", "--json", "--chan", "z"],
+    "convert": ["convert", "FILE", "OUT", "--overwrite"],
+    "replay": ["replay", "FILE", "--speed", "max"],
+    "compare": ["compare", "FILE", "FILE", "--scene", SCENE, "--json"],
+    "simulate": ["simulate", "--scene", SCENE, "--against", "FILE", "--json"],
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_line_that_is_suggested_does_what_was_asked(cli: Cli, table: Path, tmp_path: Path, name: str) -> None:
+    """It is the line that was typed, every option of it, with what is missing at its end."""
+    places = {"FILE": str(table), "OUT": str(tmp_path / "out.h5")}
+    typed = [places.get(word, word) for word in COMMANDS[name]]
+    done = cli(*typed)
+    assert (done.code, done.out) == (3, "")
+    program, *suggested = shlex.split(done.complaint[done.complaint.index("? springmass ") + 2 :])
+    refused = {"--channel=z", "--chan", "z"}
+    assert program == "springmass"
+    assert suggested == [
+        *(word for word in typed if word not in refused),
+        *("--channel", "height of bob"),
+        *([] if refused & {*typed} else ["--unit", "m"]),
+    ]
+    # The unit of a channel that was not there is asked next.
+    unit = ["--unit", "m"] if refused & {*typed} else []
+    assert cli(*suggested, *unit).code == 0
+
+
+def test_each_of_several_inputs_is_asked_for_alone(cli: Cli, table: Path) -> None:
+    """An answer for one file may be wrong for another: the line names the one that asks."""
+    done = cli("analyse", table, sample_data() / "damped_simulated_position.txt", "--json", "--unit", "cm")
+    (line,) = (line for line in done.err.splitlines() if "? " in line)
+    assert line.endswith(f'? springmass analyse "{table}" --unit cm --channel "height of bob"')
+
+
+def test_formats_gives_the_question_as_data(cli: Cli, table: Path) -> None:
+    """JSON holds what is missing, every choice and an example."""
+    (facts,) = cli("formats", table, "--json").results
+    channel, unit = facts["question"]
+    assert (channel["what"], channel["choices"], unit["what"]) == ("channel", ["height of bob", "y"], "unit")
+    assert facts["needs"].count("--channel") == 1
+    assert "question" not in cli("formats", table).out
+
+
+def test_a_course_is_asked_for_columns_of_its_table(cli: Cli, table: Path, tmp_path: Path) -> None:
+    """The row that failed says which columns of the table of runs would answer."""
+    done = cli("batch", table, "-o", tmp_path / "course")
+    assert "fill in channel, unit in the table of runs" in done.err
+    assert "springmass analyse" not in done.err
+
+
+def test_the_folder_of_sample_data_can_be_analysed(cli: Cli) -> None:
+    """JSON that describes recordings is listed as other files, whatever lists are in it; every recording is there."""
+    done = cli("analyse", sample_data(), "--json")
+    assert done.code == 0
+    assert len(done.results) == 5
+    assert "5 recordings" in done.err
+    assert "damped_simulated.truth.json" in done.err
+    listed = {row["file"]: row for row in cli("formats", sample_data(), "--json").results}
+    assert listed["damped_simulated.truth.json"]["family"] == ""
+    assert "times" in listed["damped_simulated.truth.json"]["error"]
+
+
+def test_json_with_times_is_a_recording_in_a_folder(cli: Cli, tmp_path: Path) -> None:
+    """Only JSON that states no times describes others."""
+    t = np.arange(1200) / 50
+    x = 0.2 + 0.05 * np.cos(8.3 * t) + np.random.default_rng(1).normal(0, 1e-4, t.size)
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    lists = {"time (s)": t.round(2).tolist(), "height (m)": x.round(5).tolist()}
+    (folder / "run.json").write_text(json.dumps(lists), encoding="utf-8")
+    (folder / "run.truth.json").write_text(json.dumps({"rows": list(range(500))}), encoding="utf-8")
+    done = cli("analyse", folder, "--json")
+    assert (done.code, len(done.results)) == (0, 1)

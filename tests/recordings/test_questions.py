@@ -1,0 +1,48 @@
+"""What real recordings leave out: every run and channel that a question lists can be chosen, and nothing else asks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition.errors import FormatError, NeedsAnswer, UnknownFormat
+from acquisition.recordings.identify import open_recording
+from acquisition.recordings.questions import Missing
+
+
+def walk(path: Path, answers: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Answer one question after the other, with all runs and channels; yield the answers, and why they are refused."""
+    try:
+        open_recording(path, **answers)
+    except NeedsAnswer as asked:
+        need = asked.question.needs[0]
+        assert need.what.value not in answers, f"{asked} asked again"
+        assert len(set(need.choices)) == len(need.choices)
+        for choice in need.choices if need.what in (Missing.RUN, Missing.CHANNEL) else (need.example,):
+            yield from walk(path, {**answers, need.what.value: choice})
+    except FormatError as error:
+        yield answers, str(error)
+    else:
+        yield answers, ""
+
+
+def test_every_channel_of_every_real_recording_can_be_chosen(recordings: Path) -> None:
+    """All are read by the names that the question lists; only channels of NaN are refused, and files that are none."""
+    read, refused = 0, {}
+    for path in sorted(each for each in recordings.rglob("*") if each.is_file() and each.suffix != ".md"):
+        for answers, why in walk(path, {}):
+            read += not why
+            if why:
+                refused[path.name, answers.get("channel")] = why
+    assert read > 100
+    empty = {key: why for key, why in refused.items() if "got NaN" in why}
+    assert {name for name, _ in refused.keys() - empty.keys()} == {"kafe2_pendulum.yml"}
+
+
+def test_yaml_of_a_peer_is_refused_by_its_name(recordings: Path) -> None:
+    """Its lists of x and y stand below each other and were read as one channel."""
+    with pytest.raises(UnknownFormat, match="YAML"):
+        open_recording(recordings / "peers" / "kafe2_pendulum.yml")

@@ -1,0 +1,169 @@
+"""What a recording leaves out is asked as data: every choice can be taken, and nobody has to read the sentence."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition.errors import FormatError, NeedsAnswer, UnknownFormat
+from acquisition.recordings.identify import get_format, open_recording
+from acquisition.recordings.questions import Missing, Need, Question
+from acquisition.recordings.recording import Recording
+
+T = [i / 20 for i in range(60)]
+THREE = "\n".join(f"{t},{0.5 + i % 4},{0.25 + i % 3},{0.75 + i % 5}" for i, t in enumerate(T)) + "\n"
+
+FILES = {
+    "units": "t,x,y,z\n" + THREE,
+    "names alike": "t (s),x (m),x (m),x (m)\n" + THREE,
+    "a name that looks numbered": "t (s),x (m),x [2] (m),x (m)\n" + THREE,
+    "names of one letter": "t (s),X (m),x (m),z (m)\n" + THREE,
+    "no times": "x,y,z,a\n" + "\n".join(f"{i % 4}.5,{i % 3}.5,{i % 5}.5,{i % 6}.5" for i in range(60)) + "\n",
+    "ticks": "time (ticks),x (m)\n" + "\n".join(f"{50 * i},{0.5 + i % 4}" for i in range(60)) + "\n",
+    "a unit that nobody knows": "t (s),B (uT)\n" + "\n".join(f"{t},{0.5 + i % 4}" for i, t in enumerate(T)) + "\n",
+    "runs": '"Position (mm) Run #1";"Position (mm) Run #2"\n' + "".join(f"{i % 7},5;{i % 5},5\n" for i in range(60)),
+    "two columns of MotionSensor.vi": "Motion Sensor Data File\n" + "".join(f"{t}\t{i % 7}\n" for i, t in enumerate(T)),
+}
+
+
+def walk(path: Path, answers: dict[str, Any]) -> Iterator[Recording]:
+    """Answer one question after the other, with all runs and channels that are listed; yield what is read."""
+    assert len(answers) <= len(Missing)
+    try:
+        recording = open_recording(path, **answers)
+    except NeedsAnswer as asked:
+        need = asked.question.needs[0]
+        assert need.what.value not in answers
+        choices = need.choices if need.what in (Missing.RUN, Missing.CHANNEL) else (need.example,)
+        assert need.example in choices
+        for choice in choices:
+            yield from walk(path, {**answers, need.what.value: choice})
+    else:
+        yield recording
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_choice_of_a_question_can_be_taken(tmp_path: Path, name: str) -> None:
+    """Each listed run and channel opens by the name listed, as samples of its own."""
+    path = tmp_path / "run.txt"
+    path.write_text(FILES[name], encoding="utf-8")
+    with pytest.raises(NeedsAnswer) as asked:
+        open_recording(path)
+    recordings = list(walk(path, {}))
+    first = asked.value.question.needs[0]
+    choices = len(first.choices) if first.what in (Missing.RUN, Missing.CHANNEL) else 1
+    assert len(recordings) >= choices
+    assert len({each.samples.distance.tobytes() for each in recordings}) == len(recordings)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_all_examples_together_answer_a_question(tmp_path: Path, name: str) -> None:
+    """Nothing is left to be asked once they are given."""
+    path = tmp_path / "run.txt"
+    path.write_text(FILES[name], encoding="utf-8")
+    with pytest.raises(NeedsAnswer) as asked:
+        open_recording(path)
+    answers: dict[str, Any] = asked.value.question.examples
+    assert len(open_recording(path, **answers).samples) == 60
+
+
+def test_a_question_lists_what_the_file_holds(tmp_path: Path) -> None:
+    """Columns, times, channels, units and the column of times that would do in place of a rate are there as data."""
+    path = tmp_path / "run.txt"
+    path.write_text(FILES["units"], encoding="utf-8")
+    with pytest.raises(NeedsAnswer) as asked:
+        open_recording(path)
+    question = asked.value.question
+    channel, unit = question.needs
+    assert (question.path, question.columns) == (str(path), ("x", "y", "z"))
+    assert (channel.what, channel.choices, channel.example) == (Missing.CHANNEL, ("x", "y", "z"), "x")
+    assert (unit.what, unit.of, unit.example) == (Missing.UNIT, "x", "m")
+    assert {"m", "rad", "V", "1"} < set(unit.choices)
+    path.write_text(FILES["no times"], encoding="utf-8")
+    with pytest.raises(NeedsAnswer) as asked:
+        open_recording(path, channel="x", unit="m")
+    (rate,) = asked.value.question.needs
+    assert rate.what is Missing.RATE_HZ
+    assert rate.instead is not None
+    assert (rate.instead.what, rate.instead.choices) == (Missing.TIME, ("y", "z", "a"))
+
+
+def test_an_answer_that_fits_nothing_is_asked_again(tmp_path: Path) -> None:
+    """A channel, a run and a column of times that are not there list those that are."""
+    path = tmp_path / "run.txt"
+    path.write_text(FILES["units"], encoding="utf-8")
+    for what, given in ((Missing.CHANNEL, {"channel": "w"}), (Missing.TIME, {"channel": "x", "time": "w"})):
+        with pytest.raises(NeedsAnswer) as asked:
+            open_recording(path, **given)
+        assert asked.value.question.missing == (what,)
+        assert "y" in asked.value.question.needs[0].choices
+    path.write_text(FILES["runs"], encoding="utf-8")
+    with pytest.raises(NeedsAnswer) as asked:
+        open_recording(path, run="7")
+    assert asked.value.question.needs[0].choices == ("Run #1", "Run #2")
+
+
+def test_what_no_answer_helps_is_refused_and_not_asked() -> None:
+    """Three columns that all vary, a run of a file that holds one, and a rate below zero are errors, no questions."""
+    varied = "".join(f"{t}\t{i % 7}\t{i % 5}\n" for i, t in enumerate(T))
+    rows = "Time (s)\tDistance (cm)\n" + "".join(f"{t}\t{i % 7}\n" for i, t in enumerate(T))
+    pair = "Motion Sensor Data File\n" + "".join(f"{t}\t{i % 7}\n" for i, t in enumerate(T))
+    reader: Any = get_format("motion-sensor")
+    calls = (
+        lambda: reader.read("a.txt", f"Motion Sensor Data File\n{varied}".encode()),
+        lambda: reader.read("a.txt", rows.encode(), run="2"),
+        lambda: reader.read("a.txt", rows.encode(), time="t"),
+        lambda: reader.read("a.txt", rows.encode(), rate_hz=-1.0),
+        lambda: reader.read_pair(("a.txt", rows.encode()), ("b.txt", pair.encode())),
+    )
+    for call in calls:
+        with pytest.raises(FormatError) as refused:
+            call()
+        assert not isinstance(refused.value, NeedsAnswer)
+
+
+def test_the_sentence_knows_no_shell(tmp_path: Path) -> None:
+    """A reader does not know who asked: no option and no name of a program stands in its message."""
+    path = tmp_path / "run.txt"
+    for text in FILES.values():
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(NeedsAnswer) as asked:
+            open_recording(path)
+        words = str(asked.value)
+        assert "\n" not in words
+        assert " --" not in words
+        assert "springmass" not in words
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        FormatError("run.txt", "expected rows", "export it again", line=3),
+        UnknownFormat("run.txt", "expected rows", "export it again"),
+        NeedsAnswer(Question("run.txt", (Need(Missing.RUN, ("a", "b"), "a"),), ("x",)), line=2),
+        NeedsAnswer(Question("run.txt", (Need(Missing.UNIT, ("m",), "m", of="x"),)), "give the unit"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_errors_of_files_travel_between_processes(error: FormatError) -> None:
+    """Message, type and fields are the same on the other side."""
+    error.add_note("of the third file")
+    back = pickle.loads(pickle.dumps(error))
+    assert type(back) is type(error)
+    assert str(back) == str(error)
+    assert vars(back) == vars(error)
+
+
+def test_yaml_is_refused_by_its_name(tmp_path: Path) -> None:
+    """Lists below each other would be strung together as one channel; a list in line with its key is a column."""
+    path = tmp_path / "run.yml"
+    items = "".join(f"- {t}\n" for t in T)
+    path.write_text(f"type: xy\nx_data:\n{items}y_data:\n{items}", encoding="utf-8")
+    with pytest.raises(UnknownFormat, match="YAML"):
+        open_recording(path)
+    path.write_text(f"t: {T}\nx: {[0.5 + i % 4 for i in range(60)]}\n", encoding="utf-8")
+    assert len(open_recording(path, unit="m").samples) == 60
