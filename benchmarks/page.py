@@ -207,7 +207,7 @@ def floor(seconds: float) -> float:
     """Return the share of a core of a server that does nothing but send samples to one viewer at the page's pace."""
     from websockets.sync.client import connect
 
-    from springmass.page.server import TURN_S
+    from springmass.page.web.server import TURN_S
 
     size = 16 + 16 * round(100 * TURN_S)
     command = [sys.executable, "-c", BARE, str(TURN_S), str(size)]

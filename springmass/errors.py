@@ -61,6 +61,10 @@ class ProgramError(Exception):
         super().__init__(message)
         self.exit_code = exit_code
 
+    def __reduce__(self) -> tuple[type[ProgramError], tuple[str, int]]:
+        """Return how it is made again where it arrives from another process."""
+        return type(self), (str(self), self.exit_code)
+
 
 def complain(message: object) -> None:
     """Write one line to stderr, also where a file's name or a library's message breaks over several."""

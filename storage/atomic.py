@@ -24,7 +24,7 @@ if sys.platform != "win32":
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["remove_leftovers", "sync_folder", "whole_file", "whole_h5", "write_whole", "writing_h5"]
+__all__ = ["remove_leftovers", "sync_folder", "whole_file", "whole_h5", "write_whole", "writing", "writing_h5"]
 
 # Some network and FUSE file systems cannot sync a folder, and Windows cannot even open one.
 _FOLDER_CANNOT_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EBADF}
@@ -62,11 +62,8 @@ def write_whole(path: str | os.PathLike[str], data: bytes | str, *, overwrite: b
     '{}'
     """
     content = data.encode() if isinstance(data, str) else data
-    with whole_file(path, overwrite=overwrite) as temporary:
-        try:
-            temporary.write_bytes(content)
-        except OSError as error:
-            raise _failed(Path(path), error) from error
+    with whole_file(path, overwrite=overwrite) as temporary, writing(path):
+        temporary.write_bytes(content)
     return Path(path)
 
 
@@ -106,12 +103,10 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
     temporary, lock = _reserve(target)
     try:
         yield temporary
-        try:
+        with writing(target):
             _sync(temporary)
             _place(temporary, target, overwrite=overwrite)
             sync_folder(target.parent)
-        except OSError as error:
-            raise _failed(target, error) from error
     finally:
         # After a rename nothing is left to remove.
         with contextlib.suppress(OSError):
@@ -165,6 +160,15 @@ def whole_h5(
                 file.close()
         if sink.error is not None:
             raise _failed(Path(path), sink.error) from sink.error
+
+
+@contextlib.contextmanager
+def writing(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Turn what the system raises where a file or a folder cannot be written into :class:`WriteFailed`."""
+    try:
+        yield
+    except OSError as error:
+        raise _failed(Path(path), error) from error
 
 
 @contextlib.contextmanager
@@ -262,10 +266,8 @@ def _reserve(target: Path) -> tuple[Path, int | None]:
     while True:
         # The name is cut, so that a target of the longest allowed name still gets a temporary one.
         temporary = target.with_name(f".{target.name[:32]}.{secrets.token_hex(4)}.part")
-        try:
+        with writing(target):
             descriptor = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
-        except OSError as error:
-            raise _failed(target, error) from error
         if sys.platform == "win32":
             os.close(descriptor)
             return temporary, None

@@ -34,7 +34,11 @@ class ValueRefused(ValueError):
     """
 
     def __init__(self, key: str, allowed: str, value: object) -> None:
-        super().__init__(f"{key} must be {allowed}, got {_short(value)}")
+        super().__init__(key, allowed, value)
+
+    def __str__(self) -> str:
+        key, allowed, value = self.args
+        return f"{key} must be {allowed}, got {_short(value)}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ import contextlib
 import os
 import re
 from collections.abc import Iterator
+from typing import Any
 
 __all__ = [
     "HDF5_ERRORS",
@@ -76,6 +77,10 @@ class StorageError(Exception):
     def __init__(self, path: str | os.PathLike[str], demand: str, remedy: str) -> None:
         self.path, self.demand, self.remedy = os.fspath(path), demand, remedy
         super().__init__(f"{self.path}: {demand}; {remedy}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how it is made again where it arrives from another process."""
+        return type(self), (self.path, self.demand, self.remedy)
 
 
 class NotARun(StorageError):

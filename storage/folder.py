@@ -7,6 +7,7 @@ folder, which also puts the old one back where the kill fell between the two ren
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import os
 import secrets
@@ -54,6 +55,8 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
     """
     target = Path(path).resolve()
     with _told(path):
+        if target.exists() and not target.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "a file of that name stands there")
         target.parent.mkdir(parents=True, exist_ok=True)
         _tidy(target)
         part = _beside(target, "part")

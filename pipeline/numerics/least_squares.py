@@ -92,6 +92,9 @@ class _NoDerivativeError(ArithmeticError):
         super().__init__(f"no finite derivative at {_shown(theta)}")
         self.theta = theta
 
+    def __reduce__(self) -> tuple[type[_NoDerivativeError], tuple[F8]]:
+        return type(self), (self.theta,)
+
 
 def minimise(
     residuals: Callable[[F8], F8],

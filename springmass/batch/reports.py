@@ -7,14 +7,19 @@ import heapq
 import os
 import re
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from acquisition.errors import visible
 from springmass.batch.plan import Job, job_of
 from springmass.batch.store import Store
-from springmass.errors import UNREADABLE, USAGE, ProgramError
+from springmass.errors import UNREADABLE, USAGE, ProgramError, internal_error
+from storage.atomic import writing
+from storage.errors import WriteFailed, one_line
 
 __all__ = ["REPORTS", "find_run", "jobs_of", "linked", "need_of", "report_name", "worst", "write_one", "write_reports"]
 
@@ -52,27 +57,72 @@ def linked(folder: Path) -> set[str]:
     return {page.parent.name for page in (folder / REPORTS).glob("*.results/report.html")}
 
 
-def write_reports(folder: Path, chosen: Sequence[tuple[str, Job]], jobs: int | None) -> None:
+def write_reports(folder: Path, chosen: Sequence[tuple[str, Job]], jobs: int | None) -> dict[str, str]:
     """Write the reports of these runs, take away those of others that an earlier pass wrote.
 
     A report that is there is written again: its run may have changed.
+
+    Returns
+    -------
+    dict of str to str
+        By the name of its folder, why a report could not be written or taken away; the others stand.
     """
-    wanted = {report_name(run) for run, _ in chosen}
-    for name in sorted(linked(folder) - wanted):
-        shutil.rmtree(folder / REPORTS / name)
-    if not chosen:
-        return
-    (folder / REPORTS).mkdir(exist_ok=True)
     tasks = [(run, job, folder / REPORTS / report_name(run)) for run, job in chosen]
+    failed: dict[str, str] = {}
+    for name in sorted(linked(folder) - {place.name for _, _, place in tasks}):
+        try:
+            with writing(folder / REPORTS / name):
+                shutil.rmtree(folder / REPORTS / name)
+        except WriteFailed as error:
+            failed[name] = str(error)
     from springmass.runs.processes import cores, pool
 
     processes = min(jobs or cores(), len(tasks))
-    if processes == 1:
-        for task in tasks:
-            write_one(*task)
-        return
-    with pool(processes) as workers:
-        list(workers.map(write_one, *zip(*tasks, strict=True)))
+    if processes <= 1:
+        outcomes: list[str | None] = [_attempt(*task) for task in tasks]
+    else:
+        with pool(processes) as workers:
+            outcomes = list(_each(workers, tasks))
+    for (run, job, place), outcome in zip(tasks, outcomes, strict=True):
+        # A process that ends takes the whole pool with it: this report gets a process of its own.
+        if outcome is None:
+            with pool(1) as worker:
+                (outcome,) = _each(worker, [(run, job, place)])
+        if outcome is None:
+            outcome = f"{place}: its process was ended from outside, for lack of memory perhaps; run batch again"
+        if outcome:
+            failed[place.name] = outcome
+    return failed
+
+
+def _each(workers: ProcessPoolExecutor, tasks: Sequence[tuple[str, Job, Path]]) -> Iterator[str | None]:
+    """Yield of each task why it failed, empty where it did not, and None where its process ended."""
+    futures: list[Future[str] | None] = []
+    for task in tasks:
+        try:
+            futures.append(workers.submit(_attempt, *task))
+        except BrokenProcessPool:
+            futures.append(None)
+    for future in futures:
+        try:
+            yield None if future is None else future.result()
+        except BrokenProcessPool:
+            yield None
+
+
+def _attempt(run: str, job: Job, folder: Path) -> str:
+    """Write the report of a run; return in one line why it cannot be written, or nothing."""
+    try:
+        write_one(run, job, folder)
+    except (ProgramError, WriteFailed) as error:
+        return str(error)
+    except OSError as error:
+        return f"{folder}: no report could be written ({one_line(error)}); run batch again"
+    except MemoryError:
+        return f"{folder}: more memory was demanded than there is; end other programs, or use fewer processes"
+    except Exception as error:  # a defect costs this report, and not those of the other runs
+        return f"{folder}: {internal_error(error)}"
+    return ""
 
 
 def write_one(run: str, job: Job, folder: Path) -> Path:
@@ -119,7 +169,8 @@ def find_run(store: Store, names: Mapping[str, Job], run: str) -> tuple[str, Job
     from difflib import get_close_matches
 
     for name, job in names.items():
-        if run in (name, job.path) or os.path.abspath(run) == os.path.abspath(job.whole(job.path)):
+        # The table shows a name with its control characters as escapes, and so it may come back.
+        if run in (name, job.path, visible(name)) or os.path.abspath(run) == os.path.abspath(job.whole(job.path)):
             return name, job
     near = get_close_matches(run, names, n=1)
     hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(list(names)[:5])} ..."

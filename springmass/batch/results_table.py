@@ -11,9 +11,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from acquisition.errors import visible
 from springmass.batch.rows import COLUMNS, NUMBERS, WHOLE, columns_of
 from springmass.errors import USAGE, ProgramError
-from storage.atomic import whole_file
+from storage.atomic import whole_file, writing
 
 __all__ = ["CSV", "PARQUET", "is_course", "read_rows", "table_of", "tags_in", "text_of", "write_tables"]
 
@@ -27,15 +28,21 @@ def write_tables(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence
     """Write the table as CSV in UTF-8 and, where pyarrow is installed, as Parquet: the same bytes for the same rows.
 
     In the CSV numbers keep all their digits, and what is not known is empty.
+
+    Raises
+    ------
+    storage.errors.WriteFailed
+        If one of them cannot be written; the earlier one stands then.
     """
     try:
         import pyarrow as pa
         import pyarrow.parquet as pq
     except ImportError:
         pa = pq = None
-        (folder / PARQUET).unlink(missing_ok=True)  # one of an earlier pass would tell other numbers
+        with writing(folder / PARQUET):
+            (folder / PARQUET).unlink(missing_ok=True)  # one of an earlier pass would state other numbers
     columns = columns_of(tags)
-    with contextlib.ExitStack() as stack:
+    with writing(folder / CSV), contextlib.ExitStack() as stack:
         temporary = stack.enter_context(whole_file(folder / CSV))
         text = csv.writer(stack.enter_context(temporary.open("w", encoding="utf-8", newline="")), lineterminator="\n")
         text.writerow(columns)
@@ -52,10 +59,11 @@ def write_tables(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence
 
 
 def _cell(value: Any) -> Any:
-    if value is None:
-        return ""
+    if not isinstance(value, str):
+        return "" if value is None else value
+    shown = visible(value)
     # A name that begins as a formula does would be one in a spreadsheet.
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+    return f"'{shown}" if shown.startswith(_FORMULA) else shown
 
 
 def _type(name: str, pa: Any) -> Any:
@@ -132,6 +140,6 @@ def text_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
     """Return some columns of rows as CSV text."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(columns)
+    writer.writerow(map(_cell, columns))
     writer.writerows([_cell(row[name]) for name in columns] for row in rows)
     return out.getvalue()

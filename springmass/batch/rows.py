@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from acquisition.errors import visible
 from pipeline.bench.scene import PLACES
 
 __all__ = [
@@ -84,6 +85,9 @@ def dumped(value: object) -> str:
 def flat(row: Mapping[str, Any], run: str, tags: Sequence[str]) -> dict[str, Any]:
     """Return a row of the table by column: text, whole numbers, numbers, None where there is nothing.
 
+    In text from outside control characters and marks of direction, and halves of characters that a file's name may
+    hold, stand as escapes.
+
     Parameters
     ----------
     row : mapping
@@ -97,11 +101,11 @@ def flat(row: Mapping[str, Any], run: str, tags: Sequence[str]) -> dict[str, Any
     for name, (value, u) in {**row["estimates"], **row["scene"]}.items():
         found[name], found[f"{name}_u"] = value, u
     found.update(row["quality"])
-    for name in DETAILS:
-        found[name] = dumped(row[name]) if row[name] else None
-    # Half a character, which a file's name may hold, has no place in a table.
+    messages = [[severity, visible(message)] for severity, message in row["messages"]]
+    for name, value in {**{name: row[name] for name in DETAILS}, "messages": messages}.items():
+        found[name] = dumped(value) if value else None
     return {name: _text(found.get(name, row.get(name))) for name in columns_of(tags)}
 
 
 def _text(value: Any) -> Any:
-    return value.encode("utf-8", "backslashreplace").decode() if isinstance(value, str) else value
+    return visible(value) if isinstance(value, str) else value

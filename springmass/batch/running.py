@@ -21,6 +21,8 @@ from springmass.batch.store import Store
 from springmass.batch.worker import unchanged
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.processes import cores
+from storage.atomic import writing
+from storage.errors import WriteFailed
 
 __all__ = ["LOG", "Options", "Outcome", "make", "run_pass"]
 
@@ -63,6 +65,8 @@ class Outcome:
         In the pass, unchanged, analysed.
     failures : list of str
         One line a run that gave no period.
+    unwritten : list of str
+        One line a report, or the log, that could not be written.
     made : bool
         Whether tables and page were written, and not as they stand.
     """
@@ -71,6 +75,7 @@ class Outcome:
     kept: int = 0
     done: int = 0
     failures: list[str] = field(default_factory=list)
+    unwritten: list[str] = field(default_factory=list)
     made: bool = False
 
 
@@ -94,6 +99,11 @@ def run_pass(
     options : Options
     told : callable, optional
         Of rows that were just made, how many there are by now and how many there will be.
+
+    Raises
+    ------
+    storage.errors.WriteFailed
+        If rows, tables or the page cannot be written. The rows that were written before stay.
     """
     jobs = shard_of(plan.jobs, options.shard)
     todo, touched = [], []
@@ -110,7 +120,7 @@ def run_pass(
     outcome.kept = len(jobs) - len(todo)
     if touched:
         store.add(touched)
-    _log(folder, f"{_words(options)}: {len(jobs)} runs, {outcome.kept} unchanged")
+    _log(folder, f"{_words(options)}: {len(jobs)} runs, {outcome.kept} unchanged", outcome)
     if todo:
         store.unmark()
     began = time.monotonic()
@@ -123,10 +133,10 @@ def run_pass(
         outcome.failures += [row["error"] for row in rows if row["status"] in FAILED]
         if told is not None:
             told(rows, outcome.done, len(todo))
-    _log(folder, f"{outcome.done} runs analysed in {time.monotonic() - began:.1f} s")
+    _log(folder, f"{outcome.done} runs analysed in {time.monotonic() - began:.1f} s", outcome)
     if options.shard is None:
-        outcome.made = make(plan, store, folder, reports=options.reports, jobs=options.jobs)
-        _log(folder, "tables and page written" if outcome.made else "tables and page stand")
+        make(plan, store, folder, outcome, reports=options.reports, jobs=options.jobs)
+        _log(folder, "tables and page written" if outcome.made else "tables and page stand", outcome)
     return outcome
 
 
@@ -147,10 +157,11 @@ def _engine(todo: Sequence[Job], options: Options) -> Iterator[list[dict[str, An
     return here(todo) if processes == 1 or len(todo) <= FEW else by_processes(todo, processes)
 
 
-def make(plan: Plan, store: Store, folder: Path, *, reports: int, jobs: int | None) -> bool:
-    """Make of the rows one file, the tables, the reports and the page; False where they stand already.
+def make(plan: Plan, store: Store, folder: Path, outcome: Outcome, *, reports: int, jobs: int | None) -> None:
+    """Make of the rows one file, the tables, the reports and the page, unless they stand already.
 
-    The order is that of the paths, so that it does not matter in which order rows came.
+    The order is that of the paths, so that it does not matter in which order rows came. A report that cannot be
+    written is missing on the page, and the next pass makes all of this again.
     """
     names = names_of(plan.jobs)
     made_of = {
@@ -163,7 +174,7 @@ def make(plan: Plan, store: Store, folder: Path, *, reports: int, jobs: int | No
     }  # fmt: skip
     outputs = (CSV, PAGE, *((PARQUET,) if _parquet() else ()))
     if store.marked() == made_of and all((folder / name).is_file() for name in outputs):
-        return False
+        return
     store.unmark()
 
     def kept() -> Iterator[dict[str, Any]]:
@@ -182,10 +193,13 @@ def make(plan: Plan, store: Store, folder: Path, *, reports: int, jobs: int | No
 
     write_tables(folder, rows(), plan.tags)
     chosen = worst(needs, reports)
-    write_reports(folder, [(name, job) for name, job in zip(names, plan.jobs, strict=True) if name in chosen], jobs)
-    write_page(folder, lines, plan.tags, linked(folder))
-    store.mark(made_of)
-    return True
+    drawn = [(name, job) for name, job in zip(names, plan.jobs, strict=True) if name in chosen]
+    failed = write_reports(folder, drawn, jobs)
+    write_page(folder, lines, plan.tags, linked(folder) - failed.keys())
+    if not failed:
+        store.mark(made_of)
+    outcome.unwritten += failed.values()
+    outcome.made = True
 
 
 def _parquet() -> bool:
@@ -206,7 +220,11 @@ def _words(options: Options) -> str:
     return f"{part}, process {os.getpid()}"
 
 
-def _log(folder: Path, line: str) -> None:
+def _log(folder: Path, line: str, outcome: Outcome) -> None:
     """Append a line with the time of day to the log, the one file of a course that has such."""
-    with (folder / LOG).open("a", encoding="utf-8") as log:
-        log.write(f"{datetime.now(UTC).isoformat(timespec='seconds')} {line}\n")
+    try:
+        with writing(folder / LOG), (folder / LOG).open("a", encoding="utf-8") as log:
+            log.write(f"{datetime.now(UTC).isoformat(timespec='seconds')} {line}\n")
+    except WriteFailed as error:
+        if str(error) not in outcome.unwritten:
+            outcome.unwritten.append(str(error))

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from springmass.batch.rows import dumped
 from springmass.errors import USAGE, ProgramError
-from storage.atomic import remove_leftovers, whole_file, write_whole
+from storage.atomic import remove_leftovers, whole_file, write_whole, writing
 
 if sys.platform != "win32":
     import fcntl
@@ -64,11 +64,14 @@ class Store:
         ProgramError
             With exit code 2 if another pass is at work there.
         """
-        self.parts.mkdir(parents=True, exist_ok=True)
+        with writing(self.parts):
+            self.parts.mkdir(parents=True, exist_ok=True)
         if sys.platform == "win32":  # nothing holds two passes apart
             yield
             return
-        with (self.parts / _LOCK).open("ab") as lock:
+        with writing(self.parts / _LOCK):
+            file = (self.parts / _LOCK).open("ab")
+        with file as lock:
             wanted = fcntl.LOCK_EX if how == "alone" else fcntl.LOCK_SH
             try:
                 fcntl.flock(lock, wanted | fcntl.LOCK_NB)
@@ -125,7 +128,7 @@ class Store:
         """
         whole, offset = self.parts / WHOLE, 0
         places: dict[str, list[_Place]] = {}
-        with whole_file(whole) as temporary, temporary.open("wb") as file:
+        with whole_file(whole) as temporary, writing(whole), temporary.open("wb") as file:
             for row in rows:
                 line = _line(row)
                 file.write(line)
@@ -135,7 +138,8 @@ class Store:
         self._places = places
         for path in self._files():
             if path != whole:
-                path.unlink(missing_ok=True)
+                with writing(path):
+                    path.unlink(missing_ok=True)
 
     def mark(self, told: Mapping[str, Any]) -> None:
         """Say that all was made of this; before it changes, it is to be taken away by :meth:`unmark`."""
@@ -143,7 +147,8 @@ class Store:
 
     def unmark(self) -> None:
         """Say that not all may be made."""
-        (self.parts / MARK).unlink(missing_ok=True)
+        with writing(self.parts / MARK):
+            (self.parts / MARK).unlink(missing_ok=True)
 
     def marked(self) -> Mapping[str, Any] | None:
         """Return what all was made of, None where it may not be."""

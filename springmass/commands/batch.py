@@ -19,6 +19,7 @@ from springmass.batch.store import Store
 from springmass.commands import completions
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, suggest, tell
 from springmass.runs.analysing import make_folder
+from springmass.terminal.printing import visible_lines
 
 __all__ = ["run"]
 
@@ -32,7 +33,9 @@ def run(options: argparse.Namespace) -> int:
         raise ProgramError("recordings, folders or --runs FILE were demanded, got none of them", USAGE)
     if options.template:
         jobs = plan(options.input).jobs
-        print(template([job.path for job in jobs]), end="")
+        table = template([job.path for job in jobs])
+        # A file gets the paths as they are, for they are read from it again.
+        print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))
         return OK
     if options.output is None:
         raise ProgramError("a folder for the results was demanded; name it with -o DIR", USAGE)
@@ -64,6 +67,8 @@ def run(options: argparse.Namespace) -> int:
         )
         with _Progress(quiet=options.quiet) as progress:
             outcome = run_pass(course, store, folder, how, told=progress)
+    for line in outcome.unwritten:
+        complain(line)
     failed = len(outcome.failures)
     tell(f"{outcome.runs} runs: {outcome.kept} unchanged, {outcome.done} analysed, {failed} failed")
     if options.shard is None:
@@ -71,9 +76,9 @@ def run(options: argparse.Namespace) -> int:
         suggest(f"open {folder / PAGE} in a browser")
     else:
         suggest("the same command without --shard, when all shards have ended, puts them together")
-    if not failed:
-        return OK
-    return UNREADABLE if failed == outcome.runs else SOME_FAILED
+    if failed and failed == outcome.runs:
+        return UNREADABLE
+    return SOME_FAILED if failed or outcome.unwritten else OK
 
 
 class _Progress:

@@ -68,6 +68,7 @@ def run(options: argparse.Namespace) -> int:
 def _run_courses(options: argparse.Namespace) -> int:
     from springmass.batch.benches import compare_rows, compared_json, compared_text
     from springmass.batch.search import search
+    from springmass.terminal.printing import visible_lines
 
     if options.out is not None or options.scene:
         raise ProgramError("--out and --scene go with single runs; a course has its page and its scenes", USAGE)
@@ -79,11 +80,6 @@ def _run_courses(options: argparse.Namespace) -> int:
     for suspect in found.suspects[:1]:
         suggest(f"springmass report {shlex.join([*options.input[:1], suspect.name])}")
     return OK
-
-
-def visible_lines(text: str) -> str:
-    """Return text whose names may hold control characters, lines kept."""
-    return "\n".join(map(visible, text.splitlines()))
 
 
 def _print_text(compared: Compared, runs: list[Analysed]) -> None:

@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import springmass
+from acquisition.errors import visible
 from springmass.errors import OK, SOME_FAILED, suggest
 
 __all__ = ["Check", "examine", "foreign_packages", "run"]
@@ -55,9 +56,9 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps([asdict(check) for check in checks]))
     else:
         for check in checks:
-            print(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:<24} {check.found}")
+            print(visible(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:<24} {check.found}"))
             if not check.ok:
-                print(f"      {check.remedy}")
+                print(visible(f"      {check.remedy}"))
     if all(check.ok for check in checks):
         suggest("springmass demo")
     return OK if all(check.ok for check in checks) else SOME_FAILED

@@ -11,6 +11,7 @@ import subprocess
 from acquisition.clock import SystemClock
 from acquisition.decoders.family import Identity
 from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
+from acquisition.errors import visible
 from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
 from springmass.errors import OK, SENSOR, USAGE, ProgramError, suggest, tell
@@ -35,9 +36,13 @@ def run(options: argparse.Namespace) -> int:
         _show()
         return OK
     identity = _converse(options.port, commands)
-    print(f"{options.port}: {identity}{settings_of(identity)}")
+    print(visible(f"{options.port}: {identity}{settings_of(identity)}"))
     if outdated(identity):
-        print(f"{VERSION} comes with this program; `springmass firmware --port {options.port} --flash` updates it")
+        print(
+            visible(
+                f"{VERSION} comes with this program; `springmass firmware --port {options.port} --flash` updates it"
+            )
+        )
     else:
         suggest(f"springmass record --port {shlex.quote(options.port)} --page")
     return OK

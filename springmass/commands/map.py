@@ -23,6 +23,7 @@ def run(options: argparse.Namespace) -> int:
     """Draw the map of every run for which an expression holds; write it as SVG and PDF, its numbers as CSV."""
     from springmass.report.figures.canvas import save
     from springmass.report.figures.drag_map import DragRun, drag_map_figure
+    from springmass.report.tables import cell
     from storage.atomic import write_whole
 
     found = search(options.input, where=options.where).rows
@@ -36,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
             continue
         label = row.get("disc") or f"{1e3 * row['disc_diameter_m']:.4g} mm"
         runs.append(DragRun(label, np.array(points)))
-        table.writerows([row["run"], label, *point] for point in points)
+        table.writerows([cell(row["run"]), cell(label), *point] for point in points)
     if not any((one.points[:, 2] > 0).any() for one in runs):
         demand = "a run with a drag coefficient was demanded"
         raise ProgramError(

@@ -15,8 +15,9 @@ from springmass.commands import load_for
 from springmass.errors import OK, USAGE, ProgramError, tell
 from springmass.page.desk import Desk
 from springmass.page.feeds import view_of
-from springmass.page.server import Opening, serve
-from springmass.page.sharing import address_in_network, code_for_terminal
+from springmass.page.web.log_lines import log_to_stderr
+from springmass.page.web.server import Opening, serve
+from springmass.page.web.sharing import address_in_network, code_for_terminal
 from springmass.runs.loading import kind_of
 
 __all__ = ["run"]
@@ -36,7 +37,8 @@ def run(options: argparse.Namespace) -> int:
         _look_at(desk, path, options)
     opening.opened = _ready(options, opening)
     try:
-        serve(desk, opening, until=over.is_set)
+        with log_to_stderr():
+            serve(desk, opening, until=over.is_set)
     except KeyboardInterrupt:
         tell("the page is closed")
     except OSError as error:

@@ -11,7 +11,7 @@ from typing import Any
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import describe_bytes, probe
-from acquisition.errors import PortError
+from acquisition.errors import PortError, visible
 from acquisition.live.serial_port import SerialPort, list_ports
 from springmass.errors import OK, SENSOR, ProgramError, suggest, tell
 
@@ -31,9 +31,9 @@ def run(options: argparse.Namespace) -> int:
     if not rows:
         print("no serial port on this machine; `springmass record --simulate SCENE.toml` runs without one")
     for row in rows:
-        print(f"{row['device']:<16} {row['description']}")
+        print(visible(f"{row['device']:<16} {row['description']}"))
         if row["heard"] is not None:
-            print(f"{'':<16} {row['heard']}")
+            print(visible(f"{'':<16} {row['heard']}"))
     known = [row["device"] for row in rows if row["families"]]
     suggest(f"springmass record --port {shlex.quote(known[0])}" if known else "springmass record --simulate SCENE.toml")
     return OK

@@ -6,6 +6,7 @@ import argparse
 import shlex
 from pathlib import Path
 
+from acquisition.errors import visible
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 
 __all__ = ["run"]
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
             raise ProgramError("--check looks at a scene file alone; leave the rest out", USAGE)
         scene = read_scene(options.check)
         ask_about(scene, options.check)
-        print(f"{options.check}: a scene that states {stated_keys(scene)}")
+        print(visible(f"{options.check}: a scene that states {stated_keys(scene)}"))
         suggest(f"springmass analyse RECORDING --scene {shlex.quote(options.check)}")
         return OK
     if options.input is None:

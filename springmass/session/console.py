@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import TextIO
 
 from acquisition.clock import Clock
+from acquisition.errors import visible
 
 __all__ = ["Console"]
 
@@ -60,8 +61,8 @@ class Console:
             return 80
 
     def line(self, text: str) -> None:
-        """Write a line, also where a file's name breaks over several."""
-        self.write(" ".join(text.splitlines()) + "\n")
+        """Write a line, also where a file's name breaks over several, control characters in it made visible."""
+        self.write(visible(" ".join(text.splitlines())) + "\n")
 
     def write(self, text: str, patience_s: float | None = None) -> None:
         """Write text as it is; within that time, left out within what is left of a second for all lines."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from storage.errors import one_line
 
-__all__ = ["Failures"]
+__all__ = ["Failures", "raised_at"]
 
 KINDS = 20
 """So many different failures are told apart; the texts of those beyond are not kept, their number is."""
@@ -33,7 +33,7 @@ class Failures:
 
     def note(self, what: str, error: BaseException) -> None:
         """Count a failure of the display, a decoder, the reader or the like."""
-        where = _where(error)
+        where = raised_at(error)
         name = f"{what}: {type(error).__name__} at {where}"
         with self._lock:
             known = name in self._counts
@@ -56,7 +56,7 @@ class Failures:
             yield f"beside the recording, which went on, {count} time{'s' * (count > 1)}: {name}"
 
 
-def _where(error: BaseException) -> str:
-    """File and line that raised it, with no folder of this machine."""
+def raised_at(error: BaseException) -> str:
+    """Return file and line that raised an error, with no folder of this machine."""
     frames = traceback.extract_tb(error.__traceback__)
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else "nowhere"

@@ -12,7 +12,15 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
 
-__all__ = ["classic_text", "comparison_text", "findings_text", "fitted", "shared_findings_text", "wrapped"]
+__all__ = [
+    "classic_text",
+    "comparison_text",
+    "findings_text",
+    "fitted",
+    "shared_findings_text",
+    "visible_lines",
+    "wrapped",
+]
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
 STANDING = ("nominal_clock", "stated_error_is_not_noise", "jittered_time", "offset_unknown", "velocity_missing")
@@ -114,3 +122,8 @@ def wrapped(text: str, indent: str = "") -> str:
 def fitted(text: str, width: int) -> str:
     """Return lines broken between words where they are wider than a terminal."""
     return "\n".join(textwrap.fill(line, width, subsequent_indent="    ") for line in text.splitlines())
+
+
+def visible_lines(text: str) -> str:
+    """Return text from outside with its control characters visible, lines kept."""
+    return "\n".join(map(visible, text.splitlines()))

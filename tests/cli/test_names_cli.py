@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import shutil
 import sys
@@ -14,9 +15,12 @@ import pytest
 
 from acquisition.errors import visible
 from springmass.report.tables import cell
+from tests.courses import short_course
 
 Cli = Callable[..., Any]
 ESCAPE = "a\x1b[2J\x07\u202egnp"
+TITLE = "a\x1b]0;b\x07\u202egnp"
+"""Sets a terminal's title; without a bracket, which makes a path of a table a pattern."""
 
 
 def texts_of(folder: Path) -> dict[str, str]:
@@ -107,3 +111,65 @@ def test_a_name_that_is_no_text_is_a_name(cli: Cli, recording: Path, tmp_path: P
     (results,) = (tmp_path / "out").iterdir()
     assert "\\udcff" in (results / "results.json").read_text("utf-8")
     assert "\\udcff" in (results / "report.html").read_text("utf-8")
+
+
+def test_a_course_shows_no_escapes(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of names of files and tags: in the table, the page, the catalog, the comparison and the lines of each command."""
+    monkeypatch.chdir(tmp_path)
+    short_course(Path("runs"), 3)
+    for number in range(3):
+        Path(f"runs/run{number:03d}.txt").rename(f"runs/{TITLE}{number}.txt")
+    with Path("runs.csv").open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["path", "group", "spring"])
+        table.writerows(
+            [f"runs/{TITLE}{number}.txt", f"one\u202e\x9b{number % 2}", f"\x1b[2J{number}"] for number in range(3)
+        )
+    course = ["batch", "--runs", "runs.csv", "-o", "out", "--jobs", "1", "--reports", "1", "--accuracy", "fast"]
+    for arguments in (
+        course,
+        [*course, "--rehash"],
+        ["catalog", "out"],
+        ["catalog", "out", "--columns", "run,group,spring,path,messages"],
+        ["catalog", "out", "--json"],
+        ["compare", "out"],
+        ["compare", "out", "--bench", "group"],
+        ["report", "out", f"{visible(TITLE)}1"],
+    ):
+        done = cli(*arguments)
+        assert done.code == 0, done.err
+        assert (done.out + done.err).replace("\n", "").isprintable(), arguments
+    with Path("out/results.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["run"] for row in rows] == [visible(f"{TITLE}{number}") for number in range(3)]
+    assert {row["group"] for row in rows} == {"one\\u202e\\x9b0", "one\\u202e\\x9b1"}
+    for row in rows:
+        assert "".join(row.values()).isprintable()
+        assert json.loads(row["findings"] or "[]") is not None
+        assert json.loads(row["messages"] or "[]") is not None
+    assert [c for c in Path("out/index.html").read_text("utf-8") if not c.isprintable() and c not in "\n\u00a0"] == []
+
+
+def test_a_table_made_by_hand_shows_no_escapes(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A name that somebody wrote into the table of a course comes out of the catalog visible."""
+    monkeypatch.chdir(tmp_path)
+    short_course(Path("runs"), 1)
+    assert cli("batch", "runs", "-o", "out", "--jobs", "1", "--reports", "0", "--accuracy", "fast").code == 0
+    Path("out/results.parquet").unlink(missing_ok=True)
+    text = Path("out/results.csv").read_text("utf-8")
+    Path("out/results.csv").write_text(text.replace("run000,", f"{ESCAPE},", 1), "utf-8")
+    done = cli("catalog", "out")
+    assert done.code == 0, done.err
+    assert visible(ESCAPE) in done.out
+    assert (done.out + done.err).replace("\n", "").isprintable()
+
+
+def test_the_last_lines_of_a_recording_show_no_escapes(cli: Cli, tmp_path: Path) -> None:
+    """Of its name, which the lines on what was built and what to do next repeat, and those of a recovery."""
+    scene = tmp_path / "bench.toml"
+    scene.write_text("[bob]\nmass_kg = 0.2\n[spring]\nconstant_n_per_m = 14.0\n[start]\ndisplacement_m = 0.05\n")
+    run = tmp_path / f"{ESCAPE}.h5"
+    done = cli("record", "--simulate", scene, "--seconds", "1", "--title", ESCAPE, "-o", run)
+    assert done.code == 0, done.err
+    assert visible(run.name) in done.err
+    assert (done.out + done.err).replace("\n", "").replace("\r", "").isprintable()

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from springmass.page.security import Gate
+from springmass.page.web.security import Gate
 
 
 class Served:

@@ -95,7 +95,7 @@ class Gate:
         if _name(f"//{host}") not in self._hosts:
             return "this page answers to the addresses that springmass printed alone"
         origin = headers.get(b"origin")
-        if (origin is not None or scope["type"] == "websocket") and urlsplit(origin or "").netloc != host:
+        if (origin is not None or scope["type"] == "websocket") and _netloc(origin or "") != host:
             return "this page answers to its own address alone"
         return None
 
@@ -130,6 +130,14 @@ class Gate:
 
 def _same(given: str, wanted: str) -> bool:
     return hmac.compare_digest(given.encode(), wanted.encode())
+
+
+def _netloc(address: str) -> str:
+    """Return host and port of an address; empty where it is none."""
+    try:
+        return urlsplit(address).netloc
+    except ValueError:
+        return ""
 
 
 def _name(address: str) -> str:

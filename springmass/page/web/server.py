@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import logging
 import math
 import socket
 from collections.abc import Callable, Mapping
@@ -12,9 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from springmass.page.desk import Desk
-from springmass.page.security import ROLE, Gate
-from springmass.page.sharing import code_svg
 from springmass.page.view import View, json_of
+from springmass.page.web.bounds import bounded_protocol, most_connections
+from springmass.page.web.security import ROLE, Gate
+from springmass.page.web.sharing import code_svg
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
@@ -22,7 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Opening", "application", "serve"]
 
-STATIC = Path(__file__).parent / "static"
+LOG = logging.getLogger("springmass.page")
+STATIC = Path(__file__).parents[1] / "static"
 TURN_S = 0.0225
 """Between two looks at the log: little longer than a screen's frame, and 40 ms from the sample to the screen."""
 MANY, EVERY = 4, 4
@@ -51,7 +55,7 @@ class Opening:
     network : str
         This computer's address in the local network, for viewers; empty: for nobody but this computer.
     secret, used
-        As of :class:`springmass.page.security.Gate`.
+        As of :class:`springmass.page.web.security.Gate`.
     opened : callable
         Takes the port, the address to open (None where it was used before), and that for viewers: the page answers.
     was_used : callable
@@ -77,7 +81,6 @@ def application(desk: Desk, share: Callable[[], str] = lambda: "", polled: Calla
     polled : callable
         Called after every look at the log, with how many look at the page.
     """
-    import contextlib
     from collections.abc import AsyncIterator
 
     from starlette.applications import Starlette
@@ -136,6 +139,14 @@ class _Server:
         Texts and frames are made once for all who look. A timer's callback and no task that sleeps: that would wake
         twice a turn.
         """
+        self._next = asyncio.get_running_loop().call_later(TURN_S, self.look)
+        try:
+            self._update()
+        except Exception:  # a defect: the next turn may be without it
+            LOG.exception("the page could not be brought up to date")
+        self._polled(self._viewers)
+
+    def _update(self) -> None:
         desk = self._desk
         desk.poll()
         if desk.watcher is not None:
@@ -149,8 +160,6 @@ class _Server:
         if self._viewers <= MANY or self._turn % EVERY == 0:
             turned, self._turned = self._turned, asyncio.Event()
             turned.set()
-        self._polled(self._viewers)
-        self._next = asyncio.get_running_loop().call_later(TURN_S, self.look)
 
     def close(self) -> None:
         """Look no more."""
@@ -158,23 +167,56 @@ class _Server:
             self._next.cancel()
 
     async def attend(self, socket_: WebSocket) -> None:
-        """Serve one browser: what it has not seen yet is taken from the view whenever it has taken the last."""
+        """Serve one browser until it leaves, or close its connection with a code.
+
+        What it has not seen yet is taken from the view whenever it has taken the last. The codes: 1003 for a message
+        that it may not send, 1011 for a defect of the page, 1013 where too many look.
+        """
         from starlette.websockets import WebSocketDisconnect
 
-        if self._viewers >= MOST_VIEWERS:
-            await socket_.close(1013)
-            return
-        await socket_.accept()
+        with contextlib.suppress(WebSocketDisconnect):
+            if self._viewers >= MOST_VIEWERS:
+                _log(socket_, "more than %d viewers; the newest is closed", MOST_VIEWERS)
+                await socket_.close(1013)
+                return
+            await socket_.accept()
+            error = await self._converse(socket_)
+            if isinstance(error, _Refused):
+                _log(socket_, f"{error}; its connection is closed with 1003")
+                await socket_.close(1003)
+            elif error is not None:
+                _log(socket_, "a defect of the page; its connection is closed with 1011", error=error)
+                await socket_.close(1011)
+
+    async def _converse(self, socket_: WebSocket) -> Exception | None:
+        """Send and receive until the browser leaves; return what else ended it. Raises WebSocketDisconnect."""
+        from starlette.websockets import WebSocketDisconnect
+
         self._viewers += 1
-        sending = asyncio.create_task(self._send(socket_))
+        tasks = [asyncio.create_task(each(socket_)) for each in (self._receive, self._send)]
         try:
-            while True:
-                await self._take(socket_, await socket_.receive_text())
-        except WebSocketDisconnect:
-            pass  # the browser went; there is nothing to keep of it
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._viewers -= 1
-            sending.cancel()
+            for task in tasks:
+                task.cancel()
+            received, sent = await asyncio.gather(*tasks, return_exceptions=True)
+        ended = sent if isinstance(received, asyncio.CancelledError) else received
+        if isinstance(ended, WebSocketDisconnect):
+            raise ended
+        return ended if isinstance(ended, Exception) else None
+
+    async def _receive(self, socket_: WebSocket) -> None:
+        from starlette.websockets import WebSocketDisconnect
+
+        while True:
+            message = await socket_.receive()
+            if message["type"] == "websocket.disconnect":
+                raise WebSocketDisconnect(message.get("code", 1005))
+            text = message.get("text")
+            if text is None:
+                raise _Refused("a binary message")
+            await self._take(socket_, text)
 
     async def _send(self, socket_: WebSocket) -> None:
         view: View | None = None
@@ -208,29 +250,32 @@ class _Server:
         return {**view.hello(controls=controls), "role": role, "share": share}
 
     async def _take(self, socket_: WebSocket, text: str) -> None:
-        """Do what a browser asks for; what it may not ask for closes the connection."""
+        """Do what a browser asks for.
+
+        Raises
+        ------
+        _Refused
+            If it may not ask for it.
+        """
         try:
             asked = json.loads(text)
-            if asked["type"] == "region":
-                low, high = _number(asked, "from"), _number(asked, "to")
-                watcher = self._desk.watcher
-                if watcher is not None:
-                    await socket_.send_text(await asyncio.to_thread(watcher.region, low, high))
-            elif socket_.scope[ROLE] == "controller":
-                self._act(asked)
-            else:
-                raise ValueError(text)
-        except (ValueError, KeyError, TypeError, AttributeError):
-            await socket_.close(1003)
+            kind = str(asked["type"])
+            low, high = (_number(asked, "from"), _number(asked, "to")) if kind == "region" else (0.0, 0.0)
+            checked = {} if kind == "region" else _checked(kind, asked)
+        # Also an integer of thousands of digits, and lists in lists in lists.
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+            raise _Refused("a message that is none of the page's") from error
+        if kind == "region":
+            if (watcher := self._desk.watcher) is not None:
+                await socket_.send_text(await asyncio.to_thread(watcher.region, low, high))
+        elif socket_.scope[ROLE] == "controller":
+            self._act(kind, checked)
+        else:
+            raise _Refused("a command of a viewer")
 
-    def _act(self, asked: Mapping[str, Any]) -> None:
+    def _act(self, kind: str, checked: Mapping[str, Any]) -> None:
         """Hand on what may be asked now; what may be asked at another time is passed over: the page shows the state."""
-        kind, desk = str(asked["type"]), self._desk
-        if kind not in KINDS:
-            raise ValueError(kind)
-        checked: dict[str, Any] = {"type": kind}
-        for name in KINDS[kind]:
-            checked[name] = _text(asked) if name == "text" else _number(asked, name)
+        desk = self._desk
         if not desk.may(kind):
             return
         if desk.after is None:
@@ -260,6 +305,23 @@ KINDS: dict[str, tuple[str, ...]] = {
     "close": (),
 }
 """What the controller may ask for, and with what."""
+
+
+class _Refused(Exception):
+    """What a browser sent that it may not send."""
+
+
+def _log(socket_: WebSocket, message: str, *values: object, error: Exception | None = None) -> None:
+    """Log what a browser did, or what failed while it was served."""
+    client = socket_.client.host if socket_.client else ""
+    LOG.warning(message, *values, exc_info=error, extra={"client": client})
+
+
+def _checked(kind: str, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a command with what belongs to it and nothing else. Raises ValueError or what a wrong value raises."""
+    if kind not in KINDS:
+        raise ValueError(kind)
+    return {"type": kind} | {name: _text(asked) if name == "text" else _number(asked, name) for name in KINDS[kind]}
 
 
 def _number(asked: Mapping[str, Any], name: str) -> float:
@@ -314,8 +376,12 @@ def serve(desk: Desk, opening: Opening, *, until: Callable[[], bool]) -> None:
 
         gate = Gate(application(desk, lambda: network, polled), port, opening.secret, hosts, used=opening.used)
         network = f"http://{opening.network}:{port}/?token={gate.viewers_token}" if opening.network else ""
+        most = most_connections()
         config = uvicorn.Config(
             gate,
+            http=bounded_protocol(most),
+            backlog=most // 2,  # so many are accepted in one turn, before they can be counted
+            log_config=None,  # whoever owns the process says where its log goes
             log_level="error",
             access_log=False,
             ws_max_size=LONGEST_MESSAGE,
