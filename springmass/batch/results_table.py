@@ -11,6 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from acquisition.regular_file import open_regular_text
 from springmass.batch.rows import COLUMNS, NUMBERS, WHOLE, columns_of
 from springmass.errors import USAGE, ProgramError
 from storage.atomic import whole_file
@@ -96,7 +97,7 @@ def read_rows(folder: Path) -> Iterator[dict[str, Any]]:
 
 def _read_csv(path: Path) -> Iterator[dict[str, Any]]:
     try:
-        text = path.open(encoding="utf-8", newline="")
+        text = open_regular_text(path, "utf-8", newline="")
     except OSError as error:
         demand = "a folder with results.csv was demanded, as springmass batch makes one"
         raise ProgramError(f"{path.parent}: {demand} ({error.strerror}); name that of its -o", USAGE) from error
