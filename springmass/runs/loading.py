@@ -317,7 +317,7 @@ def _sha256_of(path: Path, stamp: tuple[int, int, int] | None) -> str:
 def _load_wire(path: Path, channel: str | None) -> Loaded:
     """Recover a log into a run file that is thrown away, and take that; the log stays as it is."""
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
-        report = recover(path, Path(folder) / "run.h5")
+        report = recover(path, Path(folder) / "run.h5", growing=True)
         names = {str(each.sensor.channel): each for each in report.runs}
         listed = ", ".join(f'"{number}" ({each.sensor.port})' for number, each in names.items())
         if channel is None and len(names) > 1:

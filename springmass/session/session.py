@@ -66,6 +66,21 @@ class Ended:
     log: Path
 
 
+@dataclass(frozen=True, slots=True)
+class GivenUp:
+    """What a recording gave up when the user did not wait for the disk.
+
+    Parameters
+    ----------
+    counted : bool
+        Whether the log holds the counts.
+    status : RecorderStatus
+    """
+
+    counted: bool
+    status: RecorderStatus
+
+
 class Session:
     """Records one run.
 
@@ -85,6 +100,8 @@ class Session:
     ----------
     failures : Failures
         What failed beside the recording.
+    given_up : GivenUp or None
+        What the recording gave up, where the user did not wait for the disk.
     shown : Shown or None
         What the samples so far amount to, as far as they were shown.
     """
@@ -112,6 +129,7 @@ class Session:
         self.stops = stops or Stops()
         self._marks: list[tuple[float, str]] = []
         self.shown: Shown | None = None
+        self.given_up: GivenUp | None = None
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
         """Start reading, and return when every sensor has been heard.
@@ -288,8 +306,12 @@ class Session:
             counts = self.failures.counts
             recorder.event(0, end_ns, "ended", {"by": by, **({"failures": counts} if counts else {})})
         # From here on the user may end the wait for the disk.
-        with contextlib.suppress(WriteFailed):  # it stands in the status
-            recorder.close()
+        try:
+            with contextlib.suppress(WriteFailed):  # it stands in the status
+                recorder.close()
+        except KeyboardInterrupt:
+            self.given_up = GivenUp(recorder.give_up(), recorder.status)
+            raise
         status = recorder.status
         return Ended("the disk" if status.error else by, status, recorder.path)
 

@@ -23,15 +23,20 @@ from storage.recovery.losses import Losses
 from storage.recovery.recovered import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
 from storage.run_file.writing import RunWriter, run_writer
+from storage.wire_log.log_file import is_being_written
 from storage.wire_log.notes import Notes
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import LogContents, NotALog, read_log
 from storage.wire_log.wire_samples import LogDecoder, chains_of
 
-__all__ = ["RecoverReport", "RecoveredRun", "recover", "run_paths", "verify_against_log"]
+__all__ = ["LogGrowing", "RecoverReport", "RecoveredRun", "recover", "run_paths", "verify_against_log"]
 
 AT_ONCE = 4
 """So many sensors' run files are written in one pass over the log: each holds some megabytes of samples back."""
+
+
+class LogGrowing(StorageError):
+    """A log that a recording still writes: its run file would lack what comes and stand in the recording's way."""
 
 
 def recover(
@@ -43,6 +48,7 @@ def recover(
     header: LogHeader | None = None,
     speed_of_sound_m_per_s: float | None = None,
     provenance: Mapping[str, Any] | None = None,
+    growing: bool = False,
 ) -> RecoverReport:
     """Build the run file of a log, or one for each sensor where several were recorded.
 
@@ -63,9 +69,13 @@ def recover(
         Applied to echo times in place of the one that the log notes, m/s.
     provenance : mapping, optional
         Goes into the run file besides what the log says: software, version, ...
+    growing : bool
+        Whether to take what there is of a log that a recording still writes.
 
     Raises
     ------
+    LogGrowing
+        If a recording still writes the log.
     NotALog
         If there is no log, or nothing in it can be read.
     RunExists, WriteFailed
@@ -74,6 +84,8 @@ def recover(
         If a run file just written does not read back as it should. The log stands.
     """
     contents = read_log(log_path)
+    if not growing:
+        _demand_finished(contents)
     log = _Log(contents, _header(contents, header), provenance or {})
     leftovers = remove_leftovers(contents.path.absolute().parent)
     other = {} if speed_of_sound_m_per_s is None else {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
@@ -103,6 +115,14 @@ def recover(
         len(contents.parts),
         leftovers,
     )
+
+
+def _demand_finished(contents: LogContents) -> None:
+    for part in contents.parts:
+        with contextlib.suppress(OSError):  # that it is gone is for the reading to say
+            if is_being_written(part.path):
+                demand = f"a recording still writes the log, got it at {contents.size} bytes"
+                raise LogGrowing(contents.path, demand, "recover it when the recording has ended")
 
 
 def verify_against_log(path: str | os.PathLike[str], log_path: str | os.PathLike[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -20,11 +21,11 @@ from storage.atomic import whole_file
 from storage.errors import OutOfMemory, RunDamaged, RunExists
 from storage.recorder import Recorder
 from storage.recovery import recover as module
-from storage.recovery.recover import recover, verify_against_log
+from storage.recovery.recover import LogGrowing, recover, verify_against_log
 from storage.run_file.arrays import Columns, Originals
 from storage.run_file.reading import Run, open_run
 from storage.wire_log import notes
-from storage.wire_log.appending import WireLogWriter
+from storage.wire_log.appending import Roll, WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import NotALog, read_log
 from storage.wire_log.wire_samples import chains_of, decode_log
@@ -352,3 +353,19 @@ def test_bytes_of_an_unnamed_channel_stay_in_the_log(tmp_path: Path) -> None:
             recorder.put(3, host_ns, data)
     (decoded,) = decode_log(read_log(tmp_path / "run.wire"), header.sensors, chains_of)
     assert (len(decoded.samples), decoded.reads) == (20, 21)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="this system has no such locks")
+def test_a_log_that_is_still_written_is_not_recovered(tmp_path: Path) -> None:
+    """While a recorder has the log, in its first file or a later one, no run file is made; afterwards it is."""
+    for name, roll in (("one", Roll()), ("several", Roll(bytes=2000))):
+        log = tmp_path / f"{name}.wire"
+        with Recorder(log, HEADER, VirtualClock(), roll=roll) as recorder:
+            for host_ns, data in wire(100):
+                recorder.put(0, host_ns, data)
+            recorder.drain()
+            with pytest.raises(LogGrowing):
+                recover(log)
+            assert not log.with_suffix(".h5").exists()
+            assert recover(log, tmp_path / f"{name}-so-far.h5", growing=True).runs[0].samples > 0
+        assert recover(log).runs[0].samples == 100
