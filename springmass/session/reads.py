@@ -102,7 +102,8 @@ class Tee:
             if self._recorder is not None:
                 self._recorder.event(channel, host_ns, kind, facts)
             try:
-                self._chains[channel].lost()
+                chain = self._chains[channel]
+                (chain.returned if kind == "reopened" else chain.lost)()
             except Exception as error:
                 self._failures.note("decoder", error)
             if kind == "lost":
