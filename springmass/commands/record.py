@@ -136,8 +136,8 @@ def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple
     if not report.log_removed:
         console.line(f"{log}: the log stays")
     if console.terminal:
-        console.line(f"next: springmass analyse {shlex.quote(str(report.runs[0].path))}")
-    return _exit_code(ended, report, session, console), report.runs[0].path
+        console.line(f"next: springmass analyse {shlex.quote(str(report.main.path))}")
+    return _exit_code(ended, report, session, console), report.main.path
 
 
 def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: Console) -> int:

@@ -48,6 +48,8 @@ _SEVERITY = {
     "sensor_lost": "warning",
     "readings_dropped": "warning",
     "other_device": "warning",
+    "sensor_replaced": "warning",
+    "sensor_unconfirmed": "warning",
 }
 
 _REJECTED_WARNINGS = frozenset({"sensor_lost"})

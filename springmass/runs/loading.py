@@ -320,7 +320,9 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
         report = recover(path, Path(folder) / "run.h5", growing=True)
         names = {str(each.sensor.channel): each for each in report.runs}
         listed = ", ".join(f'"{number}" ({each.sensor.port})' for number, each in names.items())
-        if channel is None and len(names) > 1:
+        if channel is None and len(report.parts_of) == len(names) - 1:
+            channel = str(report.main.sensor.channel)
+        if channel is None:
             demand = f"the log holds {len(names)} sensors: {listed}; name the one to take with --channel"
             raise ProgramError(f"{path}: {demand}", UNREADABLE)
         wanted = [each for number, each in names.items() if channel in (None, number, each.sensor.port)]

@@ -30,7 +30,7 @@ from springmass.session.display.turns import Display, Samples
 from springmass.session.failures import Failures
 from springmass.session.identity import meeting
 from springmass.session.reads import Tee
-from springmass.session.sensors import Sensor
+from springmass.session.sensors import ANSWERED, Sensor
 from springmass.session.stops import Stops
 from springmass.session.trigger import Disarmed, Trigger, Watch
 from storage.errors import StorageError, WriteFailed
@@ -42,7 +42,7 @@ __all__ = ["Ended", "Progress", "Sensor", "Session", "Trigger"]
 
 SAY_NS = 1_500_000_000  # silence so long before a run is said
 HEAR_S = 3.0  # silence longer than this before a run is no sensor
-HEARD, ANSWERED = 3, 12  # readings that make a sensor, and within which one that is asked says what it is
+HEARD = 3  # readings that make a sensor
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # of samples that nobody looked at before the run began
 BYTES_PER_READ = 64  # log bytes a reading takes, for the look at the disk
@@ -225,7 +225,7 @@ class Session:
             self.failures.note("preview", error)
             return None
         self._chains = chains
-        self._tee.start(recorder, chains, self._clock.now_ns())
+        self._tee.start(recorder, chains, self._clock.now_ns(), preview=True)
         return recorder
 
     def record(

@@ -58,7 +58,8 @@ def recover(
         The log; finished, torn or damaged.
     out_path : str or PathLike, optional
         The run file; left out, the log's name with ``.h5``. With several sensors their channels come before the
-        suffix: ``run.0.h5``, ``run.1.h5``.
+        suffix: ``run.0.h5``, ``run.1.h5``. So they do of a sensor that came back as another on the port of the only
+        one: ``run.h5``, ``run.1.h5``.
     overwrite : bool
         Whether run files that stand there may be replaced.
     remove_log : bool
@@ -90,31 +91,56 @@ def recover(
     leftovers = remove_leftovers(contents.path.absolute().parent)
     other = {} if speed_of_sound_m_per_s is None else {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
     sensors = log.header.sensors
-    paths = run_paths(contents.path if out_path is None else Path(out_path), [each.channel for each in sensors])
-    runs = {} if overwrite else _standing(paths, sensors, contents, other)
-    missing = [number for number in range(len(sensors)) if number not in runs]
-    for start in range(0, len(missing), AT_ONCE):
-        numbers = missing[start : start + AT_ONCE]
-        built = _build(log, [sensors[n] for n in numbers], [paths[n] for n in numbers], other, overwrite)
-        for number, run in zip(numbers, built, strict=True):
-            _demand_held(run.path, contents)
-            runs[number] = run
-    if not missing:
+    out = contents.path if out_path is None else Path(out_path)
+    paths = run_paths(out, [each.channel for each in sensors])
+    runs = _runs(log, sensors, paths, other, overwrite)
+    if not log.notes.counts:  # all run files stood there
         for record in contents:
             if record.kind is not Kind.DATA:
                 log.notes.take(record)
+    if parts := _parts(log):
+        (only,) = run_paths(out, [0])
+        runs += _runs(log, parts, [_of_channel(only, part.channel) for part in parts], other, overwrite)
     damage = contents.damage
     removed = remove_log and _remove(contents)
     return RecoverReport(
         contents.path,
-        tuple(runs[number] for number in range(len(sensors))),
+        tuple(runs),
         damage,
         log.notes.counts[Kind.MARK],
         log.notes.counts[Kind.EVENT],
         removed,
         len(contents.parts),
         leftovers,
+        {part.channel: log.notes.parts[part.channel] for part in parts},
     )
+
+
+def _runs(
+    log: _Log, sensors: Sequence[SensorEntry], paths: Sequence[Path], other: Mapping[str, Any], overwrite: bool
+) -> list[RecoveredRun]:
+    """Return the run files of some sensors, those that stand there as they are and the others built."""
+    runs = {} if overwrite else _standing(paths, sensors, log.contents, other)
+    missing = [number for number in range(len(sensors)) if number not in runs]
+    for start in range(0, len(missing), AT_ONCE):
+        numbers = missing[start : start + AT_ONCE]
+        built = _build(log, [sensors[n] for n in numbers], [paths[n] for n in numbers], other, overwrite)
+        for number, run in zip(numbers, built, strict=True):
+            _demand_held(run.path, log.contents)
+            runs[number] = run
+    return [runs[number] for number in range(len(sensors))]
+
+
+def _parts(log: _Log) -> list[SensorEntry]:
+    """Return the sensors that came back as others on the ports of those that the header names."""
+    known = {sensor.channel: sensor for sensor in log.header.sensors}
+    parts = []
+    for channel, of in sorted(log.notes.parts.items()):
+        if channel not in known and (before := known.get(of)) is not None:
+            calibration = log.notes.calibrations.get(of, before.calibration)
+            known[channel] = dataclasses.replace(before, channel=channel, calibration=calibration)
+            parts.append(known[channel])
+    return parts
 
 
 def _demand_finished(contents: LogContents) -> None:
@@ -209,7 +235,11 @@ def run_paths(path: Path, channels: Sequence[int]) -> list[Path]:
     path = path if path.suffix == ".h5" else path.with_suffix(".h5")
     if len(channels) <= 1:
         return [path]
-    return [path.with_name(f"{path.stem}.{channel}{path.suffix}") for channel in channels]
+    return [_of_channel(path, channel) for channel in channels]
+
+
+def _of_channel(path: Path, channel: int) -> Path:
+    return path.with_name(f"{path.stem}.{channel}{path.suffix}")
 
 
 @dataclasses.dataclass(slots=True, eq=False)
