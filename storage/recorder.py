@@ -30,6 +30,8 @@ __all__ = ["Recorder", "RecorderStatus"]
 QUEUE_BYTES = 16 << 20
 """Half an hour of one sensor at 100 Hz, two minutes of 16 of them."""
 
+KEPT_NOTES = 10_000
+"""Marks and events that are kept while the queue is full: nobody makes so many while a disk hangs."""
 GIVE_UP_S = 1.0
 """So long the disk has for the counts of what is given up; whoever gives up does not want to wait."""
 
@@ -144,6 +146,7 @@ class Recorder:
         self._taken: list[Item] = []
         self._gave_up = False
         self._overflows: dict[int, _Overflow] = {}
+        self._notes: list[Item] = []  # marks and events that came since the queue became full
         self._dropped_records = self._dropped_bytes = 0
         self._error: WriteFailed | None = None
         self._closing = self._closed = False
@@ -194,7 +197,7 @@ class Recorder:
     def drain(self, *, sync: bool = False) -> RecorderStatus:
         """Return when all that was put before is in the log, with ``sync`` on the disk; or the recording stopped."""
         with self._done:
-            self._done.wait_for(lambda: self._error or not (self._queue or self._overflows or self._appending))
+            self._done.wait_for(lambda: self._error or not (self._waiting or self._appending))
         if sync:
             self._sync()
         return self.status
@@ -248,7 +251,8 @@ class Recorder:
             # What overflowed came after what waited, and was counted when it came.
             items = [item for item in left if item[0] is not Kind.DATA]
             items += [each.event(channel) for channel, each in (*lost.items(), *self._overflows.items())]
-            self._overflows = {}
+            items += self._notes
+            self._overflows, self._notes = {}, []
             items.append((Kind.END, 0, self._clock.now_ns(), self._end_payload()))
         self._stop_sync.set()
         written = threading.Event()
@@ -270,21 +274,29 @@ class Recorder:
                 raise ValueError(f"a channel must lie in 0 to 255, got {channel}")
         with self._lock:
             open_ = self._error is None and not self._closing
-            rung = bool(self._queue or self._overflows)
+            rung = self._waiting
             for channel, mono_ns, payload in records:
                 size = HEAD_BYTES + len(payload)
                 # After an overflow nothing is taken before its event: records around a loss must not look like
                 # neighbours.
-                if open_ and not self._overflows and self._queued_bytes + size <= self._limit:
+                if open_ and not (self._overflows or self._notes) and self._queued_bytes + size <= self._limit:
                     self._queue.append((kind, channel, mono_ns, payload))
                     self._queued_bytes += size
+                    continue
+                # What became of a port or a sensor is never given up: without it the readings after it say nothing.
+                if open_ and kind is not Kind.DATA and len(self._notes) < KEPT_NOTES:
+                    self._notes.append((kind, channel, mono_ns, payload))
                     continue
                 self._dropped_records += 1
                 self._dropped_bytes += len(payload)
                 if open_:
                     self._overflows.setdefault(channel, _Overflow(mono_ns, mono_ns)).add(mono_ns, len(payload))
-            if not rung and (self._queue or self._overflows):
+            if not rung and self._waiting:
                 self._bell.put(None)
+
+    @property
+    def _waiting(self) -> bool:
+        return bool(self._queue or self._overflows or self._notes)
 
     def _append_all(self) -> None:
         while taken := self._take_queued():
@@ -304,8 +316,9 @@ class Recorder:
         while True:
             with self._lock:
                 taken, self._queue, self._queued_bytes = self._queue, [], 0
-                taken += [lost.event(channel) for channel, lost in self._overflows.items()]
+                taken += [lost.event(channel) for channel, lost in self._overflows.items()] + self._notes
                 self._overflows.clear()
+                self._notes = []
                 self._appending = bool(taken)
                 self._taken, self._log.extended = taken, 0
                 if not taken:

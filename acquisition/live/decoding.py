@@ -28,6 +28,8 @@ CLOCKS_PPM = (0.0, 1e6)
 """What anybody may say of a clock: from one that is right to one that may stand still."""
 JOIN_NS = 1_000_000_000
 """Stamps of so long on either side of a lost port tie the clocks: a burst behind it is over then."""
+MOST_HELD = 1 << 15
+"""So many readings are held for that at most: a log's stamps may stand still."""
 AGREE_S = 0.01
 """A counter that is no further from the host's clock has gone on: no time axis may be wrong by more."""
 MISSING, GAP_BEFORE = np.uint8(Flag.MISSING), np.uint8(Flag.GAP_BEFORE)
@@ -151,7 +153,7 @@ class SensorChain:
         held, returns = self._held, self._returns
         if returns and not final:
             back = held[returns[-1] :]
-            if not back or back[-1].host_ns - back[0].host_ns < JOIN_NS:
+            if not back or (back[-1].host_ns - back[0].host_ns < JOIN_NS and len(back) < MOST_HELD):
                 held = held[: returns[-1]]
         self._held = self._held[len(held) :]
         self._returns = [at - len(held) for at in returns if at >= len(held)]
@@ -174,14 +176,15 @@ class SensorChain:
         known = clock.u_rate_error_ppm < self.clock_ppm
         pace = 1.0 / (1.0 + 1e-6 * clock.rate_error_ppm) if known else 1.0
         zero_t, zero_ns = before_t[-1], before_ns[-1]
+        if device_us[0] >= 0:
+            t += WRAP_S * round(((host_ns[0] - zero_ns) * 1e-9 - (t[0] - zero_t)) / WRAP_S)
 
         def earliest(t: F8, stamps: I8) -> float:
             return float(np.min((stamps - zero_ns) * 1e-9 - pace * (t - zero_t)))
 
         near, behind = before_ns >= zero_ns - JOIN_NS, host_ns[: t.size] <= host_ns[0] + JOIN_NS
         late_s = earliest(t[behind], host_ns[: t.size][behind]) - earliest(before_t[near], before_ns[near])
-        wraps = round(late_s / WRAP_S) if device_us[0] >= 0 else 0
-        if abs(late_s - wraps * WRAP_S) > AGREE_S:
+        if abs(late_s) > AGREE_S:
             self.timebase.join(float(t[0]) + late_s / pace)
 
     def _ways(self, ways_s: F8) -> F8:
