@@ -37,7 +37,7 @@ test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -m "not trials" -n $(WORKERS) --dist loadfile
 
 trials: $(VENV)/.installed-dev
-	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=500 SPRINGMASS_ENDS=200 SPRINGMASS_UNPLUGS=20 $(BIN)/python -m pytest -m trials -s
+	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=500 SPRINGMASS_ENDS=200 SPRINGMASS_UNPLUGS=20 SPRINGMASS_SECOND_STOPS=30 SPRINGMASS_REPLUGS=40 $(BIN)/python -m pytest -m trials -s
 
 accuracy: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/accuracy --seeds $(or $(SEEDS),2000)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from io import FileIO
+from io import BufferedReader, FileIO, TextIOWrapper
 
-__all__ = ["open_regular"]
+__all__ = ["open_regular", "open_regular_text", "read_regular"]
 
 _OTHERS = (
     (stat.S_ISDIR, "directory"),
@@ -37,6 +37,17 @@ def open_regular(path: str | os.PathLike[str]) -> FileIO:
     """
     _demand_regular(path, os.stat(path).st_mode)
     return open(path, "rb", buffering=0, opener=_open)
+
+
+def open_regular_text(path: str | os.PathLike[str], encoding: str, *, newline: str | None = None) -> TextIOWrapper:
+    """Open a regular file of text for reading, as :func:`open` does and :func:`open_regular` refuses."""
+    return TextIOWrapper(BufferedReader(open_regular(path)), encoding, newline=newline)
+
+
+def read_regular(path: str | os.PathLike[str]) -> bytes:
+    """Return what a regular file holds, as :func:`open_regular` opens it."""
+    with open_regular(path) as file:
+        return file.readall() or b""
 
 
 def _open(path: str, flags: int) -> int:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from acquisition.regular_file import open_regular
 from storage.atomic import whole_file
 from storage.errors import QueryRefused, RunDamaged
 
@@ -186,6 +187,10 @@ def _authorise(action: int, first: str | None, second: str | None, _: str | None
 @contextlib.contextmanager
 def _opened(path: str | os.PathLike[str]) -> Iterator[sqlite3.Connection]:
     """Open for reading alone, an absent file is not made."""
+    try:
+        open_regular(path).close()  # SQLite would wait for a pipe for ever
+    except OSError as error:
+        raise sqlite3.OperationalError(error.strerror) from error
     name = quote(os.path.abspath(path), errors="surrogateescape")
     with contextlib.closing(sqlite3.connect(f"file:{name}?mode=ro&immutable=1", uri=True)) as base:
         base.execute(f"PRAGMA mmap_size = {MAPPED}")  # pages are read where they lie, not copied

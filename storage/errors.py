@@ -8,6 +8,7 @@
     |-- RunClosed      a run used outside its ``with``
     |-- QueryRefused   a question to a catalog that is none, or would change it
     |-- NotALog        nothing there, or no wire log                          springmass exits with 3
+    |-- LogGrowing     a log that a recording still writes                    springmass exits with 3
     |-- OutOfMemory    the machine has too little memory; no word against the file   springmass exits with 3
     `-- WriteFailed    a file could not be written; what stood there before stands
         |-- RunExists  a file of that name stands already and may not be replaced

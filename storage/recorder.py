@@ -8,6 +8,7 @@ others waits for it.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
@@ -28,6 +29,11 @@ __all__ = ["Recorder", "RecorderStatus"]
 
 QUEUE_BYTES = 16 << 20
 """Half an hour of one sensor at 100 Hz, two minutes of 16 of them."""
+
+KEPT_NOTES = 10_000
+"""Marks and events that are kept while the queue is full: nobody makes so many while a disk hangs."""
+GIVE_UP_S = 1.0
+"""So long the disk has for the counts of what is given up; whoever gives up does not want to wait."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +78,11 @@ class _Overflow:
     last_ns: int
     records: int = 0
     bytes: int = 0
+
+    def add(self, mono_ns: int, size: int) -> None:
+        self.last_ns = mono_ns
+        self.records += 1
+        self.bytes += size
 
     def event(self, channel: int) -> Item:
         facts = {"records": self.records, "bytes": self.bytes, "first_ns": self.first_ns}
@@ -132,7 +143,10 @@ class Recorder:
         self._bell: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._queued_bytes = 0
         self._appending = False
+        self._taken: list[Item] = []
+        self._gave_up = False
         self._overflows: dict[int, _Overflow] = {}
+        self._notes: list[Item] = []  # marks and events that came since the queue became full
         self._dropped_records = self._dropped_bytes = 0
         self._error: WriteFailed | None = None
         self._closing = self._closed = False
@@ -183,7 +197,7 @@ class Recorder:
     def drain(self, *, sync: bool = False) -> RecorderStatus:
         """Return when all that was put before is in the log, with ``sync`` on the disk; or the recording stopped."""
         with self._done:
-            self._done.wait_for(lambda: self._error or not (self._queue or self._overflows or self._appending))
+            self._done.wait_for(lambda: self._error or not (self._waiting or self._appending))
         if sync:
             self._sync()
         return self.status
@@ -214,36 +228,83 @@ class Recorder:
         if self._error is not None:
             raise self._error
 
+    def give_up(self) -> bool:
+        """End at once: count what is not in the log, and write the counts into it, past a write that hangs.
+
+        Marks and events that wait are written with the counts. For when nobody waits for :meth:`close` any more.
+
+        Returns
+        -------
+        bool
+            Whether the log has the counts. The disk has a second for that.
+        """
+        with self._lock:
+            self._closing = self._gave_up = True
+            self._bell.put(None)
+            left = self._taken[self._log.stop() :] + self._queue
+            self._queue, self._queued_bytes = [], 0
+            lost: dict[int, _Overflow] = {}
+            for _, channel, mono_ns, payload in [item for item in left if item[0] is Kind.DATA]:
+                lost.setdefault(channel, _Overflow(mono_ns, mono_ns)).add(mono_ns, len(payload))
+            self._dropped_records += sum(each.records for each in lost.values())
+            self._dropped_bytes += sum(each.bytes for each in lost.values())
+            # What overflowed came after what waited, and was counted when it came.
+            items = [item for item in left if item[0] is not Kind.DATA]
+            items += [each.event(channel) for channel, each in (*lost.items(), *self._overflows.items())]
+            items += self._notes
+            self._overflows, self._notes = {}, []
+            items.append((Kind.END, 0, self._clock.now_ns(), self._end_payload()))
+        self._stop_sync.set()
+        written = threading.Event()
+
+        def write() -> None:
+            with contextlib.suppress(OSError):  # the caller says it
+                self._place.look(self._log.files)
+                if not self._place.astray:
+                    self._log.append_beside(items)
+                    written.set()
+
+        # On a thread of its own, for this disk may hang here too.
+        threading.Thread(target=write, name="springmass-counts", daemon=True).start()
+        return written.wait(GIVE_UP_S)
+
     def _offer(self, kind: Kind, records: Sequence[Read]) -> None:
         for channel, _, _ in records:
             if not 0 <= channel <= 255:
                 raise ValueError(f"a channel must lie in 0 to 255, got {channel}")
         with self._lock:
             open_ = self._error is None and not self._closing
-            rung = bool(self._queue or self._overflows)
+            rung = self._waiting
             for channel, mono_ns, payload in records:
                 size = HEAD_BYTES + len(payload)
                 # After an overflow nothing is taken before its event: records around a loss must not look like
                 # neighbours.
-                if open_ and not self._overflows and self._queued_bytes + size <= self._limit:
+                if open_ and not (self._overflows or self._notes) and self._queued_bytes + size <= self._limit:
                     self._queue.append((kind, channel, mono_ns, payload))
                     self._queued_bytes += size
+                    continue
+                # What became of a port or a sensor is never given up: without it the readings after it say nothing.
+                if open_ and kind is not Kind.DATA and len(self._notes) < KEPT_NOTES:
+                    self._notes.append((kind, channel, mono_ns, payload))
                     continue
                 self._dropped_records += 1
                 self._dropped_bytes += len(payload)
                 if open_:
-                    lost = self._overflows.setdefault(channel, _Overflow(mono_ns, mono_ns))
-                    lost.last_ns = mono_ns
-                    lost.records += 1
-                    lost.bytes += len(payload)
-            if not rung and (self._queue or self._overflows):
+                    self._overflows.setdefault(channel, _Overflow(mono_ns, mono_ns)).add(mono_ns, len(payload))
+            if not rung and self._waiting:
                 self._bell.put(None)
+
+    @property
+    def _waiting(self) -> bool:
+        return bool(self._queue or self._overflows or self._notes)
 
     def _append_all(self) -> None:
         while taken := self._take_queued():
             try:
                 self._log.extend(taken)
             except Exception as error:  # a defect, too, must stop the recording and not look like one
+                if self._gave_up:  # what was left is counted
+                    return
                 self._stop(self._one_line(error), taken[self._log.extended :])
                 return
 
@@ -255,9 +316,11 @@ class Recorder:
         while True:
             with self._lock:
                 taken, self._queue, self._queued_bytes = self._queue, [], 0
-                taken += [lost.event(channel) for channel, lost in self._overflows.items()]
+                taken += [lost.event(channel) for channel, lost in self._overflows.items()] + self._notes
                 self._overflows.clear()
+                self._notes = []
                 self._appending = bool(taken)
+                self._taken, self._log.extended = taken, 0
                 if not taken:
                     self._done.notify_all()
                 if taken or self._closing:
@@ -310,9 +373,11 @@ class Recorder:
         self._guarded(self._log.sync)
 
     def _append_end(self) -> None:
+        self._log.append(Kind.END, self._end_payload(), mono_ns=self._clock.now_ns())
+
+    def _end_payload(self) -> bytes:
         counts = {"records": self._log.written.records, "dropped_records": self._dropped_records}
-        payload = json.dumps(counts | {"dropped_bytes": self._dropped_bytes}).encode("ascii")
-        self._log.append(Kind.END, payload, mono_ns=self._clock.now_ns())
+        return json.dumps(counts | {"dropped_bytes": self._dropped_bytes}).encode("ascii")
 
     def _guarded(self, step: Callable[[], object]) -> None:
         """Do a step; the first thing that the disk refuses is kept for :meth:`close` to raise."""

@@ -5,18 +5,19 @@ Live view, recording, recovery and replay from wire bytes all use this one chain
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from acquisition.block import F8, Block, Flag
+from acquisition.block import F8, I8, Block, Flag
 from acquisition.decoders.family import Family, Told
 from acquisition.decoders.framed import FramedDecoder
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples, fit_clock
-from acquisition.live.timebase import Timebase, demand_within
+from acquisition.live.timebase import WRAP_S, Timebase, demand_within
 from acquisition.readings import NO_READINGS, Reading, Readings, carried
 from acquisition.source import SourceInfo
 
@@ -25,6 +26,12 @@ __all__ = ["SensorChain"]
 _NONE: tuple[tuple[float, ...], ...] = ((),) * len(Reading._fields)
 CLOCKS_PPM = (0.0, 1e6)
 """What anybody may say of a clock: from one that is right to one that may stand still."""
+JOIN_NS = 1_000_000_000
+"""Stamps of so long on either side of a lost port tie the clocks: a burst behind it is over then."""
+MOST_HELD = 1 << 15
+"""So many readings are held for that at most: a log's stamps may stand still."""
+AGREE_S = 0.01
+"""A counter that is no further from the host's clock has gone on: no time axis may be wrong by more."""
 MISSING, GAP_BEFORE = np.uint8(Flag.MISSING), np.uint8(Flag.GAP_BEFORE)
 
 
@@ -72,9 +79,10 @@ class SensorChain:
         self._at_reflection = False
         self._held: list[Reading] = []
         self._breaks: list[int] = []  # numbers among those held of readings before which the stream was broken off
+        self._returns: list[int] = []  # of them, before which a port came back
 
     def __len__(self) -> int:
-        """Return how many samples :meth:`block` would give."""
+        """Return how many readings are held."""
         return len(self._held)
 
     def feed(self, host_ns: int, data: bytes) -> Block:
@@ -100,8 +108,15 @@ class SensorChain:
         for host_ns, data in reads:
             self._held += self.decoder.feed(host_ns, data)
 
-    def block(self) -> Block:
-        """Return the samples of the readings held, with the next indices of the run, and hold none.
+    def block(self, *, final: bool = False) -> Block:
+        """Return the samples of the readings held, with the next indices of the run.
+
+        Those behind a port that came back are held until they span a second, for their time is told by all of these.
+
+        Parameters
+        ----------
+        final : bool
+            Whether no more come: none is held then.
 
         Notes
         -----
@@ -109,23 +124,68 @@ class SensorChain:
         its time of flight later: a sample's time is that. Left at the ping, a bob of 50 mm and 0.76 s would show a
         second harmonic of 31 um, for the further it is the later it is met.
         """
-        held, self._held = self._held, []
+        held, edges = self._released(final)
         host_ns, sequence, device_us, echo_us, distance_m, _ = zip(*held, strict=True) if held else _NONE
         stamps = np.array(host_ns, np.int64)
-        t, flags = self.timebase.push_all(held, stamps, np.array(sequence, np.int64), np.array(device_us, np.int64))
+        counters = np.array(sequence, np.int64), np.array(device_us, np.int64)
+        t, flags = np.empty(len(held)), np.zeros(len(held), np.uint8)
+        for rows, returned in edges:
+            columns = (stamps[rows], *(column[rows] for column in counters))
+            if returned:
+                self._tie(*columns)
+            t[rows], flags[rows] = self.timebase.push_all(held[rows], *columns)
+            self._clock.take(self._next + rows.start, t[rows], stamps[rows])
         echo = np.array(echo_us, np.float64)
         distance = self.calibration.distance(echo, np.array(distance_m, np.float64))
-        self._clock.take(self._next, t, stamps)
         if self.family.has_device_time:
             t = t + self._ways(0.5e-6 * echo)
             self._at_reflection |= self._way_s > 0.0
         flags[np.isnan(distance)] |= MISSING
         if self._breaks:
             flags[[at for at in self._breaks if at < len(held)]] |= GAP_BEFORE
-            self._breaks = [0] if self._breaks[-1] == len(held) else []
+            self._breaks = [at - len(held) for at in self._breaks if at >= len(held)]
         first = self._next
         self._next += len(held)
         return Block(first, t, distance, flags, stamps)
+
+    def _released(self, final: bool) -> tuple[list[Reading], Iterator[tuple[slice, bool]]]:
+        """Take the readings that may go, and return them with the rows of each stretch and whether a port came back."""
+        held, returns = self._held, self._returns
+        if returns and not final:
+            back = held[returns[-1] :]
+            if not back or (back[-1].host_ns - back[0].host_ns < JOIN_NS and len(back) < MOST_HELD):
+                held = held[: returns[-1]]
+        self._held = self._held[len(held) :]
+        self._returns = [at - len(held) for at in returns if at >= len(held)]
+        edges = sorted({0, *(at for at in returns if at < len(held)), len(held)})
+        return held, ((slice(start, stop), start in returns) for start, stop in pairwise(edges))
+
+    def _tie(self, host_ns: I8, sequence: I8, device_us: I8) -> None:
+        """Have the host's clock tell the time of readings behind a port that came back, where the device's does not.
+
+        Notes
+        -----
+        A stamp may be late, never early: of the readings of a second on either side, the least difference of stamp and
+        device time tells how the clocks stand to each other. They run apart by the rate error known so far.
+        """
+        t = self.timebase.going_on(host_ns, sequence, device_us)
+        before_t, before_ns = self._clock.columns()
+        if t is None or not before_t.size:
+            return
+        clock = fit_clock(before_t, before_ns)
+        known = clock.u_rate_error_ppm < self.clock_ppm
+        pace = 1.0 / (1.0 + 1e-6 * clock.rate_error_ppm) if known else 1.0
+        zero_t, zero_ns = before_t[-1], before_ns[-1]
+        if device_us[0] >= 0:
+            t += WRAP_S * round(((host_ns[0] - zero_ns) * 1e-9 - (t[0] - zero_t)) / WRAP_S)
+
+        def earliest(t: F8, stamps: I8) -> float:
+            return float(np.min((stamps - zero_ns) * 1e-9 - pace * (t - zero_t)))
+
+        near, behind = before_ns >= zero_ns - JOIN_NS, host_ns[: t.size] <= host_ns[0] + JOIN_NS
+        late_s = earliest(t[behind], host_ns[: t.size][behind]) - earliest(before_t[near], before_ns[near])
+        if abs(late_s) > AGREE_S:
+            self.timebase.join(float(t[0]) + late_s / pace)
 
     def _ways(self, ways_s: F8) -> F8:
         """Return how long after its ping each reading (n,) met the bob, s; one without an echo as long as the last.
@@ -140,6 +200,11 @@ class SensorChain:
         """The port went away: a frame cut in half by that is no frame, and the next sample is flagged."""
         self.decoder.flush()
         self._breaks.append(len(self._held))
+
+    def returned(self) -> None:
+        """The port came back: besides, the device's clock may be another one."""
+        self.lost()
+        self._returns.append(len(self._held))
 
     @property
     def clock_ppm(self) -> float:
@@ -176,6 +241,7 @@ class SensorChain:
             "gaps": [{"index": g.index, "length_s": g.length_s, "lost": g.lost} for g in self.timebase.gaps],
             **({"gaps_left_out": dict(left_out)} if left_out["count"] else {}),
             "restarts": self.timebase.restarts,
+            "joins": self.timebase.joins,
             "clock": {
                 "kind": self.timebase.clock,
                 "moment": "reflection" if self._at_reflection else "reading",

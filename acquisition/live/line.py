@@ -48,6 +48,11 @@ class Transport(Protocol):
         """Forget what came and was not read."""
         ...
 
+    @property
+    def identified(self) -> bool:
+        """Whether a serial number makes sure that :meth:`reopen` opens the same device."""
+        ...
+
     def reopen(self) -> None:
         """Open again after the port was lost.
 
@@ -65,6 +70,11 @@ class Transport(Protocol):
 
 class Proof(Protocol):
     """Tells the sensor that was lost from another that came in its place."""
+
+    @property
+    def facts(self) -> Mapping[str, Any]:
+        """What the event "reopened" shall say besides, once it is proven."""
+        ...
 
     def feed(self, host_ns: int, data: bytes) -> bool | None:
         """Take the bytes of one read; return whether it is the sensor, None while that is open."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import selectors
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from acquisition.clock import Clock
@@ -175,7 +175,7 @@ class PortReader:
             facts = {"port": line.transport.name, "why": "what came back does not speak as the sensor", "bytes": size}
             self._sink.event(line.channel, now_ns, "refused", facts)
             return None
-        self._back(line, now_ns)
+        self._back(line, now_ns, proof.facts)
         proven, line._unproven, line._proving = line._unproven, [], None
         return proven
 
@@ -245,14 +245,15 @@ class PortReader:
         line._closed, line._ask_ns = False, 0
         line._proving = None if line.proof is None else line.proof()
         if line._proving is None:
-            self._back(line, now)
+            self._back(line, now, {})
         return True
 
-    def _back(self, line: Line, now_ns: int) -> None:
+    def _back(self, line: Line, now_ns: int, more: Mapping[str, Any]) -> None:
         """Tell that the sensor is there again."""
         gap_s = 0.0 if line._lost_ns is None else (now_ns - line._lost_ns) * 1e-9
         line._lost_ns = None
-        self._sink.event(line.channel, now_ns, "reopened", {"port": line.transport.name, "gap_s": gap_s})
+        facts = {"port": line.transport.name, "gap_s": gap_s, **more}
+        self._sink.event(line.channel, now_ns, "reopened", facts)
 
 
 def _may_block(line: Line) -> bool:

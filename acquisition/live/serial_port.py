@@ -85,7 +85,14 @@ class SerialPort:
         What stands in the way is not looked into, for a reader may try twice a second.
         """
         self.close()
+        if self._device is None and (other := _devices().get(os.path.realpath(self.name))) is not None:
+            raise PortError(f"{self.name}: what is there now is {other}, what was lost was no USB device")
         self._open(self.name if self._device is None else self._found(self._device))
+
+    @property
+    def identified(self) -> bool:
+        """Whether the port is a USB device's that has a serial number, so that no other is taken for it."""
+        return self._device is not None and bool(self._device.serial_number)
 
     def _found(self, device: _Device) -> str:
         """Return the name under which a USB device stands now: its own, or that of its serial number."""

@@ -81,7 +81,8 @@ class Timebase:
     alone it is the counter over the nominal rate. With neither it is the host's stamp. A device that restarts (its
     clock runs backward by more than a wrap explains, or shows less than the silence before it lasted) is joined by
     the host clock, and the first reading after it is flagged. One that goes on where it stopped, or nearly, has not
-    started again, however long the silence: the link stalled, and delivers what it held.
+    started again, however long the silence: the link stalled, and delivers what it held. After a port was lost and
+    came back, whoever sees the readings on both sides gives the time of the first by :meth:`join`.
 
     Readings that a stalled link held and delivers at once have no time where only the host's stamp tells it. They
     follow a silence closer than half a period, and are flagged as those of one moment, until two come in time.
@@ -96,6 +97,8 @@ class Timebase:
         self.gaps: list[Gap] = []
         self.gaps_left_out = {"count": 0, "lost": 0, "longest_s": 0.0}  # of those after the first KEPT_GAPS
         self.restarts = 0
+        self.joins = 0  # of them, at a port that came back
+        self._join_s: float | None = None
         self._count = 0
         self._last_raw: int | None = None
         self._last_host_ns = 0
@@ -163,16 +166,41 @@ class Timebase:
             at += ALONE
         return t, flags
 
+    def going_on(self, host_ns: I8, sequence: I8, device_us: I8) -> F8 | None:
+        """Return the times (m,), m <= n, s, of the next readings if the device's clock went on as it was.
+
+        Fewer than those given where the clock runs backward among them; None where readings have no such clock or none
+        came before.
+
+        Parameters
+        ----------
+        host_ns, sequence, device_us : (n,) int64
+            Their columns.
+        """
+        raw, unit_s = self._clock_of(host_ns, sequence, device_us)
+        if self._last_raw is None or unit_s == NANO:
+            return None
+        backward = np.flatnonzero((np.diff(raw) < 0) | (raw[1:] < 0))
+        raw = raw[: backward[0] + 1] if backward.size else raw
+        return np.asarray(self._anchor_s + (self._ticks + raw - self._last_raw) * unit_s)
+
+    def join(self, t: float) -> None:
+        """Have the next reading at a time, s, and go on from there: its device's clock is not the one before."""
+        self._join_s, self._held = t, True
+
+    def _clock_of(self, host_ns: I8, sequence: I8, device_us: I8) -> tuple[I8, float]:
+        """Return what the first of some readings has its time from, -1 where others have no such, and its unit, s."""
+        if device_us[0] >= 0:
+            return device_us, 1e-6
+        if sequence[0] >= 0:
+            return np.where(device_us < 0, sequence, -1), self._period_s
+        return np.where(np.maximum(device_us, sequence) < 0, host_ns, -1), NANO
+
     def _in_step(self, t: F8, host_ns: I8, sequence: I8, device_us: I8) -> int:
         """Fill in the times of the readings that follow one after the other as they should; return how many do."""
         if self._last_raw is None or self._held:
             return 0
-        if device_us[0] >= 0:
-            raw, unit_s = device_us, 1e-6
-        elif sequence[0] >= 0:
-            raw, unit_s = np.where(device_us < 0, sequence, -1), self._period_s
-        else:
-            raw, unit_s = np.where(np.maximum(device_us, sequence) < 0, host_ns, -1), NANO
+        raw, unit_s = self._clock_of(host_ns, sequence, device_us)
         # One that has no such clock ends the row, as one does that runs backward.
         differences = np.diff(raw, prepend=self._last_raw)
         ticks = self._ticks + np.cumsum(differences)
@@ -196,6 +224,7 @@ class Timebase:
         rest["longest_s"] = max(rest["longest_s"], gap.length_s)
 
     def _step(self, raw: int, unit_s: float, host_ns: int) -> tuple[float, int]:
+        joined = self._join_s is not None
         restarted = self._advance(raw, unit_s, host_ns)
         first = self._last_raw is None
         self._last_raw, self._last_host_ns = raw, host_ns
@@ -208,7 +237,9 @@ class Timebase:
             flag = int(Flag.NON_MONOTONIC_TIME)
         elif restarted or (step > self._longest_s and not self._only_jitter(unit_s, step)):
             flag = int(Flag.GAP_BEFORE)
-            self._note_gap(Gap(self._count, step, max(round(step * self.rate_hz) - 1, 0)))
+            # Whether a device that comes back with another counter would have sent anything meanwhile nobody knows.
+            lost = 0 if joined else max(round(step * self.rate_hz) - 1, 0)
+            self._note_gap(Gap(self._count, step, lost))
             self._held, self._in_time = unit_s == NANO, 0
         elif self._held:
             flag |= self._of_a_burst(step)
@@ -231,6 +262,11 @@ class Timebase:
         """Count on to a reading; True where the device started again and the host clock had to join it."""
         if self._last_raw is None:
             return False
+        if self._join_s is not None:
+            self._anchor_s, self._ticks = max(self._join_s, self._latest_s + self._period_s), 0
+            self._join_s = None
+            self.restarts, self.joins = self.restarts + 1, self.joins + 1
+            return True
         difference = raw - self._last_raw
         step = difference * unit_s
         if unit_s != NANO and not 0.0 <= step <= self._longest_s:

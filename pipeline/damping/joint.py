@@ -168,13 +168,19 @@ def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params |
         raise AnalysisError("no damping law was fitted to every run; a joint fit has nothing to join")
     points = _points(runs)
     fits = {name: _fit(laws[name], runs, points, params) for name in shared}
-    fits = {name: fit for name, fit in fits.items() if math.isfinite(fit.chi2)}
+    # As for one run: a law whose parameters the windows do not determine states nothing.
+    fits = {name: fit for name, fit in fits.items() if math.isfinite(fit.chi2) and _determined(fit)}
     if not fits:
         raise AnalysisError("no damping law could be fitted to the runs together; fit them one by one")
     ends = points.t
     selected, admissible = choose(fits, params.evidence, lambda name: fits[name].span(ends))
     names = tuple(name for name, _, _ in runs)
     return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
+
+
+def _determined(fit: JointFit) -> bool:
+    coefficients = bool(np.isfinite(fit.coefficients.covariance).all())
+    return coefficients and all(math.isfinite(amplitude.u) for amplitude in fit.amplitudes)
 
 
 def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:

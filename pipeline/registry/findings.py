@@ -94,6 +94,8 @@ FINDINGS: Mapping[str, tuple[Severity, ...]] = {
     "readings_dropped": ("warning",),
     "sensor_away": ("info",),
     "sensor_lost": ("warning",),
+    "sensor_replaced": ("warning",),
+    "sensor_unconfirmed": ("warning",),
 }
 """Code to severities; where there are several, the first is that of a reader's finding."""
 

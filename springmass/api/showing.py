@@ -11,7 +11,7 @@ import numpy as np
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from springmass.report.laws import laws_of
-from springmass.report.tables import pretty, table_rows
+from springmass.report.tables import pretty, pretty_number, table_rows
 
 __all__ = ["html_summary", "text_summary"]
 
@@ -79,7 +79,7 @@ def html_summary(analysis: Analysis) -> str:
         damping = analysis.motion.damping
         fits = [
             f"<tr><td>{escape(row['name'])}</td><td>{escape(row['status'])}</td>"
-            f"<td>{row['fit'].reduced_chi2:.3g}</td><td>{escape(row['bic'])}</td>"
+            f"<td>{pretty_number(row['fit'].reduced_chi2, 3)}</td><td>{escape(row['bic'])}</td>"
             f"<td>{escape(', '.join(row['coefficients'][1:]))}</td></tr>"
             for row in laws_of(damping)["rows"]
         ]

@@ -14,6 +14,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from acquisition.regular_file import open_regular_text
 from pipeline.bench.scene import PLACES
 from springmass.batch.rows import COLUMNS
 from springmass.errors import USAGE, ProgramError
@@ -126,7 +127,8 @@ def _table(path: Path) -> Iterator[tuple[int, list[str], bool]]:
     try:
         if path.stat().st_size > LARGEST:
             raise ProgramError(f"{path}: a table of runs of at most {LARGEST >> 20} MB was demanded", USAGE)
-        text = path.read_text(encoding="utf-8-sig")
+        with open_regular_text(path, "utf-8-sig") as file:
+            text = file.read()
     except OSError as error:
         raise ProgramError(f"{path}: a table of runs was demanded, {error.strerror}; check the name", USAGE) from error
     except UnicodeDecodeError as error:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.recordings.base import dialect_folder
+from acquisition.regular_file import open_regular_text, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.errors import SceneError
 from springmass.batch.course import POSITION, Said, join, read_course
@@ -173,7 +174,8 @@ def _expanded(inputs: Sequence[str]) -> list[str]:
 
 def _listed(path: Path) -> list[str]:
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        with open_regular_text(path, "utf-8-sig") as file:
+            lines = file.read().splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ProgramError(f"{path}: a list of paths, one a line, was demanded, got {error}", USAGE) from error
     return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
@@ -232,7 +234,7 @@ def code_sha256() -> str:
     files = [file for room in _RESULTS for file in sorted((top / room).rglob("*.py"))]
     if (dialects := dialect_folder()).is_dir():
         files += sorted(dialects.glob("*.toml"))
-    parts += [file.read_bytes() for file in files]
+    parts += [read_regular(file) for file in files]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.errors import visible
+from acquisition.regular_file import open_regular_text
 from springmass.batch.rows import COLUMNS, NUMBERS, WHOLE, columns_of
 from springmass.errors import USAGE, ProgramError
 from storage.atomic import whole_file, writing
@@ -104,7 +105,7 @@ def read_rows(folder: Path) -> Iterator[dict[str, Any]]:
 
 def _read_csv(path: Path) -> Iterator[dict[str, Any]]:
     try:
-        text = path.open(encoding="utf-8", newline="")
+        text = open_regular_text(path, "utf-8", newline="")
     except OSError as error:
         demand = "a folder with results.csv was demanded, as springmass batch makes one"
         raise ProgramError(f"{path.parent}: {demand} ({error.strerror}); name that of its -o", USAGE) from error

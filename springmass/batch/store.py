@@ -11,9 +11,11 @@ import json
 import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from io import BufferedReader
 from pathlib import Path
 from typing import Any, Literal
 
+from acquisition.regular_file import open_regular, read_regular
 from springmass.batch.rows import dumped
 from springmass.errors import USAGE, ProgramError
 from storage.atomic import remove_leftovers, whole_file, write_whole, writing
@@ -97,9 +99,9 @@ class Store:
     def rows(self, key: str) -> Iterator[dict[str, Any]]:
         """Yield the rows of a run, the latest first."""
         for path, offset, size in reversed(self._places.get(key, ())):
-            with path.open("rb") as file:
+            with open_regular(path) as file:
                 file.seek(offset)
-                yield json.loads(file.read(size))
+                yield json.loads(file.read(size) or b"")
 
     def all(self) -> Iterator[dict[str, Any]]:
         """Yield every row that stands there, file by file."""
@@ -153,7 +155,7 @@ class Store:
     def marked(self) -> Mapping[str, Any] | None:
         """Return what all was made of, None where it may not be."""
         try:
-            told = json.loads((self.parts / MARK).read_bytes())
+            told = json.loads(read_regular(self.parts / MARK))
         except (OSError, ValueError):
             return None
         return told if isinstance(told, dict) and self._files() == [self.parts / WHOLE] else None
@@ -173,7 +175,7 @@ def _line(row: Mapping[str, Any]) -> bytes:
 def _lines(path: Path) -> Iterator[tuple[_Place, dict[str, Any] | None]]:
     """Yield where each line lies and its row, None where it is none."""
     offset = 0
-    with path.open("rb") as file:
+    with BufferedReader(open_regular(path)) as file:
         for line in file:
             try:
                 row = json.loads(line)

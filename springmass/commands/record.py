@@ -33,7 +33,7 @@ from springmass.runs.scenes import ask_about, read_scene
 from springmass.session.console import Console
 from springmass.session.operator import Closed, Operator
 from springmass.session.output import default_name, demand_new
-from springmass.session.session import BYTES_PER_READ, Ended, Sensor, Session, Trigger
+from springmass.session.session import BYTES_PER_READ, Ended, GivenUp, Sensor, Session, Trigger
 from springmass.session.simulated_bench import REST_M, Release, bench_position
 from springmass.session.stops import Stops
 from springmass.session.trigger import Disarmed
@@ -101,7 +101,8 @@ def run(options: argparse.Namespace) -> int:
             if not os.path.lexists(log):
                 raise
             # The log is whole as far as the disk has taken it; nothing of it is removed.
-            console.line(f"springmass: ended at once, by {stops.by or 'Ctrl-C'}; {_what_to_do(log)}")
+            lost = "" if session.given_up is None else f"; {_given_up(session.given_up)}"
+            console.line(f"springmass: ended at once, by {stops.by or 'Ctrl-C'}{lost}; {_what_to_do(log)}")
             return INTERRUPTED
         finally:
             session.stop()
@@ -118,6 +119,7 @@ def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple
         console.line(line)
     if status.error:
         console.line(f"springmass: {status.error}")
+        console.line(f"springmass: {status.dropped_records} records that came later were not kept")
     whole = not status.error and not status.dropped_records and log.name == out.with_suffix(".wire").name
     try:
         report = recover(
@@ -134,8 +136,8 @@ def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple
     if not report.log_removed:
         console.line(f"{log}: the log stays")
     if console.terminal:
-        console.line(f"next: springmass analyse {shlex.quote(str(report.runs[0].path))}")
-    return _exit_code(ended, report, session, console), report.runs[0].path
+        console.line(f"next: springmass analyse {shlex.quote(str(report.main.path))}")
+    return _exit_code(ended, report, session, console), report.main.path
 
 
 def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: Console) -> int:
@@ -161,6 +163,12 @@ def _usable(path: Path, channel: int, session: Session) -> bool:
         return True
     with open_run(path) as run:
         return bool(np.isfinite(run.samples().distance).any())
+
+
+def _given_up(given_up: GivenUp) -> str:
+    status = given_up.status
+    count = f"the disk did not take {status.dropped_records} reads ({status.dropped_bytes} bytes)"
+    return count if given_up.counted else f"{count} and not this count either"
 
 
 def _what_to_do(log: Path) -> str:

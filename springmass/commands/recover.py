@@ -24,5 +24,5 @@ def run(options: argparse.Namespace) -> int:
     )
     for line in report.describe():
         tell(line)
-    suggest(f"springmass analyse {shlex.quote(str(report.runs[0].path))}")
+    suggest(f"springmass analyse {shlex.quote(str(report.main.path))}")
     return OK

@@ -59,7 +59,7 @@ class LogFeed:
         if self.view.error or self.view.ended:
             return
         try:
-            for number, block in self._decoder.blocks(self._log.records()):
+            for number, block in self._decoder.blocks(self._log.records(), growing=True):
                 self.view.series[number].push(block)
         except (StorageError, OSError) as error:
             self.view.error = str(error)

@@ -88,6 +88,8 @@ ADVICE = {
     "pair_mismatch": "Check that both files are of one run.",
     "sensor_lost": "Look at cable, power and network; record again.",
     "other_device": "Give the ports names that stay.",
+    "sensor_replaced": "Check which sensor this part is of; analyse the parts one by one.",
+    "sensor_unconfirmed": "Check that the same sensor was plugged in again; give it a name with `springmass firmware`.",
     "readings_dropped": "Record on another disk.",
 }
 """What to do about an error or a warning, one sentence by code."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -50,6 +51,8 @@ def _laws(found: Damping | JointDamping, fitted: Mapping[str, Joint], status: Ca
 
 
 def _difference(value: float) -> str:
+    if not math.isfinite(value):  # chi-square of a law with as many parameters as windows
+        return pretty_number(None)
     return pretty_number(value) if abs(value) >= 1000.0 else f"{value:.1f}".replace("-", "−")
 
 

@@ -263,7 +263,7 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
         except RunDamaged as error:
             if unverified:
                 raise
-            remedy = f"{error.remedy}, or look at it as it is: unverified"
+            remedy = f"{error.remedy}, or look at it as it is with --unverified"
             raise RunDamaged(path, error.demand, remedy) from error
         return Loaded(
             path,
@@ -324,8 +324,11 @@ def _sha256_of(path: Path, stamp: tuple[int, int, int] | None) -> str:
 def _load_wire(path: Path, channel: str | None) -> Loaded:
     """Recover a log into a run file that is thrown away, and take that; the log stays as it is."""
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
-        report = recover(path, Path(folder) / "run.h5")
+        report = recover(path, Path(folder) / "run.h5", growing=True)
         names = {str(each.sensor.channel): each for each in report.runs}
+        if channel is None and len(report.parts_of) == len(names) - 1:
+            # The other sensors are parts of this one, from before or after something else came in its place.
+            channel = str(report.main.sensor.channel)
         wanted = [each for number, each in names.items() if channel in (None, number, each.sensor.port)]
         if len(wanted) != 1:
             sensors = ", ".join(f"{number} at {each.sensor.port}" for number, each in names.items())

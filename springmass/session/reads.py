@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
@@ -17,9 +18,9 @@ from acquisition.block import Block
 from acquisition.decoders.family import Polled
 from acquisition.live.decoding import SensorChain
 from acquisition.live.line import Line
-from acquisition.readings import Read
+from acquisition.readings import Read, Reading
 from springmass.session.failures import Failures
-from springmass.session.sensors import Sensor
+from springmass.session.sensors import Back, Proof, Sensor
 from storage.recorder import Recorder
 
 __all__ = ["Tee"]
@@ -35,8 +36,8 @@ class Tee:
 
     Parameters
     ----------
-    chains : sequence of SensorChain
-        By channel.
+    chains : list of SensorChain
+        By channel. While it records, a sensor that comes back as another is given one more.
     failures : Failures, optional
         Takes what decoders raise.
 
@@ -50,13 +51,18 @@ class Tee:
         Samples that nobody asked for in time: recorded, and the run file holds them, but not shown.
     """
 
-    def __init__(self, chains: Sequence[SensorChain], failures: Failures | None = None) -> None:
+    def __init__(self, chains: list[SensorChain], failures: Failures | None = None) -> None:
         self._chains = chains
         self._failures = failures or Failures()
         self._lock = threading.Lock()
         self._recorder: Recorder | None = None
+        self._preview = False
         self._kept: deque[Read] | None = None
         self._heard = [bytearray() for _ in chains]
+        self._sensors: Sequence[Sensor] = ()
+        # Where each port's bytes go: to its own channel, or to a further one since another sensor came back on it.
+        self._channels = list(range(len(chains)))
+        self._last: list[Reading | None] = [None for _ in chains]
         self.gone: dict[int, str] = {}
         self.readings = [0 for _ in chains]
         self.unshown = 0
@@ -66,17 +72,26 @@ class Tee:
 
         What it has to prove when it comes back is asked of the sensors as they are then.
         """
+        self._sensors = sensors
         family = sensors[channel].family
         decoder = None if family.poll is None else partial(self._polled, channel)
         transport = sensors[channel].transport
-        return Line(transport, channel, family.poll, decoder, lambda: sensors[channel].proof(), family.identify)
+        return Line(transport, channel, family.poll, decoder, partial(self._proof, channel), family.identify)
 
     def _polled(self, channel: int) -> Polled:
-        return cast(Polled, self._chains[channel].decoder)
+        return cast(Polled, self._chains[self._channels[channel]].decoder)
+
+    def _proof(self, channel: int) -> Proof | None:
+        """Return what has to be proven on a port that came back, by what spoke there last."""
+        sensor, now = self._sensors[channel], self._channels[channel]
+        identity = self._chains[now].told.identity or (sensor.identity if now == channel else None)
+        return replace(sensor, identity=identity).proof(self._last[now])
 
     def reads(self, reads: Sequence[Read]) -> None:
         """Take what one wake-up read; called on the reading thread."""
         with self._lock:
+            if len(self._chains) > len(self._channels):
+                reads = [(self._channels[port], host_ns, data) for port, host_ns, data in reads]
             if self._recorder is not None:
                 self._recorder.reads(reads)
             if self._kept is not None:
@@ -91,6 +106,8 @@ class Tee:
         try:
             chain.take(host_ns, data)
             self.readings[channel] += len(chain.last)
+            if chain.last:
+                self._last[channel] = chain.last[-1]
             if len(chain) > HELD_SAMPLES:
                 self.unshown += len(chain.block())
         except Exception as error:  # the bytes are recorded; what is shown of them is not worth a run
@@ -99,16 +116,34 @@ class Tee:
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Take an event; called on the reading thread."""
         with self._lock:
-            if self._recorder is not None:
-                self._recorder.event(channel, host_ns, kind, facts)
-            try:
-                self._chains[channel].lost()
-            except Exception as error:
-                self._failures.note("decoder", error)
             if kind == "lost":
                 self.gone[channel] = str(facts.get("why", ""))
             elif kind == "reopened":
                 self.gone.pop(channel, None)
+                if self._sensors and "sensor" not in facts:
+                    facts = {**facts, "sensor": self._sensors[channel].judged(None, None)}
+                if facts.get("sensor") == Back.ANOTHER and self._recorder is not None and not self._preview:
+                    self._go_on(self._recorder, channel, host_ns, facts)
+                    return
+            channel = self._channels[channel]
+            if self._recorder is not None:
+                self._recorder.event(channel, host_ns, kind, facts)
+            try:
+                chain = self._chains[channel]
+                (chain.returned if kind == "reopened" else chain.lost)()
+            except Exception as error:
+                self._failures.note("decoder", error)
+
+    def _go_on(self, recorder: Recorder, port: int, host_ns: int, facts: Mapping[str, Any]) -> None:
+        """Record what comes from a port as another sensor from here on, in the next channel that is free."""
+        before, channel = self._channels[port], len(self._chains)
+        recorder.event(before, host_ns, "replaced", {**facts, "channel": channel})
+        recorder.event(channel, host_ns, "continues", {**facts, "of": before})
+        self._channels[port] = channel
+        self._chains.append(self._sensors[port].chain())
+        self._heard.append(bytearray())
+        self._last.append(None)
+        self.readings.append(0)
 
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples that came since the last call, by channel, of the sensors that have any."""
@@ -136,15 +171,17 @@ class Tee:
             while self._kept and self._kept[0][1] < before_ns:
                 self._kept.popleft()
 
-    def start(self, recorder: Recorder, chains: Sequence[SensorChain], since_ns: int) -> None:
+    def start(self, recorder: Recorder, chains: list[SensorChain], since_ns: int, *, preview: bool = False) -> None:
         """Record from here on, and the kept reads since a moment, no read twice and none left out.
 
-        What a polled sensor is asked, and what is decoded, begins anew with these chains, as the recorded bytes do.
+        What a polled sensor is asked, and what is decoded, begins anew with these chains, as the recorded bytes do. In
+        a preview whatever comes back on a port is what will be recorded.
         """
         with self._lock:
             kept = [read for read in self._kept or () if read[1] >= since_ns]
             self._kept = None
-            self._recorder, self._chains = recorder, chains
+            self._recorder, self._chains, self._preview = recorder, chains, preview
+            self._channels = list(range(len(chains)))
             recorder.reads(kept)
             for channel, host_ns, data in kept:
                 self._decode(channel, host_ns, data)

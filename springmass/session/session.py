@@ -30,7 +30,7 @@ from springmass.session.display.turns import Display, Samples
 from springmass.session.failures import Failures
 from springmass.session.identity import meeting
 from springmass.session.reads import Tee
-from springmass.session.sensors import Sensor
+from springmass.session.sensors import ANSWERED, Sensor
 from springmass.session.stops import Stops
 from springmass.session.trigger import Disarmed, Trigger, Watch
 from storage.errors import StorageError, WriteFailed
@@ -42,7 +42,7 @@ __all__ = ["Ended", "Progress", "Sensor", "Session", "Trigger"]
 
 SAY_NS = 1_500_000_000  # silence so long before a run is said
 HEAR_S = 3.0  # silence longer than this before a run is no sensor
-HEARD, ANSWERED = 3, 12  # readings that make a sensor, and within which one that is asked says what it is
+HEARD = 3  # readings that make a sensor
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # of samples that nobody looked at before the run began
 BYTES_PER_READ = 64  # log bytes a reading takes, for the look at the disk
@@ -66,6 +66,21 @@ class Ended:
     log: Path
 
 
+@dataclass(frozen=True, slots=True)
+class GivenUp:
+    """What a recording gave up when the user did not wait for the disk.
+
+    Parameters
+    ----------
+    counted : bool
+        Whether the log holds the counts.
+    status : RecorderStatus
+    """
+
+    counted: bool
+    status: RecorderStatus
+
+
 class Session:
     """Records one run.
 
@@ -85,6 +100,8 @@ class Session:
     ----------
     failures : Failures
         What failed beside the recording.
+    given_up : GivenUp or None
+        What the recording gave up, where the user did not wait for the disk.
     shown : Shown or None
         What the samples so far amount to, as far as they were shown.
     """
@@ -112,6 +129,7 @@ class Session:
         self.stops = stops or Stops()
         self._marks: list[tuple[float, str]] = []
         self.shown: Shown | None = None
+        self.given_up: GivenUp | None = None
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
         """Start reading, and return when every sensor has been heard.
@@ -207,7 +225,7 @@ class Session:
             self.failures.note("preview", error)
             return None
         self._chains = chains
-        self._tee.start(recorder, chains, self._clock.now_ns())
+        self._tee.start(recorder, chains, self._clock.now_ns(), preview=True)
         return recorder
 
     def record(
@@ -288,8 +306,12 @@ class Session:
             counts = self.failures.counts
             recorder.event(0, end_ns, "ended", {"by": by, **({"failures": counts} if counts else {})})
         # From here on the user may end the wait for the disk.
-        with contextlib.suppress(WriteFailed):  # it stands in the status
-            recorder.close()
+        try:
+            with contextlib.suppress(WriteFailed):  # it stands in the status
+                recorder.close()
+        except KeyboardInterrupt:
+            self.given_up = GivenUp(recorder.give_up(), recorder.status)
+            raise
         status = recorder.status
         return Ended("the disk" if status.error else by, status, recorder.path)
 

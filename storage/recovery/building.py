@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from acquisition.block import Block
@@ -86,7 +86,7 @@ class SensorRun:
             self._chain.info(self._sensor.port, header.kind),
             scene=header.scene,
             title=header.title,
-            traps=(*_traps(damage), *losses.traps()),
+            traps=(*_traps(damage), *_counter_traps(decoding), *losses.traps()),
             malformed_rows=sum(count for name, count in faults.items() if not name.endswith("bytes")),
             format="wire",
             provenance={
@@ -107,6 +107,15 @@ class SensorRun:
             },
         )
         return RecoveredRun(self._sensor, self._writer.path, self._samples, faults, decoding, losses)
+
+
+def _counter_traps(decoding: Mapping[str, Any]) -> Iterator[Trap]:
+    if joins := decoding["joins"]:
+        yield Trap(
+            "counter_changed",
+            "The sensor's counter did not go on when its port came back; the host's clock times the gap.",
+            joins,
+        )
 
 
 def _traps(damage: Damage) -> tuple[Trap, ...]:

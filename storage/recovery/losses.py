@@ -21,6 +21,8 @@ SILENCE_S, SILENT_PERIODS = 1.5, 5.0
 """A sensor from which no reading comes for so long, or for so many of its periods, up to the end, is gone."""
 NO_TARGET_S = 1.0
 """A target that is lost for less, now and then, is what missing samples tell anyway."""
+UNCONFIRMED = ("restarted", "assumed")
+"""Of what the event "reopened" says of the sensor, what leaves open whether it is the same."""
 
 Event = tuple[int, Mapping[str, Any]]
 """Host's monotonic clock, ns, and ``{"kind", "facts"}`` as the log notes it."""
@@ -42,6 +44,12 @@ class Losses:
         How long the port was lost each time it came back, s.
     refused : int
         How often another device came in its place and was not recorded.
+    unconfirmed : int
+        How often a sensor came back that nothing distinguishes from another of its kind.
+    continued_in : int or None
+        Channel in which the recording goes on, because another sensor came back on the port.
+    continues : int or None
+        Channel of the sensor that was there before, where this one came back in its place.
     no_target_s, longest_no_target_s : float
         How long the sensor answered without a distance, s: in all, and at a stretch.
     dropped_reads, dropped_bytes : int
@@ -57,6 +65,9 @@ class Losses:
     longest_no_target_s: float = 0.0
     dropped_reads: int = 0
     dropped_bytes: int = 0
+    unconfirmed: int = 0
+    continued_in: int | None = None
+    continues: int | None = None
 
     def traps(self) -> Iterator[Trap]:
         """Yield what an analysis has to say of it."""
@@ -74,6 +85,25 @@ class Losses:
                 f"The sensor's port was lost {often} and came back, after {max(self.away):.3g} s at the most; "
                 f"{sum(self.away):.3g} s in all were not recorded.",
                 len(self.away),
+            )
+        if self.unconfirmed:
+            yield Trap(
+                "sensor_unconfirmed",
+                "The sensor that came back cannot be distinguished from another of its kind: no name, serial number "
+                "or counter identifies it.",
+                self.unconfirmed,
+            )
+        if self.continued_in is not None:
+            yield Trap(
+                "sensor_replaced",
+                "Another sensor, or one whose counter leapt, came back on the port; the recording goes on in channel "
+                f"{self.continued_in}.",
+            )
+        if self.continues is not None:
+            yield Trap(
+                "sensor_replaced",
+                "This run begins where another sensor, or this one before its counter leapt, was lost: channel "
+                f"{self.continues} holds what came before.",
             )
         if self.refused:
             yield Trap(
@@ -161,6 +191,9 @@ class LossCount:
             self._longest,
             sum(int(_number(facts, "records")) for facts in overflows),
             sum(int(_number(facts, "bytes")) for facts in overflows),
+            sum(kind == "reopened" and facts.get("sensor") in UNCONFIRMED for kind, facts in told),
+            next((int(_number(facts, "channel")) for kind, facts in told if kind == "replaced"), None),
+            next((int(_number(facts, "of")) for kind, facts in told if kind == "continues"), None),
         )
 
     def _add(self, stretches: np.ndarray[Any, Any]) -> None:

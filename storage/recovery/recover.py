@@ -23,15 +23,20 @@ from storage.recovery.losses import Losses
 from storage.recovery.recovered import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
 from storage.run_file.writing import RunWriter, run_writer
+from storage.wire_log.log_file import is_being_written
 from storage.wire_log.notes import Notes
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import LogContents, NotALog, read_log
 from storage.wire_log.wire_samples import LogDecoder, chains_of
 
-__all__ = ["RecoverReport", "RecoveredRun", "recover", "run_paths", "verify_against_log"]
+__all__ = ["LogGrowing", "RecoverReport", "RecoveredRun", "recover", "run_paths", "verify_against_log"]
 
 AT_ONCE = 4
 """So many sensors' run files are written in one pass over the log: each holds some megabytes of samples back."""
+
+
+class LogGrowing(StorageError):
+    """A log that a recording still writes: its run file would lack what comes and stand in the recording's way."""
 
 
 def recover(
@@ -43,6 +48,7 @@ def recover(
     header: LogHeader | None = None,
     speed_of_sound_m_per_s: float | None = None,
     provenance: Mapping[str, Any] | None = None,
+    growing: bool = False,
 ) -> RecoverReport:
     """Build the run file of a log, or one for each sensor where several were recorded.
 
@@ -52,7 +58,8 @@ def recover(
         The log; finished, torn or damaged.
     out_path : str or PathLike, optional
         The run file; left out, the log's name with ``.h5``. With several sensors their channels come before the
-        suffix: ``run.0.h5``, ``run.1.h5``.
+        suffix: ``run.0.h5``, ``run.1.h5``. So they do of a sensor that came back as another on the port of the only
+        one: ``run.h5``, ``run.1.h5``.
     overwrite : bool
         Whether run files that stand there may be replaced.
     remove_log : bool
@@ -63,9 +70,13 @@ def recover(
         Applied to echo times in place of the one that the log notes, m/s.
     provenance : mapping, optional
         Goes into the run file besides what the log says: software, version, ...
+    growing : bool
+        Whether to take what there is of a log that a recording still writes.
 
     Raises
     ------
+    LogGrowing
+        If a recording still writes the log.
     NotALog
         If there is no log, or nothing in it can be read.
     RunExists, WriteFailed
@@ -74,35 +85,70 @@ def recover(
         If a run file just written does not read back as it should. The log stands.
     """
     contents = read_log(log_path)
+    if not growing:
+        _demand_finished(contents)
     log = _Log(contents, _header(contents, header), provenance or {})
     leftovers = remove_leftovers(contents.path.absolute().parent)
     other = {} if speed_of_sound_m_per_s is None else {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
     sensors = log.header.sensors
-    paths = run_paths(contents.path if out_path is None else Path(out_path), [each.channel for each in sensors])
-    runs = {} if overwrite else _standing(paths, sensors, contents, other)
-    missing = [number for number in range(len(sensors)) if number not in runs]
-    for start in range(0, len(missing), AT_ONCE):
-        numbers = missing[start : start + AT_ONCE]
-        built = _build(log, [sensors[n] for n in numbers], [paths[n] for n in numbers], other, overwrite)
-        for number, run in zip(numbers, built, strict=True):
-            _demand_held(run.path, contents)
-            runs[number] = run
-    if not missing:
+    out = contents.path if out_path is None else Path(out_path)
+    paths = run_paths(out, [each.channel for each in sensors])
+    runs = _runs(log, sensors, paths, other, overwrite)
+    if not log.notes.counts:  # all run files stood there
         for record in contents:
             if record.kind is not Kind.DATA:
                 log.notes.take(record)
+    if parts := _parts(log):
+        (only,) = run_paths(out, [0])
+        runs += _runs(log, parts, [_of_channel(only, part.channel) for part in parts], other, overwrite)
     damage = contents.damage
     removed = remove_log and _remove(contents)
     return RecoverReport(
         contents.path,
-        tuple(runs[number] for number in range(len(sensors))),
+        tuple(runs),
         damage,
         log.notes.counts[Kind.MARK],
         log.notes.counts[Kind.EVENT],
         removed,
         len(contents.parts),
         leftovers,
+        {part.channel: log.notes.parts[part.channel] for part in parts},
     )
+
+
+def _runs(
+    log: _Log, sensors: Sequence[SensorEntry], paths: Sequence[Path], other: Mapping[str, Any], overwrite: bool
+) -> list[RecoveredRun]:
+    """Return the run files of some sensors, those that stand there as they are and the others built."""
+    runs = {} if overwrite else _standing(paths, sensors, log.contents, other)
+    missing = [number for number in range(len(sensors)) if number not in runs]
+    for start in range(0, len(missing), AT_ONCE):
+        numbers = missing[start : start + AT_ONCE]
+        built = _build(log, [sensors[n] for n in numbers], [paths[n] for n in numbers], other, overwrite)
+        for number, run in zip(numbers, built, strict=True):
+            _demand_held(run.path, log.contents)
+            runs[number] = run
+    return [runs[number] for number in range(len(sensors))]
+
+
+def _parts(log: _Log) -> list[SensorEntry]:
+    """Return the sensors that came back as others on the ports of those that the header names."""
+    known = {sensor.channel: sensor for sensor in log.header.sensors}
+    parts = []
+    for channel, of in sorted(log.notes.parts.items()):
+        if channel not in known and (before := known.get(of)) is not None:
+            calibration = log.notes.calibrations.get(of, before.calibration)
+            known[channel] = dataclasses.replace(before, channel=channel, calibration=calibration)
+            parts.append(known[channel])
+    return parts
+
+
+def _demand_finished(contents: LogContents) -> None:
+    for part in contents.parts:
+        with contextlib.suppress(OSError):  # that it is gone is for the reading to say
+            if is_being_written(part.path):
+                demand = f"a recording still writes the log, got it at {contents.size} bytes"
+                raise LogGrowing(contents.path, demand, "recover it when the recording has ended")
 
 
 def verify_against_log(path: str | os.PathLike[str], log_path: str | os.PathLike[str]) -> None:
@@ -189,7 +235,11 @@ def run_paths(path: Path, channels: Sequence[int]) -> list[Path]:
     path = path if path.suffix == ".h5" else path.with_suffix(".h5")
     if len(channels) <= 1:
         return [path]
-    return [path.with_name(f"{path.stem}.{channel}{path.suffix}") for channel in channels]
+    return [_of_channel(path, channel) for channel in channels]
+
+
+def _of_channel(path: Path, channel: int) -> Path:
+    return path.with_name(f"{path.stem}.{channel}{path.suffix}")
 
 
 @dataclasses.dataclass(slots=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +83,8 @@ class RecoverReport:
     log_removed : bool
     parts : int
         Files that the log lay in.
+    parts_of : mapping of int to int
+        By channel of a sensor that came back as another, the channel of the one before.
     leftovers : tuple of Path
         Files of builds that were killed, found in the folder and removed.
     """
@@ -95,6 +97,18 @@ class RecoverReport:
     log_removed: bool
     parts: int = 1
     leftovers: tuple[Path, ...] = ()
+    parts_of: Mapping[int, int] = field(default_factory=dict)
+
+    @property
+    def main(self) -> RecoveredRun:
+        """The run that is to be analysed: the first sensor's, the longest part where others came back in its place."""
+        root = self.runs[0].sensor.channel
+        return max((run for run in self.runs if self._root(run.sensor.channel) == root), key=lambda run: run.samples)
+
+    def _root(self, channel: int) -> int:
+        while channel in self.parts_of:
+            channel = self.parts_of[channel]
+        return channel
 
     def describe(self) -> Iterator[str]:
         """Yield lines for people: of each run file, and one about the log."""
@@ -102,5 +116,7 @@ class RecoverReport:
             yield f"{path}: left by a build that was killed, removed"
         for run in self.runs:
             yield from run.describe(self.log)
+        if self.parts_of:
+            yield f"{self.log}: another sensor came back on the port; the longest part is {self.main.path}"
         files = f" in {self.parts} files" if self.parts > 1 else ""
         yield f"{self.log}: {self.damage.describe()}{files}"

@@ -45,6 +45,7 @@ FIRST_COPY = 8192
 WRITE_BYTES = 1 << 18
 """So much is written at a time where many records wait."""
 TAKEN_NAMES = 100
+_APPEND = os.O_WRONLY | os.O_APPEND  # and never made anew
 
 Item = tuple[Kind, int, int, bytes]
 """What a record is made of: kind, channel, host's monotonic clock in ns, payload."""
@@ -125,6 +126,8 @@ class WireLogWriter:
         self._log = secrets.randbits(32) if log is None else log
         self._next_copy = FIRST_COPY
         self._syncing = threading.Lock()
+        self._counting = threading.Lock()
+        self._in_flight = (0, 0)  # records and whole items of the write that has begun and not returned
         self._append_error: WriteFailed | None = None
         self._sync_error: WriteFailed | None = None
         try:
@@ -270,6 +273,10 @@ class WireLogWriter:
             return
         data = b"".join(batch)
         taken = 0
+        with self._counting:
+            if self._append_error:
+                raise self._append_error
+            self._in_flight = len(batch), items
         try:
             taken = self._file.write(data)
             while taken < len(data):  # a nearly full disk takes a part, then says why
@@ -285,8 +292,44 @@ class WireLogWriter:
         self._count(len(batch), taken, items)
 
     def _count(self, records: int, size: int, items: int) -> None:
-        self.written = Written(self.written.records + records, self.written.bytes + size)
-        self.extended += items
+        with self._counting:
+            self.written = Written(self.written.records + records, self.written.bytes + size)
+            self.extended += items
+            self._in_flight = 0, 0
+
+    def stop(self) -> int:
+        """Begin no write any more; return how many items of the last call are in the log or in a write that hangs."""
+        with self._counting:
+            self._append_error = self._append_error or WriteFailed(
+                self.path, "the recording was ended while the disk took nothing", "look at the disk"
+            )
+            return self.extended + self._in_flight[1]
+
+    def append_beside(self, items: Iterable[Item]) -> None:
+        """Append items past a write that hangs, through a descriptor of their own, and sync; after :meth:`stop` only.
+
+        Notes
+        -----
+        The records take their numbers after those of the write that hangs. Should that never reach the log, its
+        records are missing in the count, and every reader of the log says how many.
+
+        Raises
+        ------
+        OSError
+            If the disk does not take it all, or the log's name leads to no file.
+        """
+        batch: list[bytes] = []
+        with self._counting:
+            sequence = self.written.records + self._in_flight[0]
+        for kind, channel, mono_ns, payload in items:
+            batch += frames(
+                kind, payload, sequence=sequence + len(batch), mono_ns=mono_ns, log=self._log, channel=channel
+            )
+        with open(self.files[-1], "ab", buffering=0, opener=lambda name, _: os.open(name, _APPEND)) as file:
+            data = memoryview(b"".join(batch))
+            while data:
+                data = data[file.write(data) :]
+            os.fsync(file.fileno())
 
     def sync(self) -> Written:
         """Return when everything appended before the call is on the disk, and how much that is.

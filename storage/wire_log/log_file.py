@@ -5,13 +5,18 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
+from acquisition.regular_file import open_regular
 from storage.atomic import sync_folder
 
-__all__ = ["LogFile", "open_log_file"]
+if sys.platform != "win32":
+    import fcntl
+
+__all__ = ["LogFile", "is_being_written", "open_log_file"]
 
 
 class LogFile(Protocol):
@@ -31,13 +36,16 @@ class LogFile(Protocol):
 
 
 class _NewFile(io.FileIO):
-    """A file that was not there yet; nothing is buffered on this side of the kernel."""
+    """A file that was not there yet, locked while it is open; nothing is buffered on this side of the kernel."""
 
     # macOS and Windows have no fdatasync; fsync does more than it.
     _sync: Callable[[int], None] = staticmethod(getattr(os, "fdatasync", os.fsync))
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "x", opener=lambda name, flags: os.open(name, flags | os.O_APPEND, 0o666))
+        if sys.platform != "win32":
+            with contextlib.suppress(OSError):  # a network disk without locks
+                fcntl.flock(self.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     def sync(self) -> None:
         self._sync(self.fileno())
@@ -49,3 +57,20 @@ def open_log_file(path: Path) -> LogFile:
     with contextlib.suppress(OSError):  # then the name is as safe as it gets
         sync_folder(path.parent)
     return file
+
+
+def is_being_written(path: Path) -> bool:
+    """Return whether the writer of a log's file, in this process or another, still holds its lock.
+
+    False on Windows and on a disk without locks, where nobody can know. Raises OSError where the file cannot be opened.
+    """
+    if sys.platform == "win32":
+        return False
+    with open_regular(path) as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+    return False

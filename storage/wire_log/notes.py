@@ -13,7 +13,7 @@ __all__ = ["Notes"]
 
 KEPT = 10_000
 KEPT_BYTES = 4 << 20
-ENDS = frozenset({"lost", "reopened", "ended"})
+ENDS = frozenset({"lost", "reopened", "replaced", "continues", "ended"})
 """Events of which the last is kept, however many came before: they say how a recording ended."""
 
 
@@ -26,6 +26,8 @@ class Notes:
         By kind of record.
     calibrations : dict of int to mapping
         The last calibration of each channel.
+    parts : dict of int to int
+        By channel of a sensor that came back as another, the channel of the one before.
     left_out : int
         Notes that were not kept. The log inside the run file has them.
     """
@@ -33,6 +35,7 @@ class Notes:
     def __init__(self) -> None:
         self.counts: Counter[Kind] = Counter()
         self.calibrations: dict[int, Mapping[str, Any]] = {}
+        self.parts: dict[int, int] = {}
         self.left_out = 0
         self._kept: list[tuple[Record, dict[str, Any]]] = []
         self._bytes = 0
@@ -52,6 +55,8 @@ class Notes:
             if content["kind"] == "calibration":
                 demand_calibration(content["facts"])
                 self.calibrations[record.channel] = content["facts"]
+            elif content["kind"] == "continues" and isinstance(of := content["facts"].get("of"), int):
+                self.parts.setdefault(record.channel, of)
         elif record.kind is Kind.MARK:
             content = {"text": record.text()}
         else:

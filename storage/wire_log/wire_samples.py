@@ -77,8 +77,15 @@ class LogDecoder:
         self.last_ns = 0
         self._held: list[list[tuple[int, bytes]]] = [[] for _ in self.sensors]
 
-    def blocks(self, log: Iterable[Record]) -> Iterator[tuple[int, Block]]:
-        """Yield samples as they come, with the number of the sensor among those asked for."""
+    def blocks(self, log: Iterable[Record], *, growing: bool = False) -> Iterator[tuple[int, Block]]:
+        """Yield samples as they come, with the number of the sensor among those asked for.
+
+        Parameters
+        ----------
+        log : iterable of Record
+        growing : bool
+            Whether more records come at a next call.
+        """
         places = {sensor.channel: (number, held) for number, (sensor, held) in enumerate(self._places())}
         size = mono_ns = 0
         for record in log:
@@ -90,7 +97,7 @@ class LogDecoder:
             if kind is not _DATA:
                 self._noted(record)
                 if place is not None and kind is _EVENT and event_content(payload)["kind"] in BREAKS:
-                    self._break(place[0])
+                    self._break(place[0], returned=event_content(payload)["kind"] == "reopened")
             elif place is not None:
                 place[1].append((mono_ns, payload))
                 size += len(payload)
@@ -98,14 +105,15 @@ class LogDecoder:
                     size = 0
                     yield from self._samples()
         self.last_ns = mono_ns
-        yield from self._samples()
+        yield from self._samples(final=not growing)
 
     def _places(self) -> Iterator[tuple[SensorEntry, list[tuple[int, bytes]]]]:
         return zip(self.sensors, self._held, strict=True)
 
-    def _break(self, number: int) -> None:
+    def _break(self, number: int, *, returned: bool = False) -> None:
         self._hand_over(number)
-        self.chains[number].lost()
+        chain = self.chains[number]
+        (chain.returned if returned else chain.lost)()
 
     def _hand_over(self, number: int) -> None:
         held = self._held[number]
@@ -113,11 +121,11 @@ class LogDecoder:
         self.reads[number] += len(held)
         held.clear()
 
-    def _samples(self) -> Iterator[tuple[int, Block]]:
+    def _samples(self, *, final: bool = False) -> Iterator[tuple[int, Block]]:
         for number, chain in enumerate(self.chains):
             self._hand_over(number)
             if len(chain):
-                yield number, chain.block()
+                yield number, chain.block(final=final)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,6 +160,6 @@ def decode_log(
     for number, block in decoder.blocks(log):
         blocks[number].append(block)
     return tuple(
-        Decoded(sensor, chain, concatenate([*found, chain.block()]), reads)
+        Decoded(sensor, chain, concatenate(found), reads)
         for sensor, chain, found, reads in zip(sensors, decoder.chains, blocks, decoder.reads, strict=True)
     )

@@ -32,6 +32,7 @@ PAGES = (
     "docs/how-to/read-the-budget.md",
     "docs/how-to/record-at-the-bench.md",
     "docs/how-to/simulate-a-bench.md",
+    "docs/reference/formats.md",
     "docs/reference/run-file.md",
     "docs/reference/wire-log.md",
     "docs/reference/command-line.md",

@@ -571,6 +571,8 @@ def test_what_is_no_regular_file_is_refused_at_once(
         ["recover", str(path)],
         ["analyse", str(run), "--json", "--scene", str(path)],
         ["simulate", "--scene", str(path)],
+        ["batch", "--runs", str(path), "-o", str(tmp_path / "course")],
+        ["batch", f"@{path}", "-o", str(tmp_path / "course")],
     ):
         if arguments[0] == "formats" and kind == "directory":
             continue  # which lists what is in a folder

@@ -198,7 +198,7 @@ TABLE = [
             (0.044677716, 10.020003966),
             (0.1078176349401474, 0.2420551627874374),
         ),
-        *("angular_velocity", ("--run", CHANNEL), say("Rotation x", run="Raw Data")),
+        *("angular_velocity", (Missing.RUN, CHANNEL), say("Rotation x", run="Raw Data")),
     ),
     Row("xyerr", "table", "Y", 152, 11.9, (0, 12.668), (0.5768678112, 0.647375818), "length", (UNIT,), say(unit="m")),
     Row("xy_", "table", "y", 3501, 10, (0, 350), (0, -8.98898e-05), "length", (UNIT,), say(unit="m")),

@@ -30,6 +30,7 @@ from acquisition.recordings.tables.contents import Channel, Contents, Formula, S
 from acquisition.recordings.tables.sheet import ColumnFormat
 from acquisition.recordings.tables.text import head_lines, text_of
 from acquisition.recordings.units import TIMES, time_power
+from acquisition.regular_file import open_regular_text
 
 __all__ = ["dialect", "dialects"]
 
@@ -56,7 +57,8 @@ def dialects() -> Iterator[ColumnFormat]:
     """
     for path in sorted(dialect_folder().glob("*.toml")):
         try:
-            text = path.read_text(encoding="utf-8")
+            with open_regular_text(path, "utf-8") as file:
+                text = file.read()
         except (OSError, UnicodeError) as error:
             raise AcquisitionError(f"{path}: cannot be read ({error}); repair it or take it away") from error
         yield dialect(str(path), text)

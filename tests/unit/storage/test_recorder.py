@@ -227,6 +227,89 @@ def test_an_overflow_is_told_where_it_happened() -> None:
     assert records[16].json()["dropped_records"] == 88
 
 
+def test_events_and_marks_outlast_an_overflow() -> None:
+    """They stand behind the counts of what was lost with them, and before what comes later."""
+    disk = Disk()
+    recording = recorder(disk, queue_bytes=200)
+    disk.writes_pass.clear()
+    recording.put(0, 0, b"first")
+    assert disk.held.wait(WAIT_S)
+    for number in range(1, 20):
+        recording.put(0, number, b"x" * 10)
+        recording.event(0, number, "lost", {"number": number})
+    recording.mark("now", host_ns=20)
+    disk.writes_pass.set()
+    recording.drain()
+    recording.put(0, 21, b"after")
+    recording.close()
+    _, _, *records, after, _ = list(parse_log(bytes(disk.data)))
+    lost = [record.json()["facts"]["number"] for record in records if record.json().get("kind") == "lost"]
+    assert lost == list(range(1, 20))
+    assert (records[-1].kind, records[-1].text(), after.payload) == (Kind.MARK, "now", b"after")
+    (overflow,) = [record for record in records if record.json().get("kind") == "overflow"]
+    kept = sum(record.kind is Kind.DATA for record in records)
+    assert kept + overflow.json()["facts"]["records"] == 19 == kept + recording.status.dropped_records
+
+
+def test_what_is_given_up_while_a_write_hangs_is_counted(tmp_path: Path) -> None:
+    """Every read is in the log, in the counts or in the write that hung; a write that returns later adds nothing."""
+    path = tmp_path / "run.wire"
+
+    class Hanging:
+        """A real file whose writes wait."""
+
+        def __init__(self, path: Path) -> None:
+            self.file = open_log_file(path)
+            self.passes, self.hangs = threading.Event(), threading.Event()
+            self.passes.set()
+
+        def write(self, data: bytes | memoryview) -> int:
+            """Write, when it may."""
+            if not self.passes.is_set():
+                self.hangs.set()
+                assert self.passes.wait(WAIT_S)
+            return self.file.write(data)
+
+        def sync(self) -> None:
+            """Sync."""
+            self.file.sync()
+
+        def close(self) -> None:
+            """Close."""
+            self.file.close()
+
+    files: list[Hanging] = []
+
+    def opened(path: Path) -> LogFile:
+        files.append(Hanging(path))
+        return files[0]
+
+    recording = Recorder(path, HEADER, VirtualClock(7), sync_every_s=HOUR_S, queue_bytes=3000, open_file=opened)
+    recording.put(0, 0, b"kept")
+    recording.drain()
+    files[0].passes.clear()
+    recording.put(0, 1, b"hangs")
+    assert files[0].hangs.wait(WAIT_S)
+    for number in range(200):
+        recording.put(number % 2, 2 + number, b"%03d" % number)
+    recording.mark("late", host_ns=300)
+    assert recording.give_up()
+    contents = read_log(path)
+    records = list(contents)
+    assert [record.payload for record in records if record.kind is Kind.DATA] == [b"kept"]
+    assert [record.text() for record in records if record.kind is Kind.MARK] == ["late"]
+    facts = [record.json()["facts"] for record in records if record.kind is Kind.EVENT]
+    assert sum(each["records"] for each in facts) == 200 == recording.status.dropped_records
+    assert sum(each["bytes"] for each in facts) == 600 == recording.status.dropped_bytes
+    assert contents.damage.lost == 1
+    assert contents.damage.ended
+    files[0].passes.set()
+    recording._appender.join(WAIT_S)
+    assert recording.status.dropped_records == 200
+    assert [record.payload for record in read_log(path) if record.kind is Kind.DATA] == [b"kept"]
+    files[0].close()
+
+
 def test_a_read_that_is_larger_than_the_queue_is_an_overflow_at_once() -> None:
     """Nothing else need come: its event is in the log when the queue has been drained."""
     disk = Disk()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.damping.joint import fit_joint
+from pipeline.damping.laws import LAWS
 from pipeline.damping.select import Damping, Params, fit_damping
 from pipeline.errors import AnalysisError
 from pipeline.oscillation.demodulate import Demodulated
@@ -102,3 +103,10 @@ def test_one_run_is_not_enough(synthetic: ModuleType, windows: Windows) -> None:
         fit_joint([alone])
     with pytest.raises(AnalysisError, match="nothing to join"):
         fit_joint([alone, alone], Params(laws=()))
+
+
+def test_laws_that_ship_may_be_given_as_objects(synthetic: ModuleType, windows: Windows) -> None:
+    """The options of a fit take a law by its name or itself, in a joint fit as in that of one run."""
+    runs = [run(synthetic, windows, seed, **MIXED) for seed in (1, 2)]
+    by_object = fit_joint(runs, Params(laws=(LAWS["none"], LAWS["linear"])))
+    assert set(by_object.fits) == {"none", "linear"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 
 from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.bench.scene import Scene
 from pipeline.damping.joint import fit_joint
 from pipeline.damping.laws import LAWS, find_law
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
@@ -122,3 +124,33 @@ def test_laws_are_named_or_given() -> None:
         find_law("cubic")
     with pytest.raises(AnalysisError, match="got 'linear', which is taken"):
         find_law(replace(three_halves(), name="linear"))
+
+
+@pytest.mark.parametrize("name", ["n", "beta", "c", "mu"])
+def test_a_coefficient_means_nothing_by_its_name(name: str) -> None:
+    """A coefficient with the name of one of ours is neither a power nor a drag coefficient nor friction."""
+    t = np.arange(3000) / 100.0
+    amplitude = 0.05 / (1.0 + 0.3 * math.sqrt(0.05) * t / 2.0) ** 2
+    y = 0.3 + amplitude * np.cos(8.3 * t) + 3e-4 * np.random.default_rng(1).standard_normal(t.size)
+    law = make_law(
+        "own",
+        lambda t, a, d: a / (1.0 + d * np.sqrt(a) * t / 2.0) ** 2,
+        {name: "1/(m^1/2 s)"},
+        lambda t, a: (lambda line: (line[1] ** -2, 2.0 * line[0]))(np.polyfit(t, a**-0.5, 1)),
+    )
+    bench = Scene.from_mapping({"bob": {"mass_kg": 0.2}, "disc": {"diameter_m": 0.1}, "air": {"temperature_c": 20.0}})
+    params = params_for("standard")
+    params = replace(params, damping=replace(params.damping, laws=(law,), otherwise=()))
+    found = analyse(Track.from_arrays(t, y), bench, params)
+    assert isinstance(found.motion, Oscillation)
+    own = found.motion.derived.coefficients
+    assert set(own) == {name}
+    assert own[name].value == pytest.approx(0.3, rel=0.05)
+    assert "drag_coefficient" not in found.estimates
+    assert all(not effect.included for effect in found.effects if effect.name in ("quadratic_drag", "friction"))
+
+
+def test_a_coefficient_with_the_name_of_an_estimate_is_refused() -> None:
+    """A coefficient called "period" would take the place of the period."""
+    with pytest.raises(AnalysisError, match="'period' has the name of an estimate"):
+        make_law("own", lambda t, a, d: a * np.exp(-d * t), {"period": "1/s"}, lambda t, a: (a[0], 1.0 / t[-1]))

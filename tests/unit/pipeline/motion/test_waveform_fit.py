@@ -10,8 +10,10 @@ import pytest
 
 from pipeline.accuracy import params_for
 from pipeline.analyse import Oscillation, Params, analyse
+from pipeline.damping.laws import LAWS
 from pipeline.motion.waveform_fit import FullFit, fit_record
 from pipeline.motion.waveform_fit import Params as FullParams
+from pipeline.motion.waveform_model import Chooser, Record, State
 from pipeline.results.findings import judge_fits
 from pipeline.track import Quality, Track
 
@@ -161,3 +163,18 @@ def test_samples_put_out_by_a_narrow_window_come_back(synthetic: ModuleType) -> 
     flags[100:3900:50] |= np.uint8(Quality.FALSE_ECHO)
     found = fit_record(result.conditioned, replace(m.demodulated, flags=flags), m.damping, m.phase, m.rest, m.waveform)
     assert np.count_nonzero(found.flags) <= 5
+
+
+def test_a_law_with_a_pole_in_the_record_ends_no_fit(synthetic: ModuleType) -> None:
+    """Samples are not chosen on the tangent of a law that runs to infinity: it has none."""
+    t = synthetic.times(20.0)
+    result = analyse(Track.from_arrays(t, synthetic.noisy(synthetic.Truth(gamma=0.02), t, 3e-4, 1)))
+    m = result.motion
+    assert isinstance(m, Oscillation)
+    record = Record.of(result.conditioned, m.demodulated, m.phase, m.rest, None)
+    turning = [m.phase.phase.value, m.phase.angular_frequency.value, 0.0]
+    state = State(LAWS["power"], np.array([0.05, -4.0, 2.0, *turning]), constant=True)
+    chooser = Chooser(result.conditioned, m.demodulated, record, 5.0)
+    rows, kept = chooser.settled(state, chooser.by_windows)
+    assert kept is state
+    assert np.array_equal(rows, chooser.by_windows)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -165,3 +166,12 @@ def test_correlations_of_joint_parameters() -> None:
         ("a", "b", "c"), np.ones(3), np.array([[4.0, -3.0, 0.0], [-3.0, 9.0, 0.0], [0.0, 0.0, 0.0]]), ("",) * 3
     )
     np.testing.assert_allclose(joint.correlation, [[1.0, -0.5, 0.0], [-0.5, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def test_a_replaced_value_calculates_as_what_it_says() -> None:
+    """``dataclasses.replace`` keeps nothing of the value before, also where it had been calculated with."""
+    before = Estimate(2.0, 0.1, "s")
+    assert (1 * before).nominal_value == 2.0
+    after = replace(before, value=3.0, u=0.2)
+    assert ((1 * after).nominal_value, (1 * after).std_dev) == (3.0, 0.2)
+    assert (replace(before, unit="min") - before).std_dev == 0.0

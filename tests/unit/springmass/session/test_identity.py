@@ -12,8 +12,9 @@ from acquisition.decoders.line_protocol import FAMILY, frame
 from acquisition.decoders.registry import get_family
 from acquisition.live.firmware import MODEL, VERSION
 from acquisition.live.line import Transport
+from acquisition.readings import Reading
 from springmass.session.identity import meeting, outdated, settings_of
-from springmass.session.sensors import PROOF_BYTES, Sensor
+from springmass.session.sensors import PROOF_BYTES, Back, Sensor
 
 SETTINGS = {"rate_hz": 100, "near_us": 116, "far_us": 25_000, "spread_us": 0, "thermometer": 0}
 MINE = Identity(MODEL, VERSION, "bench-3", SETTINGS)
@@ -96,3 +97,63 @@ def test_one_that_never_said_what_it_is_proves_itself_by_its_wire_form() -> None
     other: Any = sensor().proof()
     assert other.feed(0, b"\x00garbage" * 1000) is False
     assert Sensor(get_family("us100"), cast(Transport, SimpleNamespace(name="port"))).proof() is None
+
+
+@pytest.mark.parametrize(
+    ("step_s", "clock_s", "back"),
+    [
+        (2.0, 100.0, Back.CONTINUED),
+        (1.9, 100.0, Back.CONTINUED),
+        (2.2, 100.0, Back.CONTINUED),
+        (1.0, 100.0, Back.ANOTHER),
+        (3.0, 100.0, Back.ANOTHER),
+        (2992.0, 100.0, Back.ANOTHER),
+        (-3.0, 100.0, Back.ANOTHER),
+        (-99.5, 100.0, Back.RESTARTED),
+        (-98.0, 100.0, Back.RESTARTED),
+        (-97.0, 100.0, Back.ANOTHER),
+        (2.0, 4294.0, Back.CONTINUED),
+    ],
+)
+@pytest.mark.parametrize("counter", ["device_us", "sequence"])
+def test_a_counter_tells_which_sensor_came_back(step_s: float, clock_s: float, back: Back, counter: str) -> None:
+    """By its step against the host's in two seconds, and by whether it can have begun anew since."""
+    unit_s = 1e-6 if counter == "device_us" else 0.01
+    wrap = 1 << 32 if counter == "device_us" else 1 << 60
+    counts = [round(each / unit_s) % wrap for each in (clock_s, clock_s + step_s)]
+    before, now = (
+        Reading(ns, **{counter: count}) for ns, count in zip((5_000_000_000, 7_000_000_000), counts, strict=True)
+    )
+    assert on_port("port").judged(before, now) is back
+    assert on_port("port", identified=True).judged(before, now) is Back.IDENTIFIED
+
+
+def test_a_link_may_have_held_what_comes_first_behind_a_gap() -> None:
+    """Through a network a counter that goes on where it stopped is the same sensor; at a cable it is another."""
+    before, now = Reading(5_000_000_000, device_us=100_000_000), Reading(9_000_000_000, device_us=100_500_000)
+    assert on_port("socket://bench:7000").judged(before, now) is Back.CONTINUED
+    assert on_port("/dev/ttyACM0").judged(before, now) is Back.ANOTHER
+
+
+def test_nothing_tells_sensors_without_counters_apart() -> None:
+    """They are taken for the same, and it is said."""
+    before, now = Reading(5_000_000_000, distance_m=0.5), Reading(7_000_000_000, distance_m=0.5)
+    for pair in ((before, now), (None, now), (before, None), (before, now._replace(device_us=5))):
+        assert on_port("port").judged(*pair) is Back.ASSUMED
+
+
+def on_port(name: str, *, identified: bool = False) -> Sensor:
+    """Return a sensor on a port."""
+    return Sensor(FAMILY, cast(Transport, SimpleNamespace(name=name, identified=identified)))
+
+
+def test_a_sensor_that_says_its_name_only_now_is_another() -> None:
+    """It has twelve readings to say it; one that nobody named and that stays mute is judged by its counter."""
+    last = Reading(0, device_us=0, sequence=0)
+    named: Any = on_port("port").proof(last)
+    assert named.feed(10_000_000, readings(5)) is None
+    assert named.feed(20_000_000, said() + readings(7)) is True
+    assert named.facts["sensor"] is Back.ANOTHER
+    mute: Any = on_port("port").proof(last)
+    assert mute.feed(10_000_000, readings(12)) is True
+    assert mute.facts["sensor"] is Back.CONTINUED

@@ -185,3 +185,50 @@ def test_the_first_bytes_are_kept_and_no_more() -> None:
     for _ in range(200):
         tee.reads([(0, 0, b"x" * 100)])
     assert tee.heard(0) == b"x" * reads.HEARD_BYTES
+
+
+def test_another_sensor_on_a_port_is_recorded_in_a_channel_of_its_own() -> None:
+    """From the first byte on, and the one after it in the next; the channels of other ports stay."""
+    sensor = Sensor(get_family("line-protocol"), cast(Transport, SimpleNamespace(name="port", identified=False)))
+    chains = [chain(), chain()]
+    tee = Tee(chains)
+    for port in range(2):
+        tee.line(port, [sensor, sensor])
+    log = started(tee, chains, 0)
+    for turn in range(3):
+        tee.reads([(0, turn * STEP_NS, frame(turn)), (1, turn * STEP_NS, frame(100 + turn))])
+        tee.event(0, turn * STEP_NS, "lost", {"why": "cable"})
+        tee.event(0, turn * STEP_NS, "reopened", {"port": "port", "gap_s": 0.5, "sensor": "another"})
+        tee.event(1, turn * STEP_NS, "lost", {})
+        tee.event(1, turn * STEP_NS, "reopened", {"sensor": "continued"})
+    assert [channel for channel, _, _ in log.taken] == [0, 1, 2, 1, 3, 1]
+    kinds = [" ".join(event.split()[0:3:2]) for event in log.events]
+    assert kinds[:6] == ["0 lost", "0 replaced", "2 continues", "1 lost", "1 reopened", "2 lost"]
+    assert json.loads(log.events[2].split(maxsplit=3)[3])["of"] == 0
+    assert json.loads(log.events[1].split(maxsplit=3)[3])["channel"] == 2
+    assert [len(each) for each in chains] == [1, 3, 1, 1, 0]
+    assert tee.gone == {}
+
+
+def test_before_a_recording_whatever_comes_back_is_what_will_be_recorded() -> None:
+    """In a preview there is no run that another sensor could spoil."""
+    sensor = Sensor(get_family("line-protocol"), cast(Transport, SimpleNamespace(name="port", identified=False)))
+    chains, log = [chain()], Log()
+    tee = Tee(chains)
+    tee.line(0, [sensor])
+    tee.start(cast(Recorder, log), chains, 0, preview=True)
+    tee.event(0, 0, "lost", {})
+    tee.event(0, 1, "reopened", {"sensor": "another"})
+    tee.reads([(0, 2, frame(0))])
+    assert [channel for channel, _, _ in log.taken] == [0]
+
+
+def test_a_sensor_of_which_no_byte_tells_is_taken_for_the_same_and_noted() -> None:
+    """Unless the serial number of its adapter says that it is."""
+    for identified, noted in ((True, "identified"), (False, "assumed")):
+        transport = cast(Transport, SimpleNamespace(name="port", identified=identified))
+        tee = Tee([chain()])
+        tee.line(0, [Sensor(get_family("us100"), transport)])
+        log = started(tee, [chain()], 0)
+        tee.event(0, 0, "reopened", {})
+        assert json.loads(log.events[0].split(maxsplit=3)[3]) == {"sensor": noted}

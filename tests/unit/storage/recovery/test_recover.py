@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -20,11 +21,11 @@ from storage.atomic import whole_file
 from storage.errors import OutOfMemory, RunDamaged, RunExists
 from storage.recorder import Recorder
 from storage.recovery import recover as module
-from storage.recovery.recover import recover, verify_against_log
+from storage.recovery.recover import LogGrowing, recover, verify_against_log
 from storage.run_file.arrays import Columns, Originals
 from storage.run_file.reading import Run, open_run
 from storage.wire_log import notes
-from storage.wire_log.appending import WireLogWriter
+from storage.wire_log.appending import Roll, WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import NotALog, read_log
 from storage.wire_log.wire_samples import chains_of, decode_log
@@ -352,3 +353,96 @@ def test_bytes_of_an_unnamed_channel_stay_in_the_log(tmp_path: Path) -> None:
             recorder.put(3, host_ns, data)
     (decoded,) = decode_log(read_log(tmp_path / "run.wire"), header.sensors, chains_of)
     assert (len(decoded.samples), decoded.reads) == (20, 21)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="this system has no such locks")
+def test_a_log_that_is_still_written_is_not_recovered(tmp_path: Path) -> None:
+    """While a recorder has the log, in its first file or a later one, no run file is made; afterwards it is."""
+    for name, roll in (("one", Roll()), ("several", Roll(bytes=2000))):
+        log = tmp_path / f"{name}.wire"
+        with Recorder(log, HEADER, VirtualClock(), roll=roll) as recorder:
+            for host_ns, data in wire(100):
+                recorder.put(0, host_ns, data)
+            recorder.drain()
+            with pytest.raises(LogGrowing):
+                recover(log)
+            assert not log.with_suffix(".h5").exists()
+            assert recover(log, tmp_path / f"{name}-so-far.h5", growing=True).runs[0].samples > 0
+        assert recover(log).runs[0].samples == 100
+
+
+def replaced_log(path: Path, counts: tuple[int, ...]) -> None:
+    """Write a log of one port on which other sensors came back, with so many readings of each."""
+    with Recorder(path, HEADER, VirtualClock()) as recorder:
+        now_ns = START_NS
+        for channel, count in enumerate(counts):
+            if channel:
+                facts = {"port": "COM3", "gap_s": 0.5, "sensor": "another"}
+                recorder.event(channel - 1, now_ns, "lost", {"why": "cable"})
+                recorder.event(channel - 1, now_ns, "replaced", {**facts, "channel": channel})
+                recorder.event(channel, now_ns, "continues", {**facts, "of": channel - 1})
+            for host_ns, data in wire(count, seed=channel):
+                recorder.put(channel, now_ns + host_ns - START_NS, data)
+            now_ns += 10_000_000 * count + 500_000_000
+        recorder.event(0, now_ns, "ended", {"by": "seconds"})
+
+
+def test_each_sensor_that_came_back_as_another_has_its_own_run(tmp_path: Path) -> None:
+    """Named by its channel; the longest is the one to analyse, and each says where the rest is."""
+    log = tmp_path / "run.wire"
+    replaced_log(log, (100, 300, 50))
+    report = recover(log, remove_log=True)
+    assert [run.path.name for run in report.runs] == ["run.h5", "run.1.h5", "run.2.h5"]
+    assert [run.samples for run in report.runs] == [100, 300, 50]
+    assert report.main.path == tmp_path / "run.1.h5"
+    assert any("the longest part is" in line for line in report.describe())
+    assert not log.exists()
+    for run in report.runs:
+        with open_run(run.path) as made:
+            assert made.provenance["sensor"]["channel"] == run.sensor.channel
+            assert made.provenance["sensor"]["port"] == "COM3"
+            replaced = [trap for trap in made.traps if trap.code == "sensor_replaced"]
+            assert len(replaced) == (2 if run.sensor.channel == 1 else 1)
+            assert made.samples().t[0] < 0.01
+
+
+def test_run_files_of_parts_that_stand_there_are_taken_as_they_are(tmp_path: Path) -> None:
+    """A build that was killed between two of them is finished; a log that was cut short gives what it holds."""
+    log = tmp_path / "run.wire"
+    replaced_log(log, (100, 300))
+    recover(log)
+    (tmp_path / "run.1.h5").unlink()
+    assert [(run.stood, run.samples) for run in recover(log).runs] == [(True, 100), (False, 300)]
+    assert [run.stood for run in recover(log).runs] == [True, True]
+    torn = tmp_path / "torn.wire"
+    torn.write_bytes(log.read_bytes()[: log.stat().st_size * 2 // 3])
+    first, second = recover(torn).runs
+    assert first.samples == 100
+    assert 50 < second.samples < 300
+
+
+def test_a_log_of_an_earlier_version_is_timed_rightly_where_a_counter_leapt(tmp_path: Path) -> None:
+    """Its event does not say which sensor came back: one run, the gap by the host's clock, and a word on it."""
+    log = tmp_path / "run.wire"
+    encoder = get_family(FAMILY).encoder()
+    with Recorder(log, HEADER, VirtualClock()) as recorder:
+        for n in range(600):
+            away_s, leap_us = (3.0, 2_990_000_000) if n >= 300 else (0.0, 0)
+            host_ns = START_NS + 10_000_000 * n + int(away_s * 1e9)
+            if n == 300:
+                recorder.event(0, host_ns - 2, "lost", {"why": "cable"})
+                recorder.event(0, host_ns - 1, "reopened", {"port": "COM3", "gap_s": 3.0})
+            line = encoder.encode(
+                sequence=n + leap_us // 10_000,
+                device_us=10_000 * n + leap_us,
+                echo_us=1500.0,
+                distance_m=0.258,
+                temperature_c=math.nan,
+            )
+            recorder.put(0, host_ns, line)
+    (run,) = recover(log).runs
+    with open_run(run.path) as made:
+        t = made.samples().t
+        assert "counter_changed" in {trap.code for trap in made.traps}
+    np.testing.assert_allclose(t - t[0], 0.01 * np.arange(600) + 3.0 * (np.arange(600) >= 300), atol=1e-3)
+    assert [gap["lost"] for gap in run.decoding["gaps"]] == [0]
