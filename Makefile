@@ -27,7 +27,8 @@ $(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) -e '.[dev]'
+	$(PIP) 'pip>=25.1'  # the first that installs dependency groups
+	$(PIP) -e '.[batch,dask,notebook]' --group dev
 	@touch $@ $(VENV)/.installed
 
 demo: $(VENV)/.installed
