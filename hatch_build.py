@@ -1,7 +1,8 @@
 """Build hook: the wheel owns one top-level name.
 
-In a checkout `acquisition`, `pipeline` and `storage` stand next to `springmass`. The wheel has them inside `springmass`,
-so that they meet neither a user's own `pipeline.py` nor another distribution's `storage`. docs/decisions/0022 says why.
+In a checkout `acquisition`, `pipeline` and `storage` stand next to `springmass`. The wheel has them inside
+`springmass`, where a user's own `pipeline.py` and another distribution's `storage` cannot take their place.
+docs/decisions/0022-one-name-in-the-wheel.md says why.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def moved(source: str) -> str:
     return _DOTTED.sub(r"springmass.\1", _IMPORT.sub(r"\1springmass.\2", source))
 
 
-class WheelHook(BuildHookInterface):  # type: ignore[type-arg]  # hatchling's parameter is its own configuration
+class WheelHook(BuildHookInterface):
     """Puts the rewritten files of all four packages into a wheel; an editable one stays as it is."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:

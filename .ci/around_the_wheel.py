@@ -1,8 +1,8 @@
 """Write what an installed wheel must get along with, into a folder: `python .ci/around_the_wheel.py FOLDER`.
 
 `neighbours/NAME` is a distribution that owns the top-level name NAME, for each package that a checkout has under that
-name. `user` is a working folder with the user's own `pipeline.py` and `storage`. `tests` holds the command-line tests,
-with their imports as a wheel has them. Whatever imports a neighbour or the user's own module fails.
+name. `user` is a working folder with the user's own `pipeline.py` and `storage`. `tests` holds the tests with their imports
+as a wheel has them. Whatever imports a neighbour or the user's own module fails.
 """
 
 from __future__ import annotations
@@ -33,27 +33,13 @@ def write(path: Path, text: str) -> None:
 
 
 def main(folder: Path) -> None:
-    """Write neighbours, the user's folder and the tests."""
+    """Write the neighbours, the user's folder and the tests."""
     for name in MOVED:
         write(folder / "neighbours" / name / "pyproject.toml", PROJECT.format(name=name))
         write(folder / "neighbours" / name / name / "__init__.py", FOREIGN)
     write(folder / "user" / "pipeline.py", FOREIGN)
     write(folder / "user" / "storage" / "__init__.py", FOREIGN)
-    for part in (
-        "conftest.py",
-        "courses.py",
-        "screen.py",
-        "rows_oracle.py",
-        "hunt.py",
-        "synthetic.py",
-        "cli",
-        "plugin",
-    ):
-        source, target = ROOT / "tests" / part, folder / "tests" / part
-        if source.is_dir():
-            shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
-        else:
-            write(target, source.read_text(encoding="utf-8"))
+    shutil.copytree(ROOT / "tests", folder / "tests", ignore=shutil.ignore_patterns("__pycache__"))
     for path in (folder / "tests").rglob("*.py"):
         path.write_text(moved(path.read_text(encoding="utf-8")), encoding="utf-8")
     shutil.copy(ROOT / "pyproject.toml", folder)
