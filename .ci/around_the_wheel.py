@@ -1,8 +1,8 @@
 """Write what an installed wheel must get along with, into a folder: `python .ci/around_the_wheel.py FOLDER`.
 
 `neighbours/NAME` is a distribution that owns the top-level name NAME, for each package that a checkout has under that
-name. `user` is a working folder with the user's own `pipeline.py` and `storage`. `tests` holds the tests with their imports
-as a wheel has them. Whatever imports a neighbour or the user's own module fails.
+name. `user` is a working folder with the user's own `pipeline.py` and `storage`. `tests` holds the tests, with their
+imports as a wheel has them. Whatever imports a neighbour or the user's own module fails.
 """
 
 from __future__ import annotations
