@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.dynamics.strang import STRANG
 from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 

@@ -10,7 +10,7 @@ import numpy as np
 from acquisition.clock import Clock
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory
-from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.dynamics.strang import STRANG
 from pipeline.dynamics.problem import Problem
 
 __all__ = ["REST_M", "Release", "bench_position"]
