@@ -12,13 +12,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from pipeline.dynamics.choose import AUTO, choose, cost_ns, fit_step
+from pipeline.dynamics.integrators.solve_ivp import LSODA, SolveIvp
+from pipeline.dynamics.integrators.taylor import TAYLOR
 from scipy.signal import lfilter
 
 from pipeline.dynamics import Equation, Problem, get_integrator
-from pipeline.dynamics.choose import AUTO, choose, cost_ns, fit_step
 from pipeline.dynamics.flow import flow
-from pipeline.dynamics.integrators.solve_ivp import LSODA, SolveIvp
-from pipeline.dynamics.integrators.taylor import TAYLOR
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 

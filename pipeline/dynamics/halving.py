@@ -2,7 +2,7 @@
 
 1. Solve with a step h and with h / 2. The largest difference of the two runs is the stated error of the finer one.
 2. Halve the step until the stated error is within the tolerance.
-3. Where the difference no longer falls, rounding is all that is left: the tolerance is refused.
+3. Where two halvings do not reduce the difference, rounding is all that is left: the tolerance is refused.
 4. A method of scipy has no step of ours: it takes a tenth of its tolerance instead of half a step.
 
 :func:`auto` evaluates the exact flow of a linear scene. Any other scene it solves by Strang splitting, and what that
@@ -26,7 +26,7 @@ from pipeline.dynamics.strang import STRANG
 from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
 
-__all__ = ["Solution", "auto", "halved", "solved_once"]
+__all__ = ["Solution", "auto", "demand_tolerance", "halved", "solved_once"]
 
 LONGEST_STEP = 0.5  # radians of the first step: fewer than six steps a cycle show nothing of the error
 MOST_STEPS = 2**25  # of one run, about ten seconds; the finest of all takes half of the time
@@ -149,8 +149,10 @@ def halved(
     With an error of :math:`c h^p` the difference is :math:`2^p - 1` times the error of the finer run. The rounding of
     the phase, which both runs have alike, is added.
     """
-    demand_tolerance(problem, spacing_s, count, tolerance)
-    why = integrator.refusal(problem) or integrator.no_estimate(problem)
+    demand_times(spacing_s, spacing_s * count)
+    if integrator.refusal(problem):
+        raise DynamicsError(f"{integrator.name} cannot solve this: {integrator.refusal(problem)}")
+    why = integrator.no_estimate(problem)
     refused = f"{integrator.name} cannot keep a tolerance of {tolerance:.3g} here: "
     if why:
         raise DynamicsError(refused + why)
@@ -159,7 +161,8 @@ def halved(
         started = timer()
         run = EXACT.run(problem, spacing_s, count)
         return Solution(EXACT, 1, problem, run, rounding, rounding, running_s=timer() - started)
-    coarse, least, moving = None, math.inf, count
+    coarse, moving = None, count
+    errors = [math.inf]
     for setting, parts in _settings(integrator, problem, spacing_s, count, tolerance):
         if parts * moving > MOST_STEPS:
             break
@@ -172,13 +175,16 @@ def halved(
             error, velocity_error = (each + rounding for each in _difference(fine, coarse))
             if error <= tolerance:
                 return Solution(setting, parts, problem, fine, error, velocity_error, running_s=running_s)
-            if error >= least:
-                raise DynamicsError(f"{refused}rounding leaves {least:.2g}; take a larger tolerance or a shorter run")
-            least = error
+            errors.append(error)
+            if error >= errors[-3:][0]:
+                raise DynamicsError(
+                    f"{refused}rounding leaves {min(errors):.2g}; take a larger tolerance or a shorter run"
+                )
             if _needed(setting, parts * moving, error / tolerance) > MOST_STEPS:
                 break
         coarse = fine
-    raise DynamicsError(f"{refused}it needs too many steps; take a larger tolerance or a shorter run")
+    why = "it needs too many steps" if integrator.order else f"at its least tolerance {min(errors):.2g} is left"
+    raise DynamicsError(f"{refused}{why}; take a larger tolerance or a shorter run")
 
 
 def solved_once(
@@ -224,7 +230,7 @@ def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: 
     seconds = spacing_s * count
     demand_times(spacing_s, seconds)
     least = least_tolerance(problem, seconds)
-    if not (math.isfinite(tolerance) and tolerance >= 0.5 * least):
+    if not (math.isfinite(tolerance) and tolerance >= least):
         raise DynamicsError(
             f"the tolerance must be finite and at least {least:.1e}, what double precision can reach in {seconds:g} s, "
             f"got {tolerance:g}"
@@ -243,8 +249,10 @@ def _settings(
             yield replace(integrator, rtol=rtol), 1
             rtol *= 0.1
         return
-    longest = min(LONGEST_STEP / omega, integrator.stable_step(problem) or math.inf)
-    parts = math.floor(min(spacing_s / longest, MOST_STEPS)) + 1
+    # Drag that outweighs the spring has its own time, which a longer step would pass over.
+    fast = omega * (1.0 + problem.equation.drag_per_m * problem.amplitude_m())
+    limit = integrator.stable_step(problem) or math.inf
+    parts = math.floor(min(max(spacing_s * fast / LONGEST_STEP, spacing_s / limit), MOST_STEPS)) + 1
     while True:
         yield integrator, parts
         parts *= 2

@@ -18,7 +18,7 @@ from pipeline.track import F8
 
 __all__ = ["DOP853", "LEAST_RTOL", "LSODA", "SolveIvp"]
 
-MOST_CALLS = 6_000_000  # of the right side: many seconds
+MOST_CALLS = 3_000_000  # of the right side: about ten seconds
 LEAST_RTOL = 3e-14  # scipy raises anything less to a hundred roundings
 
 

@@ -26,8 +26,8 @@ import numpy as np
 from pipeline.dynamics.equation import Equation, Real
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.integrator import Integrator, kept, with_start
-from pipeline.dynamics.turning import Friction
 from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.turning import Friction
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 

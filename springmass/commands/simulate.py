@@ -66,8 +66,6 @@ def run(options: argparse.Namespace) -> int:
         demand_stable(ready.problem, options.method, named_step, where=options.scene)
     terms = required(ready.problem, options.dt * count, tolerance)[1] if options.method == "auto" and tolerance else ()
     effects = simulated_effects(ready.stated, ready.problem, terms, options.dt * count, ready.drag, options.without)
-    print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
-    print(_before(words, effects), file=say, flush=True)
     try:
         simulation = simulate(
             ready.problem,
@@ -80,6 +78,8 @@ def run(options: argparse.Namespace) -> int:
         )
     except DynamicsError as error:
         raise ProgramError(f"{options.scene}: {error}", USAGE) from error
+    print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
+    print(_before(words, effects), file=say)
     print(_after(simulation, count), file=say)
     against = None
     if analysis is not None:
