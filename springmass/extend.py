@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from pipeline.damping.laws.law import Law
     from pipeline.damping.laws.of_function import make_law
     from pipeline.dynamics import Equation, Integrator, Problem, Trajectory, get_integrator
-    from pipeline.dynamics.choose import choose
-    from pipeline.dynamics.integrators.one_step import OneStep, acceleration
+    from pipeline.dynamics.halving import auto
+    from pipeline.dynamics.methods import OneStep, acceleration
     from pipeline.errors import AnalysisError, DynamicsError
 
 __all__ = [
@@ -75,7 +75,7 @@ __all__ = [
     "Trajectory",
     "Trap",
     "acceleration",
-    "choose",
+    "auto",
     "dialect",
     "get_integrator",
     "head_lines",
@@ -103,8 +103,8 @@ _WHERE = {
     "pipeline.damping.laws.law": ("Law",),
     "pipeline.damping.laws.of_function": ("make_law",),
     "pipeline.dynamics": ("Equation", "Integrator", "Problem", "Trajectory", "get_integrator"),
-    "pipeline.dynamics.choose": ("choose",),
-    "pipeline.dynamics.integrators.one_step": ("OneStep", "acceleration"),
+    "pipeline.dynamics.halving": ("auto",),
+    "pipeline.dynamics.methods": ("OneStep", "acceleration"),
     "pipeline.errors": ("AnalysisError", "DynamicsError"),
 }
 
