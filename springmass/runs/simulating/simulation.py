@@ -286,7 +286,7 @@ def checked(problem: Problem, solution: Solution, spacing_s: float, count: int) 
     if start == 0.0:
         return Check(other, words, 0.0, 0.0, 0.0)
     speed = start * problem.equation.angular_frequency_per_s
-    error = float(np.max(np.abs(trajectory.y - other.y))) / start
+    error = _apart(trajectory, other)
     velocity = float(np.max(np.abs(trajectory.v - other.v))) / speed
     return Check(other, words, max(error, resolution), max(velocity, resolution), resolution)
 
@@ -311,17 +311,26 @@ def reference(
     DynamicsError
         If neither solves the motion.
     """
+    rounding = rounding_error(problem, spacing_s * count)
     if not problem.equation.friction_m_per_s2:
-        finest = replace(DOP853, rtol=REFERENCE_RTOL)
+        finest, next_finest = (replace(DOP853, rtol=rtol) for rtol in (REFERENCE_RTOL, 10.0 * REFERENCE_RTOL))
         try:
             run = finest.run(problem, spacing_s, count)
+            apart = _apart(run, next_finest.run(problem, spacing_s, count))
         except DynamicsError:
             pass  # too long, or too stiff
         else:
-            return run, f"DOP853 at {REFERENCE_RTOL:g}", REFERENCE_RTOL + rounding_error(problem, spacing_s * count)
+            return run, f"DOP853 at {REFERENCE_RTOL:g}", apart + rounding
     parts = 4 * (strang_parts or halved(problem, STRANG, spacing_s, count, DEFAULT_TOLERANCE).parts)
-    run = STRANG.run(problem, spacing_s / parts, count * parts, every=parts)
-    return run, f"Strang splitting in {parts} steps a sample", rounding_error(problem, spacing_s * count)
+    run, coarse = (STRANG.run(problem, spacing_s / each, count * each, every=each) for each in (parts, parts // 2))
+    # Of second order: the difference to twice the step is three times the error of the finer run.
+    return run, f"Strang splitting in {parts} steps a sample", _apart(run, coarse) / 3.0 + rounding
+
+
+def _apart(one: Trajectory, other: Trajectory) -> float:
+    """Return the largest difference of two motions over the starting amplitude."""
+    start = one.problem.amplitude_m()
+    return float(np.max(np.abs(one.y - other.y))) / start if start else 0.0
 
 
 def _rounded_down(limit: float) -> str:
