@@ -49,7 +49,7 @@ def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable
     return [
         (
             "Strang, mixed drag, 120 s",
-            "solve_ivp LSODA at equal error",
+            "solve_ivp LSODA at a third of its error",
             0.1,
             1.0,
             lambda: strang.run(MIXED, STEP_S, COUNT),

@@ -119,7 +119,12 @@ def auto(
     except DynamicsError:
         if less.equation.friction_m_per_s2:
             raise
+    try:
         return by(DOP853)
+    except DynamicsError as error:
+        raise DynamicsError(
+            f"neither strang nor dop853 keeps a tolerance of {tolerance:.3g} here; take a larger tolerance or a shorter run"
+        ) from error
 
 
 def halved(
