@@ -122,9 +122,8 @@ def auto(
     try:
         return by(DOP853)
     except DynamicsError as error:
-        raise DynamicsError(
-            f"neither strang nor dop853 keeps a tolerance of {tolerance:.3g} here; take a larger tolerance or a shorter run"
-        ) from error
+        refused = f"neither strang nor dop853 keeps a tolerance of {tolerance:.3g} here"
+        raise DynamicsError(f"{refused}; take a larger tolerance or a shorter run") from error
 
 
 def halved(
