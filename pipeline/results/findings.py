@@ -180,13 +180,16 @@ def _rejections(damping: Damping) -> Iterator[Finding]:
     """One sentence for each reason that speaks against laws, with the laws."""
     by_reason: dict[str, list[str]] = {}
     for fit in damping.fits.values():
-        by_reason.setdefault(fit.rejection, []).append(f"{fit.law.words} ({_number(fit.reduced_chi2)})")
+        # As many parameters as windows leave no degree of freedom, and so no reduced chi-square.
+        chi2 = f" ({_number(fit.reduced_chi2)})" if fit.dof > 0 else ""
+        by_reason.setdefault(fit.rejection, []).append(f"{fit.law.words}{chi2}")
+    best = damping.best
+    leaves = f", where {damping.selected} leaves {best.reduced_chi2:.2g}" if best.dof > 0 else ""
     if "misfit" in by_reason:
         yield Finding(
             "law_rejected",
             "info",
-            f"rejected by their reduced chi-square, where {damping.selected} leaves {damping.best.reduced_chi2:.2g}: "
-            + ", ".join(by_reason["misfit"]),
+            f"rejected by their reduced chi-square{leaves}: {', '.join(by_reason['misfit'])}",
         )
     if "negative" in by_reason:
         yield Finding(
