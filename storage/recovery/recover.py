@@ -40,7 +40,7 @@ class LogGrowing(StorageError):
 
 
 def recover(
-    log_path: str | os.PathLike[str],
+    log: str | os.PathLike[str] | LogContents,
     out_path: str | os.PathLike[str] | None = None,
     *,
     overwrite: bool = False,
@@ -54,7 +54,7 @@ def recover(
 
     Parameters
     ----------
-    log_path : str or PathLike
+    log : str, PathLike or LogContents
         The log; finished, torn or damaged.
     out_path : str or PathLike, optional
         The run file; left out, the log's name with ``.h5``. With several sensors their channels come before the
@@ -84,35 +84,35 @@ def recover(
     RunDamaged
         If a run file just written does not read back as it should. The log stands.
     """
-    contents = read_log(log_path)
+    contents = log if isinstance(log, LogContents) else read_log(log)
     if not growing:
         _demand_finished(contents)
-    log = _Log(contents, _header(contents, header), provenance or {})
+    known = _Log(contents, _header(contents, header), provenance or {})
     leftovers = remove_leftovers(contents.path.absolute().parent)
     other = {} if speed_of_sound_m_per_s is None else {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
-    sensors = log.header.sensors
+    sensors = known.header.sensors
     out = contents.path if out_path is None else Path(out_path)
     paths = run_paths(out, [each.channel for each in sensors])
-    runs = _runs(log, sensors, paths, other, overwrite)
-    if not log.notes.counts:  # all run files stood there
+    runs = _runs(known, sensors, paths, other, overwrite)
+    if not known.notes.counts:  # all run files stood there
         for record in contents:
             if record.kind is not Kind.DATA:
-                log.notes.take(record)
-    if parts := _parts(log):
+                known.notes.take(record)
+    if parts := _parts(known):
         (only,) = run_paths(out, [0])
-        runs += _runs(log, parts, [_of_channel(only, part.channel) for part in parts], other, overwrite)
+        runs += _runs(known, parts, [_of_channel(only, part.channel) for part in parts], other, overwrite)
     damage = contents.damage
     removed = remove_log and _remove(contents)
     return RecoverReport(
         contents.path,
         tuple(runs),
         damage,
-        log.notes.counts[Kind.MARK],
-        log.notes.counts[Kind.EVENT],
+        known.notes.counts[Kind.MARK],
+        known.notes.counts[Kind.EVENT],
         removed,
         len(contents.parts),
         leftovers,
-        {part.channel: log.notes.parts[part.channel] for part in parts},
+        {part.channel: known.notes.parts[part.channel] for part in parts},
     )
 
 
@@ -145,8 +145,8 @@ def _parts(log: _Log) -> list[SensorEntry]:
 
 def _demand_finished(contents: LogContents) -> None:
     for part in contents.parts:
-        with contextlib.suppress(OSError):  # that it is gone is for the reading to say
-            if is_being_written(part.path):
+        with contextlib.suppress(OSError), part.open() as file:  # that it is gone is for the reading to say
+            if is_being_written(file):
                 demand = f"a recording still writes the log, got it at {contents.size} bytes"
                 raise LogGrowing(contents.path, demand, "recover it when the recording has ended")
 
@@ -300,7 +300,7 @@ def _poured(
 def _remove(contents: LogContents) -> bool:
     """Remove a log whose every byte is in run files that verify; one that grew meanwhile stays."""
     with contextlib.suppress(OSError):
-        if all(part.path.stat().st_size == part.size for part in contents.parts):
+        if all(part.in_place() for part in contents.parts):
             for part in contents.parts:  # the first file first: without it, the others are not taken for all of a run
                 part.path.unlink()
             return True

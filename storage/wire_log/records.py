@@ -32,7 +32,6 @@ import enum
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from storage.checked import ValueRefused, parsed
@@ -53,7 +52,6 @@ __all__ = [
     "event_payload",
     "frame",
     "frames",
-    "part_path",
     "unframe",
 ]
 
@@ -128,17 +126,6 @@ class Record(NamedTuple):
         except ValueRefused:
             return {}
         return content if isinstance(content, dict) else {}
-
-
-def part_path(path: Path, number: int) -> Path:
-    """Return the name of a log's file, numbered from 0.
-
-    Examples
-    --------
-    >>> [part_path(Path("run.wire"), number).name for number in (0, 1, 12)]
-    ['run.wire', 'run.001.wire', 'run.012.wire']
-    """
-    return path.with_name(f"{path.stem}.{number:03d}{path.suffix}") if number else path
 
 
 def event_payload(kind: str, facts: Mapping[str, Any]) -> bytes:

@@ -85,8 +85,13 @@ class Scan:
         return Damage(self._records, self._lost, self._skipped, stretches, self._strays, self._tail, self._ended)
 
     def records(self) -> Iterator[Record]:
-        """Yield what can be delivered; :meth:`damage` is complete after the last."""
+        """Yield what can be delivered; :meth:`damage` is complete after the last.
+
+        Of a live log that is what has come; the next call yields what comes later.
+        """
         window = self._window
+        if window.live:
+            window.fill()
         while True:
             if not (self._owed or self._parts):
                 yield from self._run()
@@ -96,7 +101,8 @@ class Scan:
                     break
             elif (record := self._accept(found)) is not None:
                 yield record
-        self._drop_parts()
+        if not window.live:
+            self._drop_parts()
 
     def _run(self) -> Iterator[Record]:
         """Yield data records as long as nothing is wrong with them: nearly all of a log, in half the time.
@@ -134,13 +140,13 @@ class Scan:
         start = self._window.offset
         found = self._window.seek(self._log)
         length = self._window.offset - start
-        if not found:
+        if not (found or self._window.live):
             self._tail = length
-            return False
-        self._skipped += length
-        if len(self._stretches) < KEPT_STRETCHES:
-            self._stretches.append((start, length))
-        return True
+        elif length:
+            self._skipped += length
+            if len(self._stretches) < KEPT_STRETCHES:
+                self._stretches.append((start, length))
+        return found
 
     def _accept(self, found: Unframed) -> Record | None:
         sequence, mono_ns, _, kind, channel, parts, payload = found
