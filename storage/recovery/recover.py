@@ -8,21 +8,23 @@ stretch at a time, so that a run may be of any length.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from acquisition.errors import AcquisitionError
+from acquisition.live.calibration import Calibration
 from storage.atomic import remove_leftovers
-from storage.checked import ValueRefused
 from storage.errors import RunDamaged, RunExists, StorageError
 from storage.recovery.building import SensorRun
 from storage.recovery.losses import Losses
 from storage.recovery.recovered import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
 from storage.run_file.writing import run_writer
+from storage.schema import ValueRefused
 from storage.wire_log.log_file import is_being_written
 from storage.wire_log.notes import Notes
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
@@ -76,6 +78,8 @@ def recover(
 
     Raises
     ------
+    acquisition.errors.CalibrationError
+        If sound is never so slow or fast.
     LogGrowing
         If a recording still writes the log.
     NotALog
@@ -85,6 +89,8 @@ def recover(
     RunDamaged
         If a run file just written does not read back as it should. The log stands.
     """
+    if speed_of_sound_m_per_s is not None:
+        Calibration(speed_of_sound_m_per_s=speed_of_sound_m_per_s)
     contents = log if isinstance(log, LogContents) else read_log(log)
     if not growing:
         _demand_finished(contents)
@@ -138,17 +144,17 @@ def _sensors(header: Sequence[SensorEntry], notes: Notes, speed_of_sound_m_per_s
 
     def add(sensor: SensorEntry) -> None:
         calibration = notes.calibrations.get(sensor.channel, sensor.calibration)
-        known[sensor.channel] = dataclasses.replace(sensor, calibration=calibration)
+        known[sensor.channel] = replace(sensor, calibration=calibration)
 
     for sensor in header:
         add(sensor)
     for channel, of in sorted(notes.parts.items()):
         if channel not in known and of in known:
-            add(dataclasses.replace(known[of], channel=channel))
+            add(replace(known[of], channel=channel))
     if speed_of_sound_m_per_s is None:
         return list(known.values())
     other = {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
-    return [dataclasses.replace(each, calibration={**each.calibration, **other}) for each in known.values()]
+    return [replace(each, calibration={**each.calibration, **other}) for each in known.values()]
 
 
 def _paths(out: Path, header: Sequence[SensorEntry], sensors: Sequence[SensorEntry]) -> list[Path]:

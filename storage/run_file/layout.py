@@ -38,12 +38,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import Block, Flag
-from storage.checked import ValueRefused
-from storage.run_file.header import Header, json_text
+from storage.run_file.header import Header
+from storage.schema import ValueRefused, json_text
 
 __all__ = [
     "CHUNK",
     "COLUMNS",
+    "DIMENSION_ATTRIBUTES",
     "GROUPS",
     "HEADER",
     "INSTRUMENT",
@@ -58,6 +59,7 @@ __all__ = [
     "filters",
     "records",
     "signal_attributes",
+    "stored",
 ]
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -68,6 +70,8 @@ INSTRUMENT = "/entry/instrument"
 WIRE = "/wire"
 GROUPS = frozenset({"entry", "raw", "wire"})
 """What stands at the root besides second names of columns."""
+DIMENSION_ATTRIBUTES = frozenset({"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"})
+"""What HDF5 itself puts on arrays that are tied to a dimension."""
 NO_HOST_NS = -1
 """Stands in ``host_mono_ns`` and ``record_mono_ns`` where no host saw the sample or record."""
 
@@ -127,8 +131,8 @@ class Column:
         low, high = np.fmin.reduce(values, initial=self.greatest), np.fmax.reduce(values, initial=self.least)
         if low < self.least or high > self.greatest:
             at = int(np.flatnonzero((values < self.least) | (values > self.greatest))[0])
-            allowed = f"a number from {self.least:g} to {self.greatest:g}"
-            raise ValueRefused(f"{self.name} of sample {start + at}", allowed, values[at].item())
+            reason = f"expected a number from {self.least:g} to {self.greatest:g}, got {values[at].item()!r}"
+            raise ValueRefused(f"{self.name} of sample {start + at}", reason)
 
     @property
     def name(self) -> str:
@@ -319,3 +323,24 @@ def _text(header: Header, key: str) -> str:
     """Return a text of the provenance, or an empty one."""
     value = header.provenance.get(key)
     return value if isinstance(value, str) else ""
+
+
+def stored(value: Any) -> tuple[Any, Any]:
+    """Return a value as HDF5 is given it, with its type.
+
+    Texts get a fixed length, as netCDF's own library writes them. Texts of free length would lie in HDF5's
+    global heap, the one part of the file without a checksum: a flipped bit there changes them unseen, or
+    sends the HDF5 library into an endless loop.
+    """
+    import h5py
+
+    if not isinstance(value, str | tuple):
+        return value, None
+    texts = [_shown(text).encode() for text in ((value,) if isinstance(value, str) else value)]
+    dtype = h5py.string_dtype(length=max(1, *map(len, texts)))
+    return (texts[0] if isinstance(value, str) else np.array(texts, dtype)), dtype
+
+
+def _shown(text: str) -> str:
+    """Return a text as HDF5 can hold it, without NUL and lone surrogates; the header holds the exact one."""
+    return text.replace("\0", "\ufffd").encode("utf-16", "surrogatepass").decode("utf-16", "replace")

@@ -34,10 +34,8 @@ import zlib
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from storage.checked import ValueRefused, parsed
-from storage.run_file.header import json_text
-from storage.wire_log.allowed import LATEST_NS, LONGEST_TEXT
-from storage.wire_log.log_header import LogHeader, SensorEntry
+from storage.schema import ValueRefused, json_text, parsed
+from storage.wire_log.log_header import LATEST_NS, LONGEST_TEXT, LogHeader, SensorEntry
 
 __all__ = [
     "HEAD_BYTES",

@@ -6,7 +6,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from storage.wire_log.allowed import LATEST_NS
+from storage.wire_log.log_header import LATEST_NS
 from storage.wire_log.records import CRC_AT, HEAD_BYTES, MAGIC, MOST_PARTS, Kind, Parts, Record, Unframed, unpack_head
 from storage.wire_log.window import LONGEST, Window
 

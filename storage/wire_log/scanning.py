@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from storage.checked import ValueRefused
+from storage.schema import ValueRefused
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record
 from storage.wire_log.scan import Damage, Scan
 from storage.wire_log.window import LogPart, NotALog, Taken, Window

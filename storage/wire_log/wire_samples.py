@@ -9,7 +9,7 @@ from acquisition.block import Block, concatenate
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from storage.wire_log.allowed import event_content
+from storage.wire_log.log_header import event_content
 from storage.wire_log.records import Kind, Record, SensorEntry
 
 __all__ = ["BREAKS", "Decoded", "LogDecoder", "chains_of", "decode_log"]
