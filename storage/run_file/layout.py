@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from acquisition.block import Block, Flag
 from storage.run_file.header import Header
-from storage.schema import ValueRefused, json_text
+from storage.schema import ValueRefused, json_text, plain
 
 __all__ = [
     "CHUNK",
@@ -245,9 +245,7 @@ def attributes(header: Header) -> dict[str, dict[str, Any]]:
     for column in COLUMNS:
         if column.name in header.columns:
             tree[column.path] = column_attributes(column, header)
-    for path, units in _field_units(header).items():
-        tree[path] = {"units": units} if units else {}
-    return tree
+    return tree | {path: _units_of(path) for path in fields(header)}
 
 
 def signal_attributes(header: Header) -> dict[str, Any]:
@@ -277,25 +275,19 @@ def column_attributes(column: Column, header: Header) -> dict[str, Any]:
 
 def fields(header: Header) -> dict[str, Any]:
     """Return the scalar fields by path: NeXus keeps in fields what it gives a unit."""
-    info = header.info
-    found: dict[str, Any] = {
-        "/entry/title": header.title or None,
-        "/entry/start_time": _text(header, "start_time") or None,
-        f"{INSTRUMENT}/name": info.name or None,
-        f"{INSTRUMENT}/kind": info.kind,
-        f"{INSTRUMENT}/clock": info.clock,
-    }
-    for name in _NUMBER_UNITS:
-        number = getattr(info, name)
-        found[f"{INSTRUMENT}/{name}"] = None if number is None else float(number)
-    return {path: value for path, value in found.items() if value is not None}
+    found = {"/entry/title": header.title, "/entry/start_time": _text(header, "start_time")}
+    found |= {f"{INSTRUMENT}/{name}": value for name, value in plain(header.info).items()}
+    stated = {path: value for path, value in found.items() if value not in (None, "")}
+    return {path: value if isinstance(value, str) else float(value) for path, value in stated.items()}
 
 
-_NUMBER_UNITS = {"rate_hz": "Hz", "quantum_m": "m", "sigma_m": "m", "stated_error_m": "m"}
+_UNITS = {"hz": "Hz", "m": "m"}
+"""By the last part of a field's name."""
 
 
-def _field_units(header: Header) -> dict[str, str | None]:
-    return {path: _NUMBER_UNITS.get(path.rpartition("/")[2]) for path in fields(header)}
+def _units_of(path: str) -> dict[str, str]:
+    units = _UNITS.get(path.rpartition("_")[2])
+    return {"units": units} if units else {}
 
 
 def _plot(header: Header) -> dict[str, Any]:

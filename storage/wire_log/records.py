@@ -61,7 +61,6 @@ _HEAD = struct.Struct("<2sHIqIBBH")
 _CRC = struct.Struct("<I")
 _HEAD_AND_CRC = struct.Struct(_HEAD.format + "I")
 HEAD_BYTES = _HEAD_AND_CRC.size
-CRC_AT = _HEAD.size
 _WRAP = 1 << 32
 
 
@@ -170,7 +169,6 @@ def ends_item(record: bytes) -> bool:
     return kind != Kind.HEADER and not parts & Parts.GOES_ON
 
 
-unpack_head = _HEAD_AND_CRC.unpack_from
 Unframed = tuple[int, int, int, Kind, int, int, bytes]
 
 
@@ -193,7 +191,7 @@ def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
     start = at + HEAD_BYTES
     if start > len(data):
         return None
-    magic, length, sequence, mono_ns, found, code, channel, parts, crc = unpack_head(data, at)
+    magic, length, sequence, mono_ns, found, code, channel, parts, crc = _HEAD_AND_CRC.unpack_from(data, at)
     # The cheap checks first: a search through damage comes here for every magic that chance has put there.
     kind = _KINDS.get(code)
     if magic != MAGIC or kind is None or parts > _ALL_PARTS or start + length > len(data):

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from storage.wire_log.log_header import LATEST_NS
-from storage.wire_log.records import CRC_AT, HEAD_BYTES, MAGIC, MOST_PARTS, Kind, Parts, Record, Unframed, unpack_head
-from storage.wire_log.window import LONGEST, Window
+from storage.wire_log.records import HEAD_BYTES, MOST_PARTS, Kind, Parts, Record, Unframed
+from storage.wire_log.window import Window
 
 __all__ = ["Damage", "Scan"]
 
 KEPT_STRETCHES = 100
-_DATA, _END = Kind.DATA, Kind.END  # looked up once, and not for each record
-_record = tuple.__new__
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +89,6 @@ class Scan:
         if window.live:
             window.fill()
         while True:
-            if not (self._owed or self._parts):
-                yield from self._run()
             found = window.record(self._log)
             if found is None:
                 if not self._resynchronise():
@@ -103,37 +97,6 @@ class Scan:
                 yield record
         if not window.live:
             self._drop_parts()
-
-    def _run(self) -> Iterator[Record]:
-        """Yield data records as long as nothing is wrong with them: nearly all of a log, in half the time.
-
-        The first that is anything else is left to :meth:`records`.
-        """
-        window = self._window
-        data, at, log, expected = window.data, window.at, self._log, self._expected
-        last = len(data) - (HEAD_BYTES if window.whole else LONGEST)
-        unpack, crc32, code_of_data = unpack_head, zlib.crc32, int(_DATA)
-        while at <= last:
-            magic, length, sequence, mono_ns, found, code, channel, parts, crc = unpack(data, at)
-            if (
-                code != code_of_data
-                or sequence != expected
-                or magic != MAGIC
-                or found != log
-                or parts
-                or not 0 <= mono_ns <= LATEST_NS
-            ):
-                break
-            start = at + HEAD_BYTES
-            payload = data[start : start + length]
-            if crc != crc32(payload, crc32(data[at : at + CRC_AT])):
-                break
-            yield _record(Record, (window.base + at, sequence, mono_ns, _DATA, channel, payload, 0))
-            at = start + length
-            expected += 1
-        if read := expected - self._expected:
-            self._expected, self._records, self._ended = expected, self._records + read, False
-            window.at = at
 
     def _resynchronise(self) -> bool:
         """Go to the next sound record and count what lies before it; False where there is none."""
@@ -161,8 +124,8 @@ class Scan:
         self._records += 1
         self._lost += missing
         self._owed += missing
-        self._ended = kind is _END
-        if kind is not _DATA:
+        self._ended = kind is Kind.END
+        if kind is not Kind.DATA:
             joined = self._joined(Record(offset, sequence, mono_ns, kind, channel, payload), parts, missing)
             if joined is None:
                 return None
@@ -170,7 +133,7 @@ class Scan:
         elif self._parts:
             self._drop_parts()
         owed, self._owed = self._owed, 0
-        return _record(Record, (offset, sequence, mono_ns, kind, channel, payload, owed))
+        return Record(offset, sequence, mono_ns, kind, channel, payload, owed)
 
     def _joined(self, record: Record, parts: int, missing: int) -> Record | None:
         """Return a text whose parts are all there, None before its last one or where one is missing."""

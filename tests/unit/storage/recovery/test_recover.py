@@ -28,7 +28,7 @@ from storage.wire_log import notes
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import NotALog, read_log
-from storage.wire_log.wire_samples import chains_of, decode_log
+from storage.wire_log.wire_samples import decode_log
 
 FAMILY = "line-protocol"
 START_NS = 7_000_000_000
@@ -157,9 +157,9 @@ def test_no_frame_is_put_together_across_a_break(event: str, tmp_path: Path) -> 
         for channel in (0, 1):
             recorder.put(channel, 3, b"34\rR1000\rR1000\r")
     broken, whole = decode_log(read_log(log), header.sensors)
-    assert 1234 not in np.round(broken.samples.distance * 1000).tolist()
-    assert 1234 in np.round(whole.samples.distance * 1000).tolist()
-    assert np.count_nonzero(broken.samples.flags & Flag.GAP_BEFORE) == 1
+    assert 1234 not in np.round(broken.distance * 1000).tolist()
+    assert 1234 in np.round(whole.distance * 1000).tolist()
+    assert np.count_nonzero(broken.flags & Flag.GAP_BEFORE) == 1
 
 
 def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
@@ -351,8 +351,8 @@ def test_bytes_of_an_unnamed_channel_stay_in_the_log(tmp_path: Path) -> None:
         for host_ns, data in wire(20):
             recorder.put(4, host_ns, data[::-1])
             recorder.put(3, host_ns, data)
-    (decoded,) = decode_log(read_log(tmp_path / "run.wire"), header.sensors, chains_of)
-    assert (len(decoded.samples), decoded.reads) == (20, 21)
+    (samples,) = decode_log(read_log(tmp_path / "run.wire"), header.sensors)
+    assert len(samples) == 20
 
 
 @pytest.mark.skipif(os.name == "nt", reason="this system has no such locks")
