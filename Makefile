@@ -27,7 +27,8 @@ $(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) -e '.[dev]'
+	$(PIP) 'pip>=25.1'  # the first that installs dependency groups
+	$(PIP) -e '.[batch,dask,notebook]' --group dev
 	@touch $@ $(VENV)/.installed
 
 demo: $(VENV)/.installed
@@ -58,9 +59,11 @@ lint: $(VENV)/.installed-dev
 docs: $(VENV)/.installed-dev
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build
 
-docs-figures: $(VENV)/.installed
+# The screenshots need chromium; Debian: apt-get install chromium.
+docs-figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/figures/draw.py
 	$(BIN)/python docs/figures/wiring.py
+	$(BIN)/python docs/figures/screenshots.py
 
 docs-trade: $(VENV)/.installed-dev
 	$(BIN)/python docs/figures/trade.py

@@ -49,8 +49,8 @@ class PortReader:
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
         self._failure: BaseException | None = None
+        # Nothing reads the pipe, it only ends a wait, so it may block: Windows can set that only from Python 3.12.
         self._wake_read, self._wake_write = os.pipe()
-        os.set_blocking(self._wake_read, False)
 
     def start(self) -> None:
         """Begin to read."""

@@ -85,8 +85,10 @@ class SerialPort:
         What stands in the way is not looked into, for a reader may try twice a second.
         """
         self.close()
-        if self._device is None and (other := _devices().get(os.path.realpath(self.name))) is not None:
-            raise PortError(f"{self.name}: what is there now is {other}, what was lost was no USB device")
+        if self._device is None and "://" not in self.name:
+            other = _devices().get(os.path.realpath(self.name))
+            if other is not None:
+                raise PortError(f"{self.name}: what is there now is {other}, what was lost was no USB device")
         self._open(self.name if self._device is None else self._found(self._device))
 
     @property

@@ -1,8 +1,8 @@
-"""The equation of motion, the integrators that solve it, their limits, and the cheapest one for a tolerance.
+"""The equation of motion, the integrators that solve it, and the step halving that shows their error.
 
-In comes a scene or an equation with a start; out goes a trajectory, with the error to expect of it beforehand. A
-newcomer adds an integrator: one file in ``integrators``, one entry in ``INTEGRATORS``, and it must pass
-tests/conformance/test_integrators.py by its name; a sixth that ``auto`` may take needs its cost in ``choose`` too.
+In comes a scene or an equation with a start; out goes a trajectory with its stated error (``halving.py``). A newcomer
+adds an integrator: one entry in ``methods.py`` and in ``INTEGRATORS``, and it must pass
+tests/conformance/test_integrators.py by its name.
 
 Examples
 --------
@@ -16,16 +16,12 @@ Examples
 from __future__ import annotations
 
 from pipeline.dynamics.equation import Equation
+from pipeline.dynamics.exact import EXACT
 from pipeline.dynamics.integrator import Integrator, Trajectory
-from pipeline.dynamics.integrators.averaged import AVERAGED
-from pipeline.dynamics.integrators.euler import FORWARD_EULER, SYMPLECTIC_EULER
-from pipeline.dynamics.integrators.exact import EXACT
-from pipeline.dynamics.integrators.runge_kutta import RK4
-from pipeline.dynamics.integrators.solve_ivp import DOP853, LSODA
-from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.integrators.taylor import TAYLOR
-from pipeline.dynamics.integrators.verlet import VERLET, YOSHIDA4
+from pipeline.dynamics.methods import FORWARD_EULER, RK4, SYMPLECTIC_EULER, VERLET, YOSHIDA4
 from pipeline.dynamics.problem import Problem, effective_mass_kg
+from pipeline.dynamics.solve_ivp import DOP853, LSODA
+from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 
 __all__ = [
@@ -38,7 +34,7 @@ __all__ = [
     "get_integrator",
 ]
 
-_EACH = (FORWARD_EULER, SYMPLECTIC_EULER, VERLET, YOSHIDA4, RK4, EXACT, STRANG, TAYLOR, LSODA, DOP853, AVERAGED)
+_EACH = (FORWARD_EULER, SYMPLECTIC_EULER, VERLET, YOSHIDA4, RK4, EXACT, STRANG, DOP853, LSODA)
 INTEGRATORS: dict[str, Integrator] = {each.name: each for each in _EACH}
 
 

@@ -53,25 +53,9 @@ class Integrator(ABC):
         """Return the largest step that does not make a free motion grow, s; inf for any, 0 for none."""
         return math.inf
 
-    @abstractmethod
-    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return the expected largest error of the displacement over the starting amplitude."""
-
-    def least_error(self, problem: Problem) -> float:  # noqa: ARG002 - for some the problem tells
-        """Return an error that it has at least, over the amplitude: what it need not be predicted for."""
-        return 0.0
-
-    def bound(self, problem: Problem, step_s: float, seconds: float) -> float:  # noqa: ARG002 - some have one
-        """Return a bound of that error which costs microseconds; inf where it takes a pilot to tell."""
-        return math.inf
-
-    def keeping(self, tolerance: float) -> Integrator:  # noqa: ARG002 - some go by their step
-        """Return the method set to a tolerance, the error over the amplitude at the end of a run, if it takes one."""
-        return self
-
-    def predicted_velocity_error(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return the same of the velocity, over the amplitude times the angular frequency."""
-        return self.predicted_error(problem, step_s, seconds)
+    def no_estimate(self, problem: Problem) -> str:  # noqa: ARG002 - for some it depends on the problem
+        """Return why step halving shows nothing of its error; empty where it does."""
+        return ""
 
     @abstractmethod
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.strang import STRANG
 from pipeline.track import F8
 
 __all__ = ["C16", "STRETCH", "Sensitivity", "sensitivity", "solved"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.problem import Problem
 
-__all__ = ["SHARE", "Term", "reduced", "required"]
+__all__ = ["SHARE", "Term", "required"]
 
 SHARE = 0.1  # of the tolerance, for all terms left out together
 
@@ -67,29 +67,19 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
     (True, ['viscous_drag'])
     """
     sizes = _sizes(problem, seconds)
-    kept, _ = _kept(sizes, tolerance)
+    kept = _kept(sizes, tolerance)
     terms = []
     for name in _COEFFICIENTS:
         size = min(sizes.get(name, 0.0), 1.0)
         terms.append(Term(name, size, name in kept, _why(name in sizes, name in kept, size, tolerance)))
-    return reduced(problem, seconds, tolerance)[0], tuple(terms)
-
-
-def reduced(problem: Problem, seconds: float, tolerance: float) -> tuple[Problem, float]:
-    """Return the same problem, and the most that what was left out changes the displacement, over the amplitude.
-
-    It is all that a run needs to know: a short one takes less time than what became of each term does to tell.
-    """
-    sizes = _sizes(problem, seconds)
-    kept, left_out = _kept(sizes, tolerance)
     if len(kept) == len(sizes):
-        return problem, 0.0
+        return problem, tuple(terms)
     eq = problem.equation
     equation = Equation(
         angular_frequency_per_s=eq.angular_frequency_per_s,
         **{each: getattr(eq, each) for name, each in _COEFFICIENTS.items() if name in kept},
     )
-    return Problem(equation, problem.displacement_m, problem.velocity_m_per_s), left_out
+    return Problem(equation, problem.displacement_m, problem.velocity_m_per_s), tuple(terms)
 
 
 def _sizes(problem: Problem, seconds: float) -> dict[str, float]:
@@ -113,8 +103,8 @@ def _sizes(problem: Problem, seconds: float) -> dict[str, float]:
     return found
 
 
-def _kept(sizes: dict[str, float], tolerance: float) -> tuple[set[str], float]:
-    """Return the terms that are kept, and what the others change together."""
+def _kept(sizes: dict[str, float], tolerance: float) -> set[str]:
+    """Return the terms that are kept."""
     room, left_out, kept = SHARE * tolerance, 0.0, set()
     # Least first: what fits into the room together stays out. Friction always holds a bob in the end.
     for size, name in sorted((size if size >= 0.0 else math.inf, name) for name, size in sizes.items()):
@@ -122,7 +112,7 @@ def _kept(sizes: dict[str, float], tolerance: float) -> tuple[set[str], float]:
             left_out += size
         else:
             kept.add(name)  # with what is beyond numbers
-    return kept, left_out
+    return kept
 
 
 def _why(acts: bool, kept: bool, size: float, tolerance: float) -> str:

@@ -215,7 +215,7 @@ def fit_equation(
     parameters are the rest position, displacement and velocity at the first sample, :math:`\\omega_0`, and the
     coefficients in the convention of the amplitude, :math:`\\beta = 4\\omega_0 b/3\\pi` and
     :math:`\\mu = 2f/\\pi\\omega_0`. Solutions come from Strang splitting with located turning points
-    (:mod:`pipeline.dynamics.integrators.strang`), the least squares from :mod:`pipeline.numerics.least_squares`.
+    (:mod:`pipeline.dynamics.strang`), the least squares from :mod:`pipeline.numerics.least_squares`.
 
     The richest law goes first: what it leaves shows false echoes and the noise. The others are held to that noise,
     and chosen among as the amplitude's laws are.

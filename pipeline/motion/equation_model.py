@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.dynamics import Equation, Problem, Trajectory
 from pipeline.dynamics.equation import Real
-from pipeline.dynamics.integrators.strang import STRANG
+from pipeline.dynamics.strang import STRANG
 from pipeline.track import F8
 
 __all__ = ["COEFFICIENTS", "STATE", "FreeMotion", "envelope"]

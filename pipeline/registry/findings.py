@@ -92,6 +92,7 @@ FINDINGS: Mapping[str, tuple[Severity, ...]] = {
     "no_target": ("info",),
     "other_device": ("warning",),
     "readings_dropped": ("warning",),
+    "counter_changed": ("info",),
     "sensor_away": ("info",),
     "sensor_lost": ("warning",),
     "sensor_replaced": ("warning",),

@@ -19,6 +19,7 @@ from pipeline.errors import SceneError
 from springmass.batch.course import POSITION, Said, join, read_course
 from springmass.batch.rows import dumped
 from springmass.errors import UNREADABLE, USAGE, ProgramError
+from springmass.layout import PACKAGES, part
 from springmass.runs.analysing import numbered
 from springmass.runs.inputs import Found, files_of
 from springmass.runs.scenes import read_scene
@@ -26,8 +27,6 @@ from springmass.runs.scenes import read_scene
 __all__ = ["Job", "Plan", "code_sha256", "job_of", "names_of", "plan", "shard_of"]
 
 _GLOB = "*?["
-_RESULTS = ("acquisition", "pipeline", "storage", "springmass/batch", "springmass/runs")
-"""What of the program a row depends on."""
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
 
 
@@ -229,9 +228,10 @@ def names_of(jobs: Sequence[Job]) -> list[str]:
 @functools.cache
 def code_sha256() -> str:
     """Digest of what a row depends on beside its run: this program, its libraries' versions, the user's dialects."""
-    top = Path(__file__).resolve().parent.parent.parent
+    # In a wheel the packages are elsewhere; a folder that does not exist would leave old rows "unchanged" in silence.
+    rooms = [*map(part, PACKAGES), *(Path(__file__).resolve().parents[1] / room for room in ("batch", "runs"))]
     parts = [f"{name} {version(name)}".encode() for name in _LIBRARIES]
-    files = [file for room in _RESULTS for file in sorted((top / room).rglob("*.py"))]
+    files = [file for room in rooms for file in sorted(room.rglob("*.py"))]
     if (dialects := dialect_folder()).is_dir():
         files += sorted(dialects.glob("*.toml"))
     parts += [read_regular(file) for file in files]

@@ -14,13 +14,11 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import springmass
-from acquisition.errors import visible
 from springmass.errors import OK, SOME_FAILED, suggest
+from springmass.layout import PACKAGES, PREFIX, part
 
 __all__ = ["Check", "examine", "foreign_packages", "run"]
 
-PACKAGES = ("acquisition", "pipeline", "storage")
 LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2"),
     *("serial", "nptdms", "python_calamine", "rich", "shtab", "starlette", "uvicorn", "websockets"),
@@ -52,6 +50,8 @@ class Check:
 
 def run(options: argparse.Namespace) -> int:
     """Print every check; exit with 1 where one failed."""
+    from acquisition.errors import visible  # a foreign package of this name is one of the things that are checked
+
     checks = examine()
     if options.json:
         print(json.dumps([asdict(check) for check in checks]))
@@ -74,17 +74,16 @@ def examine() -> tuple[Check, ...]:
 
 
 def foreign_packages() -> dict[str, str]:
-    """Return packages that do not lie beside ``springmass``, name to where they were found.
+    """Return packages that are not those of this program, name to where they were found.
 
-    ``acquisition``, ``pipeline`` and ``storage`` are names that other distributions use too; one found first on the
-    path would be run in place of ours.
+    In a checkout ``acquisition``, ``pipeline`` and ``storage`` are imported by these names, which other distributions
+    use too; one found first on the path would be run in place of ours. A wheel has them inside ``springmass``.
     """
-    home = Path(springmass.__file__).resolve().parent.parent
     foreign: dict[str, str] = {}
     for name in PACKAGES:
-        spec = importlib.util.find_spec(name)  # looks for it without running it
+        spec = importlib.util.find_spec(PREFIX + name)  # looks for it without running it
         place = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent
-        if place != home / name:
+        if place != part(name):
             foreign[name] = "nowhere" if spec is None else str(place or "a folder that is no package")
     return foreign
 
@@ -101,7 +100,7 @@ def _interpreter() -> Iterator[Check]:
 def _packages() -> Iterator[Check]:
     foreign = foreign_packages()
     for name in PACKAGES:
-        found = foreign.get(name, f"of springmass {springmass.__version__}")
+        found = foreign.get(name, str(part(name)))
         yield Check(
             f"package {name}",
             name not in foreign,

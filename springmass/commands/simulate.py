@@ -13,7 +13,7 @@ from pathlib import Path
 
 from acquisition.errors import visible
 from pipeline.dynamics.band import Band, spread
-from pipeline.dynamics.choose import Choice
+from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect
 from pipeline.results.simulated_effects import simulated_effects
@@ -26,7 +26,6 @@ from springmass.runs.simulating.simulation import (
     count_of,
     default_tolerance,
     demand_stable,
-    plan,
     simulate,
 )
 from springmass.runs.simulating.told import summary
@@ -61,31 +60,25 @@ def run(options: argparse.Namespace) -> int:
     say = sys.stderr if options.json else sys.stdout
     band, of_band = _band(ready, seconds)
     tolerance, words = _tolerance(options, band)
-    effects: list[Effect] = []
-
-    def planned(choice: Choice) -> None:
-        if not options.force:
-            demand_stable(choice, where=options.scene)
-        effects.extend(
-            simulated_effects(
-                ready.stated, ready.problem, choice.terms, options.dt * count, ready.drag, options.without
-            )
-        )
-        print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
-        print(_before(choice, count, words, effects), file=say, flush=True)
-
+    if not options.force:
+        named_step = options.dt if options.tolerance is None else None
+        demand_stable(ready.problem, options.method, named_step, where=options.scene)
+    terms = required(ready.problem, options.dt * count, tolerance)[1] if options.method == "auto" and tolerance else ()
+    effects = simulated_effects(ready.stated, ready.problem, terms, options.dt * count, ready.drag, options.without)
     try:
         simulation = simulate(
             ready.problem,
-            lambda: plan(ready.problem, options.method, options.dt, count, tolerance),
+            options.method,
             options.dt,
             count,
+            tolerance,
             check=options.check,
             timer=time.perf_counter,
-            planned=planned,
         )
     except DynamicsError as error:
         raise ProgramError(f"{options.scene}: {error}", USAGE) from error
+    print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
+    print(_before(words, effects), file=say)
     print(_after(simulation, count), file=say)
     against = None
     if analysis is not None:
@@ -150,8 +143,8 @@ def _tolerance(options: argparse.Namespace, band: Band | None) -> tuple[float | 
     return found, words
 
 
-def _before(choice: Choice, count: int, tolerance: str, effects: Sequence[Effect]) -> str:
-    """What acts, what is about to run, and what to expect of it."""
+def _before(tolerance: str, effects: Sequence[Effect]) -> str:
+    """What acts, and the tolerance."""
     lines = ["effects          change of the motion, of the amplitude"]
     for effect in effects:
         size = "" if effect.predicted is None else f"{effect.predicted:.2g}"
@@ -159,22 +152,25 @@ def _before(choice: Choice, count: int, tolerance: str, effects: Sequence[Effect
         lines.append(wrapped(f"  {mark}  {effect.name:<30} {size:>8}  {effect.why}", " " * 48))
     if tolerance:
         lines.append(wrapped(tolerance, " " * 17))
-    lines.append(f"method           {choice.integrator.words}")
-    if choice.integrator.order:
-        lines.append(f"step             {choice.step_s:.6g} s, {choice.parts * count} steps")
-    return "\n".join([*lines, f"predicted error  {_errors(choice.predicted_error, choice.predicted_velocity_error)}"])
+    return "\n".join(lines)
 
 
 def _after(simulation: Simulation, count: int) -> str:
-    """Time, steps and error beside each other."""
-    choice, check = simulation.choice, simulation.check
-    steps = f"{choice.parts * count} steps" if choice.integrator.order else f"{count} states"
-    lines = []
+    """Method, step, errors and time."""
+    solution, check = simulation.solution, simulation.check
+    lines = [f"method           {solution.integrator.words}"]
+    steps = f"{count} states"
+    if solution.integrator.order:
+        steps = f"{solution.parts * count} steps"
+        lines.append(f"step             {solution.step_s:.6g} s, {steps}")
+    if solution.error is None or solution.velocity_error is None:
+        lines.append(wrapped(f"predicted error  none: {solution.no_estimate}", " " * 17))
+    else:
+        lines.append(f"predicted error  {_errors(solution.error, solution.velocity_error)}")
     if check is not None:
         lines.append(f"measured error   {_errors(check.error, check.velocity_error)}, against {check.words}")
-    error = choice.predicted_error if check is None else check.error
-    took = f"{simulation.choosing_s * 1e3:.2g} ms to choose, {simulation.running_s * 1e3:.2g} ms to run"
-    lines.append(f"price            {took}, {steps}, error {error:.2g}")
+    took = f"{simulation.choosing_s * 1e3:.2g} ms to choose, {solution.running_s * 1e3:.2g} ms to run"
+    lines.append(f"price            {took}, {steps}")
     return "\n".join(lines)
 
 

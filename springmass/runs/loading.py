@@ -22,6 +22,7 @@ from acquisition.regular_file import open_regular
 from acquisition.source import SourceInfo
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, detail, tell
+from springmass.layout import part
 from springmass.runs.about import about_of
 from springmass.runs.questions import for_python
 from springmass.runs.tracks import to_track
@@ -199,12 +200,11 @@ def load(
 
 
 def sample_data() -> Path:
-    """Return the folder of the bundled recordings: inside an installed package, beside a checkout's."""
-    here = Path(__file__).resolve().parent.parent
-    for folder in (here / "sample_data", here.parent / "sample_data"):
-        if (folder / "undamped_simulated_position.txt").is_file():
-            return folder
-    raise ProgramError(f"{here}: the bundled recordings are missing; install springmass again", UNREADABLE)
+    """Return the folder of the bundled recordings."""
+    folder = part("sample_data")
+    if (folder / "undamped_simulated_position.txt").is_file():
+        return folder
+    raise ProgramError(f"{folder}: the bundled recordings are missing; install springmass again", UNREADABLE)
 
 
 def kind_of(path: Path) -> Literal["run", "wire", "recording"]:

@@ -145,6 +145,11 @@ class Tee:
         self._last.append(None)
         self.readings.append(0)
 
+    @property
+    def first(self) -> int:
+        """Channel of the sensor that is on the first port now."""
+        return self._channels[0]
+
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples that came since the last call, by channel, of the sensors that have any."""
         with self._lock:

@@ -10,8 +10,8 @@ import numpy as np
 from acquisition.clock import Clock
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory
-from pipeline.dynamics.integrators.strang import STRANG
 from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.strang import STRANG
 
 __all__ = ["REST_M", "Release", "bench_position"]
 

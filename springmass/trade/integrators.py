@@ -1,23 +1,26 @@
 """What a trajectory costs: every integrator's error against its time on this machine, and what ``auto`` takes.
 
-Times are the least of several runs; errors are against the adaptive Taylor series, whose own is below 1e-13.
+Times are the least of several runs, those of ``auto`` with all halvings. Errors are against DOP853 at a relative
+tolerance of 1e-13, with friction against Strang splitting in a quarter of the shortest step that is measured.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem
-from pipeline.dynamics.choose import choose, least_tolerance
-from pipeline.dynamics.integrators.solve_ivp import SolveIvp
-from pipeline.dynamics.integrators.taylor import TAYLOR, Taylor
+from pipeline.dynamics.halving import Solution, auto
+from pipeline.dynamics.solve_ivp import SolveIvp
+from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
+from pipeline.track import F8
 from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, panels, style
+from springmass.runs.simulating.simulation import reference
 from springmass.trade.front import Point
 
 if TYPE_CHECKING:
@@ -38,8 +41,8 @@ SPACING_S, COUNT = 0.01, 12_000
 ROUNDS = 3
 PARTS = (1, 2, 4, 8, 16)
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+RTOLS = (1e-6, 1e-9, 1e-12)
 ROUNDING = 1e-13
-REFERENCE, FINEST = 1e-16, 1e-9  # tolerances of what errors are measured against, by Taylor series and else
 LONG_RADIANS, LONG_S = 2e4, 1.0  # of a run that adaptive methods are not put to; of one that is run once
 GROWN = 1e3  # times the amplitude: what has grown so far is no solution
 SCENES = {
@@ -56,10 +59,8 @@ _LOOKS = {
     "rk4": (VERMILLION, "D"),
     "exact": ("#000000", "P"),
     "strang": (ORANGE, "o"),
-    "taylor": (PURPLE, "s"),
     "lsoda": (GREY, "x"),
-    "dop853": ("#000000", "+"),
-    "averaged": (SKY, "*"),
+    "dop853": (PURPLE, "s"),
 }
 
 
@@ -118,24 +119,14 @@ def measure_integrators(
     for scene, equation in SCENES.items():
         if progress is not None:
             progress(scene)
-        problem = Problem(equation, START_M)
-        truth = TAYLOR.run(problem, SPACING_S, count).y
-        for integrator, parts, setting in _settings(problem):
-            found = _measured(integrator, problem, parts, count, truth, timer, rounds)
-            if found is not None:
-                rows.append(Work(scene, integrator.name, setting, *found))
-        for tolerance in TOLERANCES:
-            choice = choose(problem, SPACING_S, count, tolerance)
-            found = _measured(choice.integrator, choice.problem, choice.parts, count, truth, timer, rounds)
-            if found is not None:
-                rows.append(Work(scene, choice.integrator.name, f"step {choice.step_s:.3g} s", *found, tolerance))
+        rows += measure_scene(scene, Problem(equation, START_M), SPACING_S, count, timer, rounds=rounds)
     return rows
 
 
 def measure_scene(
     name: str, problem: Problem, spacing_s: float, count: int, timer: Callable[[], float], *, rounds: int = ROUNDS
 ) -> list[Work]:
-    """Measure every integrator on one problem, and what ``auto`` takes at each tolerance, choosing included.
+    """Measure every integrator on one problem, and what ``auto`` takes at each tolerance, all halvings included.
 
     Parameters
     ----------
@@ -154,30 +145,21 @@ def measure_scene(
     DynamicsError
         If nothing solves the problem well enough to measure errors against.
     """
-    best = replace(TAYLOR, tolerance=REFERENCE, longest=0.5 * TAYLOR.longest)
-    if best.refusal(problem) or not np.isfinite(best.predicted_error(problem, spacing_s, spacing_s * count)):
-        truth = choose(problem, spacing_s, count, max(FINEST, least_tolerance(problem, spacing_s * count))).run(count).y
-    else:
-        truth = best.run(problem, spacing_s, count).y
+    chosen = list(_chosen(problem, spacing_s, count, timer, rounds))
+    finest = max([PARTS[-1], *(solution.parts for _, solution, _ in chosen if solution.integrator is STRANG)])
+    truth = reference(problem, spacing_s, count, finest)[0].y
     rows: list[Work] = []
+    radians = spacing_s * count * problem.equation.angular_frequency_per_s
     for integrator, parts, setting in _settings(problem, spacing_s):
-        steps = spacing_s * count * problem.equation.angular_frequency_per_s
-        if isinstance(integrator, Taylor | SolveIvp) and steps > LONG_RADIANS:
+        if isinstance(integrator, SolveIvp) and radians > LONG_RADIANS:
             continue
         found = _measured(integrator, problem, parts, count, truth, timer, rounds, spacing_s)
         if found is not None and found[0] < GROWN:
             rows.append(Work(name, integrator.name, setting, *found))
-    for tolerance in TOLERANCES:
-        try:
-            start = timer()
-            choice = choose(replace(problem), spacing_s, count, tolerance)
-            chosen = timer() - start
-        except DynamicsError:
-            continue  # beyond what double precision reaches in this time
-        found = _measured(choice.integrator, choice.problem, choice.parts, count, truth, timer, rounds, spacing_s)
-        if found is not None:
-            setting = f"step {choice.step_s:.3g} s"
-            rows.append(Work(name, choice.integrator.name, setting, found[0], found[1] + chosen, tolerance))
+    for tolerance, solution, seconds in chosen:
+        error = _error(problem, solution.trajectory.y, truth)
+        setting = f"step {solution.step_s:.3g} s"
+        rows.append(Work(name, solution.integrator.name, setting, error, seconds, tolerance))
     return rows
 
 
@@ -257,19 +239,36 @@ def _within(error: float) -> float:
     return min(max(error, ROUNDING / 30.0), 5e2)
 
 
-def _settings(problem: Problem, spacing_s: float = SPACING_S) -> list[tuple[Integrator, int, str]]:
+def _settings(problem: Problem, spacing_s: float) -> list[tuple[Integrator, int, str]]:
     found: list[tuple[Integrator, int, str]] = []
     for integrator in INTEGRATORS.values():
         if integrator.refusal(problem):  # of another kind of scene
             continue
         if integrator.order:
             found += [(integrator, parts, f"step {spacing_s / parts:.3g} s") for parts in PARTS]
-        elif isinstance(integrator, Taylor | SolveIvp):
-            aims = (1e-3, 1e-6, 1e-9) if isinstance(integrator, SolveIvp) else (1e-4, 1e-8, 1e-13)
-            found += [(replace(integrator, tolerance=aim), 1, f"tolerance {aim:g}") for aim in aims]
+        elif isinstance(integrator, SolveIvp):
+            found += [(replace(integrator, rtol=rtol), 1, f"rtol {rtol:g}") for rtol in RTOLS]
         else:
             found.append((integrator, 1, "no step"))
     return found
+
+
+def _chosen(
+    problem: Problem, spacing_s: float, count: int, timer: Callable[[], float], rounds: int
+) -> Iterator[tuple[float, Solution, float]]:
+    """Yield each tolerance that ``auto`` keeps, its solution, and the least time, s."""
+    for tolerance in TOLERANCES:
+        least = float("inf")
+        try:
+            for _ in range(rounds):
+                start = timer()
+                solution = auto(problem, spacing_s, count, tolerance)
+                least = min(least, timer() - start)
+                if least > LONG_S:
+                    break
+        except DynamicsError:
+            return  # beyond what double precision reaches in this time; so is any smaller one
+        yield tolerance, solution, least
 
 
 def _measured(
@@ -277,10 +276,10 @@ def _measured(
     problem: Problem,
     parts: int,
     count: int,
-    truth: np.ndarray[Any, np.dtype[np.float64]],
+    truth: F8,
     timer: Callable[[], float],
     rounds: int,
-    spacing_s: float = SPACING_S,
+    spacing_s: float,
 ) -> tuple[float, float] | None:
     """Return error and least time; None where the method ran away."""
     least = float("inf")
@@ -293,5 +292,9 @@ def _measured(
         least = min(least, timer() - start)
         if least > LONG_S:
             break
+    return _error(problem, run.y, truth), least
+
+
+def _error(problem: Problem, y: F8, truth: F8) -> float:
     size = problem.amplitude_m()
-    return float(np.max(np.abs(run.y - truth))) / size if size > 0.0 else 0.0, least
+    return float(np.max(np.abs(y - truth))) / size if size > 0.0 else 0.0

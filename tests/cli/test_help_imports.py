@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import springmass
+from springmass.layout import PACKAGES, PREFIX
 from springmass.terminal.arguments import COMMANDS
 
 HEAVY = {
@@ -26,9 +27,7 @@ HEAVY = {
     "shutil",
     "tempfile",
     "importlib.metadata",
-    "acquisition",
-    "pipeline",
-    "storage",
+    *(PREFIX + name for name in PACKAGES),
 }
 
 # What the interpreter imports at its start, such as for the environment's own hooks, is not the program's doing.

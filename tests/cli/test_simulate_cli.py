@@ -58,7 +58,7 @@ def test_a_linear_scene_is_solved_exactly(cli: Callable, tmp_path: Path) -> None
     path.write_text(LINEAR)
     (found,) = cli("simulate", "--scene", path, "--check", "--json").results
     assert found["method"] == "exact"
-    assert 0.0 < found["measured_error"] < 1e-13
+    assert 0.0 < found["measured_error"] < 1e-10
     assert found["equation"]["angular_frequency_per_s"] == 10.0
 
 
@@ -112,7 +112,7 @@ def test_scipy_solves_a_scene(cli: Callable, scene: Path, name: str) -> None:
     (found,) = cli("simulate", "--scene", scene, "--method", name, "--check", "--json").results
     assert found["method"] == name
     assert 0.0 < found["measured_error"] < 1e-5
-    assert found["predicted_error"] == pytest.approx(1e-6, rel=1e-3)
+    assert 0.0 < found["predicted_error"] <= 1e-6
 
 
 @pytest.mark.trials
@@ -216,7 +216,7 @@ def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path:
         (("--tolerance", "1e-17"), "must be finite and at least"),
         (("--tolerance", "0"), "must be finite and at least"),
         (("--tolerance", "-1"), "must be finite and at least"),
-        (("--method", "averaged", "--tolerance", "1e-12"), "averaged cannot keep a tolerance of 1e-12"),
+        (("--method", "verlet", "--tolerance", "1e-12"), "verlet cannot keep a tolerance of 1e-12"),
         (("--method", "exact"), "exact cannot solve this"),
         (("--seconds", "1e9"), "makes 100000000000 steps"),
         (("--seconds", "0.001"), "makes 0 steps"),
@@ -313,10 +313,10 @@ def test_no_reference_is_solved_unless_asked_for(cli: Callable, scene: Path) -> 
     (found,) = cli("simulate", "--scene", scene, "--json").results
     assert found["measured_error"] is None
     assert found["running_s"] > 0.0
-    (found,) = cli("simulate", "--scene", scene, "--method", "taylor", "--check", "--json").results
-    assert 0.0 < found["measured_error"] < 1e-12
-    assert 0.0 < found["measured_velocity_error"] < 1e-12
-    assert "half the step" in found["reference"]
+    (found,) = cli("simulate", "--scene", scene, "--method", "strang", "--check", "--json").results
+    assert 0.0 < found["measured_error"] <= found["predicted_error"] < 1e-5
+    assert 0.0 < found["measured_velocity_error"] < 1e-5
+    assert "DOP853" in found["reference"]
 
 
 def test_a_tolerance_far_below_the_band_is_pointed_out(cli: Callable, bench: Path) -> None:
@@ -388,7 +388,7 @@ def test_a_scene_has_its_own_trade(cli: Callable, bench: Path, tmp_path: Path) -
     """Every method's error and time on this scene, and one recommendation that keeps what is wanted."""
     arguments = ("simulate", "--scene", bench, "--seconds", "2", "--trade", "--out", tmp_path / "trade", "--json")
     (found,) = cli(*arguments).results
-    assert {"strang", "taylor", "rk4", "averaged"} <= {row["method"] for row in found["integrators"]}
+    assert {"strang", "dop853", "rk4"} <= {row["method"] for row in found["integrators"]}
     assert found["recommended"]["error"] <= found["recommended"]["wanted"]
     assert (tmp_path / "trade" / "integrators.svg").is_file()
     (same,) = cli("trade", "--integrators", "--scene", bench, "--seconds", "2", "--tolerance", "1e-9", "--json").results

@@ -249,9 +249,17 @@ def agree(line: str, other: str) -> bool:
     )
 
 
-def test_the_figure_of_the_readme_is_drawn_by_the_script() -> None:
-    """The README shows what docs/figures/draw.py draws, and it stays small."""
+@pytest.mark.parametrize("picture", ["page.png", "report.png"])
+def test_the_pictures_of_the_readme_are_taken_by_the_script(picture: str) -> None:
+    """The README shows what docs/figures/screenshots.py takes, and it stays small."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert "docs/figures/amplitude.svg" in readme
-    assert "amplitude.svg" in (DOCS / "figures" / "draw.py").read_text(encoding="utf-8")
-    assert 1_000 < (DOCS / "figures" / "amplitude.svg").stat().st_size < 150_000
+    assert f"docs/figures/{picture}" in readme
+    assert picture in (DOCS / "figures" / "screenshots.py").read_text(encoding="utf-8")
+    assert 1_000 < (DOCS / "figures" / picture).stat().st_size < 300_000
+
+
+def test_the_readme_is_short() -> None:
+    """It says what the program does, for whom and how to start, in at most 120 lines."""
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= 120
+    assert lines[2].startswith("springmass turns recordings of a mass on a spring into period, spring constant")

@@ -153,7 +153,7 @@ def command(rng: np.random.Generator, scene: Path) -> list[str]:
     choices = [
         ["analyse", "--json", record],
         ["simulate", "--json"],
-        ["simulate", "--json", "--method", str(rng.choice(["strang", "verlet", "rk4", "taylor", "exact"]))],
+        ["simulate", "--json", "--method", str(rng.choice(["strang", "verlet", "rk4", "dop853", "exact"]))],
         ["simulate", "--out", str(out)],
         ["simulate", "--json", "--against", record],
         ["convert", record, f"{out}.h5", "--overwrite"],

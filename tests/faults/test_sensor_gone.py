@@ -252,3 +252,25 @@ def test_sensors_unplugged_for_good(bench: Any, tmp_path: Path) -> None:
         with open_run(out) as run:
             assert "sensor_lost" in [trap.code for trap in run.traps]
     print(f"{UNPLUGS} sensors unplugged for good: all said, every reading before it kept")
+
+
+def test_an_adapter_with_a_number_is_not_taken_for_a_port_that_had_none(
+    monkeypatch: pytest.MonkeyPatch, terminals: Callable[[], str]
+) -> None:
+    """Where either is known by its number, it is another; a port of either kind says whether it is known."""
+    usb, first, second = Usb(monkeypatch), terminals(), terminals()
+    port = SerialPort(first, 9600)
+    assert not port.identified
+    usb.plug(first, "B2")
+    with pytest.raises(PortError, match="serial number B2"):
+        port.reopen()
+    usb.devices.clear()
+    port.reopen()
+    port.close()
+    usb.plug(second, "A1")
+    known = SerialPort(second, 9600)
+    assert known.identified
+    usb.plug(second, "")
+    with pytest.raises(PortError):
+        known.reopen()
+    known.close()

@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.dynamics import Trajectory, get_integrator
 from pipeline.dynamics.band import Band
-from pipeline.dynamics.choose import choose
+from pipeline.dynamics.halving import auto
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, VERMILLION, blank, legend_row, style, thinned
@@ -144,10 +144,11 @@ def _beside(simulation: Simulation) -> _Beside:
     """The reference, where the error was measured; else the run, or where that is rough what auto makes of it."""
     if simulation.check is not None:
         return _Beside(simulation.check.reference, "exact")
-    run, error = simulation.trajectory, simulation.choice.predicted_error
-    if not error <= ROUGH:
-        found = choose(simulation.problem, run.spacing_s, len(run.y) - 1, ROUGH)
-        run, error = found.run(len(run.y) - 1), found.predicted_error
+    run, error = simulation.trajectory, simulation.solution.error
+    if error is None or not error <= ROUGH:
+        found = auto(simulation.problem, run.spacing_s, len(run.y) - 1, ROUGH)
+        run, error = found.trajectory, found.error
+    assert error is not None
     return _Beside(run, "exact" if error < EXACT else f"solved to {error:.0e}")
 
 
@@ -266,18 +267,18 @@ def _error(simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory]) 
     figure = blank(WIDTH, 3.2)
     panel = figure.add_axes((LEFT / WIDTH, 0.14, (WIDTH - LEFT - 2 * RIGHT) / WIDTH, 0.74))
     start = simulation.problem.amplitude_m() or 1.0
-    choice = simulation.choice
+    solution = simulation.solution
     curves = [(run, words, colour) for run, (_, words, colour) in zip(runs, EULERS, strict=True)]
-    if choice.integrator.name not in [name for name, *_ in EULERS] and simulation.trajectory is not beside.run:
-        curves.append((simulation.trajectory, choice.integrator.words, GREEN))
+    if solution.integrator.name not in [name for name, *_ in EULERS] and simulation.trajectory is not beside.run:
+        curves.append((simulation.trajectory, solution.integrator.words, GREEN))
     for run, words, colour in curves:
         error = np.maximum.accumulate(np.abs(run.y - beside.run.y[: len(run.y)])) / start
         drawn = np.flatnonzero((error > 0) & (error < GROWN))
         thinned = np.linspace(0, drawn.size - 1, min(drawn.size, POINTS)).astype(np.intp)
         rows = drawn[np.unique(thinned)]
         panel.plot(run.t[rows], error[rows], color=colour, label=words)
-    if 0.0 < choice.predicted_error < GROWN:
-        panel.axhline(choice.predicted_error, label="predicted", **{**DASHED, "lw": 0.8})
+    if solution.error is not None and 0.0 < solution.error < GROWN:
+        panel.axhline(solution.error, label="predicted", **{**DASHED, "lw": 0.8})
     panel.set_yscale("log")
     panel.set_xlim(0.0, float(beside.run.t[-1]))
     panel.set_ylabel("largest error so far / amplitude")

@@ -18,7 +18,7 @@ from pipeline.dynamics.sensitivity import C16
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.runs.simulating.simulation import FINE, Against, Move, count_of, plan
+from springmass.runs.simulating.simulation import FINE, Against, Move, count_of, solve
 
 __all__ = ["completed", "deviation_text", "duration_s", "lay_over"]
 
@@ -108,7 +108,7 @@ def lay_over(
     problem : Problem
         As the scene that :func:`completed` returned states it.
     method, step_s, tolerance
-        As in :func:`springmass.runs.simulating.simulation.plan`; the step of ``auto`` is one that can be interpolated
+        As in :func:`springmass.runs.simulating.simulation.solve`; the step of ``auto`` is one that can be interpolated
         between.
     band : Band or None
         Around the prediction.
@@ -126,7 +126,7 @@ def lay_over(
     if method == "auto":
         step_s = min(step_s, 1.0 / (FINE * problem.equation.angular_frequency_per_s))
     count = count_of(step_s * max(1, math.ceil(duration_s(analysis) / step_s)), step_s)
-    trajectory = plan(problem, method, step_s, count, tolerance).run(count)
+    trajectory = solve(problem, method, step_s, count, tolerance).trajectory
     predicted: F8 = motion.rest.at(t) + trajectory.at(t - t[0])
     rms = float(np.sqrt(np.mean((measured - predicted) ** 2)))
     noise = analysis.estimates["noise"].value

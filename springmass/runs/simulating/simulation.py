@@ -1,4 +1,4 @@
-"""A simulation: what is solved, by which integrator, what error was expected of it and what it has."""
+"""A simulation: what is solved, by which integrator, what error is stated of it and what error it has."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ import numpy as np
 
 from pipeline.dynamics import Problem, Trajectory, get_integrator
 from pipeline.dynamics.band import Band
-from pipeline.dynamics.choose import SAFETY, Choice, choose, cost_ns, demand_tolerance, fit_step
-from pipeline.dynamics.integrators.exact import closed_form
-from pipeline.dynamics.integrators.strang import STRANG
-from pipeline.dynamics.integrators.taylor import TAYLOR
-from pipeline.dynamics.prediction.rounding import expected_rounding
+from pipeline.dynamics.halving import Solution, auto, demand_tolerance, halved, solved_once
+from pipeline.dynamics.rounding import rounding_error
+from pipeline.dynamics.solve_ivp import DOP853
+from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 from springmass.errors import USAGE, ProgramError
@@ -29,15 +28,16 @@ __all__ = [
     "count_of",
     "default_tolerance",
     "demand_stable",
-    "plan",
+    "reference",
     "simulate",
+    "solve",
 ]
 
 DEFAULT_TOLERANCE = 1e-6
 FINE = 24.0  # states a radian between which an interpolation errs by 1e-8 of the amplitude
 BAND_SHARE, LARGEST_DEFAULT = 0.01, 1e-3
 MOST_SAMPLES = 20_000_000
-REFERENCE_TOLERANCE = 1e-16  # asked of a Taylor series: its rounding is all that is left
+REFERENCE_RTOL = 1e-13
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,21 +72,23 @@ class Simulation:
     ----------
     problem : Problem
         All that the scene states.
-    choice : Choice
-        Integrator, step, prediction, and the terms that were solved.
-    trajectory : Trajectory
+    solution : Solution
+        Trajectory, integrator, step, stated error, and the terms that were solved.
     check : Check or None
         The error, where it was asked for.
-    choosing_s, running_s : float
-        What choosing and running took, s.
+    choosing_s : float
+        What choosing took, s: all runs but the one that is returned.
     """
 
     problem: Problem
-    choice: Choice
-    trajectory: Trajectory
+    solution: Solution
     check: Check | None = None
     choosing_s: float = 0.0
-    running_s: float = 0.0
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The solved motion."""
+        return self.solution.trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,8 +162,15 @@ def count_of(seconds: float, spacing_s: float) -> int:
     return count
 
 
-def plan(problem: Problem, method: str, spacing_s: float, count: int, tolerance: float | None) -> Choice:
-    """Return what is to be run: the choice of ``auto``, or a method by name.
+def solve(
+    problem: Problem,
+    method: str,
+    spacing_s: float,
+    count: int,
+    tolerance: float | None,
+    timer: Callable[[], float] = lambda: 0.0,
+) -> Solution:
+    """Solve a motion by ``auto`` or by a method that was named.
 
     Parameters
     ----------
@@ -173,28 +182,23 @@ def plan(problem: Problem, method: str, spacing_s: float, count: int, tolerance:
     count : int
         Number of spacings.
     tolerance : float or None
-        Largest error over the amplitude; None: 1e-6 for auto, unbounded for a method by name.
+        Largest error over the amplitude; None: 1e-6 for methods without a step, no limit for those with one.
+    timer : callable
+        To seconds.
 
     Raises
     ------
     DynamicsError
         For an unknown method, a tolerance below what can be reached, or a method that cannot keep it.
     """
-    seconds = spacing_s * count
     if method == "auto":
-        return choose(problem, spacing_s, count, DEFAULT_TOLERANCE if tolerance is None else tolerance)
+        return auto(problem, spacing_s, count, DEFAULT_TOLERANCE if tolerance is None else tolerance, timer)
     integrator = get_integrator(method)
-    if tolerance is None:
-        why = integrator.refusal(problem)
-        if why:
-            raise DynamicsError(f"{method} cannot solve this: {why}")
-        return Choice(integrator, 1, spacing_s, seconds, cost_ns(integrator, problem, 1, count, seconds), problem)
-    demand_tolerance(problem, seconds, tolerance)
-    found = fit_step(integrator, problem, spacing_s, count, tolerance / SAFETY)
-    if found is None:
-        why = integrator.refusal(problem) or "no step of it is predicted to; take auto or a larger tolerance"
-        raise DynamicsError(f"{method} cannot keep a tolerance of {tolerance:g} here: {why}")
-    return found
+    if tolerance is None and integrator.order:
+        return solved_once(problem, integrator, spacing_s, count, timer)
+    if tolerance is not None:
+        demand_tolerance(problem, spacing_s, count, tolerance)
+    return halved(problem, integrator, spacing_s, count, DEFAULT_TOLERANCE if tolerance is None else tolerance, timer)
 
 
 def default_tolerance(band: Band | None) -> float:
@@ -204,25 +208,37 @@ def default_tolerance(band: Band | None) -> float:
     return float(f"{min(max(BAND_SHARE * band.relative_u, DEFAULT_TOLERANCE), LARGEST_DEFAULT):.1g}")
 
 
-def demand_stable(choice: Choice, *, where: str) -> None:
+def demand_stable(problem: Problem, method: str, step_s: float | None, *, where: str) -> None:
     """Refuse a step beyond the limit of its method.
+
+    Parameters
+    ----------
+    problem : Problem
+    method : str
+    step_s : float or None
+        None where the method may take any step that is short enough.
+    where : str
+        Named in the error.
 
     Raises
     ------
     ProgramError
         With exit code 2; the line names the limit and the remedy.
     """
-    limit = choice.integrator.stable_step(choice.problem)
-    if choice.step_s <= limit:
+    if method == "auto":
         return
-    words = choice.integrator.words
+    integrator = get_integrator(method)
+    limit = integrator.stable_step(problem)
+    if limit > 0.0 and (step_s is None or step_s <= limit):
+        return
     told = f"its limit here is {_rounded_down(limit)} s" if limit > 0.0 else "it grows at any step without damping"
     remedy = f"take --dt {_rounded_down(limit)} or less, " if limit > 0.0 else "take "
-    other = "auto" if choice.integrator is STRANG else "strang"
-    if math.isinf(STRANG.stable_step(choice.problem)):
+    other = "auto" if integrator is STRANG else "strang"
+    if math.isinf(STRANG.stable_step(problem)):
         other += ", which has no limit"
+    step = "a step" if step_s is None else f"a step of {step_s:g} s"
     raise ProgramError(
-        f"{where}: {words} is unstable with a step of {choice.step_s:g} s: {told}; {remedy}--method {other}, "
+        f"{where}: {integrator.words} is unstable with {step}: {told}; {remedy}--method {other}, "
         "or --force to run it all the same",
         USAGE,
     )
@@ -230,89 +246,91 @@ def demand_stable(choice: Choice, *, where: str) -> None:
 
 def simulate(
     problem: Problem,
-    choose: Callable[[], Choice],
+    method: str,
     spacing_s: float,
     count: int,
+    tolerance: float | None,
     *,
     check: bool,
     timer: Callable[[], float],
-    planned: Callable[[Choice], None] | None = None,
 ) -> Simulation:
-    """Choose, run, and where it is asked for measure the error.
+    """Solve a motion, and where it is asked for measure the error.
 
     Parameters
     ----------
-    problem : Problem
-    choose : callable
-        To the choice.
-    spacing_s : float
-    count : int
+    problem, method, spacing_s, count, tolerance
+        As in :func:`solve`.
     check : bool
         Whether to measure the error, which costs more than the run.
     timer : callable
         To seconds; the difference of two calls is a time.
-    planned : callable, optional
-        Told the choice before it runs; may refuse it.
 
     Raises
     ------
     DynamicsError
         If nothing keeps the tolerance, or the numbers ran away.
     """
-    start = timer()
-    choice = choose()
-    chosen = timer()
-    if planned is not None:
-        planned(choice)
-    before = timer()
-    trajectory = choice.run(count)
-    done = timer()
-    found = checked(problem, choice, trajectory, spacing_s, count) if check else None
-    return Simulation(problem, choice, trajectory, found, choosing_s=chosen - start, running_s=done - before)
+    started = timer()
+    solution = solve(problem, method, spacing_s, count, tolerance, timer)
+    choosing_s = timer() - started - solution.running_s
+    found = checked(problem, solution, spacing_s, count) if check else None
+    return Simulation(problem, solution, found, choosing_s)
 
 
-def checked(problem: Problem, choice: Choice, trajectory: Trajectory, spacing_s: float, count: int) -> Check:
-    """Return the error of a trajectory against a method that is not its own.
-
-    A linear problem is solved by its closed form in extended precision. Any other by Taylor series in half the longest
-    step and of more terms than a run of ``taylor`` has; where these are too many steps, by Strang splitting in a
-    quarter of the step.
-    """
-    seconds = spacing_s * count
-    reference, words, resolution = _reference(problem, choice, spacing_s, count)
+def checked(problem: Problem, solution: Solution, spacing_s: float, count: int) -> Check:
+    """Return the error of a solution against the reference."""
+    trajectory = solution.trajectory
+    parts = solution.parts if solution.integrator is STRANG else None
+    other, words, resolution = reference(problem, spacing_s, count, parts)
     start = problem.amplitude_m()
     if start == 0.0:
-        return Check(reference, words, 0.0, 0.0, 0.0)
+        return Check(other, words, 0.0, 0.0, 0.0)
     speed = start * problem.equation.angular_frequency_per_s
-    error = float(np.max(np.abs(trajectory.y - reference.y))) / start
-    velocity = float(np.max(np.abs(trajectory.v - reference.v))) / speed
-    # The closed form is good to the last digit of a state, all others to what many sums leave.
-    own = 0.0 if problem.equation.is_linear else expected_rounding(problem, seconds, power=0.5)
-    resolution = max(resolution * error, own, float(np.finfo(np.float64).eps))
-    return Check(reference, words, max(error, resolution), max(velocity, resolution), resolution)
+    error = _apart(trajectory, other)
+    velocity = float(np.max(np.abs(trajectory.v - other.v))) / speed
+    return Check(other, words, max(error, resolution), max(velocity, resolution), resolution)
 
 
-def _reference(problem: Problem, choice: Choice, spacing_s: float, count: int) -> tuple[Trajectory, str, float]:
-    """Return a reference, how it was made, and what share of the difference to it may be its own."""
-    if problem.equation.is_linear and np.finfo(np.longdouble).eps < np.finfo(np.float64).eps:
-        return closed_form(problem, spacing_s, count), "the closed form in extended precision", 0.0
-    finer = replace(TAYLOR, tolerance=REFERENCE_TOLERANCE, longest=0.5 * TAYLOR.longest)
-    if not finer.refusal(problem) and math.isfinite(finer.predicted_error(problem, spacing_s, spacing_s * count)):
-        return finer.run(problem, spacing_s, count), "Taylor series in half the step", 0.0
-    parts = 4 * (
-        choice.parts if choice.integrator.name == "strang" else _strang_parts(problem, choice, spacing_s, count)
-    )
-    run = STRANG.run(problem, spacing_s / parts, count * parts, every=parts)
-    return run, f"Strang splitting in {parts} steps a sample", 1.0 / 15.0
+def reference(
+    problem: Problem, spacing_s: float, count: int, strang_parts: int | None = None
+) -> tuple[Trajectory, str, float]:
+    """Return a motion solved far better than to a tolerance, how it was made, and what it may err by.
+
+    By DOP853 at a relative tolerance of 1e-13. With friction, or where DOP853 gives up, by Strang splitting in a
+    quarter of the step.
+
+    Parameters
+    ----------
+    problem, spacing_s, count
+        As in :func:`solve`.
+    strang_parts : int or None
+        Steps a spacing of the run that is checked; None where it is not of Strang splitting.
+
+    Raises
+    ------
+    DynamicsError
+        If neither solves the motion.
+    """
+    rounding = rounding_error(problem, spacing_s * count)
+    if not problem.equation.friction_m_per_s2:
+        finest, next_finest = (replace(DOP853, rtol=rtol) for rtol in (REFERENCE_RTOL, 10.0 * REFERENCE_RTOL))
+        try:
+            run = finest.run(problem, spacing_s, count)
+            apart = _apart(run, next_finest.run(problem, spacing_s, count))
+        except DynamicsError:
+            pass  # too long, or too stiff
+        else:
+            return run, f"DOP853 at {REFERENCE_RTOL:g}", apart + rounding
+    parts = 4 * (strang_parts or halved(problem, STRANG, spacing_s, count, DEFAULT_TOLERANCE).parts)
+    run, coarse = (STRANG.run(problem, spacing_s / each, count * each, every=each) for each in (parts, parts // 2))
+    # Of second order: the difference to twice the step is three times the error of the finer run.
+    return run, f"Strang splitting in {parts} steps a sample", _apart(run, coarse) / 3.0 + rounding
 
 
-def _strang_parts(problem: Problem, choice: Choice, spacing_s: float, count: int) -> int:
-    found = fit_step(STRANG, problem, spacing_s, count, max(choice.predicted_error, REFERENCE_TOLERANCE))
-    if found is None:
-        raise DynamicsError(
-            "nothing solves this scene well enough to check an error against; leave --check out, or take a shorter run"
-        )
-    return found.parts
+def _apart(one: Trajectory, other: Trajectory) -> float:
+    """Return the largest difference of two motions over the starting amplitude."""
+    start = one.problem.amplitude_m()
+    return float(np.max(np.abs(one.y - other.y))) / start if start else 0.0
 
 
 def _rounded_down(limit: float) -> str:

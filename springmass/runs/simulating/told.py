@@ -24,28 +24,30 @@ def summary(
     tolerance: float | None = None,
 ) -> dict[str, Any]:
     """Return a simulation as the JSON of ``springmass simulate``."""
-    choice, problem, check = simulation.choice, simulation.problem, simulation.check
-    limit = choice.integrator.stable_step(choice.problem)
+    solution, problem, check = simulation.solution, simulation.problem, simulation.check
+    limit = solution.integrator.stable_step(solution.problem)
     return {
         "schema": 1,
-        "method": choice.integrator.name,
-        "step_s": choice.step_s,
-        "steps": choice.parts * (len(simulation.trajectory.y) - 1),
+        "method": solution.integrator.name,
+        "step_s": solution.step_s,
+        "steps": solution.parts * (len(simulation.trajectory.y) - 1),
         "samples": len(simulation.trajectory.y),
         "spacing_s": simulation.trajectory.spacing_s,
         "stable_step_s": _finite(limit),
-        "predicted_error": _finite(choice.predicted_error),
-        "predicted_velocity_error": _finite(choice.predicted_velocity_error),
+        "predicted_error": _finite(solution.error),
+        "predicted_velocity_error": _finite(solution.velocity_error),
+        "no_estimate": solution.no_estimate or None,
         "measured_error": None if check is None else check.error,
         "measured_velocity_error": None if check is None else check.velocity_error,
         "reference": None if check is None else check.words,
         "tolerance": tolerance,
         "choosing_s": simulation.choosing_s,
-        "running_s": simulation.running_s,
+        "running_s": solution.running_s,
         "amplitude_m": problem.amplitude_m(),
         "equation": {name: getattr(problem.equation, name) for name in problem.equation.__slots__},
         "terms": [
-            {"name": term.name, "size": term.size, "included": term.included, "why": term.why} for term in choice.terms
+            {"name": term.name, "size": term.size, "included": term.included, "why": term.why}
+            for term in solution.terms
         ],
         "effects": [
             {key: getattr(effect, key) for key in ("name", "predicted", "measured", "unit", "included", "why")}
@@ -56,8 +58,8 @@ def summary(
     }
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
 
 
 def _against_summary(against: Against) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from pipeline.track import F8
 from springmass.runs.analysing import in_a_name, made_now, make_folder
 from springmass.runs.simulating.prepared import Prepared
 from springmass.runs.simulating.readings import plain_block, readings, rest_m
-from springmass.runs.simulating.simulation import FINE, Against, Simulation, count_of, plan
+from springmass.runs.simulating.simulation import FINE, Against, Simulation, count_of, solve
 from springmass.runs.simulating.told import band_columns
 from springmass.session.simulated_bench import REST_M
 
@@ -64,7 +64,7 @@ def write_folder(
             around = against.predicted + against.band
             tables["against"] |= {f"predicted_{level}_m": each for level, each in zip(LEVELS, around, strict=True)}
     with whole_folder(target, FILES, "simulation.json") as folder:
-        title = f"{Path(where).name} by {simulation.choice.integrator.name}"
+        title = f"{Path(where).name} by {simulation.solution.integrator.name}"
         configuration = {"rest_m": rest_m(trajectory), **told}
         _write_run(folder / "run.h5", *plain_block(trajectory, Path(where).name), scene, title, configuration)
         pictures = make_folder(folder / "figures")
@@ -97,7 +97,7 @@ def write_readings(
     path : Path
     ready : Prepared
     method : str
-        As in :func:`springmass.runs.simulating.simulation.plan`, with the spacing as its step but for "auto".
+        As in :func:`springmass.runs.simulating.simulation.solve`, with the spacing as its step but for "auto".
     seconds, spacing_s : float
     sensor : {"ideal", "rangefinder"}
     noise_m, echoes_hz : float or None
@@ -133,7 +133,7 @@ def write_readings(
 
 def _fine(problem: Problem, method: str, seconds: float, spacing_s: float, parts: int) -> Trajectory:
     count = parts * count_of(seconds, spacing_s)
-    return plan(problem, method, spacing_s / parts, count, None).run(count)
+    return solve(problem, method, spacing_s / parts, count, None).trajectory
 
 
 def _write_run(

@@ -142,16 +142,27 @@ class Shown:
 
     def __init__(self, rate_hz: float) -> None:
         self.samples = self.missing = 0
-        # A third of the time of the standard tier, which the run itself is analysed with; period and amplitude agree.
-        self._motion = MotionAccumulator(rate_hz, params=params_for("fast"))
-        self._found: LiveMotion | NotYet = NotYet("no samples so far")
-        self._found_ns = 0
+        self._rate_hz = rate_hz
         self._has_room = False
         self.useful: dict[int, Usefulness] = {}
+        self._begin(0)
+
+    def _begin(self, channel: int) -> None:
+        self._channel = channel
+        # A third of the time of the standard tier, which the run itself is analysed with; period and amplitude agree.
+        self._motion = MotionAccumulator(self._rate_hz, params=params_for("fast"))
+        self._found: LiveMotion | NotYet = NotYet("no samples so far")
+        self._found_ns = 0
         self._recent: deque[tuple[F8, F8]] = deque()
         self._missing_share = 0.0
         self._stamps: deque[I8] = deque()
         self._last_ns: int | None = None
+
+    def follow(self, channel: int) -> None:
+        """Show from here on the motion of the sensor in a channel: the one that came back on the first port."""
+        if channel != self._channel:
+            self.useful.pop(self._channel, None)
+            self._begin(channel)
 
     def push(self, blocks: Iterable[tuple[int, Block]]) -> None:
         """Take blocks of samples by channel."""
@@ -160,7 +171,7 @@ class Shown:
             missing = int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
             self.missing += missing
             self.useful.setdefault(channel, Usefulness()).push(block)
-            if channel == 0 and len(block):
+            if channel == self._channel and len(block):
                 self._missing_share = missing / len(block)
                 self._recent.append((block.t, block.distance))
                 while self._recent[0][0][-1] < block.t[-1] - RECENT_S:
@@ -225,6 +236,7 @@ def progress_of(
             failures.note("analysis", error)
             return NotYet(f"no motion shown ({type(error).__name__})")
 
+    shown.follow(tee.first)
     return Progress(
         (now_ns - start_ns) * 1e-9,
         shown.samples,

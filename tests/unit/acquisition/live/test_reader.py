@@ -157,3 +157,26 @@ def test_a_defect_on_the_reading_thread_is_heard_of_and_the_reading_goes_on() ->
     assert sink.events == ["lost 1", "reopened 1"]
     with pytest.raises(RuntimeError, match="a defect"):
         reader.stop()
+
+
+class WithoutDescriptor(Pipe):
+    """A transport as Windows has it: read in small waits, with no descriptor to wait on."""
+
+    def fileno(self) -> int:
+        """Have none."""
+        return -1
+
+    def read(self, wait_s: float) -> bytes:
+        """Return a byte at every call."""
+        return b"x"
+
+
+def test_a_system_that_cannot_make_a_pipe_non_blocking_reads_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows has no ``os.set_blocking`` before Python 3.12; its ports have no descriptor."""
+    monkeypatch.delattr(os, "set_blocking")
+    sink = Heard()
+    reader = PortReader([Line(WithoutDescriptor(), 0)], sink, VirtualClock())
+    reader.start()
+    assert sink.came.wait(WAIT_S)
+    reader.stop()
+    assert sink.reads_of[0] == [0]

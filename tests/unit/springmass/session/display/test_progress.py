@@ -41,3 +41,21 @@ def test_the_motion_is_found_anew_every_other_second() -> None:
     shown.push([(0, block(1000))])
     assert shown.motion(2 * SECOND_NS) is first
     assert shown.motion(SECOND_NS + MOTION_EVERY_NS) is not first
+
+
+def test_the_sensor_that_came_back_in_another_channel_is_shown_from_then_on() -> None:
+    """Its motion begins anew, and what was wrong with the one before is said no longer."""
+    shown = Shown(100.0)
+    for second in range(3):
+        shown.push([(0, block(100 * second))])
+    shown.follow(2)
+    assert shown.latest()[0].size == 0
+    assert isinstance(shown.motion(0), NotYet)
+    for second in range(10):
+        shown.push([(2, block(100 * second))])
+        shown.follow(2)
+    found = shown.motion(SECOND_NS)
+    assert isinstance(found, LiveMotion)
+    assert abs(found.period.value - 2 * np.pi / 4.95) < 1e-3
+    assert list(shown.useful) == [2]
+    assert shown.samples == 1300

@@ -25,14 +25,9 @@ import numpy as np
 
 from pipeline.dynamics.equation import Equation, Real
 from pipeline.dynamics.flow import flow
-from pipeline.dynamics.integrator import Integrator, demand_times, kept, with_start
-from pipeline.dynamics.integrators.turning import Friction
-from pipeline.dynamics.prediction.bounds import strang_bound
-from pipeline.dynamics.prediction.leading import SHORT_STEP, STRANG_TERMS, is_weak, leading, small_numbers
-from pipeline.dynamics.prediction.pilot import bounded, in_own_units, resonance
-from pipeline.dynamics.prediction.rounding import rounding_error, stepped_rounding
-from pipeline.dynamics.prediction.stretch import predicted
+from pipeline.dynamics.integrator import Integrator, kept, with_start
 from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.turning import Friction
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
@@ -42,7 +37,10 @@ __all__ = ["STRANG", "Strang"]
 LONGEST_WITH_FRICTION = 1e6  # radians a step
 LEAST_DRAG = 1e-30  # of a step, over the inverse velocity: below it nothing changes, and units of it may leave numbers
 LEAST_TURN = 0.05  # sine of a step's angle: above it velocities from displacements err by no more than 20 roundings
-SMALL = 1e-3  # of an error
+WEAK = (
+    0.03  # of viscous drag, quadratic drag and cubic term over the spring: of first order, the correction is good there
+)
+SHORT_STEP = 0.5  # radians up to which it is
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,41 +59,12 @@ class Strang(Integrator):
         added = 3.0 * abs(eq.cubic_per_m2_s2) * problem.amplitude_m() * problem.amplitude_m()
         return 1.0 / math.sqrt(added + eq.angular_frequency_per_s**2)
 
-    def bound(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return a fitted bound; see :func:`pipeline.dynamics.prediction.bounds.strang_bound`."""
-        return strang_bound(problem, step_s, seconds)
-
-    def predicted_error(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return what a pilot run in coarser steps shows, and the rounding."""
-        return self._predicted(problem, step_s, seconds, of_velocity=False)
-
-    def predicted_velocity_error(self, problem: Problem, step_s: float, seconds: float) -> float:
-        """Return what the same pilot shows of the velocity."""
-        return self._predicted(problem, step_s, seconds, of_velocity=True)
-
-    def _predicted(self, problem: Problem, step_s: float, seconds: float, *, of_velocity: bool) -> float:
-        demand_times(step_s, seconds)
-        problem = in_own_units(problem)
-        radians = problem.equation.angular_frequency_per_s * step_s
-        acts = problem.equation.drag_per_m or problem.equation.cubic_per_m2_s2
-        if acts and radians < SHORT_STEP:
-            known = leading(STRANG_TERMS, problem, radians, seconds, of_velocity=of_velocity)
-            if known is not None:
-                known += resonance(problem, step_s, seconds)
-                most = rounding_error(problem, seconds, seconds / step_s)
-                # Rounding that is nothing beside it need not be told closely.
-                return known + (most if most < SMALL * known else stepped_rounding(problem, seconds, step_s))
-        rounding = stepped_rounding(problem, seconds, step_s)
-        if not acts:
-            return rounding  # between turning points its flow is exact
-        return rounding + bounded(lambda: predicted(self, self, problem, step_s, seconds, of_velocity=of_velocity))
-
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Split every step; with friction, from turning point to turning point."""
         eq = problem.equation
         if not eq.friction_m_per_s2:
             # Beyond that the correction is no better than what it corrects: there it ends, by a jump as small as these.
-            corrects = is_weak(small_numbers(problem)) and eq.angular_frequency_per_s * step_s < SHORT_STEP
+            corrects = _is_weak(problem) and eq.angular_frequency_per_s * step_s < SHORT_STEP
             begun = _corrected(problem, step_s) if corrects else problem
             y, v = _states(begun, step_s, steps, every)
             # What is kept is half an oscillator short of the end of its step.
@@ -118,6 +87,14 @@ class Strang(Integrator):
         held = np.tile((bob.y, bob.v), (steps // every - len(moving), 1))
         y, v = np.concatenate([moving, held]).T
         return with_start(problem, y, v)
+
+
+def _is_weak(problem: Problem) -> bool:
+    """Whether viscous drag, quadratic drag and the cubic term change little within a cycle."""
+    eq, start, omega = problem.equation, problem.amplitude_m(), problem.equation.angular_frequency_per_s
+    reach = start / omega
+    numbers = (eq.gamma_per_s / omega, eq.drag_per_m * start, abs(eq.cubic_per_m2_s2) * reach * reach)
+    return max(numbers) <= WEAK
 
 
 def _corrected(problem: Problem, h: float) -> Problem:

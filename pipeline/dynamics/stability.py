@@ -1,4 +1,4 @@
-"""How large a step may be: the step's matrix on the linear oscillator, and its limit.
+"""How large a step may be: closed limits of the two Eulers, and a search on the matrix of a step for any other.
 
 A method that repeats a linear map grows without bound where an eigenvalue of that map leaves the unit circle. Lengths
 of time are in units of the undamped radian, 1 / omega: ``x`` is omega h, ``ratio`` is gamma / omega.
@@ -15,11 +15,29 @@ from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrator import StepMaker
 from pipeline.track import F8
 
-__all__ = ["limit_by_search", "step_matrix"]
+__all__ = ["forward_euler_limit", "limit_by_search", "step_matrix", "symplectic_euler_limit"]
 
 GREATEST = 20.0  # largest x that is looked at
 LOOKS, REFINEMENTS = 250, 6  # each narrows the bracket 249-fold
 _ROUNDING = 1e-12
+
+
+def forward_euler_limit(omega: float, gamma: float) -> float:
+    """Return the largest stable step of forward Euler, s, from frequency and damping, 1/s.
+
+    Eigenvalues :math:`1 + h\\lambda` stay in the unit circle up to :math:`-2\\,\\mathrm{Re}\\lambda/|\\lambda|^2`.
+    """
+    if gamma < omega:
+        return 2.0 * gamma / omega**2
+    return 2.0 / (gamma + math.sqrt((gamma - omega) * (gamma + omega)))
+
+
+def symplectic_euler_limit(omega: float, gamma: float) -> float:
+    """Return the largest stable step of symplectic Euler, s, from frequency and damping, 1/s.
+
+    Both roots of the step's characteristic polynomial stay in the circle: :math:`(\\omega h)^2 + 4\\gamma h < 4`.
+    """
+    return 2.0 / (gamma + math.hypot(gamma, omega))
 
 
 def step_matrix(make: StepMaker, x: float | F8, ratio: float) -> F8:
@@ -36,7 +54,7 @@ def step_matrix(make: StepMaker, x: float | F8, ratio: float) -> F8:
 
     Examples
     --------
-    >>> from pipeline.dynamics.integrators.euler import FORWARD_EULER
+    >>> from pipeline.dynamics.methods import FORWARD_EULER
     >>> step_matrix(FORWARD_EULER.make, 0.5, 0.0)
     array([[ 1. ,  0.5],
            [-0.5,  1. ]])
@@ -59,7 +77,7 @@ def limit_by_search(make: StepMaker, ratio: float) -> float:
 
     Examples
     --------
-    >>> from pipeline.dynamics.integrators.runge_kutta import RK4
+    >>> from pipeline.dynamics.methods import RK4
     >>> round(limit_by_search(RK4.make, 0.0), 4)
     2.8284
     """

@@ -1,0 +1,97 @@
+"""Take the README's pictures of the page and of a report, in headless Chromium: `make docs-figures`."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from playwright.sync_api import Page, sync_playwright
+
+from springmass import sample_data
+
+HERE = Path(__file__).resolve().parent
+RECORDED_MS = 25_000
+"""Of the recording that the page shows; by then a damping law is drawn."""
+SCENE = """
+[bob]
+mass_kg = { value = 0.2176, u = 0.00005 }
+[spring]
+constant_n_per_m = 14.0
+mass_kg = { value = 0.010, u = 0.0005 }
+[air]
+temperature_c = 20.0
+[damping]
+gamma_per_s = 0.0073
+beta_per_m_s = 0.235
+[start]
+displacement_m = 0.05
+"""
+
+
+def springmass(*arguments: str | Path) -> list[str]:
+    """Return the command line that runs the program."""
+    return [sys.executable, "-m", "springmass", *map(str, arguments)]
+
+
+@contextmanager
+def live(folder: Path) -> Iterator[str]:
+    """Record a simulated bench with its page, and give the page's address."""
+    (folder / "bench.toml").write_text(SCENE)
+    command = springmass("record", "--simulate", "bench.toml", "-o", "run.h5", "--page", "--no-browser")
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(
+        command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        try:
+            addresses = (re.search(r"page: (http\S+)", line) for line in process.stderr)
+            yield next(found[1] for found in addresses if found)
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.communicate()
+
+
+def take_page(page: Page, folder: Path) -> None:
+    """Take the page of a recording that runs."""
+    with live(folder) as address:
+        page.set_viewport_size({"width": 1280, "height": 1330})
+        page.goto(address)
+        page.wait_for_timeout(RECORDED_MS)
+        page.screenshot(path=HERE / "page.png")
+        page.goto("about:blank")
+
+
+def take_report(page: Page, folder: Path) -> None:
+    """Take the head of the report of a bundled run."""
+    data = sample_data()
+    run, scene = data / "damped_simulated_position.txt", data / "damped.scene.toml"
+    command = springmass("-q", "analyse", run, "--scene", scene, "--out", folder)
+    subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    page.set_viewport_size({"width": 1000, "height": 1400})
+    page.goto((folder / "damped_simulated_position.results" / "report.html").as_uri())
+    page.screenshot(path=HERE / "report.png")
+
+
+def main() -> None:
+    """Take both."""
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        sys.exit("docs/figures/screenshots.py: chromium is not on the PATH; Debian: apt-get install chromium")
+    with sync_playwright() as playwright, TemporaryDirectory() as folder:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+        page = browser.new_page()
+        take_report(page, Path(folder))
+        take_page(page, Path(folder))
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,286 @@
+"""Solve a motion to a tolerance by step halving, which also shows the error.
+
+1. Solve with a step h and with h / 2. The largest difference of the two runs is the stated error of the finer one.
+2. Halve the step until the stated error is within the tolerance.
+3. Where two halvings do not reduce the difference, rounding is all that is left: the tolerance is refused.
+4. A method of scipy has no step of ours: it takes a tenth of its tolerance instead of half a step.
+
+:func:`auto` evaluates the exact flow of a linear scene. Any other scene it solves by Strang splitting, and what that
+cannot reach without friction by DOP853.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.dynamics.exact import EXACT
+from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
+from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.rounding import least_tolerance, rounding_error
+from pipeline.dynamics.solve_ivp import DOP853, LEAST_RTOL, SolveIvp
+from pipeline.dynamics.strang import STRANG
+from pipeline.dynamics.terms import Term, required
+from pipeline.errors import DynamicsError
+
+__all__ = ["Solution", "auto", "demand_tolerance", "halved", "solved_once"]
+
+LONGEST_STEP = 0.5  # radians of the first step: fewer than six steps a cycle show nothing of the error
+MOST_STEPS = 2**25  # of one run, about ten seconds; the finest of all takes half of the time
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """A solved motion with its stated error.
+
+    Parameters
+    ----------
+    integrator : Integrator
+    parts : int
+        Steps from one kept state to the next.
+    problem : Problem
+        What was solved: the terms that the tolerance requires.
+    trajectory : Trajectory
+    error, velocity_error : float or None
+        Stated errors of displacement and velocity over the starting amplitude, and over that times the angular
+        frequency, with what the terms left out may change; None where halving shows nothing of them.
+    no_estimate : str
+        Why there is none; empty where there is one.
+    running_s : float
+        What the returned run took, s.
+    terms : tuple of Term
+        What became of each term; empty for a method by name, which solves all of them.
+    """
+
+    integrator: Integrator
+    parts: int
+    problem: Problem
+    trajectory: Trajectory
+    error: float | None
+    velocity_error: float | None
+    no_estimate: str = ""
+    running_s: float = 0.0
+    terms: tuple[Term, ...] = ()
+
+    @property
+    def step_s(self) -> float:
+        """The step, s."""
+        return self.trajectory.spacing_s / self.parts
+
+
+def auto(
+    problem: Problem, spacing_s: float, count: int, tolerance: float, timer: Callable[[], float] = lambda: 0.0
+) -> Solution:
+    """Solve what a tolerance requires of a motion, to that tolerance.
+
+    Parameters
+    ----------
+    problem : Problem
+    spacing_s : float
+        Time from one kept state to the next, s.
+    count : int
+        Number of spacings.
+    tolerance : float
+        Largest error of the displacement over the starting amplitude.
+    timer : callable
+        To seconds; it times the returned run.
+
+    Raises
+    ------
+    DynamicsError
+        If the tolerance is below what double precision can reach, or nothing keeps it.
+
+    Examples
+    --------
+    >>> from pipeline.dynamics.equation import Equation
+    >>> mixed = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
+    >>> solution = auto(mixed, 0.01, 1200, 1e-6)
+    >>> solution.integrator.name, solution.error <= 1e-6
+    ('strang', True)
+    """
+    demand_tolerance(problem, spacing_s, count, tolerance)
+    less, terms = required(problem, spacing_s * count, tolerance)
+    left_out = sum(term.size for term in terms if not term.included)
+    room = tolerance - left_out
+
+    def by(integrator: Integrator) -> Solution:
+        found = halved(less, integrator, spacing_s, count, room, timer)
+        assert found.error is not None
+        assert found.velocity_error is not None
+        return replace(found, error=found.error + left_out, velocity_error=found.velocity_error + left_out, terms=terms)
+
+    if less.equation.is_linear:
+        return by(EXACT)
+    try:
+        return by(STRANG)
+    except DynamicsError:
+        if less.equation.friction_m_per_s2:
+            raise
+    try:
+        return by(DOP853)
+    except DynamicsError as error:
+        refused = f"neither strang nor dop853 keeps a tolerance of {tolerance:.3g} here"
+        raise DynamicsError(f"{refused}; take a larger tolerance or a shorter run") from error
+
+
+def halved(
+    problem: Problem,
+    integrator: Integrator,
+    spacing_s: float,
+    count: int,
+    tolerance: float,
+    timer: Callable[[], float] = lambda: 0.0,
+) -> Solution:
+    """Solve a motion by one method, its step halved until the stated error is within a tolerance.
+
+    Parameters
+    ----------
+    problem, spacing_s, count, tolerance, timer
+        As in :func:`auto`.
+    integrator : Integrator
+
+    Raises
+    ------
+    DynamicsError
+        If the method cannot solve this or has no estimate of its error, or where its difference no longer falls or its
+        step becomes too short.
+
+    Notes
+    -----
+    With an error of :math:`c h^p` the difference is :math:`2^p - 1` times the error of the finer run. The rounding of
+    the phase, which both runs have alike, is added.
+    """
+    demand_times(spacing_s, spacing_s * count)
+    if integrator.refusal(problem):
+        raise DynamicsError(f"{integrator.name} cannot solve this: {integrator.refusal(problem)}")
+    why = integrator.no_estimate(problem)
+    refused = f"{integrator.name} cannot keep a tolerance of {tolerance:.3g} here: "
+    if why:
+        raise DynamicsError(refused + why)
+    rounding = rounding_error(problem, spacing_s * count)
+    if integrator is EXACT:
+        started = timer()
+        run = EXACT.run(problem, spacing_s, count)
+        return Solution(EXACT, 1, problem, run, rounding, rounding, running_s=timer() - started)
+    coarse, moving = None, count
+    errors = [math.inf]
+    for setting, parts in _settings(integrator, problem, spacing_s, count, tolerance):
+        if parts * moving > MOST_STEPS:
+            break
+        started = timer()
+        fine = _run(setting, problem, spacing_s, count, parts)
+        running_s = timer() - started
+        if fine is not None:
+            moving = 1 + int(np.count_nonzero(fine.v))  # until friction holds the bob
+        if coarse is not None and fine is not None:
+            error, velocity_error = (each + rounding for each in _difference(fine, coarse))
+            if error <= tolerance:
+                return Solution(setting, parts, problem, fine, error, velocity_error, running_s=running_s)
+            errors.append(error)
+            if error >= errors[-3:][0]:
+                raise DynamicsError(
+                    f"{refused}rounding leaves {min(errors):.2g}; take a larger tolerance or a shorter run"
+                )
+            if _needed(setting, parts * moving, error / tolerance) > MOST_STEPS:
+                break
+        coarse = fine
+    why = "it needs too many steps" if integrator.order else f"at its least tolerance {min(errors):.2g} is left"
+    raise DynamicsError(f"{refused}{why}; take a larger tolerance or a shorter run")
+
+
+def solved_once(
+    problem: Problem, integrator: Integrator, spacing_s: float, count: int, timer: Callable[[], float] = lambda: 0.0
+) -> Solution:
+    """Solve a motion in the step that was asked for, the spacing, and state the error that half of it shows.
+
+    Parameters
+    ----------
+    problem, integrator, spacing_s, count, timer
+        As in :func:`halved`; the integrator has a step.
+
+    Raises
+    ------
+    DynamicsError
+        If the method cannot solve this, or the numbers ran away.
+
+    Notes
+    -----
+    With an error of :math:`c h^p` the run in the longer step h errs by :math:`2^p / (2^p - 1)` of the difference.
+    """
+    started = timer()
+    run = integrator.run(problem, spacing_s, count)
+    running_s = timer() - started
+    why = integrator.no_estimate(problem)
+    if why:
+        return Solution(integrator, 1, problem, run, None, None, why, running_s)
+    finer = _run(integrator, problem, spacing_s, count, 2)
+    if finer is None:
+        return Solution(integrator, 1, problem, run, math.inf, math.inf, running_s=running_s)
+    share, rounding = 2.0**integrator.order / (2.0**integrator.order - 1.0), rounding_error(problem, spacing_s * count)
+    error, velocity_error = (share * each + rounding for each in _difference(run, finer))
+    return Solution(integrator, 1, problem, run, error, velocity_error, running_s=running_s)
+
+
+def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: float) -> None:
+    """Refuse a tolerance that no integrator could keep.
+
+    Raises
+    ------
+    DynamicsError
+    """
+    seconds = spacing_s * count
+    demand_times(spacing_s, seconds)
+    least = least_tolerance(problem, seconds)
+    if not (math.isfinite(tolerance) and tolerance >= least):
+        raise DynamicsError(
+            f"the tolerance must be finite and at least {least:.1e}, what double precision can reach in {seconds:g} s, "
+            f"got {tolerance:g}"
+        )
+
+
+def _settings(
+    integrator: Integrator, problem: Problem, spacing_s: float, count: int, tolerance: float
+) -> Iterator[tuple[Integrator, int]]:
+    """Yield the method with its steps a spacing, twice as many each time; of scipy's a tenth of the tolerance."""
+    omega = problem.equation.angular_frequency_per_s
+    if isinstance(integrator, SolveIvp):
+        # The errors of all steps add up, and a step is about a radian.
+        rtol = max(min(tolerance / (1.0 + omega * spacing_s * count), 1e-3), 10.0 * LEAST_RTOL)
+        while rtol >= LEAST_RTOL:
+            yield replace(integrator, rtol=rtol), 1
+            rtol *= 0.1
+        return
+    # Drag that outweighs the spring has its own time, which a longer step would pass over.
+    fast = omega * (1.0 + problem.equation.drag_per_m * problem.amplitude_m())
+    limit = integrator.stable_step(problem) or math.inf
+    parts = math.floor(min(max(spacing_s * fast / LONGEST_STEP, spacing_s / limit), MOST_STEPS)) + 1
+    while True:
+        yield integrator, parts
+        parts *= 2
+
+
+def _run(integrator: Integrator, problem: Problem, spacing_s: float, count: int, parts: int) -> Trajectory | None:
+    """Return a run; None where a method of fixed step ran away, as it may in too long a step."""
+    try:
+        return integrator.run(problem, spacing_s / parts, count * parts, every=parts)
+    except DynamicsError:
+        if not integrator.order:
+            raise
+        return None
+
+
+def _difference(one: Trajectory, other: Trajectory) -> tuple[float, float]:
+    """Return the largest differences of displacement and velocity, as shares of what the start has."""
+    size = one.problem.amplitude_m()
+    if size == 0.0:
+        return 0.0, 0.0
+    speed = size * one.problem.equation.angular_frequency_per_s
+    return float(np.max(np.abs(one.y - other.y))) / size, float(np.max(np.abs(one.v - other.v))) / speed
+
+
+def _needed(integrator: Integrator, steps: int, times: float) -> float:
+    """Return how many steps an error that is so many times less takes, by the order of the method."""
+    return float(steps * times ** (1.0 / integrator.order)) if integrator.order else 0.0

@@ -1,0 +1,122 @@
+"""Everything that a package of your own needs to add a sensor, a format, a damping law or an integrator.
+
+These names are public: they keep their meaning until a changelog says otherwise, in a checkout and in an installed
+wheel alike. Import them from here; the modules that define them may move.
+
+Examples
+--------
+>>> from springmass.extend import Channel, ColumnFormat, Contents, Formula, Sheet
+>>> from springmass.extend import Family, FramedDecoder, LineSplitter, Reading
+>>> from springmass.extend import Law, make_law
+>>> from springmass.extend import Integrator, OneStep, acceleration
+"""
+
+from __future__ import annotations
+
+# As in springmass/__init__.py: type checkers take the name for true, and nothing is imported before it is used.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from acquisition.block import Block, Flag
+    from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll
+    from acquisition.decoders.framed import FramedDecoder
+    from acquisition.decoders.lines import LineSplitter
+    from acquisition.decoders.replies import ReplyForm
+    from acquisition.decoders.sum_frames import SumFrames, with_sum
+    from acquisition.errors import FormatError, SensorError
+    from acquisition.readings import Reading, Readings
+    from acquisition.recordings.base import Format, SurveyFormat
+    from acquisition.recordings.families.declared import dialect
+    from acquisition.recordings.recording import Original, Recording, Trap
+    from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Formula, Sheet
+    from acquisition.recordings.tables.sheet import ColumnFormat
+    from acquisition.recordings.tables.text import head_lines, text_of
+    from acquisition.source import SourceInfo
+    from pipeline.damping.laws.law import Law
+    from pipeline.damping.laws.of_function import make_law
+    from pipeline.dynamics import Equation, Integrator, Problem, Trajectory, get_integrator
+    from pipeline.dynamics.halving import auto
+    from pipeline.dynamics.methods import OneStep, acceleration
+    from pipeline.errors import AnalysisError, DynamicsError
+
+__all__ = [
+    "AnalysisError",
+    "Arrays",
+    "Block",
+    "Channel",
+    "ColumnFormat",
+    "Contents",
+    "Decoder",
+    "DynamicsError",
+    "Encoder",
+    "Equation",
+    "Family",
+    "Flag",
+    "Format",
+    "FormatError",
+    "Formula",
+    "FramedDecoder",
+    "Identity",
+    "Integrator",
+    "Law",
+    "LineSplitter",
+    "OneStep",
+    "Original",
+    "Poll",
+    "Problem",
+    "Reading",
+    "Readings",
+    "Recording",
+    "ReplyForm",
+    "SensorError",
+    "Sheet",
+    "SourceInfo",
+    "SumFrames",
+    "SurveyFormat",
+    "Trajectory",
+    "Trap",
+    "acceleration",
+    "auto",
+    "dialect",
+    "get_integrator",
+    "head_lines",
+    "make_law",
+    "text_of",
+    "with_sum",
+]
+
+_WHERE = {
+    "acquisition.block": ("Block", "Flag"),
+    "acquisition.decoders.family": ("Decoder", "Encoder", "Family", "Identity", "Poll"),
+    "acquisition.decoders.framed": ("FramedDecoder",),
+    "acquisition.decoders.lines": ("LineSplitter",),
+    "acquisition.decoders.replies": ("ReplyForm",),
+    "acquisition.decoders.sum_frames": ("SumFrames", "with_sum"),
+    "acquisition.errors": ("FormatError", "SensorError"),
+    "acquisition.readings": ("Reading", "Readings"),
+    "acquisition.recordings.base": ("Format", "SurveyFormat"),
+    "acquisition.recordings.families.declared": ("dialect",),
+    "acquisition.recordings.recording": ("Original", "Recording", "Trap"),
+    "acquisition.recordings.tables.contents": ("Arrays", "Channel", "Contents", "Formula", "Sheet"),
+    "acquisition.recordings.tables.sheet": ("ColumnFormat",),
+    "acquisition.recordings.tables.text": ("head_lines", "text_of"),
+    "acquisition.source": ("SourceInfo",),
+    "pipeline.damping.laws.law": ("Law",),
+    "pipeline.damping.laws.of_function": ("make_law",),
+    "pipeline.dynamics": ("Equation", "Integrator", "Problem", "Trajectory", "get_integrator"),
+    "pipeline.dynamics.halving": ("auto",),
+    "pipeline.dynamics.methods": ("OneStep", "acceleration"),
+    "pipeline.errors": ("AnalysisError", "DynamicsError"),
+}
+
+
+def __getattr__(name: str) -> object:
+    from importlib import import_module
+
+    module = next((module for module, names in _WHERE.items() if name in names), None)
+    if module is None:
+        raise AttributeError(f"module 'springmass.extend' has no attribute {name!r}; it has {', '.join(__all__)}")
+    return getattr(import_module(module), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

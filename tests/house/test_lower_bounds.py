@@ -1,0 +1,35 @@
+"""The versions that one step of .ci/run installs are the smallest that pyproject.toml declares."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+DECLARED = [
+    *PROJECT["project"]["dependencies"],
+    *(each for extra in PROJECT["project"]["optional-dependencies"].values() for each in extra),
+    *(each for each in PROJECT["dependency-groups"]["test-core"] if isinstance(each, str)),
+]
+
+
+@pytest.fixture(scope="module")
+def installed() -> dict[str, Version]:
+    """Return the versions in constraints-lowest.txt by name."""
+    lines = (ROOT / "constraints-lowest.txt").read_text(encoding="utf-8").splitlines()
+    pins = [line.split("==") for line in lines if not line.startswith("#")]
+    return {canonicalize_name(name): Version(version) for name, version in pins}
+
+
+@pytest.mark.parametrize("declared", DECLARED)
+def test_the_smallest_version_declared_is_the_one_that_is_tested(declared: str, installed: dict[str, Version]) -> None:
+    """Each requirement has one lower bound, and the constraints hold it."""
+    requirement = Requirement(declared)
+    (bound,) = (each.version for each in requirement.specifier if each.operator == ">=")
+    assert installed[canonicalize_name(requirement.name)] == Version(bound)
