@@ -21,9 +21,10 @@ from typing import Any, Self
 from acquisition.clock import Clock
 from acquisition.readings import Read
 from storage.errors import WriteFailed, one_line
-from storage.log_place import LogPlaces
-from storage.wire_log.appending import Item, LogFile, Roll, WireLogWriter, open_log_file
+from storage.wire_log.appending import Item, LogFile, WireLogWriter, open_log_file
+from storage.wire_log.held_log import HeldLog
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, event_payload
+from storage.wire_log.scanning import LogContents, read_log
 
 __all__ = ["Recorder", "RecorderStatus"]
 
@@ -54,7 +55,7 @@ class RecorderStatus:
         Why the recording stopped, one line; empty while all is well.
     closed : bool
     astray : str
-        What became of the log's name while it was recorded; empty while it leads to the log.
+        What became first of the log's name while it was recorded; empty while it leads to the log.
     """
 
     records: int
@@ -103,15 +104,13 @@ class Recorder:
         Between syncs, s.
     queue_bytes : int
         Bound of the queue. What comes while it is full is counted, and an event in the log says so.
-    roll : Roll
-        When a long log goes on in another file.
     open_file : callable
         Makes the log's file: the seam for tests.
 
     Attributes
     ----------
     path : Path
-        The log. Once it is closed, where it lies by then: somebody may have renamed its folder.
+        The log, by the name that it was begun with.
 
     Raises
     ------
@@ -127,12 +126,15 @@ class Recorder:
         *,
         sync_every_s: float = 1.0,
         queue_bytes: int = QUEUE_BYTES,
-        roll: Roll = Roll(),  # noqa: B008, it is frozen
         open_file: Callable[[Path], LogFile] = open_log_file,
     ) -> None:
-        self._log = WireLogWriter(path, header, open_file=open_file, roll=roll)
+        self._log = WireLogWriter(path, header, open_file=open_file)
         self.path = self._log.path
-        self._place = LogPlaces(self.path)
+        self._held: HeldLog | None = None
+        if os.name != "nt":
+            with contextlib.suppress(OSError):  # then it is recorded all the same, and read by its name
+                self._held = HeldLog(self.path)
+        self._astray = ""
         self._clock = clock
         self._sync_every_ns = int(sync_every_s * 1e9)
         self._limit = queue_bytes
@@ -175,7 +177,7 @@ class Recorder:
             written, synced = self._log.written, self._log.synced
             log = (written.records, written.bytes, synced.records, synced.bytes)
             queue = (len(self._queue), self._queued_bytes, self._dropped_records, self._dropped_bytes)
-            return RecorderStatus(*log, *queue, str(self._error or ""), self._closed, self._place.astray)
+            return RecorderStatus(*log, *queue, str(self._error or ""), self._closed, self._astray)
 
     def reads(self, reads: Sequence[Read]) -> None:
         """Take what was read of ports; never waits for the disk, never raises for its sake."""
@@ -222,11 +224,21 @@ class Recorder:
             self._guarded(self._append_end)
         self._sync()
         self._guarded(self._log.close)
-        self._guarded(self._find_log)
+        self._look_for_name()
         with self._lock:
             self._closed = True
         if self._error is not None:
             raise self._error
+
+    def contents(self) -> LogContents:
+        """Return what was recorded, also where the log's name does not lead to it any more; after :meth:`close`.
+
+        Raises
+        ------
+        NotALog
+            If it cannot be read.
+        """
+        return read_log(self.path) if self._held is None else self._held.contents()
 
     def give_up(self) -> bool:
         """End at once: count what is not in the log, and write the counts into it, past a write that hangs.
@@ -259,8 +271,8 @@ class Recorder:
 
         def write() -> None:
             with contextlib.suppress(OSError):  # the caller says it
-                self._place.look(self._log.files)
-                if not self._place.astray:
+                self._look_for_name()
+                if not self._astray:
                     self._log.append_beside(items)
                     written.set()
 
@@ -349,25 +361,20 @@ class Recorder:
         # An event's wait and not the clock's: closing must not wait for the next sync.
         while not self._stop_sync.wait(max(0, due - self._clock.now_ns()) * 1e-9):
             due = max(due, self._clock.now_ns()) + self._sync_every_ns
-            self._look_for_log()
+            if self._look_for_name():
+                self.event(0, self._clock.now_ns(), "astray", {"what": self._astray})
             if self._log.synced != self._log.written:
                 self._sync()
 
-    def _find_log(self) -> None:
-        """Have :attr:`path` say where the log lies, written anew where it was deleted."""
-        try:
-            self._place.look(self._log.files)
-            self.path = self._place.found()
-        finally:
-            self._place.close()
+    def _look_for_name(self) -> bool:
+        """Look whether the log was deleted, renamed or replaced; return whether this look is the first to see it.
 
-    def _look_for_log(self) -> None:
-        """Notice a log that was deleted, renamed or replaced, once; this thread alone may wait for the disk."""
-        before = self._place.astray
-        self._place.look(self._log.files)
-        if self._place.astray != before:
-            facts = {"what": self._place.astray or "the log is in its place again"}
-            self.event(0, self._clock.now_ns(), "astray", facts)
+        Looking may wait for the disk, so the reading thread never does.
+        """
+        if self._held is None or self._astray:
+            return False
+        self._astray = self._held.astray()
+        return bool(self._astray)
 
     def _sync(self) -> None:
         self._guarded(self._log.sync)

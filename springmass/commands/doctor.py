@@ -23,6 +23,7 @@ LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2"),
     *("serial", "nptdms", "python_calamine", "rich", "shtab", "starlette", "uvicorn", "websockets"),
     "segno",
+    "msgspec",
 )
 DISTRIBUTIONS = {"serial": "pyserial"}
 

@@ -44,7 +44,6 @@ from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
 from storage.recovery.recover import RecoverReport, recover
 from storage.run_file.reading import open_run
-from storage.wire_log.appending import Roll
 
 __all__ = ["run"]
 
@@ -88,7 +87,6 @@ def run(options: argparse.Namespace) -> int:
             page = _page(options, log, session, beside) if options.page else None
             ended = _record(session, options, log, console, bench, page)
             session.stop()
-            log = ended.log
             code, run_file = _built(ended, out, session, console)
             if page is not None and run_file is not None and ended.by == PAGE:
                 page.tell("built", run=str(run_file))
@@ -110,30 +108,26 @@ def run(options: argparse.Namespace) -> int:
 
 def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple[int, Path | None]:
     """Build the run file, say what became of the recording, and return the exit code and the first run's file."""
-    log, status = ended.log, ended.status
+    log, status = ended.log.path, ended.status
     if status.astray:
-        console.line(f"springmass: {status.astray} during the recording; it is {log}")
-    if not out.parent.is_dir():
-        out = log.parent / out.name  # the folder was renamed
+        console.line(f"springmass: {log}: {status.astray}; the run file is built from what was recorded")
     for line in session.failures.describe():
         console.line(line)
     if status.error:
         console.line(f"springmass: {status.error}")
         console.line(f"springmass: {status.dropped_records} records that came later were not kept")
-    whole = not status.error and not status.dropped_records and log.name == out.with_suffix(".wire").name
+    whole = not status.error and not status.dropped_records
     try:
-        report = recover(
-            log,
-            out,
-            remove_log=whole,
-            provenance=made_now(),
-        )
+        if status.astray:
+            out.parent.mkdir(parents=True, exist_ok=True)  # its folder may have gone with the log
+        report = recover(ended.log, out, remove_log=whole, provenance=made_now())
     except Exception as error:
-        console.line(f"springmass: the run file was not built ({one_line(error)}); {_what_to_do(log)}")
+        left = f"{status.astray}, so it is under another name or lost" if status.astray else _what_to_do(log)
+        console.line(f"springmass: the run file was not built ({one_line(error)}); {left}")
         return SENSOR if status.error or isinstance(error, WriteFailed) else UNREADABLE, None
     for line in report.describe():
         console.line(line)
-    if not report.log_removed:
+    if not (report.log_removed or status.astray):
         console.line(f"{log}: the log stays")
     if console.terminal:
         console.line(f"next: springmass analyse {shlex.quote(str(report.main.path))}")
@@ -189,10 +183,6 @@ def _demand_sense(options: argparse.Namespace) -> None:
     for name, needed in (("ruler", "still"), ("pre", "trigger"), ("ready", "page"), ("lan", "page")):
         if getattr(options, name) not in (None, [], False) and getattr(options, needed) in (None, False):
             raise ProgramError(f"--{name} does nothing without --{needed}; name both or neither", USAGE)
-    for name, least, greatest, unit in (("roll_mb", 1.0, 1e9, "MB"), ("roll_hours", 1e-4, 1e5, "h")):
-        value, option = getattr(options, name), name.replace("_", "-")
-        if value is not None and not least <= value <= greatest:
-            raise ProgramError(f"--{option} must be {least:g} to {greatest:g} {unit}, got {value:g}", USAGE)
 
 
 def _record(
@@ -227,7 +217,6 @@ def _record(
                 seconds=options.seconds,
                 progress=show,
                 marks=marks,
-                roll=_roll(options),
             )
             try:
                 ended = _operated(record, operator, rest, trigger, console, bench, ready=options.ready)
@@ -281,14 +270,6 @@ def _page_options(options: argparse.Namespace) -> list[str]:
     given += [] if options.want_us is None else ["--want-us", str(options.want_us)]
     given += ["--lan"] if options.lan else []
     return [*given, "--no-browser"] if options.no_browser else given
-
-
-def _roll(options: argparse.Namespace) -> Roll:
-    """Return when the log goes on in another file."""
-    hours, megabytes = options.roll_hours, options.roll_mb
-    return Roll(
-        Roll().bytes if megabytes is None else int(megabytes * 1e6), None if hours is None else int(hours * 3600e9)
-    )
 
 
 def _rest(session: Session, seconds: float, ruler: list[float], console: Console) -> StillPoint:

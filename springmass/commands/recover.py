@@ -6,7 +6,8 @@ import argparse
 import shlex
 from pathlib import Path
 
-from springmass.errors import OK, suggest, tell
+from acquisition.errors import CalibrationError
+from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.runs.analysing import made_now
 from storage.recovery.recover import recover
 
@@ -15,13 +16,16 @@ __all__ = ["run"]
 
 def run(options: argparse.Namespace) -> int:
     """Rebuild the run; the log stays."""
-    report = recover(
-        options.input,
-        None if options.output is None else Path(options.output),
-        overwrite=options.overwrite,
-        speed_of_sound_m_per_s=options.speed_of_sound,
-        provenance=made_now(),
-    )
+    try:
+        report = recover(
+            options.input,
+            None if options.output is None else Path(options.output),
+            overwrite=options.overwrite,
+            speed_of_sound_m_per_s=options.speed_of_sound,
+            provenance=made_now(),
+        )
+    except CalibrationError as error:
+        raise ProgramError(str(error), USAGE) from error
     for line in report.describe():
         tell(line)
     suggest(f"springmass analyse {shlex.quote(str(report.main.path))}")

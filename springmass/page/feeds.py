@@ -12,8 +12,8 @@ from acquisition.live.calibration import Calibration
 from springmass.page.view import View
 from springmass.runs.loading import Loaded
 from storage.errors import StorageError
-from storage.wire_log.allowed import event_content
 from storage.wire_log.following import LogFollower
+from storage.wire_log.log_header import event_content
 from storage.wire_log.records import Kind, Record
 from storage.wire_log.wire_samples import LogDecoder, chains_of
 

@@ -205,7 +205,6 @@ class Sensor:
 
     def entry(self, channel: int) -> SensorEntry:
         """Return what the log's header says of it."""
-        calibration = self.calibration.to_mapping()
         return SensorEntry(
             channel,
             self.family.name,
@@ -213,8 +212,8 @@ class Sensor:
             self.baud,
             self.rate_hz,
             dict(self.options),
-            calibration,
             self.clock_ppm,
+            calibration=dict(self.calibration.to_mapping()),
         )
 
     def not_heard(self, heard: bytes) -> str:

@@ -35,8 +35,8 @@ from springmass.session.stops import Stops
 from springmass.session.trigger import Disarmed, Trigger, Watch
 from storage.errors import StorageError, WriteFailed
 from storage.recorder import Recorder, RecorderStatus
-from storage.wire_log.appending import Roll
 from storage.wire_log.records import LogHeader
+from storage.wire_log.scanning import LogContents
 
 __all__ = ["Ended", "Progress", "Sensor", "Session", "Trigger"]
 
@@ -57,13 +57,13 @@ class Ended:
     by : str
         "seconds", "Ctrl-C", "SIGTERM", "a closed terminal" or "the disk".
     status : RecorderStatus
-    log : Path
-        Where the log is now; elsewhere than it was begun where somebody renamed a folder meanwhile.
+    log : LogContents
+        What was recorded, also where the log's name does not lead to it any more.
     """
 
     by: str
     status: RecorderStatus
-    log: Path
+    log: LogContents
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +237,6 @@ class Session:
         rest: StillPoint | None = None,
         progress: Callable[[Progress], None] = lambda _: None,
         marks: queue.SimpleQueue[str] | None = None,
-        roll: Roll = Roll(),  # noqa: B008, it is frozen
         begun: Callable[[Path], None] = lambda _: None,
         changed: Callable[[], bool] = lambda: False,
     ) -> Ended:
@@ -257,8 +256,6 @@ class Session:
             Called about once a second, on a thread of its own.
         marks : queue of str, optional
             Marks to put into the run.
-        roll : Roll
-            When a long log goes on in another file.
         begun : callable
             Called with the log's path once reads go there.
         changed : callable
@@ -270,6 +267,8 @@ class Session:
             If ``changed`` said so.
         storage.errors.WriteFailed
             If the log cannot be begun.
+        storage.wire_log.window.NotALog
+            If it cannot be read at the end.
         KeyboardInterrupt
             If the user would not wait for the disk to take what is queued; the log stays, without its end.
         """
@@ -283,7 +282,7 @@ class Session:
         since_ns = moment_ns if trigger is None else moment_ns - int(trigger.keep_s * 1e9)
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
         self._chains = [sensor.chain() for sensor in self.sensors]
-        recorder = Recorder(log, self._header(), self._clock, roll=roll)
+        recorder = Recorder(log, self._header(), self._clock)
         with self.stops.counted():
             display = self._display(progress)
             start_ns = self._clock.now_ns()
@@ -313,7 +312,7 @@ class Session:
             self.given_up = GivenUp(recorder.give_up(), recorder.status)
             raise
         status = recorder.status
-        return Ended("the disk" if status.error else by, status, recorder.path)
+        return Ended("the disk" if status.error else by, status, recorder.contents())
 
     def poll(self, wait_s: float) -> list[tuple[int, Block]]:
         """Wait so long, then return the blocks that came since the last call."""

@@ -357,8 +357,6 @@ def _add_record(parser: argparse.ArgumentParser) -> None:
     _add_clock(parser)
     parser.add_argument("--trigger", type=_positive, metavar="M", help="start when the bob leaves its rest by this, m")
     parser.add_argument("--pre", type=_positive, metavar="S", help="seconds to keep from before (default 2)")
-    parser.add_argument("--roll-mb", type=_positive, metavar="MB", help="begin another log after this (default 1000)")
-    parser.add_argument("--roll-hours", type=_positive, metavar="H", help="begin another log after this, too")
     parser.add_argument("--no-trace", action="store_true", help="draw no motion on the terminal")
     parser.add_argument("--seed", type=_integer, default=0, metavar="N", help="of the simulated noise (default 0)")
     parser.add_argument(

@@ -13,6 +13,7 @@ from acquisition.recordings.recording import Trap
 from storage.recovery.losses import LossCount, end_of
 from storage.recovery.recovered import RecoveredRun
 from storage.run_file.writing import RunWriter
+from storage.schema import plain
 from storage.wire_log.notes import Notes
 from storage.wire_log.records import LogHeader, SensorEntry
 from storage.wire_log.scanning import Damage, LogContents
@@ -93,7 +94,7 @@ class SensorRun:
                 "start_time": header.utc(origin),
                 "clock_map": {"mono_ns": header.mono_ns, "unix_ns": header.unix_ns, "t0_mono_ns": origin},
                 "recorded_with": header.version,
-                "sensor": dataclasses.asdict(self._sensor),
+                "sensor": plain(self._sensor),
                 "reads": reads,
                 "log": {
                     "name": self._contents.path.name,

@@ -8,21 +8,23 @@ stretch at a time, so that a run may be of any length.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from acquisition.errors import AcquisitionError
+from acquisition.live.calibration import Calibration
 from storage.atomic import remove_leftovers
-from storage.checked import ValueRefused
 from storage.errors import RunDamaged, RunExists, StorageError
 from storage.recovery.building import SensorRun
 from storage.recovery.losses import Losses
 from storage.recovery.recovered import RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
-from storage.run_file.writing import RunWriter, run_writer
+from storage.run_file.writing import run_writer
+from storage.schema import ValueRefused
 from storage.wire_log.log_file import is_being_written
 from storage.wire_log.notes import Notes
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
@@ -33,6 +35,7 @@ __all__ = ["LogGrowing", "RecoverReport", "RecoveredRun", "recover", "run_paths"
 
 AT_ONCE = 4
 """So many sensors' run files are written in one pass over the log: each holds some megabytes of samples back."""
+FOREIGN = "springmass writes no such log; ask where it comes from"
 
 
 class LogGrowing(StorageError):
@@ -40,7 +43,7 @@ class LogGrowing(StorageError):
 
 
 def recover(
-    log_path: str | os.PathLike[str],
+    log: str | os.PathLike[str] | LogContents,
     out_path: str | os.PathLike[str] | None = None,
     *,
     overwrite: bool = False,
@@ -54,7 +57,7 @@ def recover(
 
     Parameters
     ----------
-    log_path : str or PathLike
+    log : str, PathLike or LogContents
         The log; finished, torn or damaged.
     out_path : str or PathLike, optional
         The run file; left out, the log's name with ``.h5``. With several sensors their channels come before the
@@ -75,6 +78,8 @@ def recover(
 
     Raises
     ------
+    acquisition.errors.CalibrationError
+        If sound is never so slow or fast.
     LogGrowing
         If a recording still writes the log.
     NotALog
@@ -84,69 +89,85 @@ def recover(
     RunDamaged
         If a run file just written does not read back as it should. The log stands.
     """
-    contents = read_log(log_path)
+    if speed_of_sound_m_per_s is not None:
+        Calibration(speed_of_sound_m_per_s=speed_of_sound_m_per_s)
+    contents = log if isinstance(log, LogContents) else read_log(log)
     if not growing:
         _demand_finished(contents)
-    log = _Log(contents, _header(contents, header), provenance or {})
+    known = _header(contents, header)
+    notes = _notes(contents)
     leftovers = remove_leftovers(contents.path.absolute().parent)
-    other = {} if speed_of_sound_m_per_s is None else {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
-    sensors = log.header.sensors
+    sensors = _sensors(known.sensors, notes, speed_of_sound_m_per_s)
     out = contents.path if out_path is None else Path(out_path)
-    paths = run_paths(out, [each.channel for each in sensors])
-    runs = _runs(log, sensors, paths, other, overwrite)
-    if not log.notes.counts:  # all run files stood there
-        for record in contents:
-            if record.kind is not Kind.DATA:
-                log.notes.take(record)
-    if parts := _parts(log):
-        (only,) = run_paths(out, [0])
-        runs += _runs(log, parts, [_of_channel(only, part.channel) for part in parts], other, overwrite)
-    damage = contents.damage
-    removed = remove_log and _remove(contents)
+    paths = _paths(out, known.sensors, sensors)
+    runs: dict[Path, RecoveredRun] = {}
+    for sensor, path in zip(sensors, paths, strict=True):
+        if not overwrite and os.path.lexists(path):
+            stood = _standing(path, sensor, contents) if speed_of_sound_m_per_s is None else None
+            if stood is None:
+                demand = "a new run file was to be written, but a file stands there"
+                raise RunExists(path, demand, "choose another name or allow overwriting")
+            runs[path] = stood
+    missing = [(sensor, path) for sensor, path in zip(sensors, paths, strict=True) if path not in runs]
+    for start in range(0, len(missing), AT_ONCE):
+        for run in _build(contents, known, notes, missing[start : start + AT_ONCE], provenance or {}, overwrite):
+            _demand_held(run.path, contents)
+            runs[run.path] = run
     return RecoverReport(
         contents.path,
-        tuple(runs),
-        damage,
-        log.notes.counts[Kind.MARK],
-        log.notes.counts[Kind.EVENT],
-        removed,
+        tuple(runs[path] for path in paths),
+        contents.damage,
+        notes.counts[Kind.MARK],
+        notes.counts[Kind.EVENT],
+        remove_log and _remove(contents),
         len(contents.parts),
         leftovers,
-        {part.channel: log.notes.parts[part.channel] for part in parts},
+        {sensor.channel: notes.parts[sensor.channel] for sensor in sensors[len(known.sensors) :]},
     )
 
 
-def _runs(
-    log: _Log, sensors: Sequence[SensorEntry], paths: Sequence[Path], other: Mapping[str, Any], overwrite: bool
-) -> list[RecoveredRun]:
-    """Return the run files of some sensors, those that stand there as they are and the others built."""
-    runs = {} if overwrite else _standing(paths, sensors, log.contents, other)
-    missing = [number for number in range(len(sensors)) if number not in runs]
-    for start in range(0, len(missing), AT_ONCE):
-        numbers = missing[start : start + AT_ONCE]
-        built = _build(log, [sensors[n] for n in numbers], [paths[n] for n in numbers], other, overwrite)
-        for number, run in zip(numbers, built, strict=True):
-            _demand_held(run.path, log.contents)
-            runs[number] = run
-    return [runs[number] for number in range(len(sensors))]
+def _notes(contents: LogContents) -> Notes:
+    """Read the log once for what it says besides bytes: a calibration at its end counts for its first sample."""
+    notes = Notes()
+    try:
+        for record in contents:
+            if record.kind is not Kind.DATA:
+                notes.take(record)
+    except ValueRefused as error:
+        raise NotALog(contents.path, str(error), FOREIGN) from error
+    return notes
 
 
-def _parts(log: _Log) -> list[SensorEntry]:
-    """Return the sensors that came back as others on the ports of those that the header names."""
-    known = {sensor.channel: sensor for sensor in log.header.sensors}
-    parts = []
-    for channel, of in sorted(log.notes.parts.items()):
-        if channel not in known and (before := known.get(of)) is not None:
-            calibration = log.notes.calibrations.get(of, before.calibration)
-            known[channel] = dataclasses.replace(before, channel=channel, calibration=calibration)
-            parts.append(known[channel])
-    return parts
+def _sensors(header: Sequence[SensorEntry], notes: Notes, speed_of_sound_m_per_s: float | None) -> list[SensorEntry]:
+    """Return the sensors of the header, then those that came back as others on their ports, as they are calibrated."""
+    known: dict[int, SensorEntry] = {}
+
+    def add(sensor: SensorEntry) -> None:
+        calibration = notes.calibrations.get(sensor.channel, sensor.calibration)
+        known[sensor.channel] = replace(sensor, calibration=calibration)
+
+    for sensor in header:
+        add(sensor)
+    for channel, of in sorted(notes.parts.items()):
+        if channel not in known and of in known:
+            add(replace(known[of], channel=channel))
+    if speed_of_sound_m_per_s is None:
+        return list(known.values())
+    other = {"speed_of_sound_m_per_s": speed_of_sound_m_per_s}
+    return [replace(each, calibration={**each.calibration, **other}) for each in known.values()]
+
+
+def _paths(out: Path, header: Sequence[SensorEntry], sensors: Sequence[SensorEntry]) -> list[Path]:
+    """Return the run file of each sensor."""
+    (single,) = run_paths(out, [0])
+    parts = [_of_channel(single, sensor.channel) for sensor in sensors[len(header) :]]
+    return run_paths(out, [sensor.channel for sensor in header]) + parts
 
 
 def _demand_finished(contents: LogContents) -> None:
     for part in contents.parts:
-        with contextlib.suppress(OSError):  # that it is gone is for the reading to say
-            if is_being_written(part.path):
+        with contextlib.suppress(OSError), part.open() as file:  # that it is gone is for the reading to say
+            if is_being_written(file):
                 demand = f"a recording still writes the log, got it at {contents.size} bytes"
                 raise LogGrowing(contents.path, demand, "recover it when the recording has ended")
 
@@ -181,32 +202,16 @@ def _demand_held(path: Path, contents: LogContents) -> None:
         raise RunDamaged(path, f"the log inside is not {contents.path}", "keep the log and recover it again")
 
 
-def _standing(
-    paths: Sequence[Path], sensors: Sequence[SensorEntry], contents: LogContents, other: Mapping[str, Any]
-) -> dict[int, RecoveredRun]:
-    """Return the run files, by number, that stand there and hold all of this log: a build that was killed made them.
-
-    Raises
-    ------
-    RunExists
-        If something else stands there. What comes meanwhile is refused by the writing itself.
-    """
-    found = {}
-    for number, (path, sensor) in enumerate(zip(paths, sensors, strict=True)):
-        if not os.path.lexists(path):
-            continue
-        try:
-            if other:
-                raise RunExists(path, "", "")
-            _demand_held(path, contents)
-            with open_run(path) as run:
-                decoding, lost = run.provenance["decoding"], run.provenance["losses"]
-                losses = Losses(**{**lost, "away": tuple(lost["away"])})
-                found[number] = RecoveredRun(sensor, path, len(run), decoding["faults"], decoding, losses, stood=True)
-        except (StorageError, KeyError, TypeError) as error:
-            demand = "a new run file was to be written, but a file stands there"
-            raise RunExists(path, demand, "choose another name or allow overwriting") from error
-    return found
+def _standing(path: Path, sensor: SensorEntry, contents: LogContents) -> RecoveredRun | None:
+    """Return the run file that stands there if it holds all of this log, as a killed recovery leaves it; else None."""
+    try:
+        _demand_held(path, contents)
+        with open_run(path) as run:
+            decoding, lost = run.provenance["decoding"], run.provenance["losses"]
+            losses = Losses(**{**lost, "away": tuple(lost["away"])})
+            return RecoveredRun(sensor, path, len(run), decoding["faults"], decoding, losses, stood=True)
+    except (StorageError, KeyError, TypeError):
+        return None
 
 
 def _header(contents: LogContents, stand_in: LogHeader | None) -> LogHeader:
@@ -218,16 +223,6 @@ def _header(contents: LogContents, stand_in: LogHeader | None) -> LogHeader:
         raise NotALog(path, f"a wire log was demanded, got {contents.size} bytes without one record", "name another")
     demand = f"the log's header is lost in all its copies ({contents.damage.describe()})"
     raise NotALog(path, demand, "say which sensors were recorded")
-
-
-def _calibrated(
-    sensors: Sequence[SensorEntry], noted: Mapping[int, Mapping[str, Any]], other: Mapping[str, Any]
-) -> tuple[SensorEntry, ...]:
-    """Return the sensors, each with the calibration noted for its channel, if any, and other numbers in it."""
-    return tuple(
-        dataclasses.replace(sensor, calibration={**noted.get(sensor.channel, sensor.calibration), **other})
-        for sensor in sensors
-    )
 
 
 def run_paths(path: Path, channels: Sequence[int]) -> list[Path]:
@@ -242,65 +237,39 @@ def _of_channel(path: Path, channel: int) -> Path:
     return path.with_name(f"{path.stem}.{channel}{path.suffix}")
 
 
-@dataclasses.dataclass(slots=True, eq=False)
-class _Log:
-    """A log on its way into run files."""
-
-    contents: LogContents
-    header: LogHeader
-    provenance: Mapping[str, Any]
-    notes: Notes = dataclasses.field(default_factory=Notes)
-
-
-class _Again(Exception):
-    """What was written was worked out with a calibration that did not last."""
-
-
 def _build(
-    log: _Log, sensors: Sequence[SensorEntry], paths: Sequence[Path], other: Mapping[str, Any], overwrite: bool
+    contents: LogContents,
+    header: LogHeader,
+    notes: Notes,
+    targets: Sequence[tuple[SensorEntry, Path]],
+    provenance: Mapping[str, Any],
+    overwrite: bool,
 ) -> list[RecoveredRun]:
     """Write the run files of some sensors in one pass over the log."""
-    while True:
-        calibrated = _calibrated(sensors, log.notes.calibrations, other)
-        with contextlib.suppress(_Again), contextlib.ExitStack() as stack:
-            writers = [stack.enter_context(run_writer(path, overwrite=overwrite)) for path in paths]
-            runs, decoder = _poured(log, calibrated, writers)
-            # Events are known when the log was read; a calibration among them is rare, so only then it is read again.
-            if _calibrated(sensors, log.notes.calibrations, other) != calibrated:
-                raise _Again
-            told = zip(runs, decoder.reads, strict=True)
-            return [run.finish(log.header, log.notes, reads, decoder.last_ns, log.provenance) for run, reads in told]
-
-
-def _poured(
-    log: _Log, sensors: Sequence[SensorEntry], writers: Sequence[RunWriter]
-) -> tuple[list[SensorRun], LogDecoder]:
-    """Read the log once, into all the run files."""
-    contents, log.notes = log.contents, Notes()
-    remedy = "springmass writes no such log; ask where it comes from"
+    sensors = [sensor for sensor, _ in targets]
     try:
         chains = chains_of(sensors)
     except AcquisitionError as error:
-        raise NotALog(contents.path, f"header.sensors: {error}", remedy) from error
-    runs = [SensorRun(*each) for each in zip(writers, [contents] * len(writers), sensors, chains, strict=True)]
+        raise NotALog(contents.path, f"header.sensors: {error}", FOREIGN) from error
+    with contextlib.ExitStack() as stack:
+        writers = [stack.enter_context(run_writer(path, overwrite=overwrite)) for _, path in targets]
+        runs = [SensorRun(*each) for each in zip(writers, [contents] * len(writers), sensors, chains, strict=True)]
 
-    def taken(part: int, data: bytes) -> None:
-        for run in runs:
-            run.take(part, data)
+        def taken(part: int, data: bytes) -> None:
+            for run in runs:
+                run.take(part, data)
 
-    decoder = LogDecoder(sensors, chains, log.notes.take)
-    try:
+        decoder = LogDecoder(sensors, chains)
         for number, block in decoder.blocks(contents.records(taken)):
             runs[number].append(block)
-    except ValueRefused as error:
-        raise NotALog(contents.path, str(error), remedy) from error
-    return runs, decoder
+        ends = zip(runs, decoder.reads, strict=True)
+        return [run.finish(header, notes, reads, decoder.last_ns, provenance) for run, reads in ends]
 
 
 def _remove(contents: LogContents) -> bool:
     """Remove a log whose every byte is in run files that verify; one that grew meanwhile stays."""
     with contextlib.suppress(OSError):
-        if all(part.path.stat().st_size == part.size for part in contents.parts):
+        if all(part.in_place() for part in contents.parts):
             for part in contents.parts:  # the first file first: without it, the others are not taken for all of a run
                 part.path.unlink()
             return True

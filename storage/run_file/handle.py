@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from storage.checked import ValueRefused
 from storage.errors import NotARun, RunClosed, RunDamaged, damaged, one_line, reading
 from storage.run_file import layout
-from storage.run_file.header import SCHEMA, Header
+from storage.run_file.header import LONGEST_HEADER, MOST_UNWRITTEN, SCHEMA, Header
 from storage.run_file.layout import CHUNK
-from storage.run_file.rules import LONGEST_HEADER, MOST_UNWRITTEN
+from storage.schema import ValueRefused
 
 __all__ = ["Contents", "open_header"]
 

@@ -2,41 +2,108 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
-import numpy as np
+from msgspec import Meta, Struct, field
 
 from acquisition.block import UNITS
-from acquisition.recordings.recording import Trap
-from acquisition.source import SourceInfo
-from storage.checked import ValueRefused, demand, parsed
-from storage.run_file.rules import HEADER_RULE
+from acquisition.source import ClockKind, Kind
+from storage.schema import Calibrated, Count, ValueRefused, converted, decoded, json_text, parsed, plain, shown
 
-__all__ = ["SCHEMA", "FileEntry", "Header", "json_text"]
+__all__ = ["LONGEST_HEADER", "MOST_UNWRITTEN", "SCHEMA", "FileEntry", "Header", "Info", "TrapEntry"]
 
 SCHEMA = 1
+LONGEST_HEADER = 1 << 26
+"""Bytes of the header's text: a day of events is a thousandth of it."""
+MOST_UNWRITTEN = 10_000_000
+"""Samples, or bytes of original files, that a file may hold packed without as many bytes of its own: a day at 100 Hz.
+
+Beyond it, a file that states more than it has bytes is a bomb: it would fill the memory with what was never measured.
+"""
+DEEPEST = 33
+"""Tables and lists in each other, the header itself among them."""
+
+_Text = Annotated[str, Meta(max_length=1 << 20)]
+_Word = Annotated[str, Meta(max_length=200)]
+_Sha256 = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
+_Samples = Annotated[int, Meta(ge=0, le=2**32)]
+_Length = Annotated[float, Meta(ge=0.0, le=1e30)]
+_Positive = Annotated[float, Meta(ge=0.0, le=1e300)]
 
 
-@dataclass(frozen=True, slots=True)
-class FileEntry:
+class Info(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The source, as :class:`acquisition.source.SourceInfo` describes it."""
+
+    kind: Kind
+    name: _Text
+    rate_hz: Annotated[float, Meta(ge=1e-9, le=1e12)]
+    sigma_m: _Length | None = None
+    quantum_m: _Length | None = None
+    clock: ClockKind = "nominal"
+    stated_error_m: Annotated[float, Meta(ge=-1e30, le=1e30)] | None = None  # as an old recording prints it
+
+
+class FileEntry(Struct, frozen=True, forbid_unknown_fields=True):
     """An original file's name, length in bytes and SHA-256."""
 
-    name: str
-    size: int
-    sha256: str
+    name: _Text
+    size: Annotated[int, Meta(ge=0, le=2**48)]
+    sha256: _Sha256
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Header:
+class TrapEntry(Struct, frozen=True, forbid_unknown_fields=True):
+    """What was seen on reading, as :class:`acquisition.recordings.recording.Trap` describes it."""
+
+    code: _Word
+    message: _Text
+    count: Count = 1
+    line: Count | None = None
+
+
+class _Columns(Struct, frozen=True, forbid_unknown_fields=True):
+    time: _Sha256
+    distance: _Sha256
+    quality: _Sha256
+    distance_errors: _Sha256 = ""
+    velocity: _Sha256 = ""
+    sequence: _Sha256 = ""
+    host_mono_ns: _Sha256 = ""
+
+
+class _SensorNote(Calibrated, frozen=True):
+    family: _Text = ""
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+class _ClockNote(Struct, frozen=True):
+    rate_error_ppm: Annotated[float, Meta(ge=-1e300, le=1e300)] | None = None
+    u_rate_error_ppm: _Positive | None = None
+    limit_ppm: _Positive = 0.0
+    span_s: _Positive = 0.0
+    held_readings: Count = 0
+    longest_stall_s: _Positive = 0.0
+    moment: Literal["reflection", "reading"] = "reading"
+
+
+class _DecodingNote(Struct, frozen=True):
+    clock: _ClockNote = _ClockNote()
+
+
+class _Provenance(Struct, frozen=True):
+    """What other rooms read of the provenance; it may hold anything else besides."""
+
+    sensor: _SensorNote = _SensorNote()
+    start_time: _Word | None = None
+    decoding: _DecodingNote = _DecodingNote()
+
+
+class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Everything about a run that is not an array.
 
     Parameters
     ----------
-    info : SourceInfo
+    info : Info
         The source.
     first, samples : int
         Index of the first sample, and how many there are.
@@ -48,7 +115,7 @@ class Header:
         As in a recording.
     scene, provenance : mapping or None, mapping
         JSON-able, with string keys.
-    traps : tuple of Trap
+    traps : tuple of TrapEntry
         What was seen on reading.
     malformed_rows : int
         Rows that were not samples.
@@ -57,18 +124,18 @@ class Header:
         which hold a length in metres.
     """
 
-    info: SourceInfo
-    first: int
-    samples: int
+    info: Info
+    first: _Samples
+    samples: _Samples
     columns: Mapping[str, str]
-    originals: tuple[FileEntry, ...] = ()
-    title: str = ""
-    channel: str = "distance"
-    format: str = ""
-    scene: Mapping[str, Any] | None = None
-    traps: tuple[Trap, ...] = ()
-    malformed_rows: int = 0
     provenance: Mapping[str, Any]
+    originals: Annotated[tuple[FileEntry, ...], Meta(max_length=100_000)] = ()
+    title: _Text = ""
+    channel: _Text = "distance"
+    format: _Text = ""
+    scene: Mapping[str, Any] | None = None
+    traps: Annotated[tuple[TrapEntry, ...], Meta(max_length=1_000_000)] = ()
+    malformed_rows: Count = 0
     quantity: str = ""
     unit: str = ""
 
@@ -81,8 +148,7 @@ class Header:
             If the scene or the provenance holds what JSON cannot: an object, NaN, an infinity; or a value is one that
             :meth:`decode` would refuse.
         """
-        content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        text = json_text({"schema": SCHEMA, **content}).encode("ascii")
+        text = json_text({"schema": SCHEMA, **plain(self)}).encode("ascii")
         self.decode(text)
         return text
 
@@ -92,42 +158,22 @@ class Header:
 
         Raises
         ------
-        ValueRefused
-            If a value is not what :data:`storage.run_file.rules.HEADER_RULE` allows.
+        storage.schema.ValueRefused
+            If a key holds what it may not.
         ValueError
             If the text is of another schema.
         """
         content = parsed(text, "header")
         schema = content.pop("schema", None) if isinstance(content, dict) else None
         if schema != SCHEMA:
-            raise ValueError(f"schema {SCHEMA} demanded, got {ascii(schema)[:60]}")
-        demand(HEADER_RULE, content, "header")
-        quantity, unit = content.get("quantity", ""), content.get("unit", "")
-        if unit != UNITS.get(quantity, ""):
-            raise ValueRefused("header.unit", f"{UNITS.get(quantity, 'empty')} of the quantity {quantity!r}", unit)
+            raise ValueError(f"schema {SCHEMA} demanded, got {shown(schema)}")
         content.pop("implied", None)  # formulas of columns, which some files hold besides the columns
-        content["info"] = SourceInfo(**content["info"])
-        content["originals"] = tuple(FileEntry(**entry) for entry in content.get("originals", ()))
-        content["traps"] = tuple(Trap(**trap) for trap in content.get("traps", ()))
-        return cls(**content)
-
-
-def json_text(value: Any) -> str:
-    """Return canonical JSON: sorted keys, no blanks, ASCII; numpy's numbers as plain ones.
-
-    Examples
-    --------
-    >>> json_text({"b": np.float64(0.5), "a": [1, None]})
-    '{"a":[1,null],"b":0.5}'
-    """
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False, default=_plain)
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    if isinstance(value, Mapping):
-        return dict(value)
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return dataclasses.asdict(value)
-    raise TypeError(f"{value!r} ({type(value).__name__}) is nothing that JSON can hold")
+        header = decoded(content, cls, "header", DEEPEST)
+        converted(header.columns, _Columns, "header.columns")
+        read = {name: header.provenance[name] for name in _Provenance.__struct_fields__ if name in header.provenance}
+        converted(read, _Provenance, "header.provenance")
+        if (header.quantity, header.unit) not in {("", ""), *UNITS.items()}:
+            known = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
+            got = f"{shown(header.quantity)} in {shown(header.unit)}"
+            raise ValueRefused("header.quantity", f"expected one of {known}, got {got}")
+        return header

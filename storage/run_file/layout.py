@@ -38,12 +38,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import Block, Flag
-from storage.checked import ValueRefused
-from storage.run_file.header import Header, json_text
+from storage.run_file.header import Header
+from storage.schema import ValueRefused, json_text, plain
 
 __all__ = [
     "CHUNK",
     "COLUMNS",
+    "DIMENSION_ATTRIBUTES",
     "GROUPS",
     "HEADER",
     "INSTRUMENT",
@@ -58,6 +59,7 @@ __all__ = [
     "filters",
     "records",
     "signal_attributes",
+    "stored",
 ]
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -68,6 +70,8 @@ INSTRUMENT = "/entry/instrument"
 WIRE = "/wire"
 GROUPS = frozenset({"entry", "raw", "wire"})
 """What stands at the root besides second names of columns."""
+DIMENSION_ATTRIBUTES = frozenset({"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"})
+"""What HDF5 itself puts on arrays that are tied to a dimension."""
 NO_HOST_NS = -1
 """Stands in ``host_mono_ns`` and ``record_mono_ns`` where no host saw the sample or record."""
 
@@ -127,8 +131,8 @@ class Column:
         low, high = np.fmin.reduce(values, initial=self.greatest), np.fmax.reduce(values, initial=self.least)
         if low < self.least or high > self.greatest:
             at = int(np.flatnonzero((values < self.least) | (values > self.greatest))[0])
-            allowed = f"a number from {self.least:g} to {self.greatest:g}"
-            raise ValueRefused(f"{self.name} of sample {start + at}", allowed, values[at].item())
+            reason = f"expected a number from {self.least:g} to {self.greatest:g}, got {values[at].item()!r}"
+            raise ValueRefused(f"{self.name} of sample {start + at}", reason)
 
     @property
     def name(self) -> str:
@@ -241,9 +245,7 @@ def attributes(header: Header) -> dict[str, dict[str, Any]]:
     for column in COLUMNS:
         if column.name in header.columns:
             tree[column.path] = column_attributes(column, header)
-    for path, units in _field_units(header).items():
-        tree[path] = {"units": units} if units else {}
-    return tree
+    return tree | {path: _units_of(path) for path in fields(header)}
 
 
 def signal_attributes(header: Header) -> dict[str, Any]:
@@ -273,25 +275,19 @@ def column_attributes(column: Column, header: Header) -> dict[str, Any]:
 
 def fields(header: Header) -> dict[str, Any]:
     """Return the scalar fields by path: NeXus keeps in fields what it gives a unit."""
-    info = header.info
-    found: dict[str, Any] = {
-        "/entry/title": header.title or None,
-        "/entry/start_time": _text(header, "start_time") or None,
-        f"{INSTRUMENT}/name": info.name or None,
-        f"{INSTRUMENT}/kind": info.kind,
-        f"{INSTRUMENT}/clock": info.clock,
-    }
-    for name in _NUMBER_UNITS:
-        number = getattr(info, name)
-        found[f"{INSTRUMENT}/{name}"] = None if number is None else float(number)
-    return {path: value for path, value in found.items() if value is not None}
+    found = {"/entry/title": header.title, "/entry/start_time": _text(header, "start_time")}
+    found |= {f"{INSTRUMENT}/{name}": value for name, value in plain(header.info).items()}
+    stated = {path: value for path, value in found.items() if value not in (None, "")}
+    return {path: value if isinstance(value, str) else float(value) for path, value in stated.items()}
 
 
-_NUMBER_UNITS = {"rate_hz": "Hz", "quantum_m": "m", "sigma_m": "m", "stated_error_m": "m"}
+_UNITS = {"hz": "Hz", "m": "m"}
+"""By the last part of a field's name."""
 
 
-def _field_units(header: Header) -> dict[str, str | None]:
-    return {path: _NUMBER_UNITS.get(path.rpartition("/")[2]) for path in fields(header)}
+def _units_of(path: str) -> dict[str, str]:
+    units = _UNITS.get(path.rpartition("_")[2])
+    return {"units": units} if units else {}
 
 
 def _plot(header: Header) -> dict[str, Any]:
@@ -319,3 +315,24 @@ def _text(header: Header, key: str) -> str:
     """Return a text of the provenance, or an empty one."""
     value = header.provenance.get(key)
     return value if isinstance(value, str) else ""
+
+
+def stored(value: Any) -> tuple[Any, Any]:
+    """Return a value as HDF5 is given it, with its type.
+
+    Texts get a fixed length, as netCDF's own library writes them. Texts of free length would lie in HDF5's
+    global heap, the one part of the file without a checksum: a flipped bit there changes them unseen, or
+    sends the HDF5 library into an endless loop.
+    """
+    import h5py
+
+    if not isinstance(value, str | tuple):
+        return value, None
+    texts = [_shown(text).encode() for text in ((value,) if isinstance(value, str) else value)]
+    dtype = h5py.string_dtype(length=max(1, *map(len, texts)))
+    return (texts[0] if isinstance(value, str) else np.array(texts, dtype)), dtype
+
+
+def _shown(text: str) -> str:
+    """Return a text as HDF5 can hold it, without NUL and lone surrogates; the header holds the exact one."""
+    return text.replace("\0", "\ufffd").encode("utf-16", "surrogatepass").decode("utf-16", "replace")

@@ -37,6 +37,7 @@ from storage.run_file.dataset import checked_dataset, lazy_dataset
 from storage.run_file.handle import Contents, open_header
 from storage.run_file.header import Header
 from storage.run_file.layout import CHUNK
+from storage.schema import plain
 
 if TYPE_CHECKING:
     import xarray
@@ -118,7 +119,7 @@ class Run(Contents):
     @property
     def info(self) -> SourceInfo:
         """The source."""
-        return self.header.info
+        return SourceInfo(**plain(self.header.info))
 
     @property
     def title(self) -> str:
@@ -143,7 +144,7 @@ class Run(Contents):
     @property
     def traps(self) -> tuple[Trap, ...]:
         """What was seen on reading the old file."""
-        return self.header.traps
+        return tuple(Trap(**plain(trap)) for trap in self.header.traps)
 
     @property
     def malformed_rows(self) -> int:

@@ -16,8 +16,7 @@ from storage.errors import RunDamaged, damaged, reading
 from storage.run_file import layout
 from storage.run_file.handle import Contents
 from storage.run_file.header import FileEntry
-from storage.run_file.layout import CHUNK
-from storage.run_file.values import DIMENSION_ATTRIBUTES, stored
+from storage.run_file.layout import CHUNK, DIMENSION_ATTRIBUTES, stored
 
 __all__ = ["differences", "entries", "original_pieces"]
 

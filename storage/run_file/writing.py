@@ -29,8 +29,9 @@ from acquisition.source import SourceInfo
 from storage.atomic import whole_h5, writing_h5
 from storage.run_file import layout
 from storage.run_file.arrays import Columns, Originals
-from storage.run_file.header import Header
-from storage.run_file.values import stored
+from storage.run_file.header import Header, Info, TrapEntry
+from storage.run_file.layout import stored
+from storage.schema import plain
 
 __all__ = ["RunWriter", "run_writer", "write_run"]
 
@@ -105,7 +106,7 @@ def write_run(
             channel=channel,
             format=format,
             scene=scene,
-            traps=tuple(traps),
+            traps=traps,
             malformed_rows=malformed_rows,
             provenance=provenance or {},
         )
@@ -168,12 +169,13 @@ class RunWriter:
         with writing_h5(self.path):
             self._originals.take(number, data)
 
-    def finish(self, info: SourceInfo, **header: Any) -> None:
+    def finish(self, info: SourceInfo, *, traps: Sequence[Trap] = (), **header: Any) -> None:
         """Write the rest and the header.
 
         Parameters
         ----------
         info : SourceInfo
+        traps : sequence of Trap
         **header
             Of :class:`storage.run_file.header.Header`, what is not known from the samples and the originals.
 
@@ -186,7 +188,8 @@ class RunWriter:
         columns.finish()
         with writing_h5(self.path):
             text = Header(
-                info=info,
+                info=Info(**plain(info)),
+                traps=tuple(TrapEntry(**plain(trap)) for trap in traps),
                 first=columns.first or 0,
                 samples=columns.rows,
                 columns={name: digest.hexdigest() for name, digest in columns.digests.items()},

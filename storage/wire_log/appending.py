@@ -24,27 +24,24 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import math
 import os
 import secrets
 import threading
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
 from storage.errors import RunExists, WriteFailed, one_line
 from storage.wire_log.log_file import LogFile, open_log_file
-from storage.wire_log.records import Kind, LogHeader, ends_item, event_payload, frames, part_path
+from storage.wire_log.records import Kind, LogHeader, ends_item, frames
 
-__all__ = ["Item", "LogFile", "Roll", "WireLogWriter", "Written", "open_log_file"]
+__all__ = ["Item", "LogFile", "WireLogWriter", "Written", "open_log_file"]
 
 FIRST_COPY = 8192
 """Byte of the log past which the header is first repeated."""
 WRITE_BYTES = 1 << 18
 """So much is written at a time where many records wait."""
-TAKEN_NAMES = 100
 _APPEND = os.O_WRONLY | os.O_APPEND  # and never made anew
 
 Item = tuple[Kind, int, int, bytes]
@@ -58,32 +55,11 @@ class Written(NamedTuple):
     bytes: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Roll:
-    """When a log goes on in another file.
-
-    Parameters
-    ----------
-    bytes : int
-        A file that is this long is the last one's, and the next record begins another.
-    ns : int or None
-        So much time by the records' stamps after a file's first record, too.
-    """
-
-    bytes: int = 1_000_000_000
-    ns: int | None = None
-
-
 class WireLogWriter:
     """Appends records to a new log.
 
-    A long log lies in several files, ``run.wire``, ``run.001.wire``, ``run.002.wire`` and so on: one log that is cut
-    between two records, each file beginning with a copy of the header. The old file is on the disk before anything is
-    written to the next. Where the next cannot be made, the old one goes on, and an event says so.
-
-    One thread appends; others may call :meth:`sync` at the same time. :attr:`files` are those made so far.
-    :attr:`written` and ``synced`` say how far the log has come, in the kernel's hands and on the disk; ``extended`` how
-    many items of the last call are whole in the log.
+    One thread appends; others may call :meth:`sync` at the same time. :attr:`written` and ``synced`` say how far the
+    log has come, in the kernel's hands and on the disk; ``extended`` how many items of the last call are whole in it.
 
     Parameters
     ----------
@@ -95,8 +71,6 @@ class WireLogWriter:
         Makes a file: the seam for tests.
     log : int, optional
         The number that all records carry; left out, a random one.
-    roll : Roll
-        When the log goes on in another file.
 
     Raises
     ------
@@ -113,14 +87,8 @@ class WireLogWriter:
         *,
         open_file: Callable[[Path], LogFile] = open_log_file,
         log: int | None = None,
-        roll: Roll = Roll(),
     ) -> None:
         self.path = Path(path)
-        self._roll = roll
-        self._open_file = open_file
-        self.files = [self.path]
-        self._files = 1
-        self._roll_at_bytes, self._roll_at_ns = self._next_roll(0, header.mono_ns)
         self.written = self.synced = Written()
         self.extended = 0
         self._log = secrets.randbits(32) if log is None else log
@@ -135,7 +103,13 @@ class WireLogWriter:
         except (TypeError, ValueError) as error:
             remedy = "give the scene and options as plain texts and numbers"
             raise WriteFailed(self.path, f"the header cannot be written ({one_line(error)})", remedy) from error
-        self._file = self._made(self.path)
+        try:
+            self._file = open_file(self.path)
+        except FileExistsError as error:
+            demand = "a new wire log was to be begun, but a file stands there"
+            raise RunExists(self.path, demand, "choose another name; a recording is never written over") from error
+        except OSError as error:
+            raise self._failed("could not be made", error) from error
         try:
             self.append(Kind.HEADER, self._header, mono_ns=header.mono_ns)
             self.sync()
@@ -144,15 +118,6 @@ class WireLogWriter:
                 self._file.close()
                 self.path.unlink()
             raise
-
-    def _made(self, path: Path) -> LogFile:
-        try:
-            return self._open_file(path)
-        except FileExistsError as error:
-            demand = "a new wire log was to be begun, but a file stands there"
-            raise RunExists(self.path, demand, "choose another name; a recording is never written over") from error
-        except OSError as error:
-            raise self._failed("could not be made", error) from error
 
     def append(self, kind: Kind, payload: bytes, *, mono_ns: int, channel: int = 0) -> int:
         """Append a record, or several where the payload is long.
@@ -199,11 +164,6 @@ class WireLogWriter:
         laid, end = 0, self.written.bytes
         try:
             for kind, channel, mono_ns, payload in items:
-                if end >= self._roll_at_bytes or mono_ns >= self._roll_at_ns:
-                    whole, batch = batch, []
-                    self._write(whole, laid)
-                    laid = 0
-                    end = self._go_on(mono_ns)
                 if end >= self._next_copy:
                     # Doubling distances: about twenty copies in a day's log, and no zeroed page takes all of them.
                     # Before the record and not after it, so that an error always means that the record itself is not
@@ -226,46 +186,6 @@ class WireLogWriter:
         sequence = self.written.records + before
         batch += frames(kind, payload, sequence=sequence, mono_ns=mono_ns, log=self._log, channel=channel)
         return sum(map(len, batch[before:]))
-
-    def _next_roll(self, start: int, start_ns: int) -> tuple[int, float]:
-        return start + self._roll.bytes, math.inf if self._roll.ns is None else start_ns + self._roll.ns
-
-    def _go_on(self, mono_ns: int) -> int:
-        """Go on in the next file; return how many bytes the log has by then.
-
-        Raises
-        ------
-        WriteFailed
-            If the disk refuses the sync of the old file or the header's copy.
-        """
-        batch: list[bytes] = []
-        self._roll_at_bytes, self._roll_at_ns = self._next_roll(self.written.bytes, mono_ns)
-        self.sync()
-        try:
-            file = self._next_file()
-        except (OSError, RunExists) as error:
-            facts = {"why": one_line(error), "files": self._files}
-            self._lay(batch, Kind.EVENT, 0, mono_ns, event_payload("roll_failed", facts))
-        else:
-            with self._syncing:
-                before, self._file = self._file, file
-            with contextlib.suppress(OSError):  # it is on the disk, whatever closing says
-                before.close()
-            self._lay(batch, Kind.HEADER, 0, mono_ns, self._header)
-        self._write(batch, 0)
-        return self.written.bytes
-
-    def _next_file(self) -> LogFile:
-        """Make the log's next file; a name that is taken, by another recording or whoever, is passed over."""
-        for number in range(self._files, self._files + TAKEN_NAMES):
-            with contextlib.suppress(FileExistsError):
-                path = part_path(self.path, number)
-                file = self._open_file(path)
-                self._files = number + 1
-                self.files.append(path)
-                return file
-        demand = f"{part_path(self.path, self._files).name} and the {TAKEN_NAMES - 1} after it are taken"
-        raise RunExists(self.path, demand, "move them away")
 
     def _write(self, batch: list[bytes], items: int) -> None:
         """Write the records of so many items, and count those that are whole in the log."""
@@ -325,7 +245,7 @@ class WireLogWriter:
             batch += frames(
                 kind, payload, sequence=sequence + len(batch), mono_ns=mono_ns, log=self._log, channel=channel
             )
-        with open(self.files[-1], "ab", buffering=0, opener=lambda name, _: os.open(name, _APPEND)) as file:
+        with open(self.path, "ab", buffering=0, opener=lambda name, _: os.open(name, _APPEND)) as file:
             data = memoryview(b"".join(batch))
             while data:
                 data = data[file.write(data) :]

@@ -8,9 +8,8 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
-from acquisition.regular_file import open_regular
 from storage.atomic import sync_folder
 
 if sys.platform != "win32":
@@ -59,18 +58,18 @@ def open_log_file(path: Path) -> LogFile:
     return file
 
 
-def is_being_written(path: Path) -> bool:
+def is_being_written(file: BinaryIO) -> bool:
     """Return whether the writer of a log's file, in this process or another, still holds its lock.
 
-    False on Windows and on a disk without locks, where nobody can know. Raises OSError where the file cannot be opened.
+    False on Windows and on a disk without locks, where nobody can know.
     """
     if sys.platform == "win32":
         return False
-    with open_regular(path) as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        except OSError:
-            return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        fcntl.flock(file, fcntl.LOCK_UN)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
     return False

@@ -1,30 +1,39 @@
-"""The header of a wire log: the sensors, the clocks and the bench, before the first byte came."""
+"""What a wire log says in words: its header, with the sensors, the clocks and the bench, and its events."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta, Struct, field
 
 from acquisition.source import Kind as SourceKind
-from storage.run_file.header import json_text
-from storage.wire_log.allowed import LOG_VERSION, LONGEST_TEXT, header_content
+from storage.schema import Calibrated, ValueRefused, decoded, json_text, parsed, plain, shown
 
-__all__ = ["LogHeader", "SensorEntry"]
+__all__ = ["LATEST_NS", "LOG_VERSION", "LONGEST_TEXT", "LogHeader", "SensorEntry", "event_content"]
+
+LOG_VERSION = 1
+LONGEST_TEXT = 64 * 65535
+"""Bytes of the longest header, mark or event."""
+LATEST_NS = 1 << 62
+"""A host's clock that counts from its start never comes there in 146 years, and UTC in 2116."""
+DEEPEST = 17
+"""Tables and lists in each other, the header or event itself among them."""
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_Nanoseconds = Annotated[int, Meta(ge=0, le=LATEST_NS)]
+_Word = Annotated[str, Meta(max_length=100)]
+_Option = Annotated[str, Meta(max_length=256)] | Annotated[int, Meta(ge=-(2**53), le=2**53)]
 
 
-@dataclass(frozen=True, slots=True)
-class SensorEntry:
+class SensorEntry(Calibrated, frozen=True, forbid_unknown_fields=True):
     """One sensor of a run.
 
     Parameters
     ----------
     channel : int
-        0 to 255, its number within the run.
+        Its number within the run.
     family : str
         As ``--sensor`` took it.
     port : str
@@ -33,29 +42,23 @@ class SensorEntry:
     rate_hz : float or None
         Readings per second that it is set to, Hz; None for the family's.
     options : mapping
-        Of the family's decoder; JSON-able.
+        Of the family's decoder.
     calibration : mapping
         Numbers of :class:`acquisition.live.calibration.Calibration` by name; empty for the default.
     clock_ppm : float or None
         What its clock may be off at most, ppm; None for the family's.
     """
 
-    channel: int
-    family: str
-    port: str = ""
-    baud: int = 0
-    rate_hz: float | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
-    calibration: Mapping[str, Any] = field(default_factory=dict)
-    clock_ppm: float | None = None
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.channel <= 255:
-            raise ValueError(f"a channel must lie in 0 to 255, got {self.channel}")
+    channel: Annotated[int, Meta(ge=0, le=255)]
+    family: _Word
+    port: Annotated[str, Meta(max_length=4096)] = ""
+    baud: Annotated[int, Meta(ge=0, le=10**9)] = 0
+    rate_hz: Annotated[float, Meta(ge=1e-6, le=1e9)] | None = None
+    options: dict[str, _Option] = field(default_factory=dict)
+    clock_ppm: Annotated[float, Meta(ge=0.0, le=1e6)] | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LogHeader:
+class LogHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What a log says of its run before the first byte came.
 
     Parameters
@@ -72,20 +75,18 @@ class LogHeader:
         The run's title; the version of springmass that records it.
     """
 
-    sensors: tuple[SensorEntry, ...]
-    mono_ns: int
-    unix_ns: int
+    sensors: Annotated[tuple[SensorEntry, ...], Meta(min_length=1, max_length=256)]
+    mono_ns: _Nanoseconds
+    unix_ns: _Nanoseconds
     kind: SourceKind = "live"
     scene: Mapping[str, Any] | None = None
-    title: str = ""
-    version: str = ""
+    title: Annotated[str, Meta(max_length=10_000)] = ""
+    version: _Word = ""
 
     def __post_init__(self) -> None:
         channels = [sensor.channel for sensor in self.sensors]
         if len(set(channels)) != len(channels):
-            raise ValueError(f"each sensor must have a channel of its own, got {channels}")
-        if self.kind not in ("live", "simulated", "replay"):
-            raise ValueError(f"kind must be live, simulated or replay, got {self.kind!r}")
+            raise ValueRefused("sensors", f"expected each with a channel of its own, got {channels}")
 
     def utc(self, mono_ns: int) -> str:
         """Return the wall clock (ISO 8601, UTC) at a moment of the monotonic clock in ns; empty beyond year 9999."""
@@ -103,8 +104,8 @@ class LogHeader:
         TypeError, ValueError
             If the scene or an option holds what JSON cannot, or a key what :meth:`decode` would refuse.
         """
-        content = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
-        payload = json_text({"log": LOG_VERSION, "start_utc": self.utc(self.mono_ns), **content}).encode("ascii")
+        content = {"log": LOG_VERSION, "start_utc": self.utc(self.mono_ns), **plain(self)}
+        payload = json_text(content).encode("ascii")
         if len(payload) > LONGEST_TEXT:
             raise ValueError(f"a header of at most {LONGEST_TEXT} bytes was demanded, got {len(payload)}")
         self.decode(payload)
@@ -116,11 +117,29 @@ class LogHeader:
 
         Raises
         ------
-        storage.checked.ValueRefused
-            If a key holds what it may not (:mod:`storage.wire_log.allowed`), or the log is of another version.
+        storage.schema.ValueRefused
+            If a key holds what it may not, or the log is of another version.
         """
-        content = header_content(payload)
-        del content["log"]
-        content.pop("start_utc", None)  # for people; the clock map says the same
-        content["sensors"] = tuple(SensorEntry(**sensor) for sensor in content["sensors"])
-        return cls(**content)
+        content = parsed(payload, "header")
+        if isinstance(content, dict):
+            if (version := content.pop("log", None)) != LOG_VERSION:
+                reason = f"expected {LOG_VERSION}, the layout that this version reads, got {shown(version)}"
+                raise ValueRefused("header.log", reason)
+            content.pop("start_utc", None)  # for people; the clock map says the same
+        return decoded(content, cls, "header", DEEPEST)
+
+
+class _Event(Struct, frozen=True, forbid_unknown_fields=True):
+    kind: _Word
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+def event_content(payload: bytes) -> dict[str, Any]:
+    """Return what an event record holds: its kind and its facts.
+
+    One that holds no such thing is an event of the kind "unreadable", with the beginning of its bytes.
+    """
+    try:
+        return plain(decoded(parsed(payload, "event"), _Event, "event", DEEPEST))
+    except ValueRefused as error:
+        return {"kind": "unreadable", "facts": {"why": str(error), "bytes": payload[:200].decode("ascii", "replace")}}

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from storage.wire_log.allowed import demand_calibration, event_content
+from storage.schema import demand_calibration
+from storage.wire_log.log_header import event_content
 from storage.wire_log.records import Kind, Record
 
 __all__ = ["Notes"]
@@ -46,14 +47,14 @@ class Notes:
 
         Raises
         ------
-        storage.checked.ValueRefused
+        storage.schema.ValueRefused
             If it is a calibration that none can be.
         """
         self.counts[record.kind] += 1
         if record.kind is Kind.EVENT:
             content = event_content(record.payload)
             if content["kind"] == "calibration":
-                demand_calibration(content["facts"])
+                demand_calibration(content["facts"], "calibration event")
                 self.calibrations[record.channel] = content["facts"]
             elif content["kind"] == "continues" and isinstance(of := content["facts"].get("of"), int):
                 self.parts.setdefault(record.channel, of)

@@ -32,13 +32,10 @@ import enum
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from storage.checked import ValueRefused, parsed
-from storage.run_file.header import json_text
-from storage.wire_log.allowed import LATEST_NS, LONGEST_TEXT
-from storage.wire_log.log_header import LogHeader, SensorEntry
+from storage.schema import ValueRefused, json_text, parsed
+from storage.wire_log.log_header import LATEST_NS, LONGEST_TEXT, LogHeader, SensorEntry
 
 __all__ = [
     "HEAD_BYTES",
@@ -53,7 +50,6 @@ __all__ = [
     "event_payload",
     "frame",
     "frames",
-    "part_path",
     "unframe",
 ]
 
@@ -65,7 +61,6 @@ _HEAD = struct.Struct("<2sHIqIBBH")
 _CRC = struct.Struct("<I")
 _HEAD_AND_CRC = struct.Struct(_HEAD.format + "I")
 HEAD_BYTES = _HEAD_AND_CRC.size
-CRC_AT = _HEAD.size
 _WRAP = 1 << 32
 
 
@@ -130,17 +125,6 @@ class Record(NamedTuple):
         return content if isinstance(content, dict) else {}
 
 
-def part_path(path: Path, number: int) -> Path:
-    """Return the name of a log's file, numbered from 0.
-
-    Examples
-    --------
-    >>> [part_path(Path("run.wire"), number).name for number in (0, 1, 12)]
-    ['run.wire', 'run.001.wire', 'run.012.wire']
-    """
-    return path.with_name(f"{path.stem}.{number:03d}{path.suffix}") if number else path
-
-
 def event_payload(kind: str, facts: Mapping[str, Any]) -> bytes:
     """Return the payload of an event; facts that JSON cannot hold go in as text, for an event is never lost."""
     try:
@@ -185,7 +169,6 @@ def ends_item(record: bytes) -> bool:
     return kind != Kind.HEADER and not parts & Parts.GOES_ON
 
 
-unpack_head = _HEAD_AND_CRC.unpack_from
 Unframed = tuple[int, int, int, Kind, int, int, bytes]
 
 
@@ -208,7 +191,7 @@ def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
     start = at + HEAD_BYTES
     if start > len(data):
         return None
-    magic, length, sequence, mono_ns, found, code, channel, parts, crc = unpack_head(data, at)
+    magic, length, sequence, mono_ns, found, code, channel, parts, crc = _HEAD_AND_CRC.unpack_from(data, at)
     # The cheap checks first: a search through damage comes here for every magic that chance has put there.
     kind = _KINDS.get(code)
     if magic != MAGIC or kind is None or parts > _ALL_PARTS or start + length > len(data):

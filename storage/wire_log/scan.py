@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from storage.wire_log.allowed import LATEST_NS
-from storage.wire_log.records import CRC_AT, HEAD_BYTES, MAGIC, MOST_PARTS, Kind, Parts, Record, Unframed, unpack_head
-from storage.wire_log.window import LONGEST, Window
+from storage.wire_log.records import HEAD_BYTES, MOST_PARTS, Kind, Parts, Record, Unframed
+from storage.wire_log.window import Window
 
 __all__ = ["Damage", "Scan"]
 
 KEPT_STRETCHES = 100
-_DATA, _END = Kind.DATA, Kind.END  # looked up once, and not for each record
-_record = tuple.__new__
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,62 +81,35 @@ class Scan:
         return Damage(self._records, self._lost, self._skipped, stretches, self._strays, self._tail, self._ended)
 
     def records(self) -> Iterator[Record]:
-        """Yield what can be delivered; :meth:`damage` is complete after the last."""
+        """Yield what can be delivered; :meth:`damage` is complete after the last.
+
+        Of a live log that is what has come; the next call yields what comes later.
+        """
         window = self._window
+        if window.live:
+            window.fill()
         while True:
-            if not (self._owed or self._parts):
-                yield from self._run()
             found = window.record(self._log)
             if found is None:
                 if not self._resynchronise():
                     break
             elif (record := self._accept(found)) is not None:
                 yield record
-        self._drop_parts()
-
-    def _run(self) -> Iterator[Record]:
-        """Yield data records as long as nothing is wrong with them: nearly all of a log, in half the time.
-
-        The first that is anything else is left to :meth:`records`.
-        """
-        window = self._window
-        data, at, log, expected = window.data, window.at, self._log, self._expected
-        last = len(data) - (HEAD_BYTES if window.whole else LONGEST)
-        unpack, crc32, code_of_data = unpack_head, zlib.crc32, int(_DATA)
-        while at <= last:
-            magic, length, sequence, mono_ns, found, code, channel, parts, crc = unpack(data, at)
-            if (
-                code != code_of_data
-                or sequence != expected
-                or magic != MAGIC
-                or found != log
-                or parts
-                or not 0 <= mono_ns <= LATEST_NS
-            ):
-                break
-            start = at + HEAD_BYTES
-            payload = data[start : start + length]
-            if crc != crc32(payload, crc32(data[at : at + CRC_AT])):
-                break
-            yield _record(Record, (window.base + at, sequence, mono_ns, _DATA, channel, payload, 0))
-            at = start + length
-            expected += 1
-        if read := expected - self._expected:
-            self._expected, self._records, self._ended = expected, self._records + read, False
-            window.at = at
+        if not window.live:
+            self._drop_parts()
 
     def _resynchronise(self) -> bool:
         """Go to the next sound record and count what lies before it; False where there is none."""
         start = self._window.offset
         found = self._window.seek(self._log)
         length = self._window.offset - start
-        if not found:
+        if not (found or self._window.live):
             self._tail = length
-            return False
-        self._skipped += length
-        if len(self._stretches) < KEPT_STRETCHES:
-            self._stretches.append((start, length))
-        return True
+        elif length:
+            self._skipped += length
+            if len(self._stretches) < KEPT_STRETCHES:
+                self._stretches.append((start, length))
+        return found
 
     def _accept(self, found: Unframed) -> Record | None:
         sequence, mono_ns, _, kind, channel, parts, payload = found
@@ -155,8 +124,8 @@ class Scan:
         self._records += 1
         self._lost += missing
         self._owed += missing
-        self._ended = kind is _END
-        if kind is not _DATA:
+        self._ended = kind is Kind.END
+        if kind is not Kind.DATA:
             joined = self._joined(Record(offset, sequence, mono_ns, kind, channel, payload), parts, missing)
             if joined is None:
                 return None
@@ -164,7 +133,7 @@ class Scan:
         elif self._parts:
             self._drop_parts()
         owed, self._owed = self._owed, 0
-        return _record(Record, (offset, sequence, mono_ns, kind, channel, payload, owed))
+        return Record(offset, sequence, mono_ns, kind, channel, payload, owed)
 
     def _joined(self, record: Record, parts: int, missing: int) -> Record | None:
         """Return a text whose parts are all there, None before its last one or where one is missing."""

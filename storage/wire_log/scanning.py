@@ -15,22 +15,12 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from storage.checked import ValueRefused
-from storage.wire_log.records import (
-    HEAD_BYTES,
-    Kind,
-    LogHeader,
-    Record,
-    part_path,
-)
+from storage.schema import ValueRefused
+from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record
 from storage.wire_log.scan import Damage, Scan
 from storage.wire_log.window import LogPart, NotALog, Taken, Window
 
 __all__ = ["Damage", "LogContents", "NotALog", "Record", "parse_log", "read_log"]
-
-KEPT_STRETCHES = 100
-_DATA, _END = Kind.DATA, Kind.END  # looked up once, and not for each record
-_record = tuple.__new__
 
 
 class LogContents:
@@ -124,9 +114,10 @@ class LogContents:
 
 
 def read_log(path: str | os.PathLike[str]) -> LogContents:
-    """Open a log, finished, torn or still being written, with the further files that a long one goes on in.
+    """Open a log, finished, torn or still being written.
 
-    A file beside it that has the name of a further one, and holds records of another log, is none of it.
+    Version 0.1.0 went on in further files, ``run.001.wire`` and so on, each a stretch of the same log. They are read
+    with the first; a file of such a name that holds records of another log is none of it.
 
     Parameters
     ----------
@@ -160,7 +151,7 @@ def _further(path: Path) -> list[Path]:
     try:
         names = os.listdir(path.absolute().parent)
     except OSError:  # a folder whose files may be read and not listed
-        tried = (part_path(path, number) for number in itertools.count(1))
+        tried = (path.with_name(f"{path.stem}.{number:03d}{path.suffix}") for number in itertools.count(1))
         return list(itertools.takewhile(Path.exists, tried))
     numbered = [(int(match[1]), name) for name in names if (match := form.fullmatch(name))]
     return [path.with_name(name) for _, name in sorted(numbered)]

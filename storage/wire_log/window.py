@@ -6,6 +6,7 @@ import hashlib
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -38,31 +39,43 @@ class LogPart:
     size : int
         Bytes that it had when it was looked at. What came later is not read, so that every pass reads the same.
     open : callable
-        Opens it for reading.
+        Opens it for reading, at its beginning.
+    stat : os.stat_result, optional
+        What identifies the file; None for bytes in memory.
     """
 
     path: Path
     size: int
     open: Callable[[], BinaryIO]
+    stat: os.stat_result | None = None
 
     @classmethod
-    def at(cls, path: Path) -> LogPart:
+    def at(cls, path: Path, opened: Callable[[], BinaryIO] | None = None) -> LogPart:
         """Return a file as it stands.
+
+        Parameters
+        ----------
+        path : Path
+        opened : callable, optional
+            Opens it where its name may not lead to it; left out, it is opened by its name.
 
         Raises
         ------
         NotALog
             If there is none, or none that can be read.
         """
-
-        def opened() -> BinaryIO:
-            return open_regular(path)
-
+        opened = opened or partial(open_regular, path)
         try:
             with opened() as file:
-                return cls(path, os.fstat(file.fileno()).st_size, opened)
+                stat = os.fstat(file.fileno())
         except OSError as error:
             raise _unreadable(path, error) from error
+        return cls(path, stat.st_size, opened, stat)
+
+    def in_place(self) -> bool:
+        """Return whether its name leads to it, and it has not grown since. Raises OSError."""
+        there = os.stat(self.path)
+        return self.stat is not None and os.path.samestat(there, self.stat) and there.st_size == self.size
 
     def sha256(self) -> str:
         """Return the SHA-256 of its bytes as they are on the disk now; those that came later do not count.
@@ -91,15 +104,20 @@ class Window:
     parts : sequence of LogPart
     taken : callable
         Is given every byte once, in order.
+    live : bool
+        Whether the log is still being written: more may come where the last file ends.
+
+    Attributes
+    ----------
+    whole : bool
+        Whether the log ended with the bytes in memory when they were read.
     """
 
-    def __init__(self, parts: Sequence[LogPart], taken: Taken = lambda *_: None) -> None:
-        self._parts = list(enumerate(parts))
-        self._taken = taken
+    def __init__(self, parts: Sequence[LogPart], taken: Taken = lambda *_: None, *, live: bool = False) -> None:
+        self._parts, self._taken, self.live = tuple(parts), taken, live
+        self._number = 0
         self._file: BinaryIO | None = None
         self._left = 0
-        self._number = -1
-        self._path = Path()
         self.data = b""
         self.base = self.at = 0
         self.whole = False
@@ -117,35 +135,36 @@ class Window:
 
     def fill(self) -> None:
         """Forget what lies before :attr:`at`, and read on until the longest record would be whole, or to the end."""
-        rest = [self.data[self.at :]]
+        pieces = [self.data[self.at :]]
         self.base, self.at = self.base + self.at, 0
-        length = len(rest[0])
+        length, self.whole = len(pieces[0]), False
         while length < LONGEST and not self.whole:
             piece = self._read()
-            rest.append(piece)
+            self.whole = not piece
+            pieces.append(piece)
             length += len(piece)
-        self.data = b"".join(rest)
+        self.data = b"".join(pieces)
 
     def _read(self) -> bytes:
-        """Return the next stretch; nothing where a file ends, and at the end of the last is :attr:`whole` set."""
-        if self._file is None:
-            if not self._parts:
-                self.whole = True
+        """Return the next stretch of the log; nothing at the end of its last file."""
+        while self._number < len(self._parts):
+            part, last = self._parts[self._number], self._number == len(self._parts) - 1
+            try:
+                if self._file is None:
+                    self._file, self._left = part.open(), part.size
+                wanted = STRETCH if self.live and last else min(STRETCH, self._left)
+                data = self._file.read(wanted)
+            except OSError as error:
+                raise _unreadable(part.path, error) from error
+            if data:
+                self._left -= len(data)
+                self._taken(self._number, data)
+                return data
+            if self.live and last:
                 return b""
-            self._number, part = self._parts.pop(0)
-            self._path, self._left = part.path, part.size
-        try:
-            if self._file is None:
-                self._file = part.open()
-            data = self._file.read(min(STRETCH, self._left))
-        except OSError as error:
-            raise _unreadable(self._path, error) from error
-        self._left -= len(data)
-        if not data:
             self.close()
-        else:
-            self._taken(self._number, data)
-        return data
+            self._number += 1
+        return b""
 
     def record(self, log: int | None) -> Unframed | None:
         """Return the record that begins at :attr:`at`, None where no whole and sound one does."""
@@ -154,7 +173,10 @@ class Window:
         return unframe(self.data, self.at, log)
 
     def seek(self, log: int | None) -> bool:
-        """Go to the next sound record behind :attr:`at`, or to the end; return whether there is one."""
+        """Go to the next sound record behind :attr:`at`, or to the end; return whether there is one.
+
+        Where none comes in a live log it stays: the record that begins here may still be written to its end.
+        """
         at = self.at + 1
         while True:
             at = self.data.find(MAGIC, at)
@@ -165,7 +187,7 @@ class Window:
                 at = 0
                 continue
             if at < 0:
-                self.at = len(self.data)
+                self.at = self.at if self.live else len(self.data)
                 return False
             if unframe(self.data, at, log) is not None:
                 self.at = at

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 from acquisition.block import Block, concatenate
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from storage.wire_log.allowed import event_content
+from storage.wire_log.log_header import event_content
 from storage.wire_log.records import Kind, Record, SensorEntry
 
-__all__ = ["BREAKS", "Decoded", "LogDecoder", "chains_of", "decode_log"]
-
-_DATA, _EVENT = Kind.DATA, Kind.EVENT  # looked up once, and not for each record
+__all__ = ["BREAKS", "LogDecoder", "chains_of", "decode_log"]
 
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
 """Events after which the bytes of a channel do not continue those before."""
@@ -94,9 +91,9 @@ class LogDecoder:
                 for number in range(len(self.chains)):
                     self._break(number)
             place = places.get(channel)
-            if kind is not _DATA:
+            if kind is not Kind.DATA:
                 self._noted(record)
-                if place is not None and kind is _EVENT and event_content(payload)["kind"] in BREAKS:
+                if place is not None and kind is Kind.EVENT and event_content(payload)["kind"] in BREAKS:
                     self._break(place[0], returned=event_content(payload)["kind"] == "reopened")
             elif place is not None:
                 place[1].append((mono_ns, payload))
@@ -128,38 +125,14 @@ class LogDecoder:
                 yield number, chain.block(final=final)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Decoded:
-    """One sensor's samples.
-
-    Parameters
-    ----------
-    sensor : SensorEntry
-    chain : SensorChain
-        As it stands after the last byte.
-    samples : Block
-        All of them, ``first`` = 0.
-    reads : int
-        Reads of the port that the log holds.
-    """
-
-    sensor: SensorEntry
-    chain: SensorChain
-    samples: Block
-    reads: int
-
-
 def decode_log(
     log: Iterable[Record],
     sensors: Sequence[SensorEntry],
     chains_for: Callable[[Sequence[SensorEntry]], Sequence[SensorChain]] = chains_of,
-) -> tuple[Decoded, ...]:
-    """Return every sensor's samples at once, in the order of ``sensors``, as :class:`LogDecoder` finds them."""
+) -> list[Block]:
+    """Return all samples of each sensor as one block, as :class:`LogDecoder` makes them."""
     decoder = LogDecoder(sensors, chains_for(sensors))
     blocks: list[list[Block]] = [[] for _ in sensors]
     for number, block in decoder.blocks(log):
         blocks[number].append(block)
-    return tuple(
-        Decoded(sensor, chain, concatenate(found), reads)
-        for sensor, chain, found, reads in zip(sensors, decoder.chains, blocks, decoder.reads, strict=True)
-    )
+    return [concatenate(each) for each in blocks]

@@ -101,24 +101,6 @@ def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Callable, tmp_
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
-def test_a_long_recording_goes_on_in_further_files_without_losing_a_sample(
-    cli: Callable, tmp_path: Path, scene: Path
-) -> None:
-    """A new log every third of a second: one run, whose samples follow each other, and which holds all the files."""
-    options = ("--simulate", scene, "--seconds", "1.5", "--roll-hours", "0.0001")
-    done = cli("record", *options, "-o", tmp_path / "run.h5")
-    assert done.code == 0, done.err
-    with open_run(tmp_path / "run.h5") as run:
-        names = [original.name for original in run.originals()]
-        # A bob that swings is met a little sooner or later after each ping.
-        np.testing.assert_allclose(np.diff(run.samples().t), 0.01, atol=1e-4)
-        assert run.provenance["log"]["lost"] == 0
-    assert names[:3] == ["run.wire", "run.001.wire", "run.002.wire"]
-    assert [path.name for path in tmp_path.glob("run*")] == ["run.h5"]
-    assert cli("record", *options[:-1], "0", "-o", tmp_path / "b.h5").code == 2
-    assert "--roll-mb must be 1 to 1e+09 MB, got 0.5" in cli("record", "--roll-mb", "0.5", "-o", tmp_path / "b.h5").err
-
-
 def test_another_speed_of_sound_is_applied_to_the_same_echoes(cli: Callable, tmp_path: Path, scene: Path) -> None:
     """A run recorded with 344 m/s comes out of its log with any other speed, every distance in proportion."""
     assert cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / "run.h5").code == 0

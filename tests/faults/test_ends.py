@@ -239,64 +239,98 @@ def test_a_disk_that_takes_nothing_more_ends_the_recording_with_what_it_has(benc
     assert len(numbers) > 200
 
 
-@pytest.mark.trials
-def test_a_folder_that_is_renamed_takes_its_recording_along(bench: Any, tmp_path: Path) -> None:
-    """The run goes on, and its run file lies beside the log, in the folder by its new name."""
-    before, after = tmp_path / "before", tmp_path / "after"
-    before.mkdir()
-    with bench.feeder() as feeder:
-        recording = bench.record(
-            feeder.port, before / "run.h5", "--seconds", "4", stderr=subprocess.PIPE, prepare=usual_signals
-        )
-        recording.until_bytes(SECONDS // 2)
-        before.rename(after)
-        assert recording.ended(4.0 + ANSWER_S) == 0
-        said = told(recording)
-    assert "renamed" in said
-    numbers = bench.numbers(after / "run.h5")
-    bench.demand_whole(numbers)
-    assert len(numbers) > 350
-    assert [path.name for path in after.iterdir()] == ["run.h5"]
+EFBIG_AT = """
+import errno
+from storage.recorder import Recorder
+
+made = Recorder.__init__.__kwdefaults__["open_file"]
+
+class SmallFiles:
+    def __init__(self, path):
+        self.file, self.room = made(path), 20_000
+    def write(self, data):
+        taken = self.file.write(data[: self.room]) if self.room else 0
+        if not taken:
+            raise OSError(errno.EFBIG, "File too large")
+        self.room -= taken
+        return taken
+    def sync(self):
+        self.file.sync()
+    def close(self):
+        self.file.close()
+
+Recorder.__init__.__kwdefaults__["open_file"] = SmallFiles
+"""
 
 
 @pytest.mark.trials
-@pytest.mark.parametrize("by", ["nothing", "another file"])
-def test_a_log_that_is_taken_away_is_noticed_and_saved(bench: Any, tmp_path: Path, by: str) -> None:
-    """Deleted or replaced while it is recorded: said in the run and at its end, and no reading is missing."""
+def test_a_file_that_may_not_grow_ends_the_recording_with_its_run_file(bench: Any, tmp_path: Path) -> None:
+    """At the file system's size limit: exit code 4, one line that says why, the log, and the run file of it."""
     out = tmp_path / "run.h5"
+    with bench.feeder() as feeder:
+        recording = bench.record(feeder.port, out, before=EFBIG_AT, stderr=subprocess.PIPE, prepare=usual_signals)
+        assert recording.ended(ANSWER_S) == 4
+        said = told(recording)
+    assert "could not be written further (File too large)" in said
+    assert recording.log.stat().st_size == 20_000
+    numbers = bench.numbers(out)
+    bench.demand_whole(numbers)
+    assert len(numbers) > 200
+
+
+def take_away(log: Path, by: str) -> Path:
+    """Take a log's name away in one of four ways; return where its bytes are by name, if anywhere."""
+    elsewhere = log.parent.with_name("elsewhere")
+    if by == "its folder was renamed":
+        return log.parent.rename(elsewhere) / log.name
+    if by == "renamed":
+        return log.rename(log.with_name("other.wire"))
+    log.unlink()
+    if by == "another file":
+        log.write_bytes(b"mine")
+    return log
+
+
+@pytest.mark.trials
+@pytest.mark.parametrize("by", ["deleted", "another file", "renamed", "its folder was renamed"])
+def test_a_log_whose_name_is_taken_away_becomes_its_run_file(bench: Any, tmp_path: Path, by: str) -> None:
+    """It is reported once, in the run and at its end; no reading is missing under the name that was asked for."""
+    out = tmp_path / "bench" / "run.h5"
+    out.parent.mkdir()
     with bench.feeder() as feeder:
         recording = bench.record(feeder.port, out, "--seconds", "4", stderr=subprocess.PIPE, prepare=usual_signals)
         recording.until_bytes(SECONDS // 2)
-        recording.log.unlink()
-        if by == "another file":
-            recording.log.write_bytes(b"mine")
+        left = take_away(recording.log, by)
         assert recording.ended(4.0 + ANSWER_S) == 0
         said = told(recording)
-    assert ("deleted" if by == "nothing" else "another file has taken") in said
+    assert f"{recording.log}: " in said
+    assert ("renamed" if "renamed" in by else by) in said
     numbers = bench.numbers(out)
     bench.demand_whole(numbers)
     assert len(numbers) > 350
     with open_run(out) as run:
         assert [event["kind"] for event in run.provenance["events"]].count("astray") == 1
+        (original,) = run.originals()
+    assert original.name == "run.wire"
     if by == "another file":
-        assert recording.log.read_bytes() == b"mine"
+        assert left.read_bytes() == b"mine"
+    elif by != "deleted":
+        assert left.read_bytes() == original.data
+    else:
+        assert [path.name for path in out.parent.iterdir()] == ["run.h5"]
 
 
 @pytest.mark.trials
-def test_a_further_file_of_a_log_that_is_taken_away_is_saved_too(bench: Any, tmp_path: Path) -> None:
-    """Deleted after the log went on in it: said which it was, and no reading is missing."""
+def test_a_kill_after_a_deletion_loses_the_log(bench: Any, tmp_path: Path) -> None:
+    """As the page on ends says: the bytes lie nowhere but in the file that the killed process held open."""
     out = tmp_path / "run.h5"
     with bench.feeder() as feeder:
-        options = ("--seconds", "4", "--roll-hours", "2e-4")
-        recording = bench.record(feeder.port, out, *options, stderr=subprocess.PIPE, prepare=usual_signals)
-        recording.until(lambda: out.with_name("run.002.wire").exists())
-        out.with_name("run.001.wire").unlink()
-        assert recording.ended(4.0 + ANSWER_S) == 0
-        said = told(recording)
-    assert "run.001.wire was deleted" in said
-    numbers = bench.numbers(out)
-    bench.demand_whole(numbers)
-    assert len(numbers) > 350
+        recording = bench.record(feeder.port, out)
+        recording.until_bytes(SECONDS // 2)
+        recording.log.unlink()
+        recording.process.kill()
+        recording.ended()
+    assert [path.name for path in tmp_path.iterdir() if path.suffix in (".wire", ".h5")] == []
 
 
 def test_a_killed_recording_leaves_its_log(bench: Any, tmp_path: Path) -> None:

@@ -23,7 +23,6 @@ from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
 from springmass.session.reads import Tee
 from storage.recorder import Recorder
-from storage.wire_log.appending import Roll
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
 
@@ -35,8 +34,7 @@ HEADER = LogHeader(sensors=(SensorEntry(0, "line"),), mono_ns=0, unix_ns=0)
 def record(port: int, log: str, mode: str) -> None:
     """Record a port until the process is killed; say after each read how far the log has come."""
     clock = SystemClock()
-    # Rolling, each file of the log takes the header and some twenty reads.
-    recorder = Recorder(log, HEADER, clock, sync_every_s=0.003, roll=Roll(2000) if mode == "rolling" else Roll())
+    recorder = Recorder(log, HEADER, clock, sync_every_s=0.003)
     chains = [SensorChain(get_family("line-protocol"))]
     tee = Tee(chains)
     tee.start(recorder, chains, 0)
@@ -90,26 +88,25 @@ def trial(log: Path, mode: str, rng: np.random.Generator) -> Outcome:
 
 
 @pytest.mark.trials
-@pytest.mark.parametrize(("mode", "kills"), [("paced", KILLS), ("flood", -(-KILLS // 3)), ("rolling", -(-KILLS // 3))])
+@pytest.mark.parametrize(("mode", "kills"), [("paced", KILLS), ("flood", -(-KILLS // 3))])
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no kill -9")
 def test_a_killed_recording_keeps_every_committed_record(mode: str, kills: int, tmp_path: Path) -> None:
     """Every log opens with the reads from the first on, at the bench's pace all but the one in flight."""
     rng = np.random.default_rng(kills)
-    lost, files = [], 0
+    lost = []
     for number in range(kills):
         log = tmp_path / f"{number}.wire"
         outcome = trial(log, mode, rng)
         contents = read_log(log)
+        assert len(contents.parts) == 1
         reads = [record.payload for record in contents if record.kind is Kind.DATA]
         assert reads == [packet(n) for n in range(len(reads))], "a wrong record"
         assert contents.header == HEADER
         assert contents.damage.lost == contents.damage.skipped_bytes == 0
         assert contents.damage.records >= outcome.written >= outcome.synced, outcome
         lost.append(outcome.taken - len(reads))
-        files = max(files, len(contents.parts))
     assert mode == "flood" or max(lost) <= 1, lost
     assert min(lost) >= 0
-    assert files > 2 if mode == "rolling" else files == 1
     print(f"kill -9, {mode}: {kills} trials, reads lost in flight: {sum(lost)}, at most {max(lost)}")
 
 

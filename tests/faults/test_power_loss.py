@@ -133,8 +133,7 @@ def test_power_loss_gives_no_wrong_value(seed: int) -> None:
         synced = {number for number, record in whole.items() if record.offset < safe}
         assert synced <= {record.sequence for record in read}
         assert contents.header == HEADER
-        (decoded,) = decode_log(contents, [SENSOR], chains_of)
-        samples = decoded.samples
+        (samples,) = decode_log(contents, [SENSOR], chains_of)
         host_ns = np.empty(0, np.int64) if samples.host_ns is None else samples.host_ns
         for moment in np.unique(host_ns):
             values = samples.distance[host_ns == moment].tolist()

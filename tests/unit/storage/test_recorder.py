@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import shutil
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -393,6 +394,25 @@ def test_putting_after_the_end_is_counted() -> None:
     recording.close()
     recording.put(0, 0, b"late")
     assert (recording.status.dropped_records, recording.status.dropped_bytes) == (1, 4)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="this system lets nobody rename or delete an open file")
+def test_a_lost_name_is_reported_once(tmp_path: Path) -> None:
+    """The first that becomes of it, in an event and in the status; what becomes of it later changes neither."""
+    log, clock = tmp_path / "run.wire", VirtualClock(7)
+    recording = Recorder(log, HEADER, clock, sync_every_s=1e-4)
+    assert recording.status.astray == ""
+    log.rename(tmp_path / "other.wire")
+    while recording.status.records < 2:  # the header, and the event to come
+        recording.drain()
+    first = recording.status.astray
+    (tmp_path / "other.wire").rename(log)
+    log.unlink()
+    log.write_bytes(b"mine")
+    recording.close()
+    assert recording.status.astray == first
+    events = [record.json() for record in recording.contents() if record.kind is Kind.EVENT]
+    assert events == [{"kind": "astray", "facts": {"what": first}}]
 
 
 def test_many_threads_may_put(tmp_path: Path) -> None:

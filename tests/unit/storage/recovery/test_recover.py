@@ -25,10 +25,10 @@ from storage.recovery.recover import LogGrowing, recover, verify_against_log
 from storage.run_file.arrays import Columns, Originals
 from storage.run_file.reading import Run, open_run
 from storage.wire_log import notes
-from storage.wire_log.appending import Roll, WireLogWriter
+from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import NotALog, read_log
-from storage.wire_log.wire_samples import chains_of, decode_log
+from storage.wire_log.wire_samples import decode_log
 
 FAMILY = "line-protocol"
 START_NS = 7_000_000_000
@@ -157,9 +157,9 @@ def test_no_frame_is_put_together_across_a_break(event: str, tmp_path: Path) -> 
         for channel in (0, 1):
             recorder.put(channel, 3, b"34\rR1000\rR1000\r")
     broken, whole = decode_log(read_log(log), header.sensors)
-    assert 1234 not in np.round(broken.samples.distance * 1000).tolist()
-    assert 1234 in np.round(whole.samples.distance * 1000).tolist()
-    assert np.count_nonzero(broken.samples.flags & Flag.GAP_BEFORE) == 1
+    assert 1234 not in np.round(broken.distance * 1000).tolist()
+    assert 1234 in np.round(whole.distance * 1000).tolist()
+    assert np.count_nonzero(broken.flags & Flag.GAP_BEFORE) == 1
 
 
 def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
@@ -351,24 +351,56 @@ def test_bytes_of_an_unnamed_channel_stay_in_the_log(tmp_path: Path) -> None:
         for host_ns, data in wire(20):
             recorder.put(4, host_ns, data[::-1])
             recorder.put(3, host_ns, data)
-    (decoded,) = decode_log(read_log(tmp_path / "run.wire"), header.sensors, chains_of)
-    assert (len(decoded.samples), decoded.reads) == (20, 21)
+    (samples,) = decode_log(read_log(tmp_path / "run.wire"), header.sensors)
+    assert len(samples) == 20
 
 
 @pytest.mark.skipif(os.name == "nt", reason="this system has no such locks")
 def test_a_log_that_is_still_written_is_not_recovered(tmp_path: Path) -> None:
-    """While a recorder has the log, in its first file or a later one, no run file is made; afterwards it is."""
-    for name, roll in (("one", Roll()), ("several", Roll(bytes=2000))):
-        log = tmp_path / f"{name}.wire"
-        with Recorder(log, HEADER, VirtualClock(), roll=roll) as recorder:
-            for host_ns, data in wire(100):
-                recorder.put(0, host_ns, data)
-            recorder.drain()
-            with pytest.raises(LogGrowing):
-                recover(log)
-            assert not log.with_suffix(".h5").exists()
-            assert recover(log, tmp_path / f"{name}-so-far.h5", growing=True).runs[0].samples > 0
-        assert recover(log).runs[0].samples == 100
+    """While a recorder has the log, no run file is made; afterwards it is."""
+    log = tmp_path / "run.wire"
+    with Recorder(log, HEADER, VirtualClock()) as recorder:
+        for host_ns, data in wire(100):
+            recorder.put(0, host_ns, data)
+        recorder.drain()
+        with pytest.raises(LogGrowing):
+            recover(log)
+        with pytest.raises(LogGrowing):
+            recover(recorder.contents())
+        assert not log.with_suffix(".h5").exists()
+        assert recover(log, tmp_path / "so-far.h5", growing=True).runs[0].samples > 0
+    assert recover(log).runs[0].samples == 100
+
+
+@pytest.mark.skipif(os.name == "nt", reason="this system lets nobody rename or delete an open file")
+@pytest.mark.parametrize("by", ["deleted", "renamed", "replaced", "its folder deleted"])
+def test_a_log_without_its_name_is_recovered_from_its_recorder(tmp_path: Path, by: str) -> None:
+    """All that was recorded is in the run file; nothing is removed by a name that leads to another file, or nowhere."""
+    (tmp_path / "bench").mkdir()
+    log = tmp_path / "bench" / "run.wire"
+    with Recorder(log, HEADER, VirtualClock()) as recorder:
+        for host_ns, data in wire(50):
+            recorder.put(0, host_ns, data)
+        recorder.drain()
+        whole = log.read_bytes()
+        if by == "renamed":
+            log.rename(tmp_path / "other.wire")
+        else:
+            log.unlink()
+        if by == "replaced":
+            log.write_bytes(b"mine")
+        if by == "its folder deleted":
+            log.parent.rmdir()
+        for host_ns, data in wire(100)[50:]:
+            recorder.put(0, host_ns, data)
+    assert recorder.status.astray
+    report = recover(recorder.contents(), tmp_path / "run.h5", remove_log=True)
+    assert (report.runs[0].samples, report.log_removed, report.damage.intact) == (100, False, True)
+    with open_run(tmp_path / "run.h5") as run:
+        (original,) = run.originals()
+    assert (original.name, original.data[: len(whole)]) == ("run.wire", whole)
+    left = {path.name: path.read_bytes() for path in tmp_path.rglob("*.wire")}
+    assert left == {"renamed": {"other.wire": original.data}, "replaced": {"run.wire": b"mine"}}.get(by, {})
 
 
 def replaced_log(path: Path, counts: tuple[int, ...]) -> None:

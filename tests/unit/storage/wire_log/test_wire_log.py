@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from storage.errors import RunExists, WriteFailed
+from storage.schema import ValueRefused
 from storage.wire_log.appending import FIRST_COPY, WireLogWriter, Written
 from storage.wire_log.records import HEAD_BYTES, MAX_PAYLOAD, Kind, LogHeader, SensorEntry, event_payload, frame, frames
 from storage.wire_log.scanning import NotALog, Record, parse_log, read_log
@@ -330,16 +331,36 @@ def test_the_clock_map_gives_the_wall_clock() -> None:
     assert HEADER.utc(4_000_000_000) == "2017-07-14T02:39:59.123456+00:00"
 
 
+@pytest.mark.parametrize(
+    ("sensors", "options", "message"),
+    [
+        ((SensorEntry(256, "line"),), {}, r"header\.sensors\[0\]\.channel: expected `int` <= 255, got 256"),
+        ((), {}, r"header\.sensors: .*, got a list of 0"),
+        ((SensorEntry(0, "line"),), {"kind": "real"}, r"header\.kind: .*, got 'real'"),
+        ((SensorEntry(0, "line", options={"a": True}),), {}, r"header\.sensors\[0\]\.options.*, got a table of 'a'"),
+        ((SensorEntry(0, "line", rate_hz=1e10),), {}, r"header\.sensors\[0\]\.rate_hz: .*, got 10000000000\.0"),
+        ((SensorEntry(0, "line"),), {"scene": {"a": [[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]}}, r"header: .* at most 17 deep"),
+    ],
+)
+def test_a_header_that_no_reader_would_take_is_not_written(
+    sensors: tuple[SensorEntry, ...], options: dict[str, Any], message: str
+) -> None:
+    """The first value that its declaration does not allow is named, with what is there."""
+    header = LogHeader(sensors=sensors, mono_ns=0, unix_ns=0, **options)
+    with pytest.raises(ValueRefused, match=message):
+        header.encode()
+
+
 def test_a_header_is_checked() -> None:
-    """Channels are bytes and differ, the kind is one of three, another version is refused."""
-    with pytest.raises(ValueError, match="0 to 255, got 256"):
-        SensorEntry(256, "line")
-    with pytest.raises(ValueError, match=r"channel of its own, got \[1, 1\]"):
+    """Channels differ, calibrations are ones that can be, another version is refused, and so is an unknown key."""
+    with pytest.raises(ValueRefused, match=r"channel of its own, got \[1, 1\]"):
         LogHeader(sensors=(SensorEntry(1, "line"), SensorEntry(1, "line")), mono_ns=0, unix_ns=0)
-    with pytest.raises(ValueError, match="kind must be live"):
-        LogHeader(sensors=(), mono_ns=0, unix_ns=0, kind="real")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"header\.log must be 1, .*, got 2"):
+    with pytest.raises(ValueRefused, match=r"calibration: scale .*, got 0"):
+        SensorEntry(0, "line", calibration={"scale": 0.0})
+    with pytest.raises(ValueRefused, match=r"header\.log: expected 1, .*, got 2"):
         LogHeader.decode(HEADER.encode().replace(b'"log":1', b'"log":2'))
+    with pytest.raises(ValueRefused, match=r"header: .* unknown field `titel`"):
+        LogHeader.decode(HEADER.encode().replace(b'"title":', b'"titel":'))
 
 
 def test_an_event_is_told_whatever_its_facts_are() -> None:
