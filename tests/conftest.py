@@ -46,12 +46,6 @@ def _load(name: str) -> ModuleType:
 
 
 @pytest.fixture(scope="session")
-def rows_oracle() -> ModuleType:
-    """Return the reader of rows in plain Python, ``tests/rows_oracle.py``."""
-    return _load("rows_oracle")
-
-
-@pytest.fixture(scope="session")
 def hunt() -> ModuleType:
     """Return the hunt guided by coverage, ``tests/hunt.py``."""
     return _load("hunt")

@@ -13,7 +13,26 @@ __all__ = ["named", "refuse"]
 
 _TEXT = 'export time and position as text, tab separated, under a line "Time (s)<TAB>Distance (m)"'
 _AS_CSV = "save the sheet as xlsx or CSV"
-_YAML = re.compile(rb"^\s*[^\W\d][\w .]*:[ \t]*\r?\n(?:[ \t]*- +[-+.\d][-+.\deE]*[ \t]*\r?\n){3}", re.MULTILINE)
+_YAML = re.compile(
+    rb"^\s*[^\W\d][\w .]*:[ \t]*(?:\r?\n(?:[ \t]*- +[-+.\d][-+.\deE]*[ \t]*\r?\n){3}|\[(?:\s*[-+.\deE]+\s*,){3})",
+    re.MULTILINE,
+)
+_JSON = re.compile(rb"[\[{]\s*(?:[\[{(\"]|[-+.\d]+\s*,)")
+_LIST = re.compile(rb"^[ \t]*[^\W\d][\w.]*\s*=\s*(?:(?:np\.)?array\(\s*)?\[(?:\s*[-+.\deE]+\s*,){3}", re.MULTILINE)
+_TUPLES = re.compile(rb"^\((?:[-+.\deE]+, *)+[-+.\deE]*\),?[ \t]*\r?$", re.MULTILINE)
+_BARS = re.compile(rb"^[ \t]*\|.*\|[ \t]*\r?\n[ \t]*\|[-:| \t]+\|[ \t]*\r?$", re.MULTILINE)
+_OF_TEXT = 0.3
+"""The share of a text that lists must take, if they are what it holds: a program may have one somewhere."""
+
+
+def _is_json(head: bytes) -> bool:
+    return bool(_JSON.match(head.lstrip(b"\xef\xbb\xbf \r\n\t")))
+
+
+def _is_lists(head: bytes) -> bool:
+    """Tell tuples of Python a line each, or lists with names that are most of the text."""
+    listed = sum(len(line) for line in head.split(b"\n") if _LIST.match(line))
+    return bool(_TUPLES.search(head)) or listed >= max(1, _OF_TEXT * len(head))
 
 
 def _is_hdf5(head: bytes) -> bool:
@@ -21,7 +40,7 @@ def _is_hdf5(head: bytes) -> bool:
 
 
 def _is_yaml(head: bytes) -> bool:
-    """Tell YAML by numbers behind hyphens below a key; one list in line with its key is read as a table."""
+    """Tell YAML by numbers behind hyphens below a key, or by a list in line with it."""
     return bool(_YAML.search(head))
 
 
@@ -36,6 +55,9 @@ _CONTENTS = (
     ("a TDMS index", _begins(b"TDSh"), "name the .tdms file beside it"),
     ("a numpy file", _begins(b"\x93NUMPY"), 'in Python numpy.savetxt("run.csv", array, delimiter=",")'),
     ("YAML", _is_yaml, "export its lists as columns of a CSV file, times first"),
+    ("JSON", _is_json, 'in Python pandas.read_json(FILE).to_csv("run.csv", index=False)'),
+    ("lists of Python", _is_lists, 'in Python numpy.savetxt("run.csv", numpy.transpose([t, x]), delimiter=",")'),
+    ("a table of Markdown", lambda head: bool(_BARS.search(head)), "export the rows as CSV, without bars"),
     ("a page (PDF)", _begins(b"%PDF"), _TEXT),
     ("a picture", lambda head: head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"GIF8")), _TEXT),
     (

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.errors import AcquisitionError, UnknownFormat
-from acquisition.recordings.identify import inspect, sniff
+from acquisition.recordings.identify import sniff
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.runs.loading import kind_of
 
-__all__ = ["Found", "files_of", "is_description"]
+__all__ = ["Found", "files_of"]
 
 NAMED = 5  # files that a message names
 _LATER_LOG = re.compile(r"\.\d{3,}\.wire$")
@@ -149,22 +149,8 @@ def _is_recording(path: Path) -> bool:
         return True
     try:
         sniff(path)
-        return not is_description(path)
+        return True
     except UnknownFormat:
         return False
     except AcquisitionError:
         return True
-
-
-def is_description(path: Path) -> bool:
-    """Tell JSON that states no times: among recordings it describes one of them, even if there are lists in it.
-
-    Raises
-    ------
-    FormatError
-        If it cannot be read.
-    """
-    if path.suffix.lower() != ".json":
-        return False
-    surveys = inspect(path).surveys
-    return bool(surveys) and all(each.rate_hz is None for each in surveys)

@@ -15,7 +15,6 @@ from acquisition.recordings.identify import inspect, sniff
 from acquisition.recordings.parts import members
 from acquisition.recordings.questions import Missing
 from springmass.errors import ProgramError
-from springmass.runs.inputs import is_description
 from springmass.runs.loading import load
 from storage.errors import StorageError
 
@@ -96,8 +95,6 @@ def _entry(path: Path, name: str) -> Entry:
 
 
 def _asked(path: Path, name: str, asked: NeedsAnswer) -> Entry:
-    if is_description(path):
-        return Entry(name, "", error="JSON without times is no recording among others; name this file to read it")
     found = inspect(path)
     missing = tuple(each.value.replace("_", "-") for each in asked.question.missing)
     told = [each for each in found.surveys if each.samples]

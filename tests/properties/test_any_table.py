@@ -61,45 +61,13 @@ def monitor(names: Names, rows: Rows) -> list[str]:
     return [f"15:{i // 6000:02d}:{i // 100 % 60:02d}.{i % 100:02d}0 -> {line}" for i, line in enumerate(lines)]
 
 
-def labelled(names: Names, rows: Rows) -> list[str]:
-    """Write the name before each number and the unit behind."""
-    return [
-        ", ".join(f"{name}: {cell} {unit}".strip() for (name, unit), cell in zip(names, row, strict=True))
-        for row in rows
-    ]
-
-
-def objects(names: Names, rows: Rows) -> list[str]:
-    """Write an object of JSON a line."""
-    keys = [f"{name} ({unit})" if unit else name for name, unit in names]
-    return ["{" + ", ".join(f'"{key}": {x}' for key, x in zip(keys, row, strict=True)) + "}" for row in rows]
-
-
-def lists(names: Names, rows: Rows) -> list[str]:
-    """Write a list of Python a column."""
-    by_column = zip(names, zip(*rows, strict=True), strict=True)
-    return [f"{name}{f' ({unit})' if unit else ''} = [{', '.join(cells)}]" for (name, unit), cells in by_column]
-
-
-def tuples(names: Names, rows: Rows) -> list[str]:
-    """Write a tuple a line, below the names behind a comment mark."""
-    head = "# " + ", ".join(f"{name} [{unit}]" if unit else name for name, unit in names)
-    return [head, *(f"({', '.join(row)})," for row in rows)]
-
-
-def markdown(names: Names, rows: Rows) -> list[str]:
-    """Write a table of Markdown."""
-    head = [f"{name} ({unit})" if unit else name for name, unit in names]
-    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows)]
-
-
 def quoted(names: Names, rows: Rows) -> list[str]:
     """Write cells in quotes, with decimal commas between commas."""
     head = [f"{name} ({unit})" if unit else name for name, unit in names]
     return [",".join(f'"{cell.replace(".", ",")}"' for cell in row) for row in (head, *rows)]
 
 
-DRESSES = (monitor, labelled, objects, lists, tuples, markdown, quoted)
+DRESSES = (monitor, quoted)
 
 
 def write(seed: int) -> Written:

@@ -5,7 +5,6 @@ which of its columns are times. What a careless reader would get wrong:
 
 - A column is a time by its name, in a dozen languages, and only if it runs forward; or, where names say nothing
   against it, because it alone runs forward. Row numbers are no times, and a period is none.
-- Thousands may be set apart; a comma that may be of thousands or of decimals is asked about.
 - Clock times (``10:04:59.812``) count from the first; midnight may lie between them.
 - Oscilloscopes write ``Start`` and ``Increment`` above a column of row numbers.
 """
@@ -19,19 +18,16 @@ from acquisition.recordings.foreign import named
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.contents import Channel, Contents, Formula, Heading, Sheet, numbered_apart
 from acquisition.recordings.tables.finding import Found, clock_s, find_table
-from acquisition.recordings.tables.grouped import ungrouped
+from acquisition.recordings.tables.prefixed import without_prefix
 from acquisition.recordings.tables.roles import columns_of, is_aside, times_by_name, times_by_steps
 from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import Line, Text, decode, guess_delimiter, is_text, parse_number, text_of
-from acquisition.recordings.tables.wrapped import SETTINGS, begins_with_lists, unwrapped
+from acquisition.recordings.tables.text import Text, decode, is_text, parse_number, text_of
 from acquisition.recordings.units import measure_of, time_power
 
 __all__ = ["FORMAT"]
 
 _HEAD_LINES = 300
 _DAY_S = 86400.0
-_MONITOR = b" -> "
-_WRAPS = (b"[", SETTINGS.encode())  # how rows begin that are wrapped, and could be taken for a table as they stand
 _BLANKS = bytes.maketrans(b"[];", b"   ")
 
 
@@ -40,18 +36,15 @@ def _evidence(head: bytes) -> str:
         return ""
     if named("", head) is not None:
         return ""  # the one who refuses the file says what it is
-    try:
-        _, found = _find(*_plain("", Text.of(head)))
-    except FormatError as error:
-        return str(error)  # said again, with the file's name, when it is read
+    _, found = _find(Text.of(head))
     if found is None:
-        return "it holds lists of numbers with names" if begins_with_lists(decode(head)) else ""
+        return ""
     names = ", ".join(f'"{each.name}"' for each in found.headings if each.name)
     return f"numbers begin in line {found.line.number}, below {names or 'no names'}"
 
 
 def _contents(path: str, data: bytes) -> Contents:
-    text, found = _find(*_plain(path, text_of(path, data)))
+    text, found = _find(text_of(path, data))
     if found is None:
         raise FormatError(path, "expected rows of numbers, three or more alike", "check that the export ended")
     columns = columns_of(found.rows)
@@ -111,33 +104,14 @@ def _units_beside(found: Found) -> tuple[list[Heading], set[int]]:
     return headings, words
 
 
-def _plain(path: str, text: Text) -> tuple[Text, list[Line]]:
-    """Take marks of thousands out of a text, whose head's last line says what separates cells; return also its head."""
-    lines = text.head(_HEAD_LINES)
-    rows = text.data[text.start : text.stop]
-    take = ungrouped(path, rows, guess_delimiter(lines[-1].text)) if lines else None
-    if take is None or begins_with_lists(decode(rows[: 1 << 16])):  # a list's commas separate
-        return text, lines
-    rows = take(rows)
-    text = replace(text, data=text.data[: text.start] + rows + text.data[text.stop :], stop=text.start + len(rows))
-    return text, text.head(_HEAD_LINES)
-
-
-def _find(text: Text, lines: list[Line]) -> tuple[Text, Found | None]:
-    """Find the table; where rows are wrapped in words or brackets, in the text without these."""
-    wrapped = any(each in text.data[: 1 << 16] for each in (_MONITOR, b" & ")) or text.data.startswith(
-        _WRAPS, text.start
-    )
-    found = None if wrapped else find_table(lines)
-    told = None if found is not None else unwrapped(text)
-    if told is None:
-        return text, found or find_table(lines)
-    plain, headings = told
-    found = find_table(plain.head(_HEAD_LINES))
+def _find(text: Text) -> tuple[Text, Found | None]:
+    """Find the table, in the text without what stands before each row."""
+    text, headings = without_prefix(text) or (text, ())
+    found = find_table(text.head(_HEAD_LINES))
     if found is not None and len(headings) == len(found.headings):
         both = zip(headings, found.headings, strict=True)
         found = replace(found, headings=tuple(Heading(a.name or b.name, a.unit or b.unit) for a, b in both))
-    return plain, found
+    return text, found
 
 
 def _name(heading: Heading, column: int) -> str:

@@ -15,8 +15,8 @@ from acquisition.recordings.sampling.timing import check_rate
 from acquisition.recordings.tables.answers import Answers, measure, settle
 from acquisition.recordings.tables.channel import pull, sample
 from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet, channels_apart, channels_of
-from acquisition.recordings.tables.grouped import doubtful, ungrouped
 from acquisition.recordings.tables.text import head_lines, says_simulated, text_of
+from acquisition.recordings.tables.thousands import refuse_thousands
 from acquisition.source import Kind, SourceInfo
 
 __all__ = ["ColumnFormat", "headed_format"]
@@ -87,23 +87,15 @@ class ColumnFormat:
         )
 
     def _plain(self, path: str, data: bytes) -> Contents:
-        """Return what a file holds, its numbers without marks of thousands and its channels with names of their own."""
+        """Return what a file holds, without marks of thousands, its channels with names of their own."""
         contents = self.contents(path, data)
-        contents = replace(contents, channels=channels_apart(contents.channels))
         sheets = {id(each.source): each.source for each in contents.channels if isinstance(each.source, Sheet)}
-        plain, traps = {}, []
-        for key, sheet in sheets.items():
-            text, rows = sheet.text, sheet.text.data[sheet.start : sheet.stop]
-            if (take := ungrouped(path, rows, sheet.delimiter)) is not None:
-                text = replace(text, data=text.data[: sheet.start] + take(rows))
-                plain[key] = replace(sheet, text=text, stop=len(text.data))
-            elif shown := doubtful(rows, sheet.delimiter):
+        traps = []
+        for sheet in sheets.values():
+            if shown := refuse_thousands(path, sheet.text.data[sheet.start : sheet.stop], sheet.delimiter):
                 message = f'"{shown}" was read with a decimal comma: nothing in the file says that it is of thousands'
                 traps.append(Trap("decimal_comma", message))
-        if not plain and not traps:
-            return contents
-        channels = (replace(each, source=plain.get(id(each.source), each.source)) for each in contents.channels)
-        return replace(contents, channels=tuple(channels), traps=(*contents.traps, *traps))
+        return replace(contents, channels=channels_apart(contents.channels), traps=(*contents.traps, *traps))
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Tell of every channel what the file says by itself, with nothing chosen or given."""

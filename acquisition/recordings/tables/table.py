@@ -1,8 +1,8 @@
 """Rows of numbers: the one reader of cells behind every text format.
 
 Rows are read a page of whole lines at a time: :mod:`acquisition.recordings.tables.regular` reads lines alike together.
-A page that is not regular is halved until its regular rows are read together and a few others one by one. Numbers that
-lost some of their digits are told by how many the others of their column print.
+The rows of a page that is not regular are read one by one. Numbers that lost some of their digits are known by how many
+the others of their column print.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from acquisition.recordings.tables.regular import (
     I1,
     UNREAD,
     Alike,
-    read_fixed,
-    read_mixed,
+    read_regular,
     read_single,
     unified,
 )
@@ -29,10 +28,7 @@ from acquisition.recordings.tables.text import Text, parse_number
 
 __all__ = ["EMPTY", "EXPONENT", "UNREAD", "Table", "read_table"]
 
-_PAGE_BYTES = 1 << 19
-_KEPT_BYTES = 1 << 22
-_MIXED_ROWS = 512  # more rows that are not all of fixed point are halved: most of them may be
-_SINGLE_ROWS = 32  # so few are read one by one
+_PAGE_BYTES = 1 << 16
 _UNIFORM = 0.9  # a column that prints the same number of decimals in this share of its rows always does
 _SHORTER = 2
 _LINE_END = re.compile(rb"\r\n?|\n")
@@ -128,9 +124,6 @@ def read_table(
     start = text.start if start is None else start
     stop = text.stop if stop is None else stop
     data = text.data
-    # glibc keeps freed memory up to the largest block that was ever given back, and maps the rest anew for each page,
-    # which takes a quarter of the time of reading it; this block is never touched.
-    np.empty(_KEPT_BYTES, np.uint8)
     rows = _Rows(tuple(columns), delimiter, width, tuple(shifts) or (0,) * len(columns), _most(data, start, stop))
     for page in _pages(data, start, stop):
         rows.take(page)
@@ -181,22 +174,13 @@ class _Rows:
 
     def take(self, lines: bytes) -> None:
         """Read some lines."""
-        asked = self.mark, self.columns, self.width, self.shifts
-        found = read_fixed(lines, *asked)
-        if found is None:
-            lines = unified(lines, self.delimiter)
-            rows = lines.count(b"\n")
-            found = read_mixed(lines, *asked) if rows <= _MIXED_ROWS else None
+        lines = unified(lines, self.delimiter)
+        found = read_regular(lines, self.mark, self.columns, self.width, self.shifts)
         if found is not None:
             self._add(found, lines)
-        elif rows <= _SINGLE_ROWS:
-            for line in lines.decode("ascii", "replace").split("\n")[:-1]:
-                self._take_single(line)
-        else:
-            middle = len(lines) // 2
-            middle = lines.rfind(b"\n", 0, middle) + 1 or lines.find(b"\n", middle) + 1
-            self.take(lines[:middle])
-            self.take(lines[middle:])
+            return
+        for line in lines.decode("ascii", "replace").split("\n")[:-1]:
+            self._take_single(line)
 
     def _add(self, columns: list[Alike], lines: bytes) -> None:
         """Append rows that are all sound; keep the cells of the last."""
@@ -204,12 +188,8 @@ class _Rows:
         raw = np.frombuffer(lines, np.uint8)
         for k, (values, form, last) in enumerate(columns):
             self.values[k][rows], self.form[k][rows] = values, form
-            if isinstance(form, int):
-                self.counts[k, form] += values.size
-                self.padded[k, form] |= self.padded[k, form] or (raw[last] == _ZERO).any()
-            else:
-                self.counts[k] += np.bincount(form[form >= 0], minlength=2 * EXPONENT)
-                self.padded[k, form[(raw[last] == _ZERO) & (form >= 0)]] = True
+            self.counts[k] += np.bincount(form[form >= 0], minlength=2 * EXPONENT)
+            self.padded[k, form[(raw[last] == _ZERO) & (form >= 0)]] = True
         self.rows = rows.stop
         line = lines[lines.rfind(b"\n", 0, -1) + 1 : -1]
         self.last = [cell.strip(" ") for cell in line.decode("ascii", "replace").rstrip("\r").split(self.mark)]

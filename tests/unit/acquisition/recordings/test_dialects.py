@@ -38,19 +38,6 @@ DIALECTS = {
         "15:00:24.100 -> time,distance\n" + rows(MONITOR + "{ms},{x:.4f}"),
         {"unit": "m", "time_unit": "ms"},
     ),
-    "labels": (rows("t={t:.3f} x={x:.4f}"), {"unit": "m"}),
-    "labels and units": (rows("Time: {t:.3f} s, Height: {x:.4f} m"), {}),
-    "units in cells": ("t,x\n" + rows("{t:.2f} s,{x:.4f} m"), {}),
-    "objects": ("\n".join(json.dumps({"t": a, "pos": {"z (m)": b}}) for a, b in zip(T, X, strict=True)), {}),
-    "list of objects": (
-        json.dumps([{"t": a, "x": b} for a, b in zip(T.tolist(), X.tolist(), strict=True)]),
-        {"unit": "m"},
-    ),
-    "object of lists": (json.dumps({"time": T.tolist(), "x": X.tolist()}), {"unit": "m"}),
-    "lists": (f"t = {T.tolist()}\nx = np.array({X.tolist()})\n", {"unit": "m"}),
-    "tuples": (rows("({t:.3f}, {x:.4f}),"), {"unit": "m"}),
-    "markdown": ("| t (s) | x (m) |\n|---|---|\n" + rows("| {t:.3f} | {x:.4f} |"), {}),
-    "pipes": ("t|x\n" + rows("{t:.3f}|{x:.4f}"), {"unit": "m"}),
     "quoted commas": ('"Zeit (s)","Weg (m)"\n' + commas('"{t:.3f}"_"{x:.4f}"').replace("_", ","), {}),
     "times, minutes": ("Time,Height (m)\n" + rows("00:{t:05.2f},{x:.4f}"), {}),
     "words first": ("Date and Time Run 5,Time (s) Run 5,Position (m) Run 5\n" + rows("2023-10-09,{t:.3f},{x:.4f}"), {}),
@@ -96,6 +83,32 @@ def test_times_may_be_named_by_name_or_number(tmp_path: Path, answers: dict[str,
     path = tmp_path / "run.csv"
     path.write_text("x (m),t (s),n (s)\n" + rows("{x:.4f},{t:.3f},{i}") + "\n", encoding="utf-8")
     np.testing.assert_allclose(open_recording(path, channel="x", **answers).samples.t, T, atol=1e-9)
+
+
+REFUSED = {
+    "labels": (rows("t={t:.3f} x={x:.4f}"), "no format recognises it"),
+    "labels and units": (rows("Time: {t:.3f} s, Height: {x:.4f} m"), "no format recognises it"),
+    "objects": ("\n".join(json.dumps({"t": a, "x": b}) for a, b in zip(T, X, strict=True)), "JSON"),
+    "list of objects": (json.dumps([{"t": a, "x": b} for a, b in zip(T.tolist(), X.tolist(), strict=True)]), "JSON"),
+    "object of lists": (json.dumps({"time": T.tolist(), "x": X.tolist()}), "JSON"),
+    "lists of lists": (json.dumps(np.transpose([T, X]).tolist()), "JSON"),
+    "lists": (f"t = {T.tolist()}\nx = np.array({X.tolist()})\n", "lists of Python"),
+    "tuples": ("# t, x\n" + rows("({t:.3f}, {x:.4f}),"), "lists of Python"),
+    "markdown": ("| t (s) | x (m) |\n|---|---|\n" + rows("| {t:.3f} | {x:.4f} |"), "a table of Markdown"),
+    "pipes": ("t|x\n" + rows("{t:.3f}|{x:.4f}"), "no format recognises it"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_wraps_its_rows_is_refused_by_name(tmp_path: Path, name: str) -> None:
+    """One line says what the file is, and what to do."""
+    text, named = REFUSED[name]
+    path = tmp_path / "run.txt"
+    path.write_text(text + "\n", encoding="utf-8")
+    with pytest.raises(UnknownFormat) as refusal:
+        open_recording(path)
+    assert named in str(refusal.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_a_program_with_a_list_in_it_is_no_recording(tmp_path: Path) -> None:

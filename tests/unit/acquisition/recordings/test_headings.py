@@ -119,11 +119,6 @@ HEADINGS: dict[str, tuple[str, str, float, Said]] = {
     "measure": ('Messung1\n\n"Zeit";"Weg"\n"s";"m"\n' + commas("{t:.2f};{x:.4f}"), "Weg", 1.0, {}),
     "Tracker": ("masse A\t\nt\tθ\tω\n" + rows("{t:.4f}\t{x:.4f}\t{y}"), "θ", 1.0, {CH: "θ", "--unit": "rad"}),
     "Kinovea": ("Time (ms);X (cm)\n" + commas("{ms};{x}"), "X", 1e-2, {}),
-    "plotter": (
-        rows("time:{ms},distance:{x:.4f}"),
-        *("distance", 1e-2, {"--time-unit": "ms", "--unit": "cm"}),
-    ),
-    "words about the number": (rows("Distance: {x:.4f} cm"), "Distance", 1e-2, {"--rate-hz": "20"}),
     "units beside the numbers": (rows("{x:.4f} cm"), "column 1", 1e-2, {"--rate-hz": "20"}),
     "millis and underscores": ("millis\tdist_cm\n" + rows("{ms}\t{x:.4f}"), "dist", 1e-2, {"--time-unit": "ms"}),
     "micros": ("micros,dist_mm\n" + rows("{us},{x:.4f}"), "dist", 1e-3, {"--time-unit": "us"}),

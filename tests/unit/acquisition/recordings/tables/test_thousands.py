@@ -1,0 +1,66 @@
+"""Numbers whose thousands are set apart are refused; decimal commas are not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.errors import FormatError
+from acquisition.recordings.identify import open_recording
+from acquisition.recordings.tables.thousands import refuse_thousands
+
+_VALUES = 1500 + 700 * np.cos(np.arange(200) * 0.1)
+
+
+def _printed(value: float, group: str, point: str) -> str:
+    return f"{value:,.1f}".replace(",", "\0").replace(".", point).replace("\0", group)
+
+
+@pytest.mark.parametrize(
+    ("group", "point"), [(",", "."), (".", ","), (" ", ","), ("'", "."), ("\xa0", ","), ("\u202f", ",")]
+)
+@pytest.mark.parametrize("heading", ["", "t;x\n", "Zeit (s);Weg (mm)\n"])
+def test_marks_of_thousands_are_refused(tmp_path: Path, group: str, point: str, heading: str) -> None:
+    """No way to set thousands apart gives numbers, whichever family reads them."""
+    path = tmp_path / "run.csv"
+    times = [f"{i / 100:.2f}".replace(".", point) for i in range(_VALUES.size)]
+    rows = (f"{t};{_printed(x, group, point)}\n" for t, x in zip(times, _VALUES, strict=True))
+    path.write_text(heading + "".join(rows), encoding="utf-8")
+    with pytest.raises(FormatError):
+        open_recording(path, unit=None if "(" in heading else "mm")
+
+
+@pytest.mark.parametrize(
+    ("page", "mark"),
+    [
+        (b"0.01;1,500\n0.02;1,498\n", ";"),
+        (b"0,01;1.500\n0,02;1.498\n", ";"),
+        (b"950;5\n1.000;5\n", ";"),
+        (b"1;999\n2;1,001\n", ";"),
+        (b'0.01,"1,234.5"\n0.02,999.5\n', ","),
+        (b"1;1,234,567\n", ";"),
+    ],
+)
+def test_what_may_be_thousands_is_refused(page: bytes, mark: str) -> None:
+    """A number that may be a thousand times another is not guessed."""
+    with pytest.raises(FormatError):
+        refuse_thousands("a.csv", page, mark)
+
+
+@pytest.mark.parametrize(
+    "page", [b"0,01;1,500\n0,02;1,498\n", b"0.01;1.500\n", b"0.12;-8,90E-4\n0.13;1,500\n", b"1;2 3\n", b"0.5;\n"]
+)
+def test_plain_numbers_pass(page: bytes) -> None:
+    """Decimal commas, and decimal commas beside points, are no thousands."""
+    assert refuse_thousands("a.csv", page, ";") == ""
+
+
+def test_a_comma_that_may_be_either_in_all_numbers_is_decimal_and_reported(tmp_path: Path) -> None:
+    """Where semicolons separate and no other mark stands in the file."""
+    path = tmp_path / "run.csv"
+    path.write_text("".join(f"{i};1,{501 + i}\n" for i in range(40)), encoding="utf-8")
+    recording = open_recording(path, unit="m", rate_hz=20.0)
+    np.testing.assert_allclose(recording.samples.distance, 1.501 + 1e-3 * np.arange(40))
+    assert "decimal_comma" in {trap.code for trap in recording.traps}
