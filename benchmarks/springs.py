@@ -38,8 +38,9 @@ def main() -> None:
             began = time.perf_counter()
             found = compare_springs(runs, spring_mass_kg=spring)
             took_s = time.perf_counter() - began
+            k = found.spring_constant
             known = "unweighed" if spring is None else "weighed"
-            print(f"{count} runs, spring {known}: {took_s:.2f} s, exchanged {found.exchanged}, k = {found.spring_constant}")
+            print(f"{count} runs, spring {known}: {took_s:.2f} s, exchanged {found.exchanged}, k = {k}")
 
 
 if __name__ == "__main__":
