@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +23,7 @@ NEARER = 0.01  # of the tension: so much less with two runs exchanged is no chan
 SOLVED = 0.5  # of what the spring's mass was uncertain by before: what runs leave of it when they tell it
 LARGEST_SPRING = 0.6  # of the lightest bob: a spring that heavy is seen to be, and weighed
 GAUSS_NEWTON_STEPS = 30
+SUSPECTS = 8  # runs whose pairs are exchanged in turn: those farthest from what most agree on
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,8 +162,9 @@ def compare_springs(
     different masses overrule it; it takes a degree of freedom then, and two runs solve for it without testing it. The
     distances' scale is in no spring constant.
 
-    Where the runs disagree every pair is exchanged in turn, and the pair is named that brings all runs into agreement,
-    or a hundred times nearer to it: exchanged records need not agree to the last digit.
+    Where the runs disagree the eight farthest from a robust line through all are exchanged pair by pair, and the pair
+    is named that brings all runs into agreement, or a hundred times nearer to it: exchanged records need not agree to
+    the last digit.
 
     Examples
     --------
@@ -185,7 +187,7 @@ def compare_springs(
     best = fit
     if not fit.agree:
         nearest = NEARER * fit.tension
-        for i, j in itertools.combinations(range(len(runs)), 2):
+        for i, j in itertools.combinations(_suspects(runs, masses, spring_mass_kg, mass_correlation), 2):
             trial = masses.copy()
             trial[i], trial[j] = trial[j], trial[i]
             other = _fit(runs, trial, spring_mass_kg, mass_correlation, probability)
@@ -254,10 +256,62 @@ def _fit(
     probability: float,
 ) -> _Fit:
     loads = np.array([mass.value for mass in masses])
-    lightest = Scene(bob_mass_kg=Estimate(float(loads.min()), 0.0, "kg"))
-    spring = stated or unstated_spring_kg(lightest)
+    spring = _known_spring(masses, stated)
     squared = np.array([run.angular_frequency.value**2 for run in runs])
     covariance, own = _covariance(runs, masses, squared * _oscillating(spring.value, loads), mass_correlation)
+    line = _line(squared, loads, covariance, spring)
+    solved = stated is None and line.spring.u < SOLVED * spring.u
+    constant, found = line.constant, line.spring
+    if stated is None and not solved:
+        # Bobs too alike: the constant without the spring, and what it may weigh in the uncertainty.
+        of_spring = float(np.mean(line.slope)) * spring.u
+        line = _line(squared, loads, covariance, Estimate(spring.value, 0.0, "kg"))
+        constant = Estimate(line.constant.value, math.hypot(line.constant.u, of_spring), "N/m")
+        found = spring
+    chi2 = float(line.residual @ np.linalg.solve(covariance, line.residual))
+    dof = len(runs) - (2 if solved else 1)
+    if stated is not None and stated.u > 0:
+        chi2 += ((line.spring.value - stated.value) / stated.u) ** 2
+    tension = chi2 / chi2_quantile(probability, dof) if dof else 0.0
+    if solved:
+        # No spring weighs less than nothing; a heavy one is weighed by who hangs it.
+        heaviest = LARGEST_SPRING * float(loads.min())
+        away = max(-found.value, found.value - heaviest, 0.0) / max(found.u, 1e-12 * heaviest)
+        tension = max(tension, away**2 / chi2_quantile(probability, 1))
+    # A stated spring gives each run the constant that its own analysis has, one that nothing brings together none.
+    shown = stated or (found if solved and tension <= 1.0 else Estimate(0.0, 0.0, "kg"))
+    each = squared * _oscillating(shown.value, loads)
+    whole = covariance + shown.u**2 * np.outer(line.slope, line.slope)
+    variances = np.diag(whole)
+    i, j = np.triu_indices(len(runs), 1)
+    deviations = np.abs(each[i] - each[j]) / np.sqrt(variances[i] + variances[j] - 2.0 * whole[i, j])
+    return _Fit(
+        constant,
+        found,
+        solved,
+        tuple(Estimate(float(value), math.sqrt(v), "N/m") for value, v in zip(each, variances, strict=True)),
+        tuple(map(float, own)),
+        tuple(map(float, line.residual / line.u_residual)),
+        chi2,
+        dof,
+        tension,
+        float(deviations.max()),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """The weighted line through the runs: constant and spring's mass, and what it leaves of each run, N/m."""
+
+    constant: Estimate
+    spring: Estimate
+    slope: F8  # of each run's constant by the spring's mass, N/(m kg); 0 where that mass is exact
+    residual: F8
+    u_residual: F8
+
+
+def _line(squared: F8, loads: F8, covariance: F8, spring: Estimate) -> _Line:
+    """Fit constant and spring's mass by Gauss-Newton steps, with what is known of the spring as one observation."""
     known = np.diag([0.0, spring.u**-2 if spring.u > 0 else 0.0])
     s, state = spring.value, np.zeros((2, 2))
     k, slope, x = squared, squared, np.zeros(2)
@@ -278,48 +332,47 @@ def _fit(
         moved, s = abs(float(x[1]) - s), float(x[1])
         if moved <= 1e-9 * float(loads.min()):
             break
-    residual = k + slope * (x[1] - s) - x[0]
-    u_spring = math.sqrt(state[1, 1]) if spring.u > 0 else 0.0
-    solved = stated is None and u_spring < SOLVED * spring.u
-    if stated is None and not solved:
-        # Bobs too alike: the constant without the spring, and what it may weigh in the uncertainty.
-        fixed = _fit(runs, masses, Estimate(spring.value, 0.0, "kg"), mass_correlation, probability)
-        of_spring = float(np.mean(slope)) * spring.u
-        constant = Estimate(fixed.constant.value, math.hypot(fixed.constant.u, of_spring), "N/m")
-        return replace(fixed, constant=constant, spring=spring)
-    chi2 = float(residual @ np.linalg.solve(covariance, residual))
-    pull = (s - spring.value) / spring.u if spring.u > 0 else 0.0
-    dof = len(runs) - (2 if solved else 1)
-    if stated is not None:
-        chi2 += pull**2
-    tension = chi2 / chi2_quantile(probability, dof) if dof else 0.0
-    if stated is None:
-        # No spring weighs less than nothing; a heavy one is weighed by who hangs it.
-        heaviest = LARGEST_SPRING * float(loads.min())
-        away = max(-s, s - heaviest, 0.0) / max(u_spring, 1e-12 * heaviest)
-        tension = max(tension, away**2 / chi2_quantile(probability, 1))
     of_residual = np.diag(covariance - design @ state @ design.T)
-    u_residual = np.sqrt(np.maximum(of_residual, 1e-24 * np.diag(covariance)))
-    # A stated spring gives each run the constant that its own analysis has, one that nothing brings together none.
-    shown = stated or (Estimate(s, u_spring, "kg") if tension <= 1.0 else Estimate(0.0, 0.0, "kg"))
-    each = squared * _oscillating(shown.value, loads)
-    whole = covariance + shown.u**2 * np.outer(slope, slope)
-    deviations = [
-        abs(each[i] - each[j]) / math.sqrt(whole[i, i] + whole[j, j] - 2.0 * whole[i, j])
-        for i, j in itertools.combinations(range(len(runs)), 2)
-    ]
-    return _Fit(
+    return _Line(
         Estimate(float(x[0]), math.sqrt(state[0, 0]), "N/m"),
-        Estimate(s, u_spring, "kg"),
-        solved,
-        tuple(Estimate(float(value), math.sqrt(v), "N/m") for value, v in zip(each, np.diag(whole), strict=True)),
-        tuple(map(float, own)),
-        tuple(map(float, residual / u_residual)),
-        chi2,
-        dof,
-        tension,
-        float(max(deviations)),
+        Estimate(s, math.sqrt(state[1, 1]) if spring.u > 0 else 0.0, "kg"),
+        slope,
+        k + slope * (x[1] - s) - x[0],
+        np.sqrt(np.maximum(of_residual, 1e-24 * np.diag(covariance))),
     )
+
+
+def _known_spring(masses: Sequence[Estimate], stated: Estimate | None) -> Estimate:
+    """What is known of the spring before the runs are compared."""
+    lightest = min(mass.value for mass in masses)
+    return stated or unstated_spring_kg(Scene(bob_mass_kg=Estimate(lightest, 0.0, "kg")))
+
+
+def _suspects(
+    runs: Sequence[SpringRun], masses: Sequence[Estimate], stated: Estimate | None, mass_correlation: float
+) -> list[int]:
+    """Return the runs farthest from a robust line through all, in their order: soft-L1, which few outliers move little.
+
+    The line is linear in the constant and in the spring's mass, over the constants with a spring of the known mass.
+    """
+    from scipy.optimize import least_squares
+
+    if len(runs) <= SUSPECTS:
+        return list(range(len(runs)))
+    spring = _known_spring(masses, stated)
+    loads = np.array([mass.value for mass in masses])
+    squared = np.array([run.angular_frequency.value**2 for run in runs])
+    k = squared * _oscillating(spring.value, loads)
+    _, own = _covariance(runs, masses, k, mass_correlation)
+    # d k_i / d s = omega_i^2 / 3 of a light spring; counted in multiples of what the spring's mass is uncertain by.
+    slope = squared * spring.u / 3.0
+
+    def pulls(x: F8) -> F8:
+        return np.asarray((k + slope * x[1] - x[0]) / own)
+
+    start = np.array([float(np.median(k)), 0.0])
+    line = least_squares(pulls, start, x_scale="jac" if spring.u > 0 else np.array([start[0], 1.0]), loss="soft_l1").x
+    return sorted(np.argsort(-np.abs(pulls(line)), kind="stable")[:SUSPECTS].tolist())
 
 
 def _oscillating(spring_kg: float, loads: F8) -> F8:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +25,7 @@ from pipeline.motion.waveform import Rest
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.robust import mad_sigma
 from pipeline.oscillation.demodulate import Demodulated
+from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, estimate_of, function_of, joint_of
 from pipeline.results.checks.finding import Misfit
@@ -34,12 +36,6 @@ from pipeline.track import F8, UNUSABLE, Quality
 __all__ = ["Derived", "Params", "derive"]
 
 # Powers of length and of one over time in the unit of a law's parameter.
-_INTEGRALS = {
-    "m/s": ("displacement_amplitude", "m", 1),
-    "m/s^2": ("displacement_amplitude", "m", 2),
-    "rad/s": ("angle_amplitude", "rad", 1),
-}
-"""Of records of a derivative: what its integral is called, its unit, and of which order the derivative is."""
 _DIMENSIONS = {"A0": (1, 0), "gamma": (0, 1), "beta": (-1, 1), "mu": (1, 1)}
 
 
@@ -216,10 +212,127 @@ def derive(
     .. [1] JCGM 100:2008, "Guide to the expression of uncertainty in measurement".
     .. [2] K. Lelas, R. Pezer, arXiv:2502.07458.
     """
-    params = params or Params()
     inputs = Inputs()
-    ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
     laws = _Laws(damping, inputs, demodulated)
+    unit = rest.mean.unit
+    params = params or Params()
+    terms, coefficients = _terms(
+        demodulated, damping, phase, rest, scene, effects, instrument, params, misfits, smoothing, laws, inputs
+    )
+    found: dict[str, tuple[Any, str]] = {}
+    parts: dict[str, tuple[Any, str]] = {}
+    for formula in _FORMULAS:
+        if formula.requires <= terms.keys():
+            x = terms[formula.name] = formula.expression(**{name: terms[name] for name in formula.requires})
+            of_run = found if formula.name in QUANTITIES else parts
+            of_run[formula.name] = x, formula.unit_in(unit)
+    budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
+    return Derived(
+        estimates={name: budgets[name].estimate for name in found},
+        coefficients={name: budgets[name].estimate for name in coefficients},
+        budgets=budgets,
+        laws=laws.weighted,
+        parts=parts,
+    )
+
+
+@dataclass(frozen=True)
+class _Formula:
+    """One row of the table: a quantity, and how it is calculated from terms.
+
+    Parameters
+    ----------
+    name : str
+        Of an estimate in :data:`pipeline.registry.quantities.QUANTITIES`, or of one of :attr:`Derived.parts`.
+    expression : callable
+        Its parameters name the terms that it requires, those of :func:`_terms` and rows above; where one is missing,
+        the quantity is left out.
+    units : mapping of str to str
+        By the record's unit, where the registry does not say.
+    """
+
+    name: str
+    expression: Callable[..., Any]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def requires(self) -> frozenset[str]:
+        return frozenset(inspect.signature(self.expression).parameters)
+
+    def unit_in(self, record_unit: str) -> str:
+        return self.units[record_unit] if record_unit in self.units else QUANTITIES[self.name].unit_in(record_unit)
+
+
+_RECORDED = ("m", "m/s", "m/s^2", "rad", "rad/s", "N", "V", "1")
+_KILOGRAMS = dict.fromkeys(_RECORDED, "kg")
+_FORMULAS = (
+    _Formula("period", lambda omega: 2 * math.pi / omega),
+    _Formula("frequency", lambda omega: omega / (2 * math.pi)),
+    _Formula("angular_frequency", lambda omega: omega),
+    _Formula("amplitude", lambda start: start),
+    _Formula("offset", lambda rest: rest),
+    _Formula("phase", lambda start_phase: start_phase),
+    _Formula("noise", lambda sample_noise: sample_noise),
+    _Formula("damping_rate", lambda lam: lam),
+    _Formula(
+        "displacement_amplitude",
+        lambda start, omega, lam, length_order: start / (omega**2 + lam**2) ** (0.5 * length_order),
+    ),
+    _Formula(
+        "angle_amplitude",
+        lambda start, omega, lam, angle_order: start / (omega**2 + lam**2) ** (0.5 * angle_order),
+    ),
+    _Formula(
+        "velocity_rms",
+        lambda omega, lengths, root_mean_square, per_value: omega * lengths * root_mean_square * per_value,
+        {"rad": "rad/s", "rad/s": "rad/s"},
+    ),
+    _Formula("quality_factor", lambda omega, decay: 0.5 * omega / decay),
+    _Formula("displacement", lambda displacement: displacement, {"m": "", "m/s": "s", "m/s^2": "s^2"}),
+    _Formula(
+        "half_stiffness",
+        lambda omega, scale, gain, displacement, energy_mass: (
+            0.5 * (omega * scale / gain * displacement) ** 2 * energy_mass
+        ),
+        {"m": "N/m", "m/s": "J s^2/m^2", "m/s^2": "J s^4/m^2"},
+    ),
+    _Formula("mass", lambda mass: mass, _KILOGRAMS),
+    _Formula("own_mass", lambda own_mass: own_mass, _KILOGRAMS),
+    _Formula("spring_constant", lambda natural, sprung_mass: natural * sprung_mass),
+    _Formula(
+        "keulegan_carpenter_number",
+        lambda displacement_amplitude, diameter: 2 * math.pi * displacement_amplitude / diameter,
+    ),
+    _Formula(
+        "reynolds_number",
+        lambda density, velocity_rms, diameter, viscosity: density * velocity_rms * diameter / viscosity,
+    ),
+    _Formula(
+        "drag_length",
+        lambda drag_per_beta, rate, scale, gain: drag_per_beta * rate / scale * gain,
+        {unit: unit for unit in _RECORDED},
+    ),
+    _Formula("drag_coefficient", lambda drag_per_beta, beta: drag_per_beta * beta),
+)
+"""Everything calculated from terms, in the order of calculation: one more estimate is one more row."""
+
+
+def _terms(
+    demodulated: Demodulated,
+    damping: Damping,
+    phase: PhaseFit,
+    rest: Rest,
+    scene: Scene,
+    effects: tuple[Effect, ...],
+    instrument: Instrument,
+    params: Params,
+    misfits: tuple[Misfit, ...],
+    smoothing: SensorFilter | None,
+    laws: _Laws,
+    inputs: Inputs,
+) -> tuple[dict[str, Any], dict[str, tuple[Any, str]]]:
+    """What the formulas calculate with, by name, without what record and scene do not give; and the coefficients."""
+    ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
     amiss = _Amiss(misfits, inputs)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
     unit = rest.mean.unit
@@ -240,58 +353,51 @@ def derive(
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B")
     offset = inputs.add("rest_position", rest.mean, "A", free) * scale
     noise = inputs.add("noise", _noise(demodulated, unit), "A", demodulated.residual.size - 3.0 * windows)
-    found: dict[str, tuple[Any, str]] = {
-        "period": (2 * math.pi / omega, "s"),
-        "frequency": (omega / (2 * math.pi), "Hz"),
-        "angular_frequency": (omega, "rad/s"),
-        "amplitude": (start, unit),
-        "offset": (offset + zero + amiss["offset"], unit),
-        "phase": (_start_phase(phase, slope, inputs, free) + amiss["phase"] + filtered.delay, "rad"),
-        "noise": (noise, unit),
-        "damping_rate": (lam, "1/s"),
-    }
-    if unit in _INTEGRALS:
-        name, own, order = _INTEGRALS[unit]
-        found[name] = (start / (omega**2 + lam**2) ** (0.5 * order), own)
-    if (per_value := {"rad": 1.0, "rad/s": natural**-0.5}.get(unit, displacement)) is not None:
-        v_rms = omega * lengths * laws.root_mean_square * per_value
-        found["velocity_rms"] = (v_rms, "rad/s" if unit.startswith("rad") else "m/s")
-    if laws.values[1] > 0:
-        found["quality_factor"] = (0.5 * omega / lam, "")
     coefficients = _coefficients(laws, rates, lengths)
-    diameter = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
+    diameter: Any = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
-    parts: dict[str, tuple[Any, str]] = {}
-    if displacement is not None:
-        parts["displacement"] = displacement, {"m": "", "m/s": "s"}.get(unit, "s^2")
-        energy = 0.5 * (omega * scale / filtered.gain * displacement) ** 2 * (1.0 if mass is None else mass)
-        parts["half_stiffness"] = energy, {"m": "N/m", "m/s": "J s^2/m^2"}.get(unit, "J s^4/m^2")
-    for name, x in (("mass", mass), ("own_mass", own)):
-        if x is not None:
-            parts[name] = x, "kg"
+    # Of which order the record is the derivative of a length or of an angle.
+    length_order, angle_order = {"m/s": 1, "m/s^2": 2}.get(unit), {"rad/s": 1}.get(unit)
+    in_air = ambient.known and diameter is not None and displacement is not None
+    drag_per_beta = None
+    if in_air and mass is not None:
+        # C over beta; the area, the mass and the density are in it once.
+        drag_per_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
     # An angle may be a pendulum's, whose bob hangs from no spring unless the scene has one.
-    if mass is not None and (not unit.startswith("rad") or scene.spring_mass_kg is not None):
-        found["spring_constant"] = (natural * mass, "N/m")
-    if diameter is not None and displacement is not None:
-        length = start if unit == "m" else found["displacement_amplitude"][0]
-        found["keulegan_carpenter_number"] = (2 * math.pi * length / diameter, "")
-        if ambient.known:
-            found["reynolds_number"] = (ambient.density * v_rms * diameter / ambient.viscosity(), "")
-        if ambient.known and mass is not None:
-            # C over beta; the area, the mass and the density are in it once.
-            over_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
-            parts["drag_length"] = over_beta * rate / scale * filtered.gain, unit
-            if damping.settled and damping.best.drag_term("beta") is not None:
-                found["drag_coefficient"] = (over_beta * coefficients["beta"][0], "")
-    budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
-    return Derived(
-        estimates={name: budgets[name].estimate for name in found},
-        coefficients={name: budgets[name].estimate for name in coefficients},
-        budgets=budgets,
-        laws=laws.weighted,
-        parts=parts,
-    )
+    sprung = not unit.startswith("rad") or scene.spring_mass_kg is not None
+    quadratic = damping.settled and damping.best.drag_term("beta") is not None
+    terms = {
+        "omega": omega,
+        "natural": natural,
+        "rate": rate,
+        "scale": scale,
+        "gain": filtered.gain,
+        "lengths": lengths,
+        "start": start,
+        "rest": offset + zero + amiss["offset"],
+        "start_phase": _start_phase(phase, slope, inputs, free) + amiss["phase"] + filtered.delay,
+        "sample_noise": noise,
+        "lam": lam,
+        "decay": lam if laws.values[1] > 0 else None,
+        "root_mean_square": laws.root_mean_square,
+        "displacement": displacement,
+        "per_value": {"rad": 1.0, "rad/s": natural**-0.5}.get(unit, displacement),
+        "length_order": length_order,
+        "angle_order": angle_order,
+        # Of a length the amplitude itself, which is not stated twice.
+        "displacement_amplitude": start if unit == "m" else None,
+        "mass": mass,
+        "energy_mass": 1.0 if mass is None else mass,
+        "own_mass": own,
+        "sprung_mass": mass if sprung else None,
+        "diameter": diameter if displacement is not None else None,
+        "density": ambient.density if in_air else None,
+        "viscosity": ambient.viscosity() if in_air else None,
+        "drag_per_beta": drag_per_beta,
+        "beta": coefficients["beta"][0] if quadratic and drag_per_beta is not None else None,
+    }
+    return {name: x for name, x in terms.items() if x is not None}, coefficients
 
 
 class _Amiss:
