@@ -14,6 +14,7 @@ from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import chi2_quantile
+from pipeline.numerics.threads import one_thread
 from pipeline.results.derive import Derived
 from pipeline.track import F8
 
@@ -123,6 +124,7 @@ class Comparison:
     message: str
 
 
+@one_thread
 def compare_springs(
     runs: Sequence[SpringRun],
     *,
