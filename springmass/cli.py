@@ -87,7 +87,9 @@ class _Parser(argparse.ArgumentParser):
                 message += f"; did you mean {near[0]}?"
         elif message.endswith("required: COMMAND"):
             message = "which command? springmass --help lists them, springmass demo shows what comes of them"
-        super().error(message)
+        from acquisition.errors import visible  # not at the top: `--help` has nothing to show
+
+        super().error(visible(message))
 
 
 def _formatter(prog: str) -> argparse.HelpFormatter:

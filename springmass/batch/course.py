@@ -78,8 +78,12 @@ class Course:
 
     def files(self) -> list[str]:
         """Return the files that it names without a pattern, those of its own folder where they are relative."""
-        named = [os.path.join(self.path.parent, text) for text, _ in self.rows if not _is_pattern(text)]
+        named = [os.path.join(self.path.parent, text) for text, _ in self.rows if not self.is_pattern(text)]
         return list(dict.fromkeys(named))
+
+    def is_pattern(self, text: str) -> bool:
+        """Return whether a row's path is a pattern: with a mark of one, and not the name of a file, ``run [1].txt``."""
+        return any(mark in text for mark in "*?[") and not os.path.exists(os.path.join(self.path.parent, text))
 
 
 def template(paths: Sequence[str]) -> str:
@@ -205,7 +209,7 @@ def join(course: Course, found: Sequence[Found]) -> tuple[list[tuple[Found, Said
     exact: dict[str, list[Said]] = {}
     patterns: list[tuple[str, Said]] = []
     for text, said in course.rows:
-        if _is_pattern(text):
+        if course.is_pattern(text):
             patterns.append((text, said))
         else:
             exact.setdefault(os.path.abspath(os.path.join(course.path.parent, text)), []).append(said)
@@ -249,10 +253,6 @@ def _together(course: Course, path: str, rows: Sequence[Said]) -> Said:
 def _over(under: Said, said: Said) -> Said:
     merged = {f.name: {**getattr(under, f.name), **getattr(said, f.name)} for f in fields(Said)[1:4]}
     return Said(said.scene_file or under.scene_file, **merged, line=under.line or said.line)
-
-
-def _is_pattern(text: str) -> bool:
-    return any(mark in text for mark in "*?[")
 
 
 def _matches(whole: str, pattern: str, here: str) -> bool:

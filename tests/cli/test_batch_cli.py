@@ -297,3 +297,21 @@ def test_a_damaged_part_costs_its_runs_alone(runs, cli):
     assert "1 lines of parts are damaged" in done.err
     assert "5 unchanged, 1 analysed" in done.err
     assert contents(Path("out")) == before
+
+
+def test_a_file_with_brackets_in_its_name_is_a_file_and_no_pattern(runs, cli):
+    """The template names it, and the filled-in table finds it."""
+    (runs / "run000.txt").rename(runs / "run [1].txt")
+    Path("runs.csv").write_text("path,bob_mass_kg\nruns/run [1].txt,0.2\n", encoding="utf-8")
+    done = cli("batch", "--runs", "runs.csv", "-o", "out", "--jobs", "1", *QUICK)
+    assert done.code == 0
+    (row,) = rows("out")
+    assert row["path"].endswith("run [1].txt")
+    assert row["bob_mass_kg"] == "0.2"
+
+
+def test_a_mistyped_option_reaches_the_terminal_escaped(runs, cli):
+    """What somebody pasted steers no terminal."""
+    done = cli("batch", runs, "--jobs", "1\x1b[2J")
+    assert done.code == 2
+    assert "\x1b" not in done.err
