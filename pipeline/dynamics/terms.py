@@ -33,12 +33,15 @@ class Term:
         Whether the equation that is solved holds it.
     why : str
         One sentence.
+    in_scene : bool
+        Whether the scene has it at all.
     """
 
     name: str
     size: float
     included: bool
     why: str
+    in_scene: bool = True
 
 
 def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Problem, tuple[Term, ...]]:
@@ -71,7 +74,8 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
     terms = []
     for name in _COEFFICIENTS:
         size = min(sizes.get(name, 0.0), 1.0)
-        terms.append(Term(name, size, name in kept, _why(name in sizes, name in kept, size, tolerance)))
+        why = _why(name in sizes, name in kept, size, tolerance)
+        terms.append(Term(name, size, name in kept, why, name in sizes))
     if len(kept) == len(sizes):
         return problem, tuple(terms)
     eq = problem.equation

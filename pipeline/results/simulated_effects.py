@@ -18,7 +18,7 @@ from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.dynamics.amplitude import amplitude
 from pipeline.dynamics.problem import Problem
-from pipeline.dynamics.terms import Term
+from pipeline.dynamics.terms import Term, required
 from pipeline.results.effects import Effect
 
 __all__ = ["simulated_effects"]
@@ -154,8 +154,6 @@ def _bob(scene: Scene, problem: Problem, seconds: float, drag: DerivedDrag | Non
 
 def _terms(problem: Problem, terms: Sequence[Term], seconds: float, drag: DerivedDrag | None) -> Iterator[Effect]:
     if not terms:
-        from pipeline.dynamics.terms import required
-
         _, found = required(problem, seconds, 1.0)
         terms = [
             replace(term, included=True, why="a method by name solves all terms") if term.size > 0.0 else term
@@ -163,7 +161,7 @@ def _terms(problem: Problem, terms: Sequence[Term], seconds: float, drag: Derive
         ]
     for term in terms:
         why = term.why
-        if why == "the scene has none":
+        if not term.in_scene:
             why = f"the scene has no {_NAMES[term.name]}"
         elif drag is not None and term.name in ("viscous_drag", "quadratic_drag"):
             why += "; the coefficient is the derived one"
