@@ -95,17 +95,17 @@ def test_the_folder_of_sample_data_can_be_analysed(cli: Cli) -> None:
     assert "damped_simulated.truth.json" in done.err
     listed = {row["file"]: row for row in cli("formats", sample_data(), "--json").results}
     assert listed["damped_simulated.truth.json"]["family"] == ""
-    assert "times" in listed["damped_simulated.truth.json"]["error"]
+    assert "JSON" in listed["damped_simulated.truth.json"]["error"]
 
 
-def test_json_with_times_is_a_recording_in_a_folder(cli: Cli, tmp_path: Path) -> None:
-    """Only JSON that states no times describes others."""
-    t = np.arange(1200) / 50
-    x = 0.2 + 0.05 * np.cos(8.3 * t) + np.random.default_rng(1).normal(0, 1e-4, t.size)
-    folder = tmp_path / "runs"
-    folder.mkdir()
-    lists = {"time (s)": t.round(2).tolist(), "height (m)": x.round(5).tolist()}
-    (folder / "run.json").write_text(json.dumps(lists), encoding="utf-8")
-    (folder / "run.truth.json").write_text(json.dumps({"rows": list(range(500))}), encoding="utf-8")
-    done = cli("analyse", folder, "--json")
-    assert (done.code, len(done.results)) == (0, 1)
+def test_json_next_to_a_recording_is_another_file(cli: Cli, table: Path) -> None:
+    """JSON is no recording, with times in it neither: it is listed, and by itself refused with a way to export it."""
+    other = table.with_name("run.json")
+    other.write_text(json.dumps({"time (s)": [0.0, 0.1, 0.2], "height (m)": [0.2, 0.3, 0.2]}), encoding="utf-8")
+    answers = ("--channel", "y", "--unit", "m", "--json")
+    done = cli("analyse", table.parent, *answers)
+    assert "run.json" in done.err
+    assert len(done.results) == 1
+    alone = cli("analyse", other, "--json")
+    assert alone.code == 3
+    assert "JSON" in alone.complaint
