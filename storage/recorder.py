@@ -23,7 +23,7 @@ from acquisition.readings import Read
 from storage.errors import WriteFailed, one_line
 from storage.wire_log.appending import Item, LogFile, WireLogWriter, open_log_file
 from storage.wire_log.held_log import HeldLog
-from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, event_payload
+from storage.wire_log.records import HEAD_BYTES, HIGHEST_CHANNEL, Kind, LogHeader, event_payload
 from storage.wire_log.scanning import LogContents, read_log
 
 __all__ = ["Recorder", "RecorderStatus"]
@@ -282,8 +282,8 @@ class Recorder:
 
     def _offer(self, kind: Kind, records: Sequence[Read]) -> None:
         for channel, _, _ in records:
-            if not 0 <= channel <= 255:
-                raise ValueError(f"a channel must lie in 0 to 255, got {channel}")
+            if not 0 <= channel <= HIGHEST_CHANNEL:
+                raise ValueError(f"a channel must lie in 0 to {HIGHEST_CHANNEL}, got {channel}")
         with self._lock:
             open_ = self._error is None and not self._closing
             rung = self._waiting
@@ -349,7 +349,7 @@ class Recorder:
         with self._lock:
             self._error = self._error or error
             left += self._queue
-            self._queue = []
+            self._queue, self._taken = [], []  # counted here, and not again by give_up
             self._queued_bytes = 0
             self._dropped_records += len(left)
             self._dropped_bytes += sum(len(payload) for *_, payload in left)

@@ -30,6 +30,8 @@ JOIN_NS = 1_000_000_000
 """Stamps of so long on either side of a lost port tie the clocks: a burst behind it is over then."""
 MOST_HELD = 1 << 15
 """So many readings are held for that at most: a log's stamps may stand still."""
+RATE_READINGS = 1 << 16
+"""Of so many the rate of the clock is fitted then, eleven minutes at 100 Hz: the reading thread waits meanwhile."""
 AGREE_S = 0.01
 """A counter that is no further from the host's clock, whose uncertain rate comes on top, has gone on."""
 MISSING, GAP_BEFORE = np.uint8(Flag.MISSING), np.uint8(Flag.GAP_BEFORE)
@@ -173,7 +175,7 @@ class SensorChain:
         before_t, before_ns = self._clock.columns()
         if t is None or not before_t.size:
             return
-        clock = fit_clock(before_t, before_ns)
+        clock = fit_clock(before_t[-RATE_READINGS:], before_ns[-RATE_READINGS:])
         u_ppm = min(clock.u_rate_error_ppm, self.clock_ppm)
         # A rate error within three of its uncertainties would only carry these over the gap: 2.2 of them, in a second
         # on a busy machine, once made 19 ms.

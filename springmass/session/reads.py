@@ -22,6 +22,7 @@ from acquisition.readings import Read, Reading
 from springmass.session.failures import Failures
 from springmass.session.sensors import Back, Proof, Sensor
 from storage.recorder import Recorder
+from storage.wire_log.records import HIGHEST_CHANNEL
 
 __all__ = ["Tee"]
 
@@ -120,9 +121,13 @@ class Tee:
                 self.gone[channel] = str(facts.get("why", ""))
             elif kind == "reopened":
                 self.gone.pop(channel, None)
+                if self._kept is not None:
+                    # A run that is about to begin holds nothing from before: whether it was this sensor nobody noted.
+                    self._kept = deque(read for read in self._kept if read[0] != self._channels[channel])
                 if self._sensors and "sensor" not in facts:
                     facts = {**facts, "sensor": self._sensors[channel].judged(None, None)}
-                if facts.get("sensor") == Back.ANOTHER and self._recorder is not None and not self._preview:
+                more = self._recorder is not None and not self._preview and len(self._chains) <= HIGHEST_CHANNEL
+                if facts.get("sensor") == Back.ANOTHER and self._recorder is not None and more:
                     self._go_on(self._recorder, channel, host_ns, facts)
                     return
             channel = self._channels[channel]

@@ -89,9 +89,11 @@ class Proof:
         """Which sensor it is, once that is proven."""
         if self._named:
             return {"sensor": Back.IDENTIFIED}
-        if self._identity is None and Told.by(self._decoder).identity is not None:
-            return {"sensor": Back.ANOTHER, "why": "it says what it is, and the one before did not"}
-        return {"sensor": self._judged(self._last)}
+        judged, said = self._judged(self._last), Told.by(self._decoder).identity
+        # The serial number of its adapter outweighs what it says; without a name all of a family say the same.
+        if judged is not Back.IDENTIFIED and self._identity is None and said is not None and said.name:
+            return {"sensor": Back.ANOTHER, "why": "it says its name, and the one before had none"}
+        return {"sensor": judged}
 
     def feed(self, host_ns: int, data: bytes) -> bool | None:
         """Take the bytes of one read; return whether it is the sensor, None while that is open."""

@@ -101,18 +101,23 @@ def recover(
     out = contents.path if out_path is None else Path(out_path)
     paths = _paths(out, known.sensors, sensors)
     runs: dict[Path, RecoveredRun] = {}
+    taken: list[Path] = []
     for sensor, path in zip(sensors, paths, strict=True):
         if not overwrite and os.path.lexists(path):
             stood = _standing(path, sensor, contents) if speed_of_sound_m_per_s is None else None
             if stood is None:
-                demand = "a new run file was to be written, but a file stands there"
-                raise RunExists(path, demand, "choose another name or allow overwriting")
-            runs[path] = stood
-    missing = [(sensor, path) for sensor, path in zip(sensors, paths, strict=True) if path not in runs]
+                taken.append(path)
+            else:
+                runs[path] = stood
+    if paths[0] in taken:
+        raise _exists(paths[0])
+    missing = [(sensor, path) for sensor, path in zip(sensors, paths, strict=True) if path not in (*runs, *taken)]
     for start in range(0, len(missing), AT_ONCE):
         for run in _build(contents, known, notes, missing[start : start + AT_ONCE], provenance or {}, overwrite):
             _demand_held(run.path, contents)
             runs[run.path] = run
+    if taken:  # the others are there by then
+        raise _exists(taken[0])
     return RecoverReport(
         contents.path,
         tuple(runs[path] for path in paths),
@@ -162,6 +167,11 @@ def _paths(out: Path, header: Sequence[SensorEntry], sensors: Sequence[SensorEnt
     (single,) = run_paths(out, [0])
     parts = [_of_channel(single, sensor.channel) for sensor in sensors[len(header) :]]
     return run_paths(out, [sensor.channel for sensor in header]) + parts
+
+
+def _exists(path: Path) -> RunExists:
+    demand = "a new run file was to be written, but a file stands there"
+    return RunExists(path, demand, "choose another name or allow overwriting")
 
 
 def _demand_finished(contents: LogContents) -> None:

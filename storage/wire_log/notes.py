@@ -8,7 +8,7 @@ from typing import Any
 
 from storage.schema import demand_calibration
 from storage.wire_log.log_header import event_content
-from storage.wire_log.records import Kind, Record
+from storage.wire_log.records import HIGHEST_CHANNEL, Kind, Record
 
 __all__ = ["Notes"]
 
@@ -58,6 +58,11 @@ class Notes:
                 self.calibrations[record.channel] = content["facts"]
             elif content["kind"] == "continues" and isinstance(of := content["facts"].get("of"), int):
                 self.parts.setdefault(record.channel, of)
+            elif content["kind"] == "replaced":
+                # The same link as "continues" states, where that record is damaged.
+                part = content["facts"].get("channel")
+                if isinstance(part, int) and 0 <= part <= HIGHEST_CHANNEL and part != record.channel:
+                    self.parts.setdefault(part, record.channel)
         elif record.kind is Kind.MARK:
             content = {"text": record.text()}
         else:

@@ -39,6 +39,7 @@ from storage.wire_log.log_header import LATEST_NS, LONGEST_TEXT, LogHeader, Sens
 
 __all__ = [
     "HEAD_BYTES",
+    "HIGHEST_CHANNEL",
     "MAGIC",
     "MAX_PAYLOAD",
     "Kind",
@@ -52,6 +53,9 @@ __all__ = [
     "frames",
     "unframe",
 ]
+
+HIGHEST_CHANNEL = 255
+"""A record has one byte for its channel."""
 
 MAGIC = b"\xf5\xa9"
 MAX_PAYLOAD = 65535

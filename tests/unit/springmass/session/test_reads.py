@@ -232,3 +232,20 @@ def test_a_sensor_of_which_no_byte_tells_is_taken_for_the_same_and_noted() -> No
         log = started(tee, [chain()], 0)
         tee.event(0, 0, "reopened", {})
         assert json.loads(log.events[0].split(maxsplit=3)[3]) == {"sensor": noted}
+
+
+def test_a_run_that_a_trigger_begins_holds_nothing_from_before_a_replug() -> None:
+    """The port came back while the trigger waited: what was kept from before may be another sensor's, and goes."""
+    sensor = Sensor(get_family("line-protocol"), cast(Transport, SimpleNamespace(name="/dev/x", identified=False)))
+    tee, log, new = Tee([chain()], Failures()), Log(), chain()
+    tee.line(0, [sensor])
+    tee.keep()
+    tee.reads([(0, i * STEP_NS, frame(i)) for i in range(100)])
+    tee.event(0, 101 * STEP_NS, "lost", {"why": "unplugged"})
+    tee.event(0, 150 * STEP_NS, "reopened", {"sensor": "another", "gap_s": 0.5})
+    after = [(0, i * STEP_NS, frame(100_000 + i)) for i in range(150, 300)]
+    tee.reads(after)
+    tee.start(cast(Recorder, log), [new], 0)
+    assert log.taken == after
+    (found,) = (block for _, block in tee.blocks())
+    assert np.ptp(found.t) == pytest.approx(149 * STEP_NS * 1e-9, abs=0.01)

@@ -478,3 +478,38 @@ def test_a_log_of_an_earlier_version_is_timed_rightly_where_a_counter_leapt(tmp_
         assert "counter_changed" in {trap.code for trap in made.traps}
     np.testing.assert_allclose(t - t[0], 0.01 * np.arange(600) + 3.0 * (np.arange(600) >= 300), atol=1e-3)
     assert [gap["lost"] for gap in run.decoding["gaps"]] == [0]
+
+
+def replaced(path: Path) -> Path:
+    """Write a log in which another sensor comes back on the port and goes on in channel 1."""
+    recorder = Recorder(path, HEADER, VirtualClock())
+    recorder.reads([(0, stamp, data) for stamp, data in wire(200)])
+    last = wire(200)[-1][0]
+    recorder.event(0, last + 10**6, "lost", {"port": "x", "why": "unplugged"})
+    recorder.event(0, last + 10**9, "replaced", {"port": "x", "gap_s": 1.0, "channel": 1})
+    recorder.event(1, last + 10**9, "continues", {"port": "x", "gap_s": 1.0, "of": 0})
+    recorder.reads([(1, last + 10**9 + stamp, data) for stamp, data in wire(400, 1)])
+    recorder.close()
+    return path
+
+
+def test_a_file_in_the_way_of_a_further_part_leaves_the_first_its_run_file(tmp_path: Path) -> None:
+    """The run file of the port is built, and the one line names the file that stands there."""
+    log = replaced(tmp_path / "run.wire")
+    (tmp_path / "run.1.h5").write_bytes(b"somebody else's")
+    with pytest.raises(RunExists, match=r"run\.1\.h5"):
+        recover(log)
+    assert (tmp_path / "run.1.h5").read_bytes() == b"somebody else's"
+    with open_run(tmp_path / "run.h5") as run:
+        assert len(run.samples()) > 100
+
+
+def test_one_damaged_record_hides_no_further_part(tmp_path: Path) -> None:
+    """Both events state that the recording goes on in another channel: either is enough."""
+    log = replaced(tmp_path / "run.wire")
+    data = bytearray(log.read_bytes())
+    data[data.index(b'"continues"') + 2] ^= 1
+    log.write_bytes(data)
+    report = recover(log)
+    assert [run.path.name for run in report.runs] == ["run.h5", "run.1.h5"]
+    assert report.main.path.name == "run.1.h5"
