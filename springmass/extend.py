@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     from acquisition.decoders.lines import LineSplitter
     from acquisition.decoders.replies import ReplyForm
     from acquisition.decoders.sum_frames import SumFrames, with_sum
-    from acquisition.errors import FormatError, SensorError
+    from acquisition.errors import FormatError, NeedsAnswer, SensorError
     from acquisition.readings import Reading, Readings
     from acquisition.recordings.base import Format, SurveyFormat
     from acquisition.recordings.families.declared import dialect
+    from acquisition.recordings.questions import Missing, Need, Question
     from acquisition.recordings.recording import Original, Recording, Trap
     from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Formula, Sheet
     from acquisition.recordings.tables.sheet import ColumnFormat
@@ -59,10 +60,14 @@ __all__ = [
     "Integrator",
     "Law",
     "LineSplitter",
+    "Missing",
+    "Need",
+    "NeedsAnswer",
     "OneStep",
     "Original",
     "Poll",
     "Problem",
+    "Question",
     "Reading",
     "Readings",
     "Recording",
@@ -91,10 +96,11 @@ _WHERE = {
     "acquisition.decoders.lines": ("LineSplitter",),
     "acquisition.decoders.replies": ("ReplyForm",),
     "acquisition.decoders.sum_frames": ("SumFrames", "with_sum"),
-    "acquisition.errors": ("FormatError", "SensorError"),
+    "acquisition.errors": ("FormatError", "NeedsAnswer", "SensorError"),
     "acquisition.readings": ("Reading", "Readings"),
     "acquisition.recordings.base": ("Format", "SurveyFormat"),
     "acquisition.recordings.families.declared": ("dialect",),
+    "acquisition.recordings.questions": ("Missing", "Need", "Question"),
     "acquisition.recordings.recording": ("Original", "Recording", "Trap"),
     "acquisition.recordings.tables.contents": ("Arrays", "Channel", "Contents", "Formula", "Sheet"),
     "acquisition.recordings.tables.sheet": ("ColumnFormat",),

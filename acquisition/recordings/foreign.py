@@ -17,6 +17,7 @@ _YAML = re.compile(
     rb"^\s*[^\W\d][\w .]*:[ \t]*(?:\r?\n(?:[ \t]*- +[-+.\d][-+.\deE]*[ \t]*\r?\n){3}|\[(?:\s*[-+.\deE]+\s*,){3})",
     re.MULTILINE,
 )
+_YAML_LINE = re.compile(rb"[ \t]*(?:- +[-+.\d]|[^\W\d][\w .]*:[ \t]*\[[-+.\d])")
 _JSON = re.compile(rb"[\[{]\s*(?:[\[{(\"]|[-+.\d]+\s*,)")
 _LIST = re.compile(rb"^[ \t]*[^\W\d][\w.]*\s*=\s*(?:(?:np\.)?array\(\s*)?\[(?:\s*[-+.\deE]+\s*,){3}", re.MULTILINE)
 _TUPLES = re.compile(rb"^\((?:[-+.\deE]+, *)+[-+.\deE]*\),?[ \t]*\r?$", re.MULTILINE)
@@ -40,8 +41,9 @@ def _is_hdf5(head: bytes) -> bool:
 
 
 def _is_yaml(head: bytes) -> bool:
-    """Tell YAML by numbers behind hyphens below a key, or by a list in line with it."""
-    return bool(_YAML.search(head))
+    """Tell YAML by numbers behind hyphens below a key, or by a list in line with it, that are most of the text."""
+    listed = sum(len(line) for line in head.split(b"\n") if _YAML_LINE.match(line))
+    return bool(_YAML.search(head)) and listed >= max(1, _OF_TEXT * len(head))
 
 
 def _begins(with_bytes: bytes) -> Callable[[bytes], bool]:

@@ -181,6 +181,9 @@ def _work(task: _Task) -> _Done:
     """Analyse one of several inputs, and write its report; a defect met on one does not keep the others from theirs."""
     try:
         return _analyse_and_report(task)
+    except MemoryError:
+        why = "more memory was demanded than there is; end other programs, or raise the limit"
+        return _Done(task.name, UNREADABLE, (f"{task.found.path}: {why}",))
     except Exception as error:
         return _Done(task.name, INTERNAL, (f"{task.found.path}: {internal_error(error)}",))
 
@@ -235,7 +238,8 @@ def _words(task: _Task) -> list[str] | None:
     if task.options.input == [task.found.path]:
         return None
     velocity = () if task.found.velocity is None else ("--velocity", task.found.velocity)
-    return ["springmass", "analyse", task.found.path, *velocity]
+    path = task.found.path
+    return ["springmass", "analyse", f"./{path}" if path.startswith("-") else path, *velocity]
 
 
 def _remembered(loaded: Loaded, scene: Scene | None) -> Path | None:

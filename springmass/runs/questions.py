@@ -79,6 +79,10 @@ def for_command(question: Question, words: Sequence[str], given: Mapping[str, ob
     'springmass convert run.csv run.h5 --channel theta --unit rad'
     """
     kept = as_options(_without(given, question))
+    if "--" in words:
+        # Options follow, so a file's name that begins with a minus is written as one that does not.
+        at = list(words).index("--")
+        words = [*words[:at], *(f"./{word}" if word.startswith("-") else word for word in words[at + 1 :])]
     return " ".join(each for each in (*map(quoted, words), kept, _asked_as_options(question)) if each)
 
 

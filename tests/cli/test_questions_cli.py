@@ -109,3 +109,14 @@ def test_json_next_to_a_recording_is_another_file(cli: Cli, table: Path) -> None
     alone = cli("analyse", other, "--json")
     assert alone.code == 3
     assert "JSON" in alone.complaint
+
+
+def test_a_name_that_begins_with_a_minus_is_suggested_so_that_it_works(
+    cli: Cli, table: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Options follow the name, so it cannot stand behind the two hyphens any more."""
+    monkeypatch.chdir(table.parent)
+    table.rename("-run.csv")
+    asked = cli("analyse", "--no-report", "--", "-run.csv").complaint
+    words = shlex.split(asked[asked.index("springmass analyse") :])
+    assert cli(*words[1:]).code == 0

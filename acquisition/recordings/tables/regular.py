@@ -126,10 +126,11 @@ def read_single(cell: str, shift: int) -> tuple[float, int]:
 def _shifted(values: F8, form: NDArray[np.int64], shift: int) -> F8:
     """Return numbers of fixed point times a power of ten, rounded once from their digits; NaN for all others."""
     places = np.clip(form, 0, _TENS.size - 1)
-    whole = np.rint(values * _TENS[places])
     power = form - shift
     near = np.minimum(np.abs(power), _TENS.size - 1)
-    scaled = np.where(power >= 0, whole / _TENS[near], whole * _TENS[near])
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not exact, and left out below
+        whole = np.rint(values * _TENS[places])
+        scaled = np.where(power >= 0, whole / _TENS[near], whole * _TENS[near])
     exact = (form >= 0) & (form < _TENS.size) & (np.abs(power) < _TENS.size) & (np.abs(whole) < _MOST_WHOLE)
     return np.where(exact, scaled, np.nan)
 

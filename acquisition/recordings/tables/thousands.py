@@ -57,7 +57,11 @@ def refuse_thousands(path: str, rows: bytes, mark: str) -> str:
     """
     points, commas = b"." in rows, b"," in rows and (mark != "," or b'"' in rows)
     blanks = bool(mark) and _BLANKS.search(rows) is not None
-    alone = [each for each, there in ((b".", points), (b",", commas)) if there and not _DECIMAL[each].search(rows)]
+    # Where commas separate the cells, only those within quotes are marks of a number.
+    marked = {b".": rows, b",": b"\n".join(re.findall(rb'"[^"]*"', rows)) if mark == "," else rows}
+    alone = [
+        each for each, there in ((b".", points), (b",", commas)) if there and not _DECIMAL[each].search(marked[each])
+    ]
     if not alone and not blanks and not (points and commas):
         return ""
     lines = rows.splitlines()
