@@ -15,6 +15,7 @@ from springmass import __version__
 from springmass.errors import (
     INTERNAL,
     INTERRUPTED,
+    NO_MEMORY,
     OK,
     SENSOR,
     SOME_FAILED,
@@ -130,7 +131,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         complain(f"{error}; this installation is not whole, springmass doctor says what is wrong with it")
         return SOME_FAILED
     except MemoryError:
-        complain("more memory was demanded than there is; end other programs, or raise the limit")
+        complain(NO_MEMORY)
         return UNREADABLE
     except BrokenPipeError:
         # The reader of our output went away (`| head`): nothing is left to say, not even at exit.

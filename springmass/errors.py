@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "INTERNAL",
     "INTERRUPTED",
+    "NO_MEMORY",
     "OK",
     "REJECTED",
     "SENSOR",
@@ -44,6 +45,9 @@ __all__ = [
 _quiet = False
 _verbose = False
 OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 4, 5, 70, 130
+
+
+NO_MEMORY = "there is not enough memory; end other programs, or raise the limit"
 
 
 class ProgramError(Exception):

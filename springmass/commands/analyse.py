@@ -24,6 +24,7 @@ from pipeline.numerics.estimate import Estimate
 from springmass.commands import completions, worded_for
 from springmass.errors import (
     INTERNAL,
+    NO_MEMORY,
     OK,
     REJECTED,
     SOME_FAILED,
@@ -182,8 +183,7 @@ def _work(task: _Task) -> _Done:
     try:
         return _analyse_and_report(task)
     except MemoryError:
-        why = "more memory was demanded than there is; end other programs, or raise the limit"
-        return _Done(task.name, UNREADABLE, (f"{task.found.path}: {why}",))
+        return _Done(task.name, UNREADABLE, (f"{task.found.path}: {NO_MEMORY}",))
     except Exception as error:
         return _Done(task.name, INTERNAL, (f"{task.found.path}: {internal_error(error)}",))
 

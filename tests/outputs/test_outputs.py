@@ -45,7 +45,9 @@ def test_one_of_each_class_in_every_output(tmp_path: Path) -> None:
         chosen = list(subjects(tmp_path))[: None if name == "special" else 1]
         if name == "recording" and not RECORDINGS.is_dir():
             continue
-        count, outputs = _played(iter(chosen), tmp_path / name) if (tmp_path / name).mkdir() is None else (0, 0)
+        folder = tmp_path / name
+        folder.mkdir()
+        count, outputs = _played(iter(chosen), folder)
         assert outputs >= 10 * count
 
 
