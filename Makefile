@@ -12,7 +12,7 @@ help:
 	@echo "make test     the tests, in two processes (WORKERS=n for others; make trials: thousands of seeds)"
 	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
 	@echo "make bench    speed, as ratios to named references"
-	@echo "make lint     ruff, mypy, import contracts"
+	@echo "make lint     ruff, mypy, import contracts, spelling, wording"
 	@echo "make firmware the rangefinder's hex, as it travels in the package (Debian: gcc-avr avr-libc arduino-core-avr)"
 	@echo "make docs     the pages and the reference of the Python API as a site, docs/_build/index.html"
 
@@ -32,7 +32,7 @@ $(VENV)/.installed-dev: pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@ $(VENV)/.installed
 
 demo: $(VENV)/.installed
-	$(BIN)/springmass demo --out demo-output
+	$(BIN)/springmass demo -o demo-output
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -m "not trials" -n $(WORKERS) --dist loadfile
@@ -55,6 +55,8 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	git ls-files -z | xargs -0 $(BIN)/codespell
+	$(BIN)/python .ci/wording.py
 
 docs: $(VENV)/.installed-dev
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build

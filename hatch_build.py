@@ -15,6 +15,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 MOVED = ("acquisition", "pipeline", "storage")
+RECORDINGS = "sample_data"  # but for the program that generates them
 
 _NAMES = "|".join(MOVED)
 # An import of a whole package, and a dotted name anywhere: in an import, a lazy registry's string, a docstring.
@@ -36,9 +37,9 @@ class WheelHook(BuildHookInterface):
             return
         self._folder = TemporaryDirectory(prefix="springmass-wheel-")
         root = Path(self.root)
-        for name in (*MOVED, "springmass"):
+        for name in (*MOVED, "springmass", RECORDINGS):
             for path in sorted((root / name).rglob("*")):
-                if path.is_dir() or "__pycache__" in path.parts:
+                if path.is_dir() or "__pycache__" in path.parts or (name == RECORDINGS and path.suffix == ".py"):
                     continue
                 inside = path.relative_to(root).as_posix()
                 target = inside if name == "springmass" else f"springmass/{inside}"

@@ -1,4 +1,4 @@
-"""A block of consecutive samples: what every source delivers and everything else consumes."""
+"""A block of consecutive samples: every source delivers blocks, and all other code takes them."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ UNITS = {
     "voltage": "V",
     "number": "1",
 }
-"""What a sample may be of, and the one SI unit that it is then in. `pipeline.track.UNITS` is the same table."""
+"""The quantities that a sample may have, each with its SI unit. `pipeline.track.UNITS` is the same table."""
 
 
 class Flag(enum.IntFlag):
-    """Why a sample may not be taken at face value; a sample carries the sum of its bits.
+    """Why a sample may not be taken at face value. The flags of a sample are the sum of these bits.
 
     The values are part of the run file (CF ``flag_masks``) and never change.
     """
@@ -55,21 +55,20 @@ class Block:
     t : (n,) float64, s
         Sensor time since the start of the run.
     distance : (n,) float64, m
-        Distance from the sensor; NaN where unmeasured.
+        Distance from the sensor; NaN if unmeasured.
     flags : (n,) uint8
         Sums of :class:`Flag` bits.
     host_ns : (n,) int64, ns, or None
-        Host clock at which each sample arrived; None where no host was there (an old file).
+        Host time at which each sample arrived; None for a recording, which has no host time.
     velocity : (n,) float64, m/s, or None
-        Velocity as the recording states it, where it states one; NaN where it does not.
+        Velocity as stated in the recording; NaN for samples without one.
     quantity, unit : str
-        What ``distance`` holds, of :data:`UNITS`; every source of today gives a length in metres. A velocity is per
-        second of the same unit.
+        Quantity and unit of ``distance``, from :data:`UNITS`. The velocity is in this unit per second.
 
     Raises
     ------
     ValueError
-        If the quantity is not of the table, or in another unit.
+        If the quantity is not in the table, or has another unit.
     """
 
     first: int
@@ -84,7 +83,7 @@ class Block:
     def __post_init__(self) -> None:
         if UNITS.get(self.quantity) != self.unit:
             known = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
-            raise ValueError(f"a block holds one of {known}, got {self.quantity} in {self.unit}; convert to SI first")
+            raise ValueError(f"expected one of {known}, got {self.quantity} in {self.unit}; convert to SI first")
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -93,7 +92,7 @@ class Block:
         """Return the samples of a slice (step 1) as a block of views."""
         start, stop, step = rows.indices(len(self))
         if step != 1:
-            raise ValueError(f"a block is sliced with step 1, got step {step}; index its arrays instead")
+            raise ValueError(f"expected a slice of step 1, got step {step}; index the arrays of the block instead")
         cut = slice(start, stop)
         return Block(
             self.first + start,
@@ -108,22 +107,22 @@ class Block:
 
 
 def concatenate(blocks: Iterable[Block]) -> Block:
-    """Join blocks in the order given into one.
+    """Join blocks into one, in the given order.
 
-    A column that some blocks lack is filled there: velocity with NaN, host time with -1. No block at all
-    gives an empty one.
+    If some blocks lack a column it is filled there: velocity with NaN, host time with -1. Without blocks the result is
+    empty.
 
     Raises
     ------
     ValueError
-        If they are not of one quantity.
+        If their quantities differ.
     """
     parts = list(blocks)
     if not parts:
         empty = np.empty(0)
         return Block(0, empty, empty, np.empty(0, np.uint8))
     if len(quantities := {b.quantity for b in parts}) > 1:
-        raise ValueError(f"blocks of one quantity are joined, got {', '.join(sorted(quantities))}; keep them apart")
+        raise ValueError(f"expected blocks of one quantity, got {', '.join(sorted(quantities))}; join them separately")
     host = velocity = None
     if any(b.host_ns is not None for b in parts):
         host = np.concatenate([b.host_ns if b.host_ns is not None else np.full(len(b), -1) for b in parts])

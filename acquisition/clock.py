@@ -1,4 +1,4 @@
-"""Time, injected: the one module of the three packages that touches the system clock."""
+"""Clocks that are passed as arguments. Of the three packages only this module reads the system clock."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ class Clock(Protocol):
         ...
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Return when :meth:`now_ns` has reached ``deadline_ns``; at once if it has passed."""
+        """Wait until :meth:`now_ns` reaches ``deadline_ns``; do not wait if it has passed."""
         ...
 
 
 class SystemClock:
     """The machine's monotonic clock.
 
-    Deadlines are absolute, so that errors of single waits do not add up: 500 waits of 10 ms drifted 132 ms
-    with relative sleeps and 0.15 ms with deadlines.
+    Deadlines are absolute, so that the errors of single waits do not add up: 500 waits of 10 ms drifted by 132 ms
+    with relative sleeps and by 0.15 ms with deadlines.
     """
 
     def now_ns(self) -> int:
@@ -32,15 +32,15 @@ class SystemClock:
         return time.monotonic_ns()
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Sleep until the deadline, again after an early return."""
-        while (left := deadline_ns - time.monotonic_ns()) > 0:
-            time.sleep(left * 1e-9)
+        """Sleep until the deadline, and sleep again after an early wake-up."""
+        while (remaining_ns := deadline_ns - time.monotonic_ns()) > 0:
+            time.sleep(remaining_ns * 1e-9)
 
 
 class VirtualClock:
-    """A clock that never waits: asked to sleep, it is already there.
+    """A clock that never waits: a sleep only advances its time.
 
-    It gives replay as fast as possible, and tests two minutes in no time.
+    It allows replays at full speed and tests of long runs that take no time.
     """
 
     def __init__(self, start_ns: int = 0) -> None:
@@ -51,5 +51,5 @@ class VirtualClock:
         return self._now_ns
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Advance to the deadline, never back."""
+        """Advance to the deadline, never backward."""
         self._now_ns = max(self._now_ns, deadline_ns)

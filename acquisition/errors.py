@@ -5,13 +5,13 @@
     AcquisitionError
     |-- FormatError          a recording cannot be read        springmass exits with 3
     |   |-- UnknownFormat    no family recognises the content
-    |   `-- NeedsAnswer      the file leaves something out that must not be guessed (rate, unit, channel)
-    |-- SourceError          a source failed while it was delivering
-    |-- SensorError          a family of rangefinders that is not known, or an option it does not take
+    |   `-- NeedsAnswer      the file lacks something that must not be guessed (rate, unit, channel)
+    |-- SourceError          a source failed during delivery
+    |-- SensorError          an unknown family of rangefinders, or an option that it does not have
     |-- PortError            a port that cannot be opened: absent, busy, no permission   springmass exits with 4
-    `-- CalibrationError     numbers that calibrate nothing
+    `-- CalibrationError     numbers that cannot be a calibration
 
-Every message is one line: what was demanded, what was got, where, and what to do.
+Every message is one line: ``where: what is wrong, got VALUE; what to do``.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ __all__ = [
 
 
 def visible(text: str) -> str:
-    """Return a text on one line with nothing hidden in it: what would steer a terminal or a page stands as an escape.
+    """Return a text on one line, with an escape for each character that a terminal or a page would not print.
 
-    Titles, names and units come out of files. An escape sequence among them could clear the screen or print a line of
-    its own, and a mark of direction turn a name around.
+    Titles, names and units come from files. An escape sequence in them could clear the screen or fake a line, and a
+    direction mark could reverse a name.
 
     Examples
     --------
@@ -51,12 +51,12 @@ def visible(text: str) -> str:
 
 
 def _escaped(character: str) -> str:
-    # Blanks that are not the plain one hide nothing, and hold a number and its unit together.
+    # Other blanks are harmless and occur between a number and its unit.
     return character if unicodedata.category(character) == "Zs" else character.encode("unicode_escape").decode()
 
 
 class AcquisitionError(Exception):
-    """Anything that acquisition refuses; its text is a single line meant for the user."""
+    """Base class of the errors of acquisition. The message is one line for the user."""
 
 
 class FormatError(AcquisitionError):
@@ -66,38 +66,38 @@ class FormatError(AcquisitionError):
     ----------
     path : str
         The file.
-    demand : str
-        What was expected there and what was found instead.
+    problem : str
+        What is wrong: what was expected and what was found.
     remedy : str
         What the user can do.
     line : int, optional
-        One-based line of the offence.
+        One-based line of the fault.
     """
 
-    def __init__(self, path: str, demand: str, remedy: str, *, line: int | None = None) -> None:
-        self.path, self.demand, self.remedy, self.line = path, demand, remedy, line
+    def __init__(self, path: str, problem: str, remedy: str, *, line: int | None = None) -> None:
+        self.path, self.problem, self.remedy, self.line = path, problem, remedy, line
         where = path if line is None else f"{path}, line {line}"
-        said = f"{demand} {remedy}" if demand.endswith("?") else f"{demand}; {remedy}"
-        # Names and units come out of the file, line ends and all. The path is the user's own and stays as it is.
-        super().__init__(f"{where}: {visible(said)}")
+        text = f"{problem} {remedy}" if problem.endswith("?") else f"{problem}; {remedy}"
+        # Names and units come from the file and may contain line ends. The path comes from the user and stays as it is.
+        super().__init__(f"{where}: {visible(text)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(type(self), self.path, self.demand, self.remedy, line=self.line), (), self.__dict__
+        return partial(type(self), self.path, self.problem, self.remedy, line=self.line), (), self.__dict__
 
 
 class UnknownFormat(FormatError):
-    """No family of recordings recognises the file's content."""
+    """No family of recordings recognises the content of the file."""
 
 
 class NeedsAnswer(FormatError):
-    """The file lacks something that is never guessed: the user must name it.
+    """The file lacks something that is never guessed, so the user must state it.
 
     Parameters
     ----------
     question : Question
-        What is missing, and every answer that can be given, as data.
+        What is missing, and every possible answer, as data.
     remedy : str, optional
-        How the user gives the answer, where somebody knows; left out, the question's own neutral words.
+        How the user gives the answer; by default the neutral wording of the question.
     line : int, optional
         One-based line that shows what is missing.
     """
@@ -107,7 +107,7 @@ class NeedsAnswer(FormatError):
         self.question = question
 
     def with_remedy(self, remedy: str) -> NeedsAnswer:
-        """Return the same question with how the user answers it."""
+        """Return the same question with another remedy."""
         return NeedsAnswer(self.question, remedy, line=self.line)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -115,16 +115,16 @@ class NeedsAnswer(FormatError):
 
 
 class SourceError(AcquisitionError):
-    """A source failed while it was delivering; what came before it stands."""
+    """A source failed during delivery; the blocks before are valid."""
 
 
 class SensorError(AcquisitionError):
-    """A family of rangefinders that is not known, or an option that it does not take."""
+    """An unknown family of rangefinders, or an option that it does not have."""
 
 
 class PortError(AcquisitionError):
-    """A port that cannot be opened, or that does not carry what was expected."""
+    """A port that cannot be opened, or that does not deliver the expected data."""
 
 
 class CalibrationError(AcquisitionError):
-    """Numbers that calibrate nothing: too few distances, a bob that moves, a ruler in the wrong unit."""
+    """Numbers that cannot be a calibration: too few distances, a bob that moves, a ruler in the wrong unit."""

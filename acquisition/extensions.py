@@ -1,4 +1,4 @@
-"""What other packages add by entry points: recordings' formats and sensors' families alike."""
+"""Extensions from other packages by entry points: formats of recordings and families of sensors."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ __all__ = ["entry_points_of", "load_entry"]
 
 @cache
 def entry_points_of(group: str) -> dict[str, EntryPoint]:
-    """Return the entry points of a group by name; looked for once a process."""
-    from importlib.metadata import entry_points  # costs more than all the rest of the registries
+    """Return the entry points of a group by name; the result is cached for the process."""
+    from importlib.metadata import entry_points  # its import takes longer than all other code of the registries
 
     return {entry.name: entry for entry in entry_points(group=group)}
 
 
 def load_entry(
-    entry: EntryPoint, what: str, refused: type[AcquisitionError], checked: Callable[[Any], Any] = lambda found: found
+    entry: EntryPoint, what: str, refused: type[AcquisitionError], checked: Callable[[Any], Any] = lambda loaded: loaded
 ) -> Any:
-    """Return what an entry point names, as ``checked`` takes it.
+    """Load an entry point and return the result of ``checked`` for it.
 
     Raises
     ------
     refused
-        If it cannot be loaded or is not what it should be, whatever is raised; one line.
+        For any exception while it is loaded or checked; one line.
     """
     try:
         return checked(entry.load())
@@ -38,5 +38,5 @@ def load_entry(
         reason = " ".join(str(error).split())
         raise refused(
             f"{what} ({entry.value}): cannot be loaded ({type(error).__name__}: {reason}); "
-            "repair or remove the package that brings it"
+            "repair or remove the package that provides it"
         ) from error

@@ -1,4 +1,4 @@
-"""Files opened for reading: regular ones alone, at once or not at all."""
+"""Open files for reading: regular files only, and without waiting."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ _OTHERS = (
 def open_regular(path: str | os.PathLike[str]) -> FileIO:
     """Open a regular file for reading, unbuffered.
 
-    Opening a pipe that nobody writes to waits for ever, and reading a terminal or a device waits or never ends. So what
-    it is is asked first, and again of what was opened, which does not wait either.
+    Opening a pipe without a writer waits for ever, and reading a terminal or a device may never end. So the kind of
+    file is checked before it is opened and again afterwards, and opening does not wait.
 
     Raises
     ------
     OSError
-        If it is no regular file or cannot be opened; ``strerror`` says why in a few words.
+        If it is not a regular file or cannot be opened; ``strerror`` gives the reason in a few words.
 
     Examples
     --------
     >>> open_regular("/dev/null")
     Traceback (most recent call last):
-    OSError: [Errno 22] a regular file was demanded, got a device: '/dev/null'
+    OSError: [Errno 22] expected a regular file, got a device: '/dev/null'
     """
     _demand_regular(path, os.stat(path).st_mode)
     return open(path, "rb", buffering=0, opener=_open)
 
 
 def open_regular_text(path: str | os.PathLike[str], encoding: str, *, newline: str | None = None) -> TextIOWrapper:
-    """Open a regular file of text for reading, as :func:`open` does and :func:`open_regular` refuses."""
+    """Open a regular text file for reading, with the checks of :func:`open_regular`."""
     return TextIOWrapper(BufferedReader(open_regular(path)), encoding, newline=newline)
 
 
 def read_regular(path: str | os.PathLike[str]) -> bytes:
-    """Return what a regular file holds, as :func:`open_regular` opens it."""
+    """Return the content of a regular file; see :func:`open_regular`."""
     with open_regular(path) as file:
         return file.readall() or b""
 
@@ -63,4 +63,4 @@ def _open(path: str, flags: int) -> int:
 def _demand_regular(path: str | os.PathLike[str], mode: int) -> None:
     if not stat.S_ISREG(mode):
         got = next((word for holds, word in _OTHERS if holds(mode)), "something else")
-        raise OSError(errno.EINVAL, f"a regular file was demanded, got a {got}", os.fspath(path))
+        raise OSError(errno.EINVAL, f"expected a regular file, got a {got}", os.fspath(path))

@@ -1,7 +1,7 @@
-"""A recording played again through the interface of a live source.
+"""Replay a recording through the interface of a live source.
 
-Time is kept as in rosbag2: the clock is injected, and a snapshot (clock time, record time) is taken anew
-whenever play pauses or jumps. Between snapshots every deadline is absolute, so nothing drifts.
+Time is kept as in rosbag2: the clock is an argument, and a new snapshot (clock time, recording time) is taken
+whenever the replay pauses or jumps. Between snapshots every deadline is absolute, so nothing drifts.
 """
 
 from __future__ import annotations
@@ -20,39 +20,38 @@ from acquisition.source import SourceInfo
 
 __all__ = ["Replay"]
 
-_LONGEST_SLEEP_NS = 50_000_000  # how long a jump or a pause may take to be noticed
+_LONGEST_SLEEP_NS = 50_000_000  # the longest delay until a jump or a pause takes effect
 
 
 class Replay:
-    """Blocks delivered at the pace at which they were recorded, or at another.
+    """Delivers blocks at the speed at which they were recorded, or at another.
 
     Parameters
     ----------
     blocks : iterable of Block
         A whole run, in order.
     clock : Clock
-        Waits between blocks; with a :class:`acquisition.clock.VirtualClock` two minutes take no time.
+        Waits between blocks; a :class:`acquisition.clock.VirtualClock` does not wait.
     info : SourceInfo
         Of the recording; ``kind`` becomes "replay", but simulated data stay "simulated".
     speed : float or None
-        Record seconds per clock second; None or infinity never waits.
+        Seconds of the recording per second of the clock; None or infinity never waits.
     block_samples : int
-        Most samples in a block.
+        Largest number of samples in a block.
     loop : bool
-        Whether to begin again after the end.
+        Whether to start again after the end.
 
     Notes
     -----
-    A block is due when its last sample is, as from a port. Whatever the speed, ``t``, ``distance`` and
-    ``velocity`` are those recorded, bit for bit, and so are ``flags`` within the first segment.
+    A block is due when its last sample is due, as from a port. At any speed ``t``, ``distance`` and ``velocity`` are
+    as recorded, bit for bit, and so are ``flags`` within the first segment.
 
-    A seek during play and each turn of a loop begin a new *segment*: ``segment`` counts it, ``t`` is again
-    the record's own time and so may run back, ``first`` goes on counting samples delivered, and the first
-    sample carries ``GAP_BEFORE``. A consumer that keeps state resets it there.
+    A seek during the replay and each turn of a loop begin a new *segment*. ``segment`` counts them, ``t`` is the time
+    of the recording and so may jump back, ``first`` continues to count delivered samples, and the first sample has
+    the flag ``GAP_BEFORE``. A consumer with a state must reset it there.
 
-    Control methods may be called from any thread, in particular while another one iterates. One thread
-    iterates at a time; a second iteration goes on where the first one stopped. Entering the ``with`` again
-    after it was left rewinds.
+    Control methods may be called from any thread, even while another one iterates. One thread iterates at a time; a
+    second iteration continues where the first one stopped. Entering the ``with`` again rewinds.
 
     Examples
     --------
@@ -81,7 +80,7 @@ class Replay:
             raise ValueError(f"speed must be positive, or None to never wait, got {speed!r}")
         self.info = info if info.kind == "simulated" else replace(info, kind="replay")
         self._run = concatenate(blocks)
-        # Times that run back are due at once, and so are unknown ones: nothing waits for the past.
+        # Times that jump back and unknown times are due immediately.
         known = self._run.t[np.isfinite(self._run.t)]
         self._due = np.fmax.accumulate(np.concatenate([known[:1], self._run.t]))[known[:1].size :]
         if not known.size:
@@ -101,7 +100,7 @@ class Replay:
         self._cut = False
         self._steps = 0
         self._closed = False
-        self._reference: tuple[int, float] | None = None  # clock ns, record s; None until play begins
+        self._reference: tuple[int, float] | None = None  # clock ns, recording s; None until the replay begins
 
     def __enter__(self) -> Self:
         """Open; rewind if it was closed."""
@@ -122,29 +121,29 @@ class Replay:
 
     @property
     def segment(self) -> int:
-        """How many seeks and turns of the loop came before the block delivered last."""
+        """Number of seeks and loop turns before the block that was delivered last."""
         return self._segment
 
     @property
     def paused(self) -> bool:
-        """Whether play stands still."""
+        """Whether the replay is paused."""
         return self._paused
 
     @property
     def position_s(self) -> float:
-        """Record time that play has reached, s."""
+        """Current time of the recording, s."""
         with self._changed:
             return self._position()
 
     def pause(self) -> None:
-        """Stand still until :meth:`resume`; what has not been delivered waits."""
+        """Pause until :meth:`resume`."""
         with self._changed:
             if not self._paused:
                 self._move_reference(self._position())
                 self._paused = True
 
     def resume(self) -> None:
-        """Go on from where play stands."""
+        """Continue after a pause."""
         with self._changed:
             if self._paused:
                 self._move_reference(self._position())
@@ -152,7 +151,7 @@ class Replay:
                 self._changed.notify_all()
 
     def step(self, n: int = 1) -> None:
-        """Deliver the next ``n`` samples at once and stand still again; only while paused.
+        """Deliver the next ``n`` samples immediately and pause again; only while paused.
 
         Raises
         ------
@@ -166,7 +165,7 @@ class Replay:
             self._changed.notify_all()
 
     def seek(self, t_s: float) -> None:
-        """Go to the first sample at or after a record time, s; past the end, to the end.
+        """Go to the first sample at or after a time of the recording, s; beyond the last sample, to the end.
 
         Raises
         ------
@@ -183,7 +182,7 @@ class Replay:
             self._move_reference(float(min(max(t_s, start), end)))
 
     def __iter__(self) -> Iterator[Block]:
-        """Yield the blocks that are left, each when it is due; play begins at the first ``next``."""
+        """Yield the remaining blocks, each when it is due; the replay begins at the first ``next``."""
         with self._changed:
             self._reference = None
         while (block := self._take()) is not None:
@@ -206,11 +205,11 @@ class Replay:
                 deadline_ns, now_ns = self._deadline_ns(stop - 1), self._clock.now_ns()
                 if now_ns >= deadline_ns:
                     return self._deliver(stop)
-            # In slices, so that a control call is noticed soon.
+            # Wait in slices, so that a control call takes effect soon.
             self._clock.sleep_until_ns(min(deadline_ns, now_ns + _LONGEST_SLEEP_NS))
 
     def _find_next(self) -> bool:
-        """Tell whether a sample is left; a loop goes back to the first, as a new segment."""
+        """Return whether a sample remains; a loop returns to the first one in a new segment."""
         size = len(self._run)
         if self._next < size:
             return True
@@ -219,7 +218,7 @@ class Replay:
         self._next = 0
         self._cut = self._delivered > 0
         if self._reference is not None and not self._paused:
-            # The first sample comes one period after the last one was due, not after it was consumed.
+            # The first sample is due one period after the due time of the last, not after it was consumed.
             reference_ns, reference_s = self._reference
             lasted = self._due[-1] - reference_s + 1.0 / self.info.rate_hz
             self._reference = reference_ns + round(lasted / self._speed * 1e9), float(self._due[0])
@@ -241,7 +240,7 @@ class Replay:
         return block
 
     def _deadline_ns(self, row: int) -> int:
-        """Return the clock time at which a sample is due; at infinite speed that of the reference."""
+        """Return the clock time at which a sample is due; at infinite speed the time of the reference."""
         reference_ns, reference_s = self._reference or self._take_reference(float(self._due[self._next]))
         return reference_ns + round((float(self._due[row]) - reference_s) / self._speed * 1e9)
 
@@ -254,12 +253,12 @@ class Replay:
         if self._paused:
             return reference_s
         played = (self._clock.now_ns() - reference_ns) * 1e-9 * self._speed
-        # Play never runs ahead of what is still to be delivered.
+        # The position is never ahead of the next block to deliver.
         ahead = self._due[min(self._next, len(self._run) - 1)] + 1.0 / self.info.rate_hz * self._block_samples
         return float(min(reference_s + played, ahead, self._due[-1]))
 
     def _move_reference(self, position_s: float) -> None:
-        if self._reference is not None:  # before play begins there is nothing to move
+        if self._reference is not None:  # there is none before the replay begins
             self._take_reference(position_s)
 
     def _take_reference(self, position_s: float) -> tuple[int, float]:

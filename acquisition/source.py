@@ -1,4 +1,4 @@
-"""What delivers samples: a live port, a replayed recording and a simulation look alike from here on."""
+"""The common interface of everything that delivers samples: a live port, a replayed recording, a simulation."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ class SourceInfo:
     Parameters
     ----------
     kind : {"live", "replay", "simulated"}
-        Travels with the data: simulated data cannot pass for measured.
+        It stays with the data, so that simulated data cannot pass for measured.
     name : str
         Port, file or scene.
     rate_hz : float
         Samples per second, Hz.
     sigma_m : float or None
-        Standard deviation of a distance, m, where the source knows it.
+        Standard deviation of a distance, m, if the source knows it.
     quantum_m : float or None
-        Smallest step of a distance, m (a timer's tick or the last printed digit), where known.
+        Smallest step of a distance, m (a timer's tick or the last printed digit), if known.
     clock : {"nominal", "device", "host"}
-        Where sample times come from; "nominal" are row numbers over the rate, not measured times.
+        Origin of the sample times; "nominal" times are row numbers divided by the rate, not measured times.
     stated_error_m : float or None
-        The error that the recording itself states for a distance, m. It need not be the noise.
+        The error of a distance that the recording states, m. It need not be the noise.
     """
 
     kind: Kind
@@ -48,8 +48,8 @@ class SourceInfo:
 class Source(Protocol):
     """An iterator of blocks inside a ``with``.
 
-    Iteration ends where the source ends. A fault raises :class:`acquisition.errors.SourceError`; ``None`` is
-    never delivered.
+    Iteration ends with the source. A fault raises :class:`acquisition.errors.SourceError`; ``None`` is never
+    delivered.
     """
 
     @property

@@ -2,7 +2,7 @@
 
 A session records through its own threads, log and live analysis; only the clock and the port are simulated. The port
 advances the clock by a tenth of a second whenever the session has nothing more to do, and sends what a sensor would
-have sent by then, so that a day takes minutes. The log is then recovered by a process of its own, which says what it
+have sent by then, so that a day takes minutes. The log is then recovered by a separate process, which says what it
 took: time by the clock and by the processor, and the peak of its memory (VmHWM).
 """
 
@@ -23,6 +23,7 @@ from pathlib import Path
 
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
+from springmass.session.options import RunLimits, RunListeners
 from springmass.session.session import Progress, Sensor, Session
 from storage.recovery.recover import recover
 from storage.wire_log.scanning import read_log
@@ -132,7 +133,7 @@ class Cost:
 
 
 def recovered(log: Path) -> Cost:
-    """Recover a log in a process of its own, and remove it as a recording's end does."""
+    """Recover a log in a separate process, and remove it as a recording's end does."""
     command = [sys.executable, __file__, "--recover", str(log)]
     said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return Cost(**json.loads(said))
@@ -163,7 +164,7 @@ def record(hours: float, points: int) -> tuple[list[tuple[float, float]], int, i
         log = Path(folder) / "day.wire"
         session.listen()
         try:
-            status = session.record(log, seconds=seconds, progress=note).status
+            status = session.record(log, RunLimits(seconds=seconds), RunListeners(progress=note)).status
         finally:
             session.stop()
         readings = sum(record.payload.count(b"\n") for record in read_log(log))

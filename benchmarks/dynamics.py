@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from scipy.signal import lfilter
 
+from benchmarks.ratios import alternate
 from pipeline.dynamics import Equation, Problem, get_integrator
 from pipeline.dynamics.flow import flow
 from pipeline.dynamics.halving import auto
@@ -23,7 +21,6 @@ STEP_S, COUNT = 0.01, 12_000
 
 def main() -> int:
     """Print each ratio, its reference and its limit; exit with 1 where a limit is broken."""
-    alternate = _ratios().alternate
     bad = 0
     for name, reference, limit, share, ours, theirs, rounds in cases():
         mine, other = alternate(ours, theirs, rounds)
@@ -91,17 +88,6 @@ def errors() -> dict[str, float]:
         "LSODA": equal_lsoda().run(MIXED, STEP_S, COUNT),
     }
     return {name: float(np.max(np.abs(run.y - truth))) / 0.05 for name, run in runs.items()}
-
-
-def _ratios() -> object:
-    path = Path(__file__).with_name("ratios.py")
-    spec = importlib.util.spec_from_file_location("springmass_ratios", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where its dataclasses look themselves up
-    spec.loader.exec_module(module)
-    return module
 
 
 if __name__ == "__main__":

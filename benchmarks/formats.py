@@ -1,6 +1,6 @@
 """Speed and memory of reading old recordings, as ratios to named readers within one run: `make bench`.
 
-Each pair runs alternately, each call in a process of its own, and the least of each side is compared: for cold starts
+Each pair runs alternately, each call in a separate process, and the least of each side is compared: for cold starts
 the processor time of the whole process, for files that of the call alone and the peak of resident memory.
 Processor time (user and system, of all threads) is what a call costs whoever else runs on the machine.
 """
@@ -99,7 +99,7 @@ def write_lvm(path: Path, rows: int, seed: int = 0) -> Path:
 
 
 def timed(setup: str, path: Path, what: int) -> Callable[[], float]:
-    """Return a call that reads a file in a process of its own: its seconds (0) or its peak memory, KiB (1)."""
+    """Return a call that reads a file in a separate process: its seconds (0) or its peak memory, KiB (1)."""
 
     def call() -> float:
         code = TIMED.format(setup=setup)

@@ -59,7 +59,7 @@ def analysed(paths: list[Path], out: Path, *options: str) -> Taken:
     printed = io.StringIO()
     before, start = _processor_s(), time.perf_counter()
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
-        code = main(["analyse", *map(str, paths), "--out", str(out), *options])
+        code = main(["analyse", *map(str, paths), "-o", str(out), *options])
     if code:
         raise RuntimeError(f"analyse ended with {code}")
     return Taken(time.perf_counter() - start, _processor_s() - before, printed.getvalue())

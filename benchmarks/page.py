@@ -14,7 +14,6 @@ import http.client
 import json
 import os
 import re
-import shutil
 import signal
 import struct
 import subprocess
@@ -43,7 +42,6 @@ displacement_m = 0.05
 """
 SETTLED_S = 6.0
 """So long the history and what the first analysis loads take."""
-BROWSER = "--no-sandbox --disable-gpu --disable-background-networking --disable-dev-shm-usage"
 DRAWN = """() => {
   window.drawn = [];
   let seen = samples[0].count;
@@ -199,7 +197,7 @@ def _watch(bench: Bench, seconds: float, viewers: int, suspended_s: float) -> di
     for thread in threads:
         thread.join()
     lag = came - taken
-    lag -= lag.min()  # the earliest is taken for at once: clocks of two processes have no common zero
+    lag -= lag.min()  # the earliest counts as no lag: clocks of two processes have no common zero
     return {**found, "p50_s": float(np.median(lag)), "p95_s": float(np.quantile(lag, 0.95))}
 
 
@@ -225,13 +223,11 @@ def floor(seconds: float) -> float:
 
 def screen(seconds: float) -> dict[str, float]:
     """Return the time from the host's stamp of a sample to the frame that shows it, in headless Chromium, s."""
-    from playwright.sync_api import sync_playwright
+    from tests.browser import headless
 
-    chromium = shutil.which("chromium")
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        with recording(Path(folder)) as bench:
+    with tempfile.TemporaryDirectory() as folder:
+        with recording(Path(folder)) as bench, headless() as browser:
             assert bench is not None
-            browser = playwright.chromium.launch(executable_path=chromium, args=BROWSER.split())
             page = browser.new_page(viewport={"width": 1366, "height": 900})
             page.goto(bench.address)
             page.wait_for_function("() => samples.length && samples[0].count > 600")
@@ -241,7 +237,6 @@ def screen(seconds: float) -> dict[str, float]:
             drawn = np.array(page.evaluate("drawn"))
             passed = time.perf_counter() - start
             cpu, serve = (bench.cpu_s() - before) / passed, (bench.cpu_s("serving") - serving) / passed
-            browser.close()
         with open_run(Path(folder) / "run.h5") as run:
             samples = run.samples()
     assert samples.host_ns is not None
@@ -253,9 +248,9 @@ def screen(seconds: float) -> dict[str, float]:
 
 def history(hours: float, frames: int = 240) -> dict[str, float]:
     """Return the time from frame to frame while so many hours are played, all in view and a minute of them, s."""
-    from playwright.sync_api import sync_playwright
+    from tests.browser import headless
 
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+    with tempfile.TemporaryDirectory() as folder, headless() as browser:
         path, t = Path(folder) / "long.txt", np.arange(round(hours * 360_000)) / 100.0
         y = 25.0 + 5.0 * np.exp(-1e-4 * t) * np.cos(8.0 * t)
         rows = "".join(f"{a:.2f}\t{b:.4f}\t0.239\n" for a, b in zip(t, y, strict=True))
@@ -266,7 +261,6 @@ def history(hours: float, frames: int = 240) -> dict[str, float]:
         with subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as process:
             assert process.stderr is not None
             address = next(m[1] for line in process.stderr if (m := re.search(r"page: (http\S+)", line)))
-            browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=BROWSER.split())
             page = browser.new_page(viewport={"width": 1366, "height": 900})
             page.goto(address)
             page.wait_for_function(f"() => samples.length && samples[0].count >= {t.size}", timeout=120_000)
@@ -279,7 +273,6 @@ def history(hours: float, frames: int = 240) -> dict[str, float]:
                     page.keyboard.press("w")
                 each = np.array(page.evaluate(FRAMES, frames)) / 1e3
                 found |= {f"{window}_p50_s": float(np.median(each)), f"{window}_p95_s": float(np.quantile(each, 0.95))}
-            browser.close()
             process.send_signal(signal.SIGINT)
             process.stderr.read()
     return found

@@ -1,6 +1,6 @@
 """What reading many ports costs and whether it keeps its limits: ``python benchmarks/ports.py``.
 
-A process of its own writes the line protocol to pseudo-terminals, with the moment of sending as the device's clock; so
+A separate process writes the line protocol to pseudo-terminals, with the moment of sending as the device's clock; so
 the processor time counted is the reader's alone, and each sample tells how long it took from the wire until it was
 decoded. They are read as ``springmass record`` reads them: one thread reads every port, puts what came into the
 recorder's queue and gives it to the port's chain.

@@ -3,7 +3,7 @@
 A time says nothing without the machine it was taken on; the ratio of two, taken in turn on one machine, does. Each
 pair is run alternately and the minimum of each side is taken, which is what the code costs without its neighbours.
 Fits and analyses run on one thread of linear algebra each; what the same analysis takes with a library's own number of
-threads, on a quiet machine and beside two busy loops, is a case of its own.
+threads, on a quiet machine and next to two busy loops, is a separate case.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def damped_sine(t: np.ndarray, y: np.ndarray) -> Callable[[], object]:
 
 
 def beside_busy_loops(path: Path, said: Mapping[str, str], rounds: int) -> tuple[float, float]:
-    """Return the least seconds of an analysis in a process of its own, beside busy loops and quiet."""
+    """Return the least seconds of an analysis in a separate process, next to busy loops and quiet."""
     quiet = in_a_process(path, said, rounds)
     loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY_LOOPS)]
     try:

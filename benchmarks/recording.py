@@ -1,6 +1,6 @@
 """What a recording costs and keeps, over its limit of 4 % of a core: `python benchmarks/recording.py`.
 
-A simulated sensor speaks from a process of its own; `springmass record` reads it twice, for a short and a long run. The
+A simulated sensor runs in a separate process; `springmass record` reads it twice, for a short and a long run. The
 difference of the two is the recording with what its readings cost in the run file built at its end, without the start.
 Both are done with the progress line going nowhere, and with it on a terminal. The exit code is 1 where the limit is
 exceeded or a reading is missing.

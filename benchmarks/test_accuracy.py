@@ -2,43 +2,24 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
-
 import numpy as np
 import pytest
 
-FOLDER = Path(__file__).with_name("accuracy")
+from benchmarks.accuracy import checks
+
 SEEDS = 8
 # What is measured; the names are those of `--only`.
 PARTS = ("efficiency", "damping", "laws", "echoes", "weak", "invariance", "ranges")
 
 
-@pytest.fixture(scope="module")
-def checks():
-    """The module of the checks, with its neighbour beside it."""
-    loaded = []
-    for name in ("trials", "checks"):
-        spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module
-        spec.loader.exec_module(module)
-        loaded.append(name)
-    yield sys.modules["checks"]
-    for name in loaded:
-        del sys.modules[name]
-
-
-def test_every_part_is_tested(checks: ModuleType) -> None:
+def test_every_part_is_tested() -> None:
     """The list here is that of the command."""
     assert tuple(checks.CHECKS) == PARTS
 
 
 @pytest.mark.trials
 @pytest.mark.parametrize("part", PARTS)
-def test_requirements_hold_in_short_form(checks: ModuleType, part: str) -> None:
+def test_requirements_hold_in_short_form(part: str) -> None:
     """With few seeds no limit is exceeded by more than their scatter allows."""
     lines = list(checks.CHECKS[part](checks.Bench(SEEDS, map)))
     assert lines
@@ -58,14 +39,12 @@ def test_requirements_hold_in_short_form(checks: ModuleType, part: str) -> None:
         (1.0, 20, 0.0, 0.02, False),
     ],
 )
-def test_a_share_beyond_its_scatter_fails(
-    checks: ModuleType, share: float, count: int, low: float, high: float, ok: bool
-) -> None:
+def test_a_share_beyond_its_scatter_fails(share: float, count: int, low: float, high: float, ok: bool) -> None:
     """Three standard errors are allowed beyond a limit, not more."""
     assert checks.share_line("share", share, count, low, high).ok is ok
 
 
-def test_errors_beyond_the_limit_fail(checks: ModuleType) -> None:
+def test_errors_beyond_the_limit_fail() -> None:
     """Errors of 1.3 bounds with a bias of a quarter and intervals half as wide break every limit of a tier."""
     rng = np.random.default_rng(1)
     error = 1.3 * rng.standard_normal(2000) + 0.25

@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import pytest
 
-SCRIPT = Path(__file__).with_name("day.py")
+from benchmarks import day
 
 
 @pytest.mark.trials
 def test_memory_is_flat_and_every_reading_is_kept() -> None:
     """After the first minutes memory grows by less than 4 MB; log and run file hold 90,000 readings, within 200 MB."""
-    spec = importlib.util.spec_from_file_location("springmass_benchmark_day", SCRIPT)
-    assert spec is not None
-    assert spec.loader is not None
-    day = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = day
-    spec.loader.exec_module(day)
     seen, readings, dropped, cost = day.record(0.25, 3)
     assert seen[-1][1] - seen[0][1] < 4.0
     assert (readings, dropped) == (90_000, 0)

@@ -2,38 +2,23 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-from types import ModuleType
-
-import pytest
-
-HERE = Path(__file__).resolve().parent
+from benchmarks import dynamics
 
 
-@pytest.fixture(scope="module")
-def dynamics() -> ModuleType:
-    """Return ``benchmarks/dynamics.py``."""
-    spec = importlib.util.spec_from_file_location("springmass_benchmark_dynamics", HERE / "dynamics.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_one_trajectory_of_mixed_drag(benchmark, dynamics):
+def test_one_trajectory_of_mixed_drag(benchmark):
     """120 s of mixed drag by Strang splitting."""
     run = benchmark(dynamics.get_integrator("strang").run, dynamics.MIXED, 0.01, 12_000)
     assert run.relative_energy()[-1] < 0.05
 
 
-def test_the_compared_errors_are_equal(dynamics):
+def test_the_compared_errors_are_equal():
     """Strang and step halving err by at most 1e-6, and LSODA is not asked for more than halving has."""
     errors = dynamics.errors()
     assert errors["strang"] <= 1e-6
     assert errors["auto for 1e-6"] <= errors["LSODA"] <= 1e-6
 
 
-def test_every_ratio_can_be_taken(dynamics):
+def test_every_ratio_can_be_taken():
     """Each pair runs, and gives what the other gives."""
     found = {name: (ours(), theirs()) for name, _, _, _, ours, theirs, _ in dynamics.cases()}
     exact, filtered = found["exact propagator, linear, 120 s"]

@@ -3,30 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
 
 import pytest
 
-PORTS = Path(__file__).with_name("ports.py")
-
-
-@pytest.fixture(scope="module")
-def ports() -> ModuleType:
-    """Return the benchmark as a module."""
-    spec = importlib.util.spec_from_file_location("springmass_benchmark_ports", PORTS)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+from benchmarks import ports
 
 
 @pytest.mark.parametrize(("count", "rate_hz"), [(1, 1000.0), (16, 100.0)])
-def test_every_sample_is_received_and_recorded(ports: ModuleType, count: int, rate_hz: float) -> None:
+def test_every_sample_is_received_and_recorded(count: int, rate_hz: float) -> None:
     """One port at 1 kHz and sixteen at 100 Hz deliver for 0.3 s what was sent, and the log holds every line."""
     figures = ports.measure(ports=count, rate_hz=rate_hz, seconds=0.3)
     assert figures.received == figures.expected == figures.recorded == round(count * rate_hz * 0.3)
@@ -34,7 +18,7 @@ def test_every_sample_is_received_and_recorded(ports: ModuleType, count: int, ra
 
 
 @pytest.mark.parametrize("wrong", [{"received": 99}, {"recorded": 99}, {"p50_ms": 1.01}])
-def test_a_lost_sample_or_a_late_one_breaks_a_limit(ports: ModuleType, wrong: dict[str, float]) -> None:
+def test_a_lost_sample_or_a_late_one_breaks_a_limit(wrong: dict[str, float]) -> None:
     """Each limit by itself is noticed, and figures within all of them are not."""
     figures = ports.Figures(100, 100, 100, 0.02, 0.9, 3.0)
     assert not figures.broken

@@ -1,4 +1,4 @@
-"""Stages from a track to findings: arithmetic alone, no input or output.
+"""Stages from a track to findings: only arithmetic, no input or output.
 
 The rooms in the order in which data flows; each imports only from those before it::
 

@@ -8,7 +8,7 @@ from pipeline.analyse import STANDARD, Params
 from pipeline.damping.select import Params as DampingParams
 from pipeline.errors import AnalysisError
 from pipeline.motion.waveform_fit import Params as WaveformParams
-from pipeline.oscillation.disturbances import Params as DisturbancesParams
+from pipeline.windows.disturbances import Params as DisturbancesParams
 
 __all__ = ["PRESETS", "TIERS", "params_for"]
 

@@ -1,186 +1,70 @@
-"""The straight line from a track to findings, with one branch for each kind of motion."""
+"""The line of analysis: from a track to estimates and findings, one stage after the other.
+
+Follow a sample from the top of :func:`analyse` to its end. Each line is a stage: a pure function with its own options.
+A stage that runs again, on fewer samples or without what was found, is called here again. The names of the stages are
+those of the modules that hold them.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
+from pipeline.analysis import Analysis, Motion, Oscillation, Overdamped, Still
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
-from pipeline.damping import select as dampings
+from pipeline.checks.echoes import echoes_by_chance, find_clusters
+from pipeline.checks.harmonics import find_harmonics
+from pipeline.checks.misfit import Misfit
+from pipeline.checks.model import check_model
+from pipeline.checks.oscillation import check_coherence, check_sinusoid, typical_miss
+from pipeline.checks.plausibility import check_plausibility
+from pipeline.checks.residuals import residuals_of
+from pipeline.checks.sensor import find_held, find_smoothing, held_count, matters
+from pipeline.damping.select import Damping, fit_damping
 from pipeline.errors import AnalysisError
-from pipeline.motion import equation_fit as equations
-from pipeline.motion import overdamped as relaxations
-from pipeline.motion import phase as phases
-from pipeline.motion import waveform_fit as fullfits
+from pipeline.findings.damping import damping_findings
+from pipeline.findings.finding import Finding, by_severity
+from pipeline.findings.motion import (
+    fit_findings,
+    harmonics_finding,
+    model_finding,
+    motion_findings,
+    overdamped_finding,
+    plausibility_findings,
+    smoothing_finding,
+)
+from pipeline.findings.parts import part_findings
+from pipeline.findings.samples import COARSE, clock_findings, held_finding, sample_findings
+from pipeline.findings.scene import scene_findings
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equation
-from pipeline.motion.kinds import Fitted, Windows, astray, by_equation, by_windows, incoherent, see_windows
-from pipeline.motion.overdamped import Overdamped, find_overdamped, spring_constant
-from pipeline.motion.smoother import Smoothed, smooth
+from pipeline.motion.fitted import Fitted, fit_by_equation, fit_by_windows, fit_waveform
+from pipeline.motion.overdamped import find_overdamped, spring_constant
 from pipeline.motion.two_modes import TwoModes, find_two_modes
+from pipeline.motion.waveform_fit import Params as WaveformParams
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length
+from pipeline.numerics.robust import median
 from pipeline.numerics.threads import one_thread
-from pipeline.oscillation import condition as conditioning
-from pipeline.oscillation import cycles as cycling
-from pipeline.oscillation import demodulate as demodulation
-from pipeline.oscillation import disturbances as separation
-from pipeline.oscillation import segments as segmentation
-from pipeline.oscillation.condition import Conditioned, coarsest_step, condition
-from pipeline.oscillation.cycles import Cycles, NoOscillation
-from pipeline.registry.quantities import check_quantity
-from pipeline.results import derive as derivation
-from pipeline.results.checks.clock_findings import judge_clock
-from pipeline.results.checks.contact import find_contact
-from pipeline.results.checks.finding import Checked, Finding, by_severity
-from pipeline.results.checks.halves import judge_halves
-from pipeline.results.checks.modulation import judge_modulation
-from pipeline.results.checks.plausibility import judge_plausibility
-from pipeline.results.checks.sample_findings import STEPS, count_quality, find_clusters, judge_samples
-from pipeline.results.checks.segment_findings import judge_rows, judge_segments
-from pipeline.results.checks.self_check import check_residuals, holding, judge_held
-from pipeline.results.checks.wave_slips import find_wave_slips
-from pipeline.results.derive import Derived, derive
+from pipeline.params import STANDARD, Params
+from pipeline.results.derive import derive
 from pipeline.results.effects import Effect, tabulate
-from pipeline.results.findings import judge, judge_fits, judge_overdamped, judge_scene
-from pipeline.track import U8, Track
+from pipeline.samples.condition import Conditioned, coarsest_step, condition
+from pipeline.samples.stopping import moving_part
+from pipeline.track import Quality, Track
+from pipeline.windows.clipping import find_cuts
+from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
+from pipeline.windows.demodulate import Demodulated, demodulate, model_error
+from pipeline.windows.disturbances import separate
+from pipeline.windows.part import before_release, before_trigger, long_after_stop
+from pipeline.windows.segments import Segments, SpanKind, find_free_part
 
 __all__ = ["STANDARD", "Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of every stage.
-
-    Parameters
-    ----------
-    condition, cycles, demodulate, segments, disturbances, damping, phase, derive, relaxation, motion
-        Of the stages of those names.
-    full : pipeline.motion.waveform_fit.Params, optional
-        Of the fit of the whole waveform; None leaves it out.
-    settle : bool
-        Whether the whole waveform is fitted where the halves of a record contradict the model of the windows.
-    """
-
-    condition: conditioning.Params = field(default_factory=conditioning.Params)
-    cycles: cycling.Params = field(default_factory=cycling.Params)
-    demodulate: demodulation.Params = field(default_factory=demodulation.Params)
-    segments: segmentation.Params = field(default_factory=segmentation.Params)
-    disturbances: separation.Params = field(default_factory=separation.Params)
-    damping: dampings.Params = field(default_factory=dampings.Params)
-    phase: phases.Params = field(default_factory=phases.Params)
-    derive: derivation.Params = field(default_factory=derivation.Params)
-    full: fullfits.Params | None = None
-    settle: bool = True
-    relaxation: relaxations.Params = field(default_factory=relaxations.Params)
-    motion: equations.Params = field(default_factory=equations.Params)
-
-
-STANDARD = Params()
-MOST_ROWS = 50_000  # of a record whose waveform is fitted though nobody asked for it
-BEATING = 0.3  # of the amplitude, by which periods miss the oscillation found: there may be two
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Oscillation(Fitted):
-    """What the stages found in a record that oscillates, strongly damped or not: the fit, and what follows."""
-
-    cycles: Cycles
-    derived: Derived
-
-
-@dataclass(frozen=True, slots=True)
-class Still:
-    """A record in which nothing moves that these stages know.
-
-    Parameters
-    ----------
-    why : str
-        One sentence.
-    """
-
-    why: str
-
-
-Motion = Oscillation | Overdamped | Still
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Analysis:
-    """One run, analysed.
-
-    Parameters
-    ----------
-    track : Track
-    scene : Scene
-    params : Params
-    conditioned : Conditioned
-    motion : Oscillation, Overdamped or Still
-        Of an overdamped motion ``estimates`` hold the rates, of a still one offset and noise alone.
-    effects : tuple of Effect
-    findings : tuple of Finding
-        Gravest first.
-    estimates : mapping of str to Estimate
-        By names of :data:`pipeline.registry.quantities.QUANTITIES`.
-
-    Raises
-    ------
-    ValueError
-        If the name of an estimate is not registered.
-    """
-
-    track: Track
-    scene: Scene
-    params: Params
-    conditioned: Conditioned
-    motion: Motion
-    effects: tuple[Effect, ...]
-    findings: tuple[Finding, ...]
-    estimates: Mapping[str, Estimate]
-
-    def __post_init__(self) -> None:
-        for name in self.estimates:
-            check_quantity(name)
-
-    @property
-    def flags(self) -> U8:
-        """(n,) uint8: the final flags of every sample."""
-        return self.motion.demodulated.flags if isinstance(self.motion, Oscillation) else self.conditioned.flags
-
-    @property
-    def quality(self) -> dict[str, int]:
-        """Counts of samples by flag, and of those used."""
-        return count_quality(self.flags)
-
-    @one_thread
-    def smoothed(self) -> Smoothed:
-        """Position, velocity and acceleration at every sample with their uncertainties; worked out when called.
-
-        Raises
-        ------
-        AnalysisError
-            If the record does not oscillate.
-
-        Examples
-        --------
-        >>> t = np.arange(1000) / 100
-        >>> y = 0.2 + 0.05 * np.cos(8.3 * t) + 3e-4 * np.random.default_rng(1).standard_normal(1000)
-        >>> motion = analyse(Track.from_arrays(t, y)).smoothed()
-        >>> error = motion.velocity + 0.05 * 8.3 * np.sin(8.3 * t)
-        >>> bool(np.std(error) < 0.002 * 0.05 * 8.3)
-        True
-        """
-        motion = self.motion
-        if not isinstance(motion, Oscillation):
-            raise AnalysisError(f"there is no oscillation to smooth: {motion.why}")
-        return smooth(self.track, motion.demodulated, motion.phase, motion.rest, motion.disturbances)
-
-
-Found = tuple[Motion, tuple[Effect, ...], tuple[Finding, ...], Mapping[str, Estimate]]
-"""What one branch finds: the last four attributes of an analysis."""
 
 
 @one_thread
@@ -191,7 +75,8 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     ----------
     track : Track
     scene : Scene, optional
-        What is known of the bench; left out, nothing is.
+        What is known of the bench; left out, nothing is. Its damping law is the stated one, unless ``params`` state
+        another.
     params : Params, optional
 
     Returns
@@ -212,94 +97,177 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     0.757010 +- 0.000022 s
     """
     scene, params = scene or Scene(), params or STANDARD
+    if params.damping.stated is None and params.damping.from_scene and scene.damping_law is not None:
+        params = replace(params, damping=replace(params.damping, stated=scene.damping_law))
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
-    conditioned = condition(track, params.condition)
-    windows = see_windows(
-        conditioned,
-        params.condition,
-        params.cycles,
-        params.demodulate,
-        params.segments,
-        params.disturbances,
-        params.damping,
-    )
-    conditioned = conditioned if isinstance(windows, NoOscillation) else windows.conditioned
-    solved = _solve_equation(windows, params)
-    relaxed = find_overdamped(conditioned, params.relaxation) if _may_be_overdamped(windows, solved, params) else None
-    if isinstance(relaxed, Overdamped):
-        found = _overdamped(conditioned, scene, relaxed)
-    elif isinstance(windows, NoOscillation):
-        two = find_two_modes(conditioned) if windows.code == "no_oscillation" else None
-        found = _still(conditioned, relaxed or windows) if two is None else _two_modes(conditioned, two)
-    elif isinstance(solved, EquationFit):  # strongly damped
-        found = _oscillation(windows, by_equation(windows, solved), solved, scene, params)
+    samples = condition(track, params.condition)
+    part = _free_part(samples, params)
+    if isinstance(part, NoOscillation):
+        return _without_period(samples, part, scene, params)
+
+    samples, cycles = part.samples, part.cycles
+    windows = demodulate(samples, cycles, params.demodulate)
+    if (cut := find_cuts(samples, cycles, windows)) is not None:
+        samples, windows = cut, demodulate(cut, cycles, params.demodulate)
+    if (why := check_sinusoid(samples, windows)) is not None:
+        return _without_period(samples, why, scene, params)
+
+    windows, disturbances = separate(samples, cycles, windows, params.disturbances, params.demodulate)
+    damping = fit_damping(windows, _start_s(samples, windows.angular_frequency), params.damping)
+
+    # Strong damping, or friction that stops the bob, needs the equation of motion itself, not its average over a cycle.
+    solved = fit_equation(samples, windows, damping, params.motion, params.damping, stopped=part.stopped)
+    if _may_be_overdamped(windows, damping, solved, params):
+        relaxed = find_overdamped(samples, params.relaxation)
+        if isinstance(relaxed, Overdamped):
+            return _overdamped(samples, relaxed, scene, params)
+    if isinstance(solved, EquationFit):
+        fitted = fit_by_equation(solved, samples, windows)
     else:
-        fitted = by_windows(windows, params.phase, params.full)
-        typical = astray(fitted)
-        why = incoherent(fitted, conditioned.track, typical)
-        two = find_two_modes(conditioned) if why is not None or typical > BEATING else None
+        fitted = fit_by_windows(windows, disturbances, damping, params.phase)
+        if params.full is not None:
+            fitted = fit_waveform(fitted, samples, params.full)
+        missed = typical_miss(fitted)
+        incoherent = check_coherence(fitted, samples.track, missed)
+        two = find_two_modes(samples) if incoherent is not None or missed > params.beating else None
         if two is not None:
-            found = _two_modes(conditioned, two)
-        elif why is not None:
-            found = _still(conditioned, why)
-        else:
-            found = _oscillation(windows, fitted, solved, scene, params)
-    return Analysis(conditioned.track, scene, params, conditioned, *found)
+            return _two_modes(samples, two, scene, params)
+        if incoherent is not None:
+            return _still(samples, incoherent, scene, params)
+    return _oscillation(samples, part, fitted, solved, scene, params)
 
 
-def _solve_equation(windows: Windows | NoOscillation, params: Params) -> EquationFit | EquationMisfit | None:
-    """Return the solution of the equation of motion that a strongly damped oscillation follows."""
-    if isinstance(windows, NoOscillation):
-        return None
-    return fit_equation(
-        windows.conditioned,
-        windows.demodulated,
-        windows.damping,
-        params.motion,
-        params.damping,
-        stopped=windows.stopped,
-    )
+@dataclass(frozen=True, slots=True, eq=False)
+class _FreePart:
+    """The part of a recording that oscillates freely.
+
+    ``samples`` is the whole recording with the samples outside the part flagged, ``segments`` says which part that is
+    (None: all of it), and ``stopped`` whether friction stopped the bob within it.
+    """
+
+    samples: Conditioned
+    segments: Segments | None
+    cycles: Cycles
+    stopped: bool
+
+
+def _free_part(samples: Conditioned, params: Params) -> _FreePart | NoOscillation:
+    """Leave out, one after the other, the time before trigger and release, long after the stop, and all but one part.
+
+    After each step the samples are conditioned again: what was left out may have hidden the plateaus and the noise of
+    the part that stays.
+    """
+    segments = None
+    release = partial(before_release, periods=params.segments.held_periods)
+    for outside_of in (before_trigger, release, partial(long_after_stop, share=params.early)):
+        if (outside := outside_of(samples)) is not None:
+            samples = condition(outside.flagged(samples.track), params.condition)
+            segments = outside.within(segments)
+    rests = segments is not None and any(span.kind is SpanKind.AT_REST for span in segments.left_out)
+    cycles, stopped = _cycles(samples, params, params.late if rests else params.early)
+    if isinstance(cycles, NoOscillation):
+        return cycles
+    for _ in range(params.most_parts):
+        windows = demodulate(samples, cycles, params.demodulate)
+        outside = find_free_part(samples, cycles, windows, params.segments)
+        if outside is None:
+            break
+        shorter = condition(outside.flagged(samples.track), params.condition)
+        trimmed, stops = _cycles(shorter, params, params.early)
+        if isinstance(trimmed, NoOscillation):
+            break
+        samples, segments, cycles, stopped = shorter, outside.within(segments), trimmed, stops
+    return _FreePart(samples, segments, cycles, stopped)
+
+
+def _cycles(samples: Conditioned, params: Params, share: float) -> tuple[Cycles | NoOscillation, bool]:
+    """Return the cycles, of the moving part if the bob stops within a share of the samples, and whether it does."""
+    cycles = find_cycles(samples, params.cycles)
+    moving = moving_part(samples, params.late if isinstance(cycles, NoOscillation) else share)
+    if moving is None or isinstance(trimmed := find_cycles(moving, params.cycles), NoOscillation):
+        return cycles, False
+    return trimmed, True
+
+
+def _start_s(samples: Conditioned, omega: float) -> float:
+    """Time for which amplitude and phase are stated, s: of the part's first row, though an echo may stand there.
+
+    Where more than a period is missing at the start it is the time of the first sample used. A single false echo must
+    not move it.
+    """
+    track = samples.track
+    first = float(track.t[np.argmax(samples.used)])
+    # A row whose time is wrong begins nothing.
+    out = Quality.OUTSIDE | Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME | Quality.MALFORMED
+    rows = ((samples.flags & np.uint8(out)) == 0) & (track.t <= first)
+    begin = float(np.min(track.t[rows], initial=first))
+    return begin if first - begin < 2.0 * math.pi / omega else first
 
 
 def _may_be_overdamped(
-    windows: Windows | NoOscillation, solved: EquationFit | EquationMisfit | None, params: Params
+    windows: Demodulated, damping: Damping, solved: EquationFit | EquationMisfit | None, params: Params
 ) -> bool:
-    """Whether no oscillation is seen, or one whose damping is strong and, as far as its equation was solved, linear."""
-    if isinstance(windows, NoOscillation):
-        return windows.code == "no_oscillation"
-    linear = not isinstance(solved, EquationFit) or solved.damping.selected == "linear"
-    return linear and windows.damping_ratio > params.relaxation.least_damping
+    """Whether the damping is strong and, as far as the equation of motion was solved, linear."""
+    linear = not isinstance(solved, EquationFit) or solved.damping.best is solved.damping.of_powers(1)
+    return linear and damping.best.rate_at_start() / windows.angular_frequency > params.relaxation.least_damping
 
 
 def _oscillation(
-    windows: Windows, fitted: Fitted, solved: EquationFit | EquationMisfit | None, scene: Scene, params: Params
-) -> Found:
-    """What follows from an oscillation, however it was fitted."""
-    fitted = fitted.in_unit(windows.conditioned.track.unit)
-    track, cycles = windows.conditioned.track, windows.cycles
-    demodulated, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
-    disturbances = fitted.disturbances
-    rest = fitted.rest.stepping(disturbances.steps)
-    waveform = fitted.waveform.with_disturbances(disturbances)
+    samples: Conditioned,
+    part: _FreePart,
+    fitted: Fitted,
+    solved: EquationFit | EquationMisfit | None,
+    scene: Scene,
+    params: Params,
+) -> Analysis:
+    """Return what follows from an oscillation, however it was fitted: checks, results and findings, in this order."""
+    track, unit = samples.track, samples.track.unit
+    fitted = fitted.in_unit(unit)
+    windows, damping, phase, disturbances = fitted.demodulated, fitted.damping, fitted.phase, fitted.disturbances
+    rest, waveform = fitted.rest.stepping(disturbances.steps), fitted.waveform.with_disturbances(disturbances)
     instrument = Instrument.of(track, u_crystal=params.derive.u_clock_nominal)
-    noise_m = demodulated.noise_m
-    effects = tabulate(scene, damping, phase, rest, noise_m=noise_m, instrument=instrument, disturbances=disturbances)
-    u_amplitude = damping.best.joint["A0"].u
-    # Strong damping bends every period: its own solution holds what would look like harmonics.
-    bent = isinstance(solved, EquationFit)
     smoothing = SensorFilter.of(scene, track.rate_hz)
-    checked = Checked.together(
-        judge_rows(windows.conditioned, waveform.rms_m),
-        Checked()
-        if bent
-        else check_residuals(windows.conditioned, demodulated, disturbances, phase, u_amplitude, smoothing),
-        judge_plausibility(windows.conditioned, demodulated, phase),
-        Checked() if bent else judge_modulation(demodulated, damping, phase, track.unit),
-        Checked() if bent else judge_halves(fitted, track.unit, _fit_whole(windows, fitted, params)),
+    by_windows = not isinstance(solved, EquationFit)
+
+    misfits: list[Misfit] = []
+    found: list[Finding | None] = []
+    plausible = check_plausibility(samples, windows, phase, params.checks.plausibility)
+    misfits += plausible.misfits
+    found += plausibility_findings(plausible, track)
+    # Strong damping bends every period, which would look like harmonics, and its fit is of the whole motion already.
+    residuals = residuals_of(samples, windows, disturbances, phase) if by_windows else None
+    unexplained = residuals
+    if residuals is not None:
+        rounding_m = median(model_error(windows.amplitude, windows.decay, windows.angular_frequency))
+        shape = find_harmonics(residuals, max(0.5 * (samples.quantum_m or 0.0), rounding_m), params.checks.harmonics)
+        if shape is not None:
+            misfits.append(shape.misfit)
+            found.append(harmonics_finding(shape, unit))
+            unexplained = residuals = residuals.less(shape.at_samples)
+        if (held := find_held(samples, residuals)) is not None:
+            misfits.append(held.misfit)
+            found.append(held_finding(held.count, held.interval_s, unit))
+            unexplained = None
+        elif not windows.noise_m > max(rounding_m, (samples.quantum_m or 0.0) / COARSE):
+            unexplained = None  # rounding, or steps, which the finding quantised reports
+        elif (smoothed := find_smoothing(residuals, params.checks.sensor)) is not None:
+            if smoothed.certain:
+                unexplained = None
+            if matters(smoothed, residuals, damping.best.joint["A0"].u, smoothing, params.checks.sensor):
+                misfits.append(smoothed.misfit)
+                if smoothed.certain:
+                    found.append(smoothing_finding(smoothed, unit))
+    if by_windows:
+        model = check_model(fitted, unexplained, _settling_fit(fitted, samples, params), params.checks.model)
+        misfits += model.misfits
+        found.append(model_finding(model, unit))
+
+    effects = tabulate(
+        scene, damping, phase, rest, noise_m=windows.noise_m, instrument=instrument, disturbances=disturbances
     )
     derived = derive(
-        demodulated,
+        windows,
         damping,
         phase,
         rest,
@@ -307,71 +275,105 @@ def _oscillation(
         effects,
         instrument=instrument,
         params=params.derive,
-        misfits=checked.misfits,
+        misfits=tuple(misfits),
         smoothing=smoothing,
     )
-    slips = find_wave_slips(track, demodulated)
-    clusters = find_clusters(demodulated, lambda rows: phase.total(track.t[rows]), slips)
+    swing_m = (derived.estimates["offset"].value, float(damping.best.amplitude(np.zeros(1))[0]))
     findings = by_severity(
-        judge_segments(windows.segments, find_contact(windows.conditioned, windows.segments, cycles.frequency_hz)),
-        judge(cycles, demodulated, damping, phase, rest, waveform, disturbances, derived.coefficients),
-        checked.findings,
-        judge_samples(windows.conditioned, demodulated.flags, noise_m, clusters, slips),
-        judge_scene(scene, effects),
-        judge_fits(fitted.full, solved),
-        judge_clock(track, instrument),
+        part_findings(part.segments),
+        motion_findings(part.cycles, fitted, rest),
+        damping_findings(damping, derived.coefficients),
+        (finding for finding in found if finding is not None),
+        sample_findings(
+            samples,
+            windows.flags,
+            windows.noise_m,
+            find_clusters(track, windows, phase),
+            swing_m,
+            by_chance=echoes_by_chance(samples.flags, windows, params.demodulate.clip_sigmas),
+        ),
+        scene_findings(scene, effects),
+        fit_findings(fitted.full, solved),
+        clock_findings(track, instrument),
     )
-    motion = Oscillation(demodulated, disturbances, damping, phase, rest, waveform, fitted.full, cycles, derived)
-    return motion, effects, findings, derived.estimates
+    motion = Oscillation(windows, disturbances, damping, phase, rest, waveform, fitted.full, part.cycles, derived)
+    return Analysis(track, scene, params, samples, motion, effects, findings, derived.estimates)
 
 
-def _fit_whole(windows: Windows, fitted: Fitted, params: Params) -> Callable[[], Fitted] | None:
-    """Return the fit of the whole waveform, to be made where windows contradict themselves; None for long records."""
-    if not params.settle or fitted.full is not None or len(windows.conditioned.track) > MOST_ROWS:
+def _settling_fit(fitted: Fitted, samples: Conditioned, params: Params) -> Callable[[], Fitted] | None:
+    """Return the fit of the whole waveform, to be made where windows contradict themselves; None for long runs."""
+    if not params.settle or fitted.full is not None or len(samples.track) > params.most_settled:
         return None
-    unit = windows.conditioned.track.unit
-    # What it is asked for depends on no law that the windows speak against.
-    return lambda: by_windows(windows, params.phase, fullfits.Params(besides=())).in_unit(unit)
+    # Only the selected law is fitted: the comparison needs amplitude and phase, and no choice among laws.
+    return lambda: fit_waveform(fitted, samples, WaveformParams(besides=())).in_unit(samples.track.unit)
 
 
-def _overdamped(conditioned: Conditioned, scene: Scene, found: Overdamped) -> Found:
-    """A motion that damping ends within a few cycles or without any."""
-    estimates = {**_at_rest(conditioned), **found.estimates, **spring_constant(found, scene)}
-    return found, (), _findings(conditioned, judge_overdamped(found)), estimates
+def _without_period(samples: Conditioned, why: NoOscillation, scene: Scene, params: Params) -> Analysis:
+    """Classify a recording without a period: a relaxation, two modes that hide each other, or a bob at rest."""
+    relaxed = find_overdamped(samples, params.relaxation)
+    if isinstance(relaxed, Overdamped):
+        return _overdamped(samples, relaxed, scene, params)
+    if (two := find_two_modes(samples)) is not None:
+        return _two_modes(samples, two, scene, params)
+    return _still(samples, relaxed or why, scene, params)
 
 
-def _still(conditioned: Conditioned, why: NoOscillation) -> Found:
-    """A record without any motion to fit."""
-    findings = _findings(conditioned, Finding(why.code, "error", why.why))
-    if (held := holding(conditioned)) > 1:
-        findings = by_severity(findings, (judge_held(held, 1.0 / conditioned.track.rate_hz, conditioned.track.unit),))
-    return Still(why.why), (), findings, _at_rest(conditioned)
+def _overdamped(samples: Conditioned, found: Overdamped, scene: Scene, params: Params) -> Analysis:
+    """Return a motion that damping ends within a few cycles or without any."""
+    estimates = {**_at_rest(samples), **found.estimates, **spring_constant(found, scene)}
+    return _ended(samples, found, (overdamped_finding(found),), estimates, scene, params)
 
 
-def _two_modes(conditioned: Conditioned, two: TwoModes) -> Found:
-    """A record of two oscillations, neither of which is the motion."""
-    findings = _findings(conditioned, Finding("two_modes", "error", two.why))
-    return Still(two.why), (), findings, {**_at_rest(conditioned), **two.estimates}
+def _two_modes(samples: Conditioned, two: TwoModes, scene: Scene, params: Params) -> Analysis:
+    """Return a recording of two oscillations, neither of which is the motion."""
+    finding = Finding(
+        "two_modes",
+        "error",
+        "Two oscillations of similar strength run together, so there is no single period.",
+        f"{two.why}.",
+        {name: estimate.value for name, estimate in two.estimates.items()},
+    )
+    return _ended(samples, Still(two.why), (finding,), {**_at_rest(samples), **two.estimates}, scene, params)
 
 
-def _at_rest(conditioned: Conditioned) -> dict[str, Estimate]:
+def _still(samples: Conditioned, why: NoOscillation, scene: Scene, params: Params) -> Analysis:
+    """Return a recording without any motion to fit."""
+    findings = [Finding("no_oscillation", "error", f"No oscillation: {why.why}.")]
+    if (held := held_count(samples)) > 1:
+        findings.append(held_finding(held, held / samples.track.rate_hz, samples.track.unit))
+    return _ended(samples, Still(why.why), tuple(findings), _at_rest(samples), scene, params)
+
+
+def _ended(
+    samples: Conditioned,
+    motion: Motion,
+    first: tuple[Finding, ...],
+    estimates: Mapping[str, Estimate],
+    scene: Scene,
+    params: Params,
+) -> Analysis:
+    track = samples.track
+    findings = by_severity(
+        first,
+        sample_findings(samples, samples.flags, samples.noise_m),
+        clock_findings(track, Instrument.of(track)),
+    )
+    none: tuple[Effect, ...] = ()
+    return Analysis(track, scene, params, samples, motion, none, findings, estimates)
+
+
+def _at_rest(samples: Conditioned) -> dict[str, Estimate]:
     """Mean and noise of the samples used."""
-    y, noise_m, unit = conditioned.track.y[conditioned.used], conditioned.noise_m, conditioned.track.unit
+    y, noise_m, unit = samples.track.y[samples.used], samples.noise_m, samples.track.unit
     if not y.size:
         raise AnalysisError("no usable sample is left; see the counts of flagged samples")
-    # Where the distance steps or creeps, neighbours say the same: their number would make the mean look certain.
+    # Where the distance steps or creeps, neighbours are alike: their number would make the mean look certain.
     u = float(np.std(y) * np.sqrt(correlation_length(y) / y.size))
-    # Of a sensor at rest between two steps all but a few distances are alike, and these few were taken for echoes.
-    every = conditioned.track.y[np.isfinite(conditioned.track.y)]
-    if (quantum_m := coarsest_step(np.sort(every), conditioned.quantum_m) or 0.0) > STEPS * noise_m:
-        u = float(np.hypot(u, quantum_m / np.sqrt(12.0)))  # rounding that noise does not reach over stays
+    # A sensor at rest between two steps gives all but a few distances alike, and these few were taken for echoes.
+    every = samples.track.y[np.isfinite(samples.track.y)]
+    if (quantum_m := coarsest_step(np.sort(every), samples.quantum_m) or 0.0) > COARSE * noise_m:
+        u = float(np.hypot(u, quantum_m / np.sqrt(12.0)))  # rounding that noise does not average out
     return {
         "offset": Estimate(float(np.mean(y)), u, unit),
         "noise": Estimate(noise_m, noise_m / np.sqrt(2.0 * y.size), unit),
     }
-
-
-def _findings(conditioned: Conditioned, first: Finding) -> tuple[Finding, ...]:
-    track = conditioned.track
-    samples = judge_samples(conditioned, conditioned.flags, conditioned.noise_m)
-    return by_severity((first,), samples, judge_clock(track, Instrument.of(track)))

@@ -8,7 +8,7 @@
     |-- AnalysisError   a track that a stage cannot work on (too short, no motion)
     `-- DynamicsError   a motion that cannot be computed: coefficient, start, step, tolerance or method
 
-Every message is one line: what was demanded, what was got, where, and what to do.
+Every message is one line: where, what is wrong, what was given, and what to do.
 """
 
 from __future__ import annotations

@@ -123,7 +123,7 @@ class MotionAccumulator:
         )
 
     def value(self) -> LiveMotion | NotYet:
-        """Return the motion of the samples held, or why there is none."""
+        """Return the motion of the stored samples, or the reason why there is none."""
         if len(self) < 16:
             return NotYet(f"{len(self)} samples so far")
         track = self.track()

@@ -202,7 +202,7 @@ class Track:
             steps = np.diff(t_s)
             steps = steps[np.isfinite(steps) & (steps > 0)]
             if not steps.size:
-                raise TrackError("time never increases, so no rate can be told: give rate_hz")
+                raise TrackError("time never increases, so the rate is unknown: give rate_hz")
             rate_hz = float(np.round(1.0 / np.median(steps), 6))
         # An infinite time is as unknown as one that is no number; only the latter passes through a cosine in silence.
         t_s[~np.isfinite(t_s)] = np.nan

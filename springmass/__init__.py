@@ -13,11 +13,9 @@ Examples
 
 from __future__ import annotations
 
-# Type checkers take the name for true; importing typing for it would cost `springmass --help` milliseconds.
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from typing import Any
+from typing import TYPE_CHECKING, Any
 
+if TYPE_CHECKING:
     from acquisition.replay import Replay
     from pipeline.analyse import Params
     from pipeline.bench.scene import Scene
@@ -31,12 +29,12 @@ if TYPE_CHECKING:
     from springmass.api.live import live
     from springmass.api.opening import Run, open_run
     from springmass.api.results import results
-    from springmass.api.sources import Comparison, analyse, compare
-    from springmass.runs.loading import Loaded, load, sample_data
+    from springmass.api.sources import Comparison, analyse, compare, load
+    from springmass.runs.loading import Loaded, sample_data
     from springmass.runs.scenes import read_scene
     from storage.run_file.writing import write_run
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "LAWS",
@@ -83,7 +81,7 @@ _WHERE = {
     "compare": "springmass.api.sources",
     "compare_springs": "pipeline.results.compare",
     "live": "springmass.api.live",
-    "load": "springmass.runs.loading",
+    "load": "springmass.api.sources",
     "make_law": "pipeline.damping.laws.of_function",
     "open_run": "springmass.api.opening",
     "read_scene": "springmass.runs.scenes",

@@ -16,10 +16,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from collections.abc import Iterator
 
 __all__ = [
     "INTERNAL",
@@ -35,9 +32,9 @@ __all__ = [
     "adopt",
     "complain",
     "detail",
-    "hushed",
     "internal_error",
     "manner",
+    "quietly",
     "suggest",
     "tell",
 ]
@@ -56,7 +53,7 @@ class ProgramError(Exception):
     Parameters
     ----------
     message : str
-        What was demanded, what was got, where, what to do.
+        Where, what is wrong, the value, and what to do.
     exit_code : int
         One of the codes above.
     """
@@ -99,7 +96,7 @@ def adopt(quiet: bool, verbose: bool) -> None:
 
 
 @contextlib.contextmanager
-def hushed() -> Iterator[None]:
+def quietly() -> Iterator[None]:
     """Say nothing but what is wrong until the ``with`` ends."""
     global _quiet
     before, _quiet = _quiet, True
@@ -141,7 +138,7 @@ def suggest(command: str) -> None:
 
 
 def _write(message: str) -> None:
-    from acquisition.errors import visible  # not at the top: `--help` has nothing to tell
+    from acquisition.errors import visible  # its package imports numpy, which `--help` does not need
 
     with contextlib.suppress(OSError, ValueError):  # nobody hears it; the exit code still says what it was
         print(visible(message), file=sys.stderr)

@@ -7,14 +7,15 @@ Examples
 --------
 >>> from springmass.extend import Channel, ColumnFormat, Contents, Formula, Sheet
 >>> from springmass.extend import Family, FramedDecoder, LineSplitter, Reading
->>> from springmass.extend import Law, make_law
+>>> from springmass.extend import Law, Unit, make_law
 >>> from springmass.extend import Integrator, OneStep, acceleration
 """
 
 from __future__ import annotations
 
-# As in springmass/__init__.py: type checkers take the name for true, and nothing is imported before it is used.
-TYPE_CHECKING = False
+from typing import TYPE_CHECKING
+
+# As in springmass/__init__.py nothing is imported before it is used.
 if TYPE_CHECKING:
     from acquisition.block import Block, Flag
     from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll
@@ -26,13 +27,13 @@ if TYPE_CHECKING:
     from acquisition.readings import Reading, Readings
     from acquisition.recordings.base import Format, SurveyFormat
     from acquisition.recordings.families.declared import dialect
-    from acquisition.recordings.questions import Missing, Need, Question
+    from acquisition.recordings.questions import Missing, MissingItem, Question
     from acquisition.recordings.recording import Original, Recording, Trap
     from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Formula, Sheet
     from acquisition.recordings.tables.sheet import ColumnFormat
     from acquisition.recordings.tables.text import head_lines, text_of
     from acquisition.source import SourceInfo
-    from pipeline.damping.laws.law import Law
+    from pipeline.damping.laws.law import Law, Unit
     from pipeline.damping.laws.of_function import make_law
     from pipeline.dynamics import Equation, Integrator, Problem, Trajectory, get_integrator
     from pipeline.dynamics.halving import auto
@@ -61,7 +62,7 @@ __all__ = [
     "Law",
     "LineSplitter",
     "Missing",
-    "Need",
+    "MissingItem",
     "NeedsAnswer",
     "OneStep",
     "Original",
@@ -79,6 +80,7 @@ __all__ = [
     "SurveyFormat",
     "Trajectory",
     "Trap",
+    "Unit",
     "acceleration",
     "auto",
     "dialect",
@@ -100,13 +102,13 @@ _WHERE = {
     "acquisition.readings": ("Reading", "Readings"),
     "acquisition.recordings.base": ("Format", "SurveyFormat"),
     "acquisition.recordings.families.declared": ("dialect",),
-    "acquisition.recordings.questions": ("Missing", "Need", "Question"),
+    "acquisition.recordings.questions": ("Missing", "MissingItem", "Question"),
     "acquisition.recordings.recording": ("Original", "Recording", "Trap"),
     "acquisition.recordings.tables.contents": ("Arrays", "Channel", "Contents", "Formula", "Sheet"),
     "acquisition.recordings.tables.sheet": ("ColumnFormat",),
     "acquisition.recordings.tables.text": ("head_lines", "text_of"),
     "acquisition.source": ("SourceInfo",),
-    "pipeline.damping.laws.law": ("Law",),
+    "pipeline.damping.laws.law": ("Law", "Unit"),
     "pipeline.damping.laws.of_function": ("make_law",),
     "pipeline.dynamics": ("Equation", "Integrator", "Problem", "Trajectory", "get_integrator"),
     "pipeline.dynamics.halving": ("auto",),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["PACKAGES", "PREFIX", "part"]
+__all__ = ["PACKAGES", "PREFIX", "STDIN", "part", "static_file"]
 
+STDIN = "<stdin>"
+"""The path that stands for standard input, ``-`` on the command line."""
 PACKAGES = ("acquisition", "pipeline", "storage")
 
 _HOME = Path(__file__).resolve().parent
@@ -23,3 +25,14 @@ def part(name: str) -> Path:
     'storage'
     """
     return (_HOME if PREFIX else _HOME.parent) / name
+
+
+def static_file(name: str) -> Path:
+    """Return a file that browsers get: a script, a style or a picture.
+
+    Examples
+    --------
+    >>> static_file("charts.js").is_file()
+    True
+    """
+    return _HOME / "page" / "static" / name

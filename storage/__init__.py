@@ -1,7 +1,7 @@
-"""What stays on the disk: wire logs while recording, run files afterwards, each never half there.
+"""Files on disk: wire logs during a recording, run files afterwards. No file is ever half written.
 
-In: blocks, raw bytes as they came, descriptions. Out: files, and from them the same again or a one-line error of
-:mod:`storage.errors`. Free to change: the rooms `run_file` and `wire_log`, each behind its format's page in
-docs/reference, and `recovery`, which makes the one of the other; :mod:`storage.atomic` writes any file whole or not at
-all. Importing this package costs nothing.
+In: blocks, raw bytes as received, descriptions. Out: files, and their content when they are read again, or a one-line
+error of :mod:`storage.errors`. `run_file` and `wire_log` each implement a format that a page in docs/reference
+describes. `recovery` builds run files from wire logs. :mod:`storage.atomic` writes any file whole or not at all.
+Importing this package costs nothing.
 """

@@ -1,6 +1,6 @@
-"""A file is written whole or not at all: temporary file, fsync, rename, fsync of the folder.
+"""Write files whole or not at all: temporary file, fsync, rename, fsync of the folder.
 
-Existence therefore means completeness: whoever finds the file finds all of it, also after a power cut.
+A file that exists is therefore complete, even after a power cut.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from storage.errors import HDF5_ERRORS, RunExists, WriteFailed, demand_memory, one_line
+from storage.errors import HDF5_ERRORS, RunExists, WriteFailed, one_line, raise_if_out_of_memory
 
 if sys.platform != "win32":
     import fcntl
@@ -38,9 +38,9 @@ def write_whole(path: str | os.PathLike[str], data: bytes | str, *, overwrite: b
     path : str or PathLike
         The file; its folder must exist.
     data : bytes or str
-        Its content; text is encoded as UTF-8, its line ends left as they are.
+        Its content; text is encoded as UTF-8, with its line ends unchanged.
     overwrite : bool
-        Whether a file that stands there may be replaced.
+        Whether an existing file may be replaced.
 
     Returns
     -------
@@ -50,9 +50,9 @@ def write_whole(path: str | os.PathLike[str], data: bytes | str, *, overwrite: b
     Raises
     ------
     RunExists
-        If a file stands there and may not be replaced.
+        If the file exists and may not be replaced.
     WriteFailed
-        If it cannot be written; what stood there before stands.
+        If it cannot be written; an existing file is then unchanged.
 
     Examples
     --------
@@ -69,15 +69,15 @@ def write_whole(path: str | os.PathLike[str], data: bytes | str, *, overwrite: b
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Iterator[Path]:
-    """Give a temporary file to write, and put it in place when the ``with`` ends well.
+    """Give a temporary file to write, and put it in place when the ``with`` ends without an error.
 
     Parameters
     ----------
     path : str or PathLike
         The file to be made; its folder must exist.
     overwrite : bool
-        Whether a file that stands there may be replaced. It is looked for before the work, and the putting in
-        place itself refuses one that has come meanwhile.
+        Whether an existing file may be replaced. This is checked before the body runs and again when the new file is
+        put in place.
 
     Yields
     ------
@@ -87,14 +87,14 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
     Raises
     ------
     RunExists
-        If a file stands there and may not be replaced.
+        If the file exists and may not be replaced.
     WriteFailed
-        If the temporary file cannot be made, synced or put in place. After any error, also one of the body,
-        the temporary file is gone and what stood there before stands.
+        If the temporary file cannot be made, synced or put in place. After any error, including one of the body,
+        the temporary file is removed and an existing file is unchanged.
 
     Notes
     -----
-    What a killed writer left in the folder goes with the next file that is written there.
+    The temporary file of a killed writer is removed when the next file is written to the same folder.
     """
     target = Path(path)
     if not overwrite and os.path.lexists(target):
@@ -108,7 +108,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
             _place(temporary, target, overwrite=overwrite)
             sync_folder(target.parent)
     finally:
-        # After a rename nothing is left to remove.
+        # After a rename there is nothing to remove.
         with contextlib.suppress(OSError):
             temporary.unlink()
         if lock is not None:
@@ -119,7 +119,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
 def whole_h5(
     path: str | os.PathLike[str], *, overwrite: bool = True, libver: tuple[str, str] | None = None
 ) -> Iterator[h5py.File]:
-    """Give an empty HDF5 file to fill, and put it in place when the ``with`` ends well.
+    """Give an empty HDF5 file to fill, and put it in place when the ``with`` ends without an error.
 
     Parameters
     ----------
@@ -145,12 +145,12 @@ def whole_h5(
         whole_file(path, overwrite=overwrite) as temporary,
         temporary.open("r+b", buffering=0) as raw,
     ):
-        sink = _Sink(raw)
+        sink = _ErrorKeepingFile(raw)
         file = h5py.File(sink, "w", libver=libver)
         try:
             yield file
         except BaseException:
-            # Closing writes, and may fail where the body did: the first error is the one to tell.
+            # Closing writes too and may fail for the same reason: report the first error.
             with contextlib.suppress(*HDF5_ERRORS):
                 file.close()
             if sink.error is None:
@@ -164,7 +164,7 @@ def whole_h5(
 
 @contextlib.contextmanager
 def writing(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn what the system raises where a file or a folder cannot be written into :class:`WriteFailed`."""
+    """Raise :class:`WriteFailed` for an OSError while a file or folder is written."""
     try:
         yield
     except OSError as error:
@@ -173,20 +173,20 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def writing_h5(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn what HDF5 raises on a full disk or a value that it cannot hold into one line."""
+    """Raise :class:`WriteFailed` for what HDF5 raises on a full disk or a value that it cannot store."""
     try:
         yield
     except HDF5_ERRORS as error:
-        demand_memory(path, error)
-        remedy = "check the disk's space and what was handed over"
+        raise_if_out_of_memory(path, error)
+        remedy = "check the disk space and the values to be written"
         raise WriteFailed(path, f"could not be written ({one_line(error)})", remedy) from error
 
 
-class _Sink:
-    """A file for HDF5 that never refuses a write: it keeps the disk's first refusal and drops the rest.
+class _ErrorKeepingFile:
+    """A file for HDF5 that never fails a write: it keeps the disk's first error and ignores later writes.
 
-    The HDF5 library takes the process down when the disk is full: closing fails, and what could not be closed
-    is closed again at exit. So it is told that all went well, and the caller is told the truth after closing.
+    The HDF5 library crashes the process when the disk is full: closing fails, and the library closes the file once
+    more at exit. So HDF5 sees no error here, and the caller raises the kept error after closing.
     """
 
     def __init__(self, raw: io.FileIO) -> None:
@@ -194,11 +194,11 @@ class _Sink:
         self.error: OSError | None = None
 
     def write(self, data: memoryview) -> int:
-        rest = memoryview(data).cast("B")
-        size = len(rest)
-        with self._keeping():
-            while len(rest) and self.error is None:  # a nearly full disk takes a part
-                rest = rest[self._raw.write(rest) :]
+        pending = memoryview(data).cast("B")
+        size = len(pending)
+        with self._recording_error():
+            while len(pending) and self.error is None:  # a nearly full disk writes only a part
+                pending = pending[self._raw.write(pending) :]
         return size
 
     def read(self, size: int = -1) -> bytes:
@@ -207,11 +207,11 @@ class _Sink:
     def readinto(self, buffer: memoryview) -> int:
         room = memoryview(buffer).cast("B")
         got = self._raw.readinto(room)
-        room[got:] = bytes(len(room) - got)  # what a full disk did not take
+        room[got:] = bytes(len(room) - got)  # zeros for what a full disk did not write
         return len(room)
 
     def truncate(self, size: int) -> int:
-        with self._keeping():
+        with self._recording_error():
             self._raw.truncate(size)
         return size
 
@@ -225,7 +225,7 @@ class _Sink:
         """Nothing is buffered here."""
 
     @contextlib.contextmanager
-    def _keeping(self) -> Iterator[None]:
+    def _recording_error(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
@@ -236,10 +236,10 @@ _LEFTOVER = re.compile(r"\..{1,32}\.[0-9a-f]{8}\.part", re.DOTALL)
 
 
 def remove_leftovers(folder: Path) -> tuple[Path, ...]:
-    """Remove what writers left that were killed, and return it; what a living one is at work on stays.
+    """Remove the temporary files of killed writers and return their paths; those of running writers stay.
 
-    A writer holds a lock on its temporary file, which ends with it, however it ends. Where a system or a file system
-    has no locks, nothing is removed.
+    A writer holds a lock on its temporary file, and the system releases it when the writer ends. Without file locks
+    (Windows, some network disks) nothing is removed.
     """
     if sys.platform == "win32":
         return ()
@@ -252,7 +252,7 @@ def remove_leftovers(folder: Path) -> tuple[Path, ...]:
 
 
 def _abandoned(leftover: Path) -> bool:
-    """Remove a temporary file that nobody holds; return whether it is gone."""
+    """Remove a temporary file that no process has locked; return whether it was removed."""
     with contextlib.suppress(OSError), leftover.open("r+b") as file:
         assert sys.platform != "win32"
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -262,9 +262,9 @@ def _abandoned(leftover: Path) -> bool:
 
 
 def _reserve(target: Path) -> tuple[Path, int | None]:
-    """Make an empty hidden file beside the target, with the permissions that any new file would get, and lock it."""
+    """Make and lock an empty hidden file next to the target, with the permissions of any new file."""
     while True:
-        # The name is cut, so that a target of the longest allowed name still gets a temporary one.
+        # The name is truncated, so that the temporary name of a long target is not too long.
         temporary = target.with_name(f".{target.name[:32]}.{secrets.token_hex(4)}.part")
         with writing(target):
             descriptor = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
@@ -275,7 +275,7 @@ def _reserve(target: Path) -> tuple[Path, int | None]:
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         if os.fstat(descriptor).st_nlink:
             return temporary, descriptor
-        os.close(descriptor)  # taken for a leftover before it was locked
+        os.close(descriptor)  # another process removed it as a leftover before it was locked
 
 
 def _sync(file: Path) -> None:
@@ -291,19 +291,19 @@ def _place(temporary: Path, target: Path, *, overwrite: bool) -> None:
     if overwrite:
         os.replace(temporary, target)
         return
-    # A hard link fails where a name exists, which a rename does not: no gap between looking and placing.
+    # A hard link fails if the name exists and a rename does not, so there is no gap between check and placement.
     try:
         os.link(temporary, target)
     except FileExistsError as error:
         raise _exists(target) from error
-    except OSError:  # a file system without hard links, such as a memory stick's
+    except OSError:  # a file system without hard links, such as FAT
         if os.path.lexists(target):
             raise _exists(target) from None
         os.replace(temporary, target)
 
 
 def sync_folder(folder: Path) -> None:
-    """Return when the names in a folder are safe on the disk, where its file system can do that. Raises OSError."""
+    """Sync the names in a folder to the disk, if its file system can do that. Raises OSError."""
     try:
         descriptor = os.open(folder, os.O_RDONLY)
     except OSError as error:
@@ -320,12 +320,11 @@ def sync_folder(folder: Path) -> None:
 
 
 def _exists(target: Path) -> RunExists:
-    demand = "a new file was to be written, but one stands there"
-    return RunExists(target, demand, "choose another name or allow overwriting")
+    return RunExists(target, "already exists", "choose another name or allow overwriting")
 
 
 def _failed(target: Path, error: OSError) -> WriteFailed:
     reason = error.strerror or one_line(error)
     missing = isinstance(error, FileNotFoundError)
-    remedy = "make the folder first" if missing else "check the disk's space and permissions"
+    remedy = "make the folder first" if missing else "check the disk space and the permissions"
     return WriteFailed(target, f"could not be written ({reason})", remedy)

@@ -1,4 +1,4 @@
-"""Room on the disk, looked at before a run starts."""
+"""Check the free disk space before a run starts."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ __all__ = ["DiskNearlyFull", "check_disk"]
 
 
 class DiskNearlyFull(WriteFailed):
-    """A disk with less room than a run will need, found before the run starts."""
+    """A disk with too little space for a run, found before the run starts."""
 
 
 def check_disk(path: str | os.PathLike[str], needed_bytes: int) -> int:
-    """Return the free bytes of the disk that a file is going to lie on.
+    """Return the free bytes of the disk on which a file will be written.
 
     Parameters
     ----------
     path : str or PathLike
         The file; its folder must exist.
     needed_bytes : int
-        What the run will write.
+        How many bytes the run will write.
 
     Raises
     ------
     DiskNearlyFull
         If less is free.
     WriteFailed
-        If the folder is not there.
+        If the folder does not exist.
     """
     folder = Path(path).absolute().parent
     try:
         free = shutil.disk_usage(folder).free
     except OSError as error:
-        demand = f"a folder with {_megabytes(needed_bytes)} of room was demanded, got none"
-        raise WriteFailed(path, f"{demand} ({error.strerror or one_line(error)})", "make the folder first") from error
+        problem = f"its folder cannot be read ({error.strerror or one_line(error)})"
+        raise WriteFailed(path, problem, "make the folder first") from error
     if free < needed_bytes:
-        demand = f"the run needs {_megabytes(needed_bytes)}, but {_megabytes(free)} are free"
-        raise DiskNearlyFull(path, demand, "make room, record for a shorter time, or name a file on another disk")
+        problem = f"the run needs {_megabytes(needed_bytes)}, but {_megabytes(free)} are free"
+        raise DiskNearlyFull(path, problem, "free disk space, record for a shorter time or use another disk")
     return free
 
 

@@ -3,18 +3,18 @@
 ::
 
     StorageError
-    |-- NotARun        nothing there, not HDF5, or HDF5 of another layout     springmass exits with 3
-    |-- RunDamaged     a run file whose content is not what was written       springmass exits with 3
+    |-- NotARun        no file, not HDF5, or HDF5 of another layout           springmass exits with 3
+    |-- RunDamaged     a run file that is damaged or was edited               springmass exits with 3
     |-- RunClosed      a run used outside its ``with``
-    |-- QueryRefused   a question to a catalog that is none, or would change it
-    |-- NotALog        nothing there, or no wire log                          springmass exits with 3
+    |-- QueryRefused   an invalid search of a catalog, or one that would change it
+    |-- NotALog        no file, or no wire log                                springmass exits with 3
     |-- LogGrowing     a log that a recording still writes                    springmass exits with 3
-    |-- OutOfMemory    the machine has too little memory; no word against the file   springmass exits with 3
-    `-- WriteFailed    a file could not be written; what stood there before stands
-        |-- RunExists  a file of that name stands already and may not be replaced
-        `-- DiskNearlyFull   too little room for the run, known before it starts
+    |-- OutOfMemory    too little memory; the file may be sound               springmass exits with 3
+    `-- WriteFailed    a file could not be written; an earlier file of that name is unchanged
+        |-- RunExists  a file of that name exists and may not be replaced
+        `-- DiskNearlyFull   too little disk space for the run, found before it starts
 
-Every message is one line: where, what was demanded, what was got, and what to do.
+Every message is one line: ``where: what is wrong, got VALUE; what to do``.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ __all__ = [
     "StorageError",
     "WriteFailed",
     "damaged",
-    "demand_memory",
     "one_line",
+    "raise_if_out_of_memory",
     "reading",
 ]
 
@@ -48,7 +48,7 @@ _NO_MEMORY = re.compile("memory alloc|alloc[a-z]* memory|out of memory|cannot al
 
 
 def one_line(error: BaseException) -> str:
-    """Return an error's text on a single line (HDF5 breaks its own over several).
+    """Return an error's text on a single line (HDF5 uses several).
 
     Examples
     --------
@@ -63,82 +63,81 @@ def one_line(error: BaseException) -> str:
 
 
 class StorageError(Exception):
-    """Anything that storage refuses; its text is a single line meant for the user.
+    """Base class of the errors of storage. The message is one line for the user.
 
     Parameters
     ----------
     path : str or PathLike
         The file.
     demand : str
-        What was demanded of it and what was got instead.
+        What is wrong, with the value that was found.
     remedy : str
         What the user can do.
     """
 
-    def __init__(self, path: str | os.PathLike[str], demand: str, remedy: str) -> None:
-        self.path, self.demand, self.remedy = os.fspath(path), demand, remedy
-        super().__init__(f"{self.path}: {demand}; {remedy}")
+    def __init__(self, path: str | os.PathLike[str], problem: str, remedy: str) -> None:
+        self.path, self.problem, self.remedy = os.fspath(path), problem, remedy
+        super().__init__(f"{self.path}: {problem}; {remedy}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how it is made again where it arrives from another process."""
-        return type(self), (self.path, self.demand, self.remedy)
+        """Return how to recreate the error in another process."""
+        return type(self), (self.path, self.problem, self.remedy)
 
 
 class NotARun(StorageError):
-    """A path that holds no run file: a missing file, a text, an HDF5 file of another program."""
+    """A path without a run file: a missing file, a text file, an HDF5 file of another program."""
 
 
 class RunDamaged(StorageError):
-    """A run file whose content is not what was written: a flipped bit, a cut end, an edited attribute."""
+    """A run file that changed after it was written: a flipped bit, a missing end, an edited attribute."""
 
 
 class QueryRefused(StorageError):
-    """A question to a catalog that is none, names what is not there, or would do anything but read."""
+    """A search that is invalid, names an unknown column, or would do anything but read."""
 
 
 class RunClosed(StorageError):
-    """A run read after its ``with`` ended."""
+    """A run that is read after its ``with`` ended."""
 
 
 class OutOfMemory(StorageError):
-    """A file that this machine has too little memory for; it may be sound."""
+    """A file that needs more memory than is available; the file may be sound."""
 
 
 class WriteFailed(StorageError):
-    """A file that could not be written: a full disk, a missing folder, blocks with a gap between them."""
+    """A file that could not be written: a full disk, a missing folder, blocks that do not follow each other."""
 
 
 class RunExists(WriteFailed):
-    """A file of that name stands already, and the caller has not said that it may be replaced."""
+    """A file of that name exists, and the caller did not allow replacing it."""
 
 
 def damaged(path: str | os.PathLike[str], what: str, how: str) -> RunDamaged:
-    """Return the error for a part of a run file that is not what was written."""
-    remedy = "restore the file from a copy, or make it again from the wire log or the old recording"
-    return RunDamaged(path, f"{what} is not what was written: {how}", remedy)
+    """Return the error for a damaged part of a run file."""
+    remedy = "restore a copy of the file, or make it again from the wire log or recording"
+    return RunDamaged(path, f"{what} is damaged: {how}", remedy)
 
 
 @contextlib.contextmanager
 def reading(path: str | os.PathLike[str], what: str) -> Iterator[None]:
-    """Turn what HDF5 raises on damaged bytes into one line."""
+    """Raise :class:`RunDamaged` for the errors that HDF5 raises on damaged bytes."""
     try:
         yield
     except StorageError:
         raise
     except HDF5_ERRORS as error:
-        demand_memory(path, error)
+        raise_if_out_of_memory(path, error)
         raise damaged(path, what, one_line(error)) from error
 
 
-def demand_memory(path: str | os.PathLike[str], error: BaseException) -> None:
-    """Raise :class:`OutOfMemory` where an error is a lack of memory, which says nothing of the file.
+def raise_if_out_of_memory(path: str | os.PathLike[str], error: BaseException) -> None:
+    """Raise :class:`OutOfMemory` if an error is a lack of memory and not a fault of the file.
 
     Examples
     --------
-    >>> demand_memory("run.h5", OSError("Can't read data (memory allocation failed for chunk)"))
+    >>> raise_if_out_of_memory("run.h5", OSError("Can't read data (memory allocation failed for chunk)"))
     Traceback (most recent call last):
-    storage.errors.OutOfMemory: run.h5: more memory was demanded than there is; end other programs, or raise the limit
+    storage.errors.OutOfMemory: run.h5: out of memory; close other programs or raise the memory limit
     """
     if isinstance(error, MemoryError) or _NO_MEMORY.search(str(error)):
-        demand = "more memory was demanded than there is"
-        raise OutOfMemory(path, demand, "end other programs, or raise the limit") from error
+        raise OutOfMemory(path, "out of memory", "close other programs or raise the memory limit") from error

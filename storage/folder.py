@@ -1,7 +1,7 @@
-"""A folder of results is built beside its place and put there by rename: nobody finds the old and the new mixed.
+"""Replace a folder of results as a whole: build it under a temporary name and rename it, so old and new never mix.
 
-A kill leaves the old folder or the new one. What a killed build left beside is taken away by the next build of the same
-folder, which also puts the old one back where the kill fell between the two renames.
+After a kill either the old folder or the new one is in place. The next build of the same folder removes what the killed
+one left, and restores the old folder if the kill came between the two renames.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from storage.errors import WriteFailed, one_line
 
 try:
     import fcntl
-except ImportError:  # Windows: leftovers stay, for nothing tells them from what is being built
+except ImportError:  # Windows: leftovers stay, because nothing distinguishes them from a build that is running
     fcntl = None  # type: ignore[assignment]
 
 __all__ = ["whole_folder"]
@@ -30,35 +30,35 @@ _LOCKS = bool(fcntl)
 
 @contextlib.contextmanager
 def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str) -> Iterator[Path]:
-    """Give an empty folder to fill, and put it in place when the ``with`` ends well.
+    """Give an empty folder to fill, and put it in place when the ``with`` ends without an error.
 
     Parameters
     ----------
     path : str or PathLike
         The folder to be made or replaced.
     names : collection of str
-        Whatever may be made in it, as relative paths with slashes. A folder that holds anything else, or that a
-        process stands in, is not replaced: its files are, one by one, ``last`` taken away first and put there last.
-        Files of these names that were not made this time are taken away.
+        All files that may be made in it, as relative paths with slashes. If the folder holds other files, or is the
+        working directory, its files are replaced one by one: ``last`` is removed first and written last. Files of
+        these names that were not made this time are removed.
     last : str
-        The file whose presence says that the rest is there.
+        The file whose presence shows that the folder is complete.
 
     Yields
     ------
     Path
-        An empty folder beside the place.
+        An empty folder next to the target.
 
     Raises
     ------
     WriteFailed
-        If it cannot be made or put in place. After an error of the body what stood there before stands.
+        If it cannot be made or put in place. After an error of the body the old folder is unchanged.
     """
     target = Path(path).resolve()
-    with _told(path):
+    with _writing_folder(path):
         if target.exists() and not target.is_dir():
-            raise NotADirectoryError(errno.ENOTDIR, "a file of that name stands there")
+            raise NotADirectoryError(errno.ENOTDIR, "a file of that name exists")
         target.parent.mkdir(parents=True, exist_ok=True)
-        _tidy(target)
+        _clean_up(target)
         part = _beside(target, "part")
         part.mkdir()
         lock = os.open(part, os.O_RDONLY) if _LOCKS else None
@@ -66,7 +66,7 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
         if lock is not None:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield part
-        with _told(path):
+        with _writing_folder(path):
             _replace(part, target, names, last)
             sync_folder(target.parent)
     finally:
@@ -76,20 +76,20 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
 
 
 def _replace(part: Path, target: Path, names: Collection[str], last: str) -> None:
-    held = _files(target)
+    existing = _files(target)
     cwd = Path.cwd()
     if not target.exists():
         os.rename(part, target)
-    elif held <= set(names) and target != cwd and target not in cwd.parents and not os.path.ismount(target):
+    elif existing <= set(names) and target != cwd and target not in cwd.parents and not os.path.ismount(target):
         old = _beside(target, "old")
         os.rename(target, old)
         os.rename(part, target)
         shutil.rmtree(old)
     else:
-        made = _files(part)
-        for name in (last, *sorted(held & set(names) - made)):
+        new = _files(part)
+        for name in (last, *sorted(existing & set(names) - new)):
             (target / name).unlink(missing_ok=True)
-        for name in (*sorted(made - {last}), last):
+        for name in (*sorted(new - {last}), last):
             (target / name).parent.mkdir(exist_ok=True)
             os.replace(part / name, target / name)
 
@@ -103,23 +103,23 @@ def _beside(target: Path, kind: str) -> Path:
 
 
 def _prefix(target: Path) -> str:
-    # Cut, so that the longest allowed name still gets one; the digest tells names apart that begin alike.
+    # Truncated, because names have a maximal length; the digest distinguishes names with the same beginning.
     return f".{target.name[:32]}.{hashlib.sha256(os.fsencode(target.name)).hexdigest()[:8]}."
 
 
-def _tidy(target: Path) -> None:
-    """Put back or take away what a killed build left."""
+def _clean_up(target: Path) -> None:
+    """Restore or remove what a killed build left."""
     if not _LOCKS:
         return
-    for left in [each for each in target.parent.iterdir() if each.name.startswith(_prefix(target))]:
-        if left.suffix == ".old" and not target.exists():
-            os.rename(left, target)
-        elif _abandoned(left):
-            shutil.rmtree(left)
+    for leftover in [each for each in target.parent.iterdir() if each.name.startswith(_prefix(target))]:
+        if leftover.suffix == ".old" and not target.exists():
+            os.rename(leftover, target)
+        elif _abandoned(leftover):
+            shutil.rmtree(leftover)
 
 
 def _abandoned(folder: Path) -> bool:
-    """Tell whether no process holds a folder."""
+    """Return whether no process has locked a folder."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -131,9 +131,10 @@ def _abandoned(folder: Path) -> bool:
 
 
 @contextlib.contextmanager
-def _told(path: str | os.PathLike[str]) -> Iterator[None]:
+def _writing_folder(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        demand = f"a folder for results was demanded, it cannot be made ({error.strerror or one_line(error)})"
-        raise WriteFailed(path, demand, "check the disk's space and permissions, or name another with --out") from error
+        problem = f"the folder for results cannot be made ({error.strerror or one_line(error)})"
+        remedy = "check the disk space and the permissions, or choose another folder"
+        raise WriteFailed(path, problem, remedy) from error

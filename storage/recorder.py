@@ -1,9 +1,8 @@
-"""The recorder: takes what the reading thread brings, and sees that it reaches the disk.
+"""The recorder: it takes records from the reading thread and writes them to the disk.
 
-Three threads share the work. The reading thread only puts records into a queue, the one way to the log for every
-sensor. A second takes them out and appends them to the wire log at once, so that a killed process loses no more than
-the read in flight. A third calls fdatasync once a second: that may take as long as the disk likes, and neither of the
-others waits for it.
+Three threads share the work. The reading thread only puts the records of all sensors into a queue. The second thread
+takes them out and appends them to the wire log immediately, so that a killed process loses at most the last read. The
+third calls fdatasync once a second. A sync may take long, but neither of the other threads waits for it.
 """
 
 from __future__ import annotations
@@ -29,33 +28,34 @@ from storage.wire_log.scanning import LogContents, read_log
 __all__ = ["Recorder", "RecorderStatus"]
 
 QUEUE_BYTES = 16 << 20
-"""Half an hour of one sensor at 100 Hz, two minutes of 16 of them."""
+"""Half an hour of one sensor at 100 Hz, or two minutes of 16 sensors."""
 
-KEPT_NOTES = 10_000
-"""Marks and events that are kept while the queue is full: nobody makes so many while a disk hangs."""
+MAX_NOTES = 10_000
+"""Largest number of marks and events that are kept while the queue is full; nobody makes so many while a disk hangs."""
 GIVE_UP_S = 1.0
-"""So long the disk has for the counts of what is given up; whoever gives up does not want to wait."""
+"""How long :meth:`Recorder.give_up` waits for the disk, s; a user who gives up does not want to wait."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecorderStatus:
-    """Where a recording stands; counts of records hold marks, events and the header too.
+    """The state of a recording. Counts of records include marks, events and the header.
 
     Parameters
     ----------
     records, bytes : int
-        In the log: a killed process does not lose them.
+        In the log. They survive a killed process.
     synced_records, synced_bytes : int
-        On the disk: a power cut does not lose them. Record numbers below ``synced_records`` are safe.
+        On the disk. They survive a power cut: record numbers below ``synced_records`` are safe.
     queued_records, queued_bytes : int
-        Put and not yet taken out of the queue.
+        In the queue.
     dropped_records, dropped_bytes : int
-        Put and not recorded, because the queue was full or the recording had stopped.
+        Received but not recorded, because the queue was full or the recording had stopped.
     error : str
-        Why the recording stopped, one line; empty while all is well.
+        Why the recording stopped, one line; empty if there is no error.
     closed : bool
     astray : str
-        What became first of the log's name while it was recorded; empty while it leads to the log.
+        Whether the log was first deleted, renamed or replaced during the recording; empty if its name still leads to
+        it.
     """
 
     records: int
@@ -73,7 +73,7 @@ class RecorderStatus:
 
 @dataclass(slots=True)
 class _Overflow:
-    """What one channel lost since the queue became full."""
+    """What one channel has lost since the queue became full."""
 
     first_ns: int
     last_ns: int
@@ -91,31 +91,31 @@ class _Overflow:
 
 
 class Recorder:
-    """Records to a new wire log. It is a :class:`acquisition.live.line.Sink`.
+    """Records to a new wire log. It implements :class:`acquisition.live.line.Sink`.
 
     Parameters
     ----------
     path : str or PathLike
-        The log to be made; its folder must exist.
+        The log to make; its folder must exist.
     header : LogHeader
     clock : Clock
-        Says when a sync is due, and stamps marks and events that come without a time.
+        Times the syncs, and gives marks and events without a time their time.
     sync_every_s : float
-        Between syncs, s.
+        Time between syncs, s.
     queue_bytes : int
-        Bound of the queue. What comes while it is full is counted, and an event in the log says so.
+        Size of the queue. Reads that arrive while it is full are counted and dropped, and an event in the log says so.
     open_file : callable
-        Makes the log's file: the seam for tests.
+        Makes the log's file; tests replace it.
 
     Attributes
     ----------
     path : Path
-        The log, by the name that it was begun with.
+        The log, by its first name.
 
     Raises
     ------
     RunExists, WriteFailed
-        If the log cannot be begun.
+        If the log cannot be started.
     """
 
     def __init__(
@@ -132,7 +132,7 @@ class Recorder:
         self.path = self._log.path
         self._held: HeldLog | None = None
         if os.name != "nt":
-            with contextlib.suppress(OSError):  # then it is recorded all the same, and read by its name
+            with contextlib.suppress(OSError):  # the recording goes on, and the log is read by its name
                 self._held = HeldLog(self.path)
         self._astray = ""
         self._clock = clock
@@ -141,14 +141,14 @@ class Recorder:
         self._lock = threading.Lock()
         self._done = threading.Condition(self._lock)
         self._queue: list[Item] = []
-        # Rung whenever there is something again. A condition's waiting and waking are Python, and cost twice as much.
-        self._bell: queue.SimpleQueue[None] = queue.SimpleQueue()
+        # Gets an item whenever the queue is filled again. A Condition is written in Python and costs twice as much.
+        self._wakeup: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._queued_bytes = 0
         self._appending = False
         self._taken: list[Item] = []
         self._gave_up = False
         self._overflows: dict[int, _Overflow] = {}
-        self._notes: list[Item] = []  # marks and events that came since the queue became full
+        self._notes: list[Item] = []  # marks and events since the queue became full
         self._dropped_records = self._dropped_bytes = 0
         self._error: WriteFailed | None = None
         self._closing = self._closed = False
@@ -172,7 +172,7 @@ class Recorder:
 
     @property
     def status(self) -> RecorderStatus:
-        """Where the recording stands; any thread may ask."""
+        """The state of the recording; any thread may read it."""
         with self._lock:
             written, synced = self._log.written, self._log.synced
             log = (written.records, written.bytes, synced.records, synced.bytes)
@@ -180,24 +180,24 @@ class Recorder:
             return RecorderStatus(*log, *queue, str(self._error or ""), self._closed, self._astray)
 
     def reads(self, reads: Sequence[Read]) -> None:
-        """Take what was read of ports; never waits for the disk, never raises for its sake."""
+        """Record reads of ports. This never waits for the disk and never raises an error of the disk."""
         self._offer(Kind.DATA, reads)
 
     def put(self, channel: int, host_ns: int, data: bytes) -> None:
-        """Take the bytes of one read of a port."""
+        """Record the bytes of one read of a port."""
         self.reads(((channel, host_ns, data),))
 
     def mark(self, text: str, *, host_ns: int | None = None, channel: int = 0) -> None:
-        """Take a mark."""
+        """Record a mark."""
         now = self._clock.now_ns() if host_ns is None else host_ns
         self._offer(Kind.MARK, ((channel, now, text.encode("utf-8", "replace")),))
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Take "lost", "reopened", "timeout", "trigger", "calibration" or another event, with facts about it."""
+        """Record "lost", "reopened", "timeout", "trigger", "calibration" or another event, with facts about it."""
         self._offer(Kind.EVENT, ((channel, host_ns, event_payload(kind, facts)),))
 
     def drain(self, *, sync: bool = False) -> RecorderStatus:
-        """Return when all that was put before is in the log, with ``sync`` on the disk; or the recording stopped."""
+        """Wait until everything received so far is in the log (with ``sync``: on the disk) or the recording stops."""
         with self._done:
             self._done.wait_for(lambda: self._error or not (self._waiting or self._appending))
         if sync:
@@ -205,18 +205,18 @@ class Recorder:
         return self.status
 
     def close(self) -> None:
-        """Write what is queued, the end record, sync and close; again does no harm.
+        """Write the queue and the end record, sync and close. Further calls do nothing.
 
         Raises
         ------
         WriteFailed
-            If the disk refused anything since the beginning. What had been written before stands.
+            If any write has failed since the start. Everything written before that is kept.
         """
         with self._lock:
             if self._closing:
                 return
             self._closing = True
-            self._bell.put(None)
+            self._wakeup.put(None)
         self._appender.join()
         self._stop_sync.set()
         self._syncer.join()
@@ -231,7 +231,7 @@ class Recorder:
             raise self._error
 
     def contents(self) -> LogContents:
-        """Return what was recorded, also where the log's name does not lead to it any more; after :meth:`close`.
+        """Return what was recorded, even if the log was renamed or deleted. Call it after :meth:`close`.
 
         Raises
         ------
@@ -241,27 +241,27 @@ class Recorder:
         return read_log(self.path) if self._held is None else self._held.contents()
 
     def give_up(self) -> bool:
-        """End at once: count what is not in the log, and write the counts into it, past a write that hangs.
+        """End immediately: count what is not in the log, and write the counts despite a write that hangs.
 
-        Marks and events that wait are written with the counts. For when nobody waits for :meth:`close` any more.
+        Queued marks and events are written with the counts. Use it when the user no longer waits for :meth:`close`.
 
         Returns
         -------
         bool
-            Whether the log has the counts. The disk has a second for that.
+            Whether the counts were written within a second.
         """
         with self._lock:
             self._closing = self._gave_up = True
-            self._bell.put(None)
-            left = self._taken[self._log.stop() :] + self._queue
+            self._wakeup.put(None)
+            pending = self._taken[self._log.stop() :] + self._queue
             self._queue, self._queued_bytes = [], 0
             lost: dict[int, _Overflow] = {}
-            for _, channel, mono_ns, payload in [item for item in left if item[0] is Kind.DATA]:
+            for _, channel, mono_ns, payload in [item for item in pending if item[0] is Kind.DATA]:
                 lost.setdefault(channel, _Overflow(mono_ns, mono_ns)).add(mono_ns, len(payload))
             self._dropped_records += sum(each.records for each in lost.values())
             self._dropped_bytes += sum(each.bytes for each in lost.values())
-            # What overflowed came after what waited, and was counted when it came.
-            items = [item for item in left if item[0] is not Kind.DATA]
+            # What overflowed is younger than the queue and has been counted already.
+            items = [item for item in pending if item[0] is not Kind.DATA]
             items += [each.event(channel) for channel, each in (*lost.items(), *self._overflows.items())]
             items += self._notes
             self._overflows, self._notes = {}, []
@@ -270,13 +270,13 @@ class Recorder:
         written = threading.Event()
 
         def write() -> None:
-            with contextlib.suppress(OSError):  # the caller says it
+            with contextlib.suppress(OSError):  # the return value reports it
                 self._look_for_name()
                 if not self._astray:
                     self._log.append_beside(items)
                     written.set()
 
-        # On a thread of its own, for this disk may hang here too.
+        # In a separate thread, because the disk may hang here too.
         threading.Thread(target=write, name="springmass-counts", daemon=True).start()
         return written.wait(GIVE_UP_S)
 
@@ -285,80 +285,79 @@ class Recorder:
             if not 0 <= channel <= HIGHEST_CHANNEL:
                 raise ValueError(f"a channel must lie in 0 to {HIGHEST_CHANNEL}, got {channel}")
         with self._lock:
-            open_ = self._error is None and not self._closing
-            rung = self._waiting
+            accepting = self._error is None and not self._closing
+            was_waiting = self._waiting
             for channel, mono_ns, payload in records:
                 size = HEAD_BYTES + len(payload)
-                # After an overflow nothing is taken before its event: records around a loss must not look like
-                # neighbours.
-                if open_ and not (self._overflows or self._notes) and self._queued_bytes + size <= self._limit:
+                # After an overflow its event must come first: records around a loss must not look consecutive.
+                if accepting and not (self._overflows or self._notes) and self._queued_bytes + size <= self._limit:
                     self._queue.append((kind, channel, mono_ns, payload))
                     self._queued_bytes += size
                     continue
-                # What became of a port or a sensor is never given up: without it the readings after it say nothing.
-                if open_ and kind is not Kind.DATA and len(self._notes) < KEPT_NOTES:
+                # Events of ports and sensors are never dropped: later readings cannot be decoded without them.
+                if accepting and kind is not Kind.DATA and len(self._notes) < MAX_NOTES:
                     self._notes.append((kind, channel, mono_ns, payload))
                     continue
                 self._dropped_records += 1
                 self._dropped_bytes += len(payload)
-                if open_:
+                if accepting:
                     self._overflows.setdefault(channel, _Overflow(mono_ns, mono_ns)).add(mono_ns, len(payload))
-            if not rung and self._waiting:
-                self._bell.put(None)
+            if not was_waiting and self._waiting:
+                self._wakeup.put(None)
 
     @property
     def _waiting(self) -> bool:
         return bool(self._queue or self._overflows or self._notes)
 
     def _append_all(self) -> None:
-        while taken := self._take_queued():
+        while items := self._take_queued():
             try:
-                self._log.extend(taken)
-            except Exception as error:  # a defect, too, must stop the recording and not look like one
-                if self._gave_up:  # what was left is counted
+                self._log.extend(items)
+            except Exception as error:  # a defect must stop the recording too, and not go unnoticed
+                if self._gave_up:  # give_up has counted the rest
                     return
-                self._stop(self._one_line(error), taken[self._log.extended :])
+                self._stop(self._one_line(error), items[self._log.extended :])
                 return
 
     def _take_queued(self) -> list[Item]:
-        """Wait for records and return all of them; none where the recording is closing and all are in the log.
+        """Wait for records and return all of them; an empty list if the recording is closing and all are in the log.
 
-        What overflowed came after everything queued and before everything to come: its events stand in its place.
+        Overflow events go after the queued records and before all later ones, which is where the lost reads belong.
         """
         while True:
             with self._lock:
-                taken, self._queue, self._queued_bytes = self._queue, [], 0
-                taken += [lost.event(channel) for channel, lost in self._overflows.items()] + self._notes
+                items, self._queue, self._queued_bytes = self._queue, [], 0
+                items += [lost.event(channel) for channel, lost in self._overflows.items()] + self._notes
                 self._overflows.clear()
                 self._notes = []
-                self._appending = bool(taken)
-                self._taken, self._log.extended = taken, 0
-                if not taken:
+                self._appending = bool(items)
+                self._taken, self._log.extended = items, 0
+                if not items:
                     self._done.notify_all()
-                if taken or self._closing:
-                    return taken
-            self._bell.get()
+                if items or self._closing:
+                    return items
+            self._wakeup.get()
 
     def _one_line(self, error: Exception) -> WriteFailed:
         if isinstance(error, WriteFailed):
             return error
         return WriteFailed(self.path, f"a record could not be appended ({one_line(error)})", "report this defect")
 
-    def _stop(self, error: WriteFailed, left: list[Item]) -> None:
-        """Keep what there is: what was appended can still be synced, though no more can be appended."""
+    def _stop(self, error: WriteFailed, pending: list[Item]) -> None:
+        """Stop recording; what was appended can still be synced."""
         with self._lock:
             self._error = self._error or error
-            left += self._queue
-            self._queue, self._taken = [], []  # counted here, and not again by give_up
+            pending += self._queue
+            self._queue, self._taken = [], []  # counted here, so give_up must not count them again
             self._queued_bytes = 0
-            self._dropped_records += len(left)
-            self._dropped_bytes += sum(len(payload) for *_, payload in left)
+            self._dropped_records += len(pending)
+            self._dropped_bytes += sum(len(payload) for *_, payload in pending)
             self._done.notify_all()
         self._sync()
 
     def _sync_often(self) -> None:
         due = self._clock.now_ns() + self._sync_every_ns
-        # An event's wait and not the clock's: closing must not wait for the next sync.
+        # Wait on the event and not on the clock, so that closing does not wait for the next sync.
         while not self._stop_sync.wait(max(0, due - self._clock.now_ns()) * 1e-9):
             due = max(due, self._clock.now_ns()) + self._sync_every_ns
             if self._look_for_name():
@@ -367,9 +366,9 @@ class Recorder:
                 self._sync()
 
     def _look_for_name(self) -> bool:
-        """Look whether the log was deleted, renamed or replaced; return whether this look is the first to see it.
+        """Check whether the log was deleted, renamed or replaced; return whether this call is the first to find so.
 
-        Looking may wait for the disk, so the reading thread never does.
+        The check may wait for the disk, so the reading thread never calls it.
         """
         if self._held is None or self._astray:
             return False
@@ -387,7 +386,7 @@ class Recorder:
         return json.dumps(counts | {"dropped_bytes": self._dropped_bytes}).encode("ascii")
 
     def _guarded(self, step: Callable[[], object]) -> None:
-        """Do a step; the first thing that the disk refuses is kept for :meth:`close` to raise."""
+        """Do a step and keep its error, if it is the first, for :meth:`close` to raise."""
         try:
             step()
         except WriteFailed as error:

@@ -1,9 +1,9 @@
-"""What a header or an event of a file may hold: the tools to declare it once, and to read JSON by that declaration.
+"""Tools to declare the content of a file's header or event once, and to read JSON by that declaration.
 
-A header behind a right checksum is still a stranger's: the checksum says that it is what was written, not that it makes
-sense. The keys with their types and ranges are ``msgspec`` structs: :class:`storage.run_file.header.Header` and
+A correct checksum shows that a header is unchanged, not that its values make sense. So the keys with their types and
+ranges are declared as ``msgspec`` structs: :class:`storage.run_file.header.Header` and
 :class:`storage.wire_log.log_header.LogHeader`. What :func:`decoded` returns has the types, ranges, sizes and depth that
-the code behind relies on.
+later code relies on.
 """
 
 from __future__ import annotations
@@ -36,26 +36,26 @@ __all__ = [
 ]
 
 Count = Annotated[int, Meta(ge=0, le=2**53)]
-"""A number of things: an integer that a float holds exactly."""
+"""A count: an integer that a float can represent exactly."""
 
 _T = TypeVar("_T")
 _SHOWN = 60
-_GREATEST = sys.float_info.max  # an integer beyond it is no float's equal, and NaN compares as false
+_GREATEST = sys.float_info.max  # no float equals a larger integer, and any comparison with NaN is false
 _AT = re.compile(r" - at `(?:key` in `)?\$(.*)`$", re.DOTALL)
 _STEP = re.compile(r"\.(\w+)|\[([0-9]+)\]")
 _ANY_KEY = "[...]"
-"""How msgspec's paths name a value of a table with keys of any name: then the table is what is shown."""
+"""How a path of msgspec names a value in a table with arbitrary keys; then the message shows the whole table."""
 
 
 class ValueRefused(ValueError):
-    """A value that may not stand where it does.
+    """A value that is not allowed for its key.
 
     Parameters
     ----------
     key : str
-        Where it stands, dotted.
+        Dotted path of the key.
     reason : str
-        What is expected, and what is there.
+        What is expected, and the value.
     """
 
     def __init__(self, key: str, reason: str) -> None:
@@ -66,7 +66,7 @@ class ValueRefused(ValueError):
 
 
 class Calibrated(Struct, frozen=True, kw_only=True):
-    """Numbers of :class:`acquisition.live.calibration.Calibration` by name, which are held against its ranges."""
+    """A struct with the numbers of a :class:`acquisition.live.calibration.Calibration`, checked against its ranges."""
 
     calibration: dict[str, float] = field(default_factory=dict)
 
@@ -75,7 +75,7 @@ class Calibrated(Struct, frozen=True, kw_only=True):
 
 
 def demand_calibration(numbers: Mapping[str, Any], key: str) -> None:
-    """Refuse numbers that no calibration has.
+    """Check the numbers of a calibration.
 
     Raises
     ------
@@ -88,12 +88,12 @@ def demand_calibration(numbers: Mapping[str, Any], key: str) -> None:
 
 
 def parsed(text: bytes, key: str) -> Any:
-    """Return what a JSON text holds.
+    """Return the value of a JSON text.
 
     Raises
     ------
     ValueRefused
-        If it is none, or is nested deeper than Python's own reader goes.
+        If the text is not JSON, or is nested too deep for Python's JSON reader.
     """
     try:
         return json.loads(text)
@@ -107,19 +107,18 @@ def decoded(content: object, kind: type[_T], key: str, deepest: int) -> _T:
     Parameters
     ----------
     content : object
-        As :func:`parsed` gives it.
+        As :func:`parsed` returns it.
     kind : type
         The struct.
     key : str
-        What a message calls the content; keys inside are added after dots.
+        Name of the content in messages; keys inside are appended after dots.
     deepest : int
-        How many tables and lists may lie in each other.
+        Largest depth of nested tables and lists.
 
     Raises
     ------
     ValueRefused
-        For the first value that the struct does not allow, for one that is nested too deep, and for a number that is
-        not finite.
+        For the first value that the struct does not allow, that is nested too deep, or that is not finite.
 
     Examples
     --------
@@ -147,7 +146,7 @@ def decoded(content: object, kind: type[_T], key: str, deepest: int) -> _T:
 
 
 def converted(content: object, kind: type[_T], key: str) -> _T:
-    """Return plain content as a type; see :func:`decoded`, which looks into untyped tables too."""
+    """Return plain content as a type. Unlike :func:`decoded` this does not check untyped tables."""
     try:
         return msgspec.convert(content, kind)
     except msgspec.ValidationError as error:
@@ -157,11 +156,11 @@ def converted(content: object, kind: type[_T], key: str) -> _T:
 
 
 def _refused(error: msgspec.ValidationError, content: object, key: str) -> ValueRefused:
-    """Return the error with the value that it speaks of, which msgspec names by its path alone."""
+    """Return the error with the value that it is about; msgspec gives only the path of the value."""
     message = str(error)
     at = _AT.search(message)
     path, reason = (at[1], message[: at.start()]) if at else ("", message)
-    if isinstance(error.__cause__, ValueRefused):  # of a struct's own check
+    if isinstance(error.__cause__, ValueRefused):  # raised by a check inside the struct
         inner, reason = error.__cause__.args
         return ValueRefused(f"{key}{_visible(path)}.{inner}", reason)
     value: Any = content
@@ -172,7 +171,7 @@ def _refused(error: msgspec.ValidationError, content: object, key: str) -> Value
 
 
 def shown(value: object) -> str:
-    """Return the beginning of a value in visible ASCII; a text from outside may hold what a terminal obeys."""
+    """Return the beginning of a value in visible ASCII, because a text from a file may hold terminal commands."""
     if isinstance(value, Mapping):
         names = [shown(name) for name in list(value)[:4]]
         return f"a table of {', '.join(names)}{', ...' if len(value) > 4 else ''}" if names else "an empty table"
@@ -187,12 +186,12 @@ def shown(value: object) -> str:
 
 
 def _visible(message: str) -> str:
-    """Return a message that may quote a name from outside, in visible ASCII and not longer than a line."""
+    """Return a message in visible ASCII and at most a line long; it may quote a name from a file."""
     return ascii(message[:200])[1:-1]
 
 
 def plain(value: Any) -> dict[str, Any]:
-    """Return the fields of a struct or dataclass by name, those inside as they are."""
+    """Return the fields of a struct or dataclass by name; nested ones are not converted."""
     return {name: getattr(value, name) for name in _names(value)}
 
 
@@ -201,16 +200,16 @@ def _names(value: object) -> tuple[str, ...]:
         return value.__struct_fields__
     if dataclasses.is_dataclass(value):
         return tuple(field.name for field in dataclasses.fields(value))
-    raise TypeError(f"{value!r} ({type(value).__name__}) is nothing that JSON can hold")
+    raise TypeError(f"expected a value that JSON can store, got {value!r} ({type(value).__name__})")
 
 
 def json_text(value: Any) -> str:
-    """Return canonical JSON: sorted keys, no blanks, ASCII; numpy's numbers as plain ones.
+    """Return canonical JSON: sorted keys, no blanks, ASCII; numpy numbers become plain numbers.
 
     Raises
     ------
     TypeError, ValueError
-        If it holds what JSON cannot: an object, NaN, an infinity.
+        If JSON cannot store a value: an object, NaN, an infinity.
 
     Examples
     --------

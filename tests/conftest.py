@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -15,7 +13,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from numpy.typing import ArrayLike
 
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.windows.demodulate import Demodulated
+from tests import synthetic as synthetic_runs
 
 # A slow machine is no fault of the data: neither a deadline nor the check for slow generation holds here.
 settings.register_profile(
@@ -33,34 +32,10 @@ def a_page_of_one_width(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "100")
 
 
-def _load(name: str) -> ModuleType:
-    """Import a helper that lies beside this file, whatever the working directory is."""
-    path = Path(__file__).with_name(f"{name}.py")
-    spec = importlib.util.spec_from_file_location(f"springmass_tests_{name}", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="session")
-def hunt() -> ModuleType:
-    """Return the hunt guided by coverage, ``tests/hunt.py``."""
-    return _load("hunt")
-
-
-@pytest.fixture(scope="session")
-def screen() -> ModuleType:
-    """Return pseudo-terminals and their screens, ``tests/screen.py``."""
-    return _load("screen")
-
-
 @pytest.fixture(scope="session")
 def synthetic() -> ModuleType:
     """Return the generator of synthetic runs, ``tests/synthetic.py``."""
-    return _load("synthetic")
+    return synthetic_runs
 
 
 @pytest.fixture(scope="session")

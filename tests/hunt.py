@@ -9,21 +9,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 _SCRIPT = """
-import importlib.util, sys
+import importlib, sys
 import atheris
 with atheris.instrument_imports(include=[{package!r}]):
     {imports}
-spec = importlib.util.spec_from_file_location("hunt", sys.argv[1])
-hunt = importlib.util.module_from_spec(spec)
-sys.modules["hunt"] = hunt
-spec.loader.exec_module(hunt)
-atheris.Setup([sys.argv[0], *sys.argv[2:]], hunt.target)
+atheris.Setup([sys.argv[0], *sys.argv[2:]], importlib.import_module(sys.argv[1]).target)
 atheris.Fuzz()
 """
 
 
 def hunt(
-    file: str,
+    module: str,
     package: str,
     imports: str,
     seeds: Mapping[str, bytes],
@@ -34,12 +30,12 @@ def hunt(
     longest: int,
     options: Sequence[str] = (),
 ) -> int:
-    """Run a hunt over the ``target`` of a test module in a process of its own; return how many inputs it tried.
+    """Run a hunt over the ``target`` of a test module in a separate process; return how many inputs it tried.
 
     Parameters
     ----------
-    file : str
-        The test module.
+    module : str
+        Name of the test module.
     package : str
         What is watched while it runs.
     imports : str
@@ -57,7 +53,7 @@ def hunt(
         (folder / name).write_bytes(data)
     bounds = [f"-runs={runs}", f"-max_total_time={seconds}", "-seed=1", f"-max_len={longest}", *options]
     script = _SCRIPT.format(package=package, imports=imports)
-    command = [sys.executable, "-c", script, file, *bounds, f"-artifact_prefix={folder}/", str(folder)]
+    command = [sys.executable, "-c", script, module, *bounds, f"-artifact_prefix={folder}/", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=10 * seconds)
     assert done.returncode == 0, done.stderr[-3000:]
     tried = re.search(r"Done (\d+) runs", done.stderr)

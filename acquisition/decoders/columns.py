@@ -1,4 +1,4 @@
-"""Where in a line of text a number stands: by its place, or after a name."""
+"""Find a number in a line of text, by its column or after a name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from acquisition.errors import SensorError
 
 __all__ = ["Column", "as_column", "as_separator", "split"]
 
-# No float() on what came: it takes "nan", "inf" and "1_0" for numbers.
+# float() accepts "nan", "inf" and "1_0" as numbers.
 _NUMBER = rb"[+-]?(?:[0-9]{1,15}(?:\.[0-9]{0,12})?|\.[0-9]{1,12})(?:[eE][+-]?[0-9]{1,2})?"
 _NAME = re.compile(r"[A-Za-z_][\w .-]{0,31}", re.ASCII)
 _ANY = re.compile(rb"[\s,;]+")
@@ -22,11 +22,11 @@ class Column:
     Parameters
     ----------
     index : int or None
-        Place from 0; None where it is found by name.
+        Column from 0; None for a column that is found by name.
     name : bytes
-        Empty where it is found by place.
+        Empty for a column that is found by index.
     form : re.Pattern
-        Of the whole cell, or of name and number.
+        Pattern of the whole cell, or of name and number.
     """
 
     index: int | None
@@ -34,20 +34,20 @@ class Column:
     form: re.Pattern[bytes]
 
     def number(self, line: bytes, cells: list[bytes]) -> float | None:
-        """Return the number of a line split into cells, None where there is none."""
+        """Return the number in a line that was split into cells; None if there is none."""
         if self.index is None:
-            found = self.form.search(line)
+            match = self.form.search(line)
         elif self.index < len(cells):
-            found = self.form.fullmatch(cells[self.index].strip())
+            match = self.form.fullmatch(cells[self.index].strip())
         else:
             return None
-        return None if found is None else float(found[1])
+        return None if match is None else float(match[1])
 
 
 def as_column(option: str, where: int | str, unit: str = "") -> Column:
     """Return the column that an option names.
 
-    The unit may stand behind the number, and no other: "12.3 cm" read as millimetres is refused line by line.
+    The number may be followed by this unit but by no other: a line with "12.3 cm" is refused if the unit is mm.
 
     Raises
     ------
@@ -61,12 +61,12 @@ def as_column(option: str, where: int | str, unit: str = "") -> Column:
     if _NAME.fullmatch(text) is None:
         raise SensorError(f"{option} of text-lines must be a column from 0 to 63 or a name, got {where!r}")
     before, after = rb"(?:^|[\s,;:|])", rb"\s*[=:]\s*(" + _NUMBER + rb")" + tail + rb"(?=$|[\s,;|])"
-    other = rb"(?!\s+(?:m|cm|mm|in|us|ms|s)(?:$|[\s,;|]))" if unit else b""
-    return Column(None, text.encode(), re.compile(before + re.escape(text.encode()) + after + other))
+    no_other_unit = rb"(?!\s+(?:m|cm|mm|in|us|ms|s)(?:$|[\s,;|]))" if unit else b""
+    return Column(None, text.encode(), re.compile(before + re.escape(text.encode()) + after + no_other_unit))
 
 
 def as_separator(text: str | None) -> bytes:
-    """Return a separator as bytes, empty for any of blanks, commas and semicolons.
+    """Return a separator as bytes; empty if blanks, commas and semicolons all separate.
 
     Raises
     ------

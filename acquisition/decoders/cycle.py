@@ -1,4 +1,4 @@
-"""Whose turn it is where a polled sensor gives its temperature to a request of its own."""
+"""Choose the next request to a polled sensor that has a separate request for the temperature."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from acquisition.errors import SensorError
 
 __all__ = ["OPTIONS", "Cycle", "PolledEncoder"]
 
-OPTIONS = {"temperature_every": "ask for the temperature after so many distances; 0 never does"}
-"""What a family with such a sensor takes."""
+OPTIONS = {"temperature_every": "number of distances between two temperatures; 0: no temperatures"}
+"""The options of a family with such a sensor."""
 
 
 class Cycle:
-    """So many distances, then a temperature, and again; a lost reply starts it anew with a distance.
+    """A cycle of some distances and one temperature; a lost reply restarts it with a distance.
 
-    It moves by replies and flushes alone, so that the same bytes replayed give the same turns.
+    Only replies and flushes advance it, so that replayed bytes give the same cycle.
 
     Parameters
     ----------
     ask_distance, ask_temperature : bytes
         The requests.
     temperature_every : int
-        Distances between two temperatures; 0 for no temperature at all.
+        Number of distances between two temperatures; 0 for no temperatures.
 
     Raises
     ------
     SensorError
-        If it is no whole number from 0.
+        If this is not a whole number from 0.
     """
 
     def __init__(self, ask_distance: bytes, ask_temperature: bytes, temperature_every: int) -> None:
@@ -46,15 +46,15 @@ class Cycle:
 
     @property
     def request(self) -> bytes:
-        """What to send next."""
+        """The next request."""
         return self.ask_temperature if self.wants_temperature else self.ask_distance
 
     def answered(self, *, temperature: bool) -> None:
-        """Take note of a reply."""
+        """Advance after a reply."""
         self._distances = 0 if temperature else self._distances + 1
 
     def restart(self) -> None:
-        """Begin again with distances: a sensor that gives no temperature still gives those."""
+        """Restart with distances, because a sensor without temperatures still sends those."""
         self._distances = 0
 
 
@@ -64,9 +64,9 @@ class PolledEncoder:
     Parameters
     ----------
     cycle : Cycle
-        As the decoder's.
+        A cycle like the decoder's.
     distance_reply, temperature_reply : callable
-        From m and degC, which may be NaN, to the bytes of a reply.
+        Convert m and degC, which may be NaN, to the bytes of a reply.
     """
 
     def __init__(
@@ -76,13 +76,13 @@ class PolledEncoder:
         self._distance_reply, self._temperature_reply = distance_reply, temperature_reply
 
     def encode(self, *, distance_m: float, temperature_c: float, **_: float) -> bytes:
-        """Return the reply to the request whose turn it is."""
+        """Return the reply to the next request of the cycle."""
         request = self._cycle.request
         self._cycle.answered(temperature=self._cycle.wants_temperature)
         return self.reply(request, distance_m=distance_m, temperature_c=temperature_c)
 
     def reply(self, request: bytes, *, distance_m: float, temperature_c: float) -> bytes:
-        """Return the reply to a request, nothing to what is none."""
+        """Return the reply to a request; empty for unknown requests."""
         if request == self._cycle.ask_distance:
             return self._distance_reply(distance_m)
         return self._temperature_reply(temperature_c) if request == self._cycle.ask_temperature else b""

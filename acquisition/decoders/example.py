@@ -1,21 +1,21 @@
-"""A template: copy it, and change what is marked. The recipe for a new family of rangefinders.
+"""A template for a new family of rangefinders: copy it and change the marked lines.
 
-1. Copy this file to ``acquisition/decoders/NAME.py``. Say in the docstring what a frame looks like, with one real
-   frame and its value, the no-target codes, and the data sheet.
-2. Frames: lines come from :class:`acquisition.decoders.lines.LineSplitter`, frames of one size with a sum at the end
-   from :class:`acquisition.decoders.sum_frames.SumFrames`. Both give the same frames however the stream is cut,
-   count what is none, and hold a bounded number of bytes.
-3. What a frame must be is written as strictly as the data sheet allows: fixed digits, range, checksum. A code for
-   "no target" is NaN; a number that is no distance never passes for one.
-4. ``reading`` says what a frame means; all else is :class:`acquisition.decoders.framed.FramedDecoder`'s. Echo times go
-   in as echo times.
-5. The encoder is written from the data sheet and not from the decoder, so that one checks the other.
-6. One line in ``_TABLE`` of ``acquisition/decoders/registry.py``, or, in a package of your own, an entry point in the
+1. Copy this file to ``acquisition/decoders/NAME.py``. The docstring describes a frame, with one real frame and its
+   value, the codes for no target, and the data sheet.
+2. Frames: :class:`acquisition.decoders.lines.LineSplitter` cuts lines,
+   :class:`acquisition.decoders.sum_frames.SumFrames` cuts frames of a fixed size with a sum at the end. Both give the
+   same frames however the stream is cut into reads, count faults, and hold a limited number of bytes.
+3. Accept frames as strictly as the data sheet allows: fixed digits, range, checksum. A code for "no target" becomes
+   NaN; a number that is not a distance must never be taken for one.
+4. ``reading`` interprets a frame; :class:`acquisition.decoders.framed.FramedDecoder` does the rest. Echo times are
+   passed on as echo times.
+5. Write the encoder from the data sheet and not from the decoder, so that each checks the other.
+6. Add one line to ``_TABLE`` of ``acquisition/decoders/registry.py``, or, in a separate package, an entry point in the
    group ``springmass.sensors``.
-7. One ``Case`` in ``tests/conformance/test_decoders.py``.
+7. Add one ``Case`` to ``tests/conformance/test_decoders.py``.
 
 The device of this template is invented. It sends ``:dddd,cc`` and a line feed: mm with leading zeros, and the sum of
-the four digits' codes in hex. ``:0253,CA`` is 253 mm; 0 says no target.
+the codes of the four digits in hex. ``:0253,CA`` is 253 mm; 0 means no target.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ class ExampleDecoder(FramedDecoder):
         super().__init__(LineSplitter(b"\n", _LONGEST, {"garbage_bytes": 0, "bad_frame": 0, "bad_checksum": 0}))
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return a line's distance, or count why it has none."""
-        found = _FORM.fullmatch(frame)
-        if found is not None and sum(found[1]) & 0xFF == int(found[2], 16):
-            return Reading(host_ns, distance_m=int(found[1]) / 1000 or NAN)
-        self._count("bad_frame" if found is None else "bad_checksum", len(frame) + 1)
+        """Return the distance of a line; count the fault of a line without one."""
+        match = _FORM.fullmatch(frame)
+        if match is not None and sum(match[1]) & 0xFF == int(match[2], 16):
+            return Reading(host_ns, distance_m=int(match[1]) / 1000 or NAN)
+        self._count("bad_frame" if match is None else "bad_checksum", len(frame) + 1)
         return None
 
 
@@ -53,7 +53,7 @@ class ExampleEncoder:
     """Writes the example's lines."""
 
     def encode(self, *, distance_m: float, **_: float) -> bytes:
-        """Return one line; it carries the distance alone."""
+        """Return one line; it contains only the distance."""
         mm = 0 if math.isnan(distance_m) else round(distance_m * 1000)
         digits = b"%04d" % (mm if 0 <= mm <= 9999 else 0)
         return b":%s,%02X\n" % (digits, sum(digits) & 0xFF)

@@ -1,4 +1,4 @@
-"""What a family of rangefinders must offer: its decoder, how it is polled, and its limits in numbers."""
+"""The description of a family of rangefinders: its decoder, how it is polled, and its limits in numbers."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from typing import Any, Protocol
 from acquisition.errors import SensorError
 from acquisition.readings import Readings
 
-__all__ = ["RESONATOR_PPM", "Decoder", "Encoder", "Family", "Identity", "Poll", "Polled", "Told"]
+__all__ = ["RESONATOR_PPM", "Decoder", "DeviceStatus", "Encoder", "Family", "Identity", "Poll", "Polled"]
 
 RESONATOR_PPM = 10_000.0
-"""What a ceramic resonator may be off, ppm: 5000 when new, 3000 with temperature, 3000 with age (Murata P16E)."""
+"""Largest error of a ceramic resonator, ppm: 5000 when new, 3000 by temperature, 3000 by age (Murata P16E)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a device says that it is.
+    """How a device identifies itself.
 
     Parameters
     ----------
     model, version : str
     name : str
-        What its owner calls it; empty where nobody named it.
+        The name that its owner gave it; may be empty.
     settings : mapping of str to int
-        What it is set to, with units in the names.
+        Its settings, with units in the names.
     """
 
     model: str
@@ -38,17 +38,17 @@ class Identity:
 
 
 @dataclass(slots=True)
-class Told:
-    """What a device says besides readings; a decoder whose device does so keeps it as its attribute ``told``.
+class DeviceStatus:
+    """What a device sends besides readings; decoders of such devices have it as their attribute ``status``.
 
     Parameters
     ----------
     identity : Identity or None
-        What it last said that it is.
+        The last identity that it sent.
     conditions : dict of str to int
         Counts of readings that measured nothing, by the reason that it gave.
     complaint : str
-        What it says is wrong with it now, and what to check; empty where nothing is.
+        The fault that it reports now, and what to check; empty if there is none.
     """
 
     identity: Identity | None = None
@@ -56,62 +56,62 @@ class Told:
     complaint: str = ""
 
     @staticmethod
-    def by(decoder: Decoder) -> Told:
-        """Return what the device behind a decoder told so far; nothing where it cannot tell."""
-        told = getattr(decoder, "told", None)
-        return told if isinstance(told, Told) else Told()
+    def of(decoder: Decoder) -> DeviceStatus:
+        """Return the status of the device behind a decoder; empty if the device sends none."""
+        status = getattr(decoder, "status", None)
+        return status if isinstance(status, DeviceStatus) else DeviceStatus()
 
 
 class Decoder(Protocol):
-    """Turns bytes into readings, back in step within two frames after any garbage; never raises on bytes."""
+    """Turns bytes into readings. It resynchronises within two frames after any garbage and never raises on bytes."""
 
     @property
     def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading: "garbage_bytes", "bad_checksum", "bad_frame", ...
+        """Counts of faults: "garbage_bytes", "bad_checksum", "bad_frame", ...
 
-        "garbage_bytes" are those that were part of no frame: what tells whether a stream is of this family at all.
+        "garbage_bytes" are bytes outside of frames. Their share shows whether a stream belongs to this family.
         """
         ...
 
     @property
     def pending(self) -> int:
-        """Bytes held until the frame they began is whole; bounded, whatever comes."""
+        """Bytes of an incomplete frame; their number is limited for any input."""
         ...
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Take the bytes of one read of the port, return the frames they completed (perhaps none)."""
+        """Decode the bytes of one read of the port, and return the readings of completed frames (perhaps none)."""
         ...
 
     def flush(self) -> None:
-        """Forget a half-received frame: the port was reopened, or a reply timed out."""
+        """Discard an incomplete frame: the port was reopened, or a reply timed out."""
         ...
 
 
 class Polled(Decoder, Protocol):
-    """The decoder of a sensor that speaks only when asked.
+    """The decoder of a sensor that sends only on request.
 
-    Replies and flushes alone decide what comes next, so replayed bytes decode as they did live. Before a request is
-    sent with ``pending`` bytes left over, ``flush`` is due: a late or a surplus byte would shift every reply.
+    Only replies and flushes determine the next request, so replayed bytes decode as in the recording. If bytes are
+    ``pending`` when a request is due, call ``flush`` first: a late or surplus byte would shift every reply.
     """
 
     @property
     def request(self) -> bytes:
-        """What to send next: mostly ``Poll.request``, at times the request for a temperature."""
+        """The next request: usually ``Poll.request``, sometimes the request for a temperature."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Poll:
-    """How a sensor that speaks only when asked is asked.
+    """How to poll a sensor that sends only on request.
 
     Parameters
     ----------
     request : bytes
         Sent for each reading.
     interval_s : float
-        Between requests, s.
+        Time between requests, s.
     timeout_s : float
-        A reply later than this is lost: the decoder is flushed and the input discarded.
+        Longest wait for a reply, s. After it the decoder is flushed and the input discarded.
     """
 
     request: bytes
@@ -120,12 +120,12 @@ class Poll:
 
 
 class Encoder(Protocol):
-    """Writes readings in a family's wire form, for the simulated sensor; the decoder's counterpart in no line."""
+    """Writes readings as bytes of a family, for the simulated sensor; it shares no code with the decoder."""
 
     def encode(
         self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
     ) -> bytes:
-        """Return one frame; NaN distance means no target."""
+        """Return one frame; a NaN distance means no target."""
         ...
 
 
@@ -136,9 +136,9 @@ class Family:
     Parameters
     ----------
     name : str
-        As ``--sensor`` takes it.
+        Name of the family.
     title : str
-        One line for people, with the devices it covers.
+        One line for the user, with the devices it covers.
     baud : int
         Default speed of the port (8 data bits, no parity, one stop bit).
     rate_hz : float
@@ -150,7 +150,7 @@ class Family:
     limits : str
         What a user must know before relying on it, one sentence.
     decoder : callable
-        Makes a fresh decoder; keyword options as ``options`` names them.
+        Makes a new decoder; its keyword arguments are those in ``options``.
     encoder : callable
         Makes the simulated sensor's encoder, with the same options.
     poll : Poll or None
@@ -158,16 +158,16 @@ class Family:
     options : mapping of str to str
         Options of the decoder by name, with one line each (column, unit, ...).
     has_device_time : bool
-        Whether readings carry the device's clock or counter.
+        Whether readings contain the device's clock or counter.
     clock_ppm : float
-        What the device's clock may be off at most, with temperature and age, ppm: 200 with a crystal, 10 000 with a
-        ceramic resonator, as common boards have it. A comparison with the host that says more is not believed.
+        Largest rate error of the device's clock, including temperature and age, ppm: 200 for a crystal, 10 000 for a
+        ceramic resonator, as on common boards. A larger error found by comparison with the host is not believed.
     identify : bytes
-        Makes the device say what it is; empty where it does not know such a request.
+        Request on which the device identifies itself; empty if it has none.
     self_framing : bool
-        Whether a mark or checksum tells a frame from noise; without one, bytes alone never show the family.
+        Whether a mark or checksum distinguishes a frame from noise. Without one, bytes cannot show the family.
     source : str
-        Datasheet or specification.
+        Data sheet or specification.
     """
 
     name: str
@@ -188,19 +188,19 @@ class Family:
     source: str = ""
 
     def demand_options(self, options: Mapping[str, Any]) -> None:
-        """Refuse options that this family does not take.
+        """Check that this family has these options.
 
         Raises
         ------
         SensorError
-            Naming them and those it takes.
+            With the unknown options and those of the family.
         """
         unknown = sorted(set(options) - set(self.options))
         if unknown:
             known = ", ".join(self.options) or "none"
-            raise SensorError(f"sensor {self.name} takes these options: {known}; got {', '.join(unknown)}")
+            raise SensorError(f"sensor {self.name}: expected options among {known}, got {', '.join(unknown)}")
 
     def describe(self) -> dict[str, Any]:
-        """Return what ``springmass sensors --json`` prints."""
+        """Return the description as plain data, as in the JSON of the sensors."""
         shown = (item.name for item in fields(self) if item.name not in ("decoder", "encoder", "poll", "identify"))
         return {name: getattr(self, name) for name in shown} | {"polled": self.poll is not None}

@@ -1,8 +1,8 @@
 """FF H L SUM: the waterproof modules of many names that send four bytes by themselves.
 
 A02YYUW, ME007YS, A01NYUB, DYP-A01/A02/ME007, and the JSN-SR04T in its serial mode: 0xFF, distance in mm as high and
-low byte, sum. ``FF 07 A1 A7`` is 1953 mm. 0 says no target, and so do FFFD (none in range) and FFFE (disturbed by
-another sensor) of the newer DYP modules.
+low byte, sum. ``FF 07 A1 A7`` is 1953 mm. 0 means no target, as do FFFD (none in range) and FFFE (disturbed by another
+sensor) of the newer DYP modules.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from acquisition.readings import NAN, Reading
 __all__ = ["FAMILY", "FfhlsDecoder", "FfhlsEncoder"]
 
 FARTHEST_MM = 10_000
-"""No module of the family reaches it; keeps 0xFF out of H, which makes the header unmistakable."""
+"""Beyond the range of every module of the family. So H is never 0xFF, and the header is unambiguous."""
 
 _NO_TARGET = (0, 0xFFFD, 0xFFFE)
 
@@ -46,7 +46,7 @@ class FfhlsEncoder:
     """Writes FF H L SUM."""
 
     def encode(self, *, distance_m: float, **_: float) -> bytes:
-        """Return one frame; it carries the distance alone, to 1 mm."""
+        """Return one frame; it contains only the distance, to 1 mm."""
         mm = 0 if math.isnan(distance_m) else round(distance_m * 1000)
         return with_sum(b"\xff" + (mm if 0 <= mm <= FARTHEST_MM else 0).to_bytes(2, "big"))
 

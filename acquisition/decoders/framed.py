@@ -1,9 +1,9 @@
-"""What all decoders of lines or summed frames share: cut the stream, make a reading of each frame, count the rest."""
+"""The common base of decoders for lines or summed frames: cut the stream, read each frame, count faults."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 
 from acquisition.decoders.lines import LineSplitter
@@ -14,12 +14,12 @@ __all__ = ["FramedDecoder"]
 
 
 class FramedDecoder(ABC):
-    """A :class:`acquisition.decoders.family.Decoder` of frames; a family says in :meth:`reading` what one means.
+    """A :class:`acquisition.decoders.family.Decoder` of frames; a family defines :meth:`reading`.
 
     Parameters
     ----------
     frames : LineSplitter or SumFrames
-        What cuts the stream.
+        Cuts the stream into frames.
     """
 
     def __init__(self, frames: LineSplitter | SumFrames) -> None:
@@ -27,37 +27,28 @@ class FramedDecoder(ABC):
 
     @property
     def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading."""
+        """Counts of faults."""
         return MappingProxyType(self._frames.faults)
 
     @property
     def pending(self) -> int:
-        """Bytes held until the frame they began is whole."""
+        """Bytes of an incomplete frame."""
         return self._frames.pending
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the readings whose frames these bytes complete, all stamped with the read that completed them."""
-        found: list[Reading] = []
-        self.extend(found, ((host_ns, data),))
-        return Readings(found) if found else NO_READINGS
-
-    def extend(self, found: list[Reading], reads: Iterable[tuple[int, bytes]]) -> None:
-        """Append the readings of many reads, each of which has its own stamp."""
-        split, reading = self._frames.split, self.reading
-        for host_ns, data in reads:
-            for frame in split(data):
-                if (row := reading(host_ns, frame)) is not None:
-                    found.append(row)
+        """Return the readings of the frames that these bytes complete, all with the host time of this read."""
+        readings = [row for frame in self._frames.split(data) if (row := self.reading(host_ns, frame)) is not None]
+        return Readings(readings) if readings else NO_READINGS
 
     def flush(self) -> None:
-        """Forget a half-received frame."""
+        """Discard an incomplete frame."""
         self._frames.flush()
 
     @abstractmethod
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return what a frame says; None where it says no distance, which :meth:`_count` counts if it should."""
+        """Return the reading of a frame; None if it has none. Count its fault with :meth:`_count` if it is one."""
 
     def _count(self, fault: str, garbage_bytes: int) -> None:
-        """Count a fault, and the bytes that were part of no frame."""
+        """Count a fault, and the bytes outside of frames."""
         self._frames.faults[fault] += 1
         self._frames.faults["garbage_bytes"] += garbage_bytes

@@ -1,8 +1,8 @@
-"""The project's own line protocol, for a microcontroller that times a transducer at 100 Hz.
+"""The line protocol of this project, for a microcontroller that times a transducer at 100 Hz.
 
 ``$R1,sequence,device_us,echo_us,temperature,status*CRC`` and a line feed: see docs/reference/line-protocol.md, and
-firmware/springmass_rangefinder for a device that speaks it. The echo's time is sent, not a distance: the speed of
-sound is the host's affair and can be applied again later. Lines ``$I1,...`` say what the device is.
+firmware/springmass_rangefinder for a device that uses it. The device sends the time of the echo and not a distance, so
+the host can apply another speed of sound later. Lines ``$I1,...`` identify the device.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 import re
 from binascii import crc_hqx
 
-from acquisition.decoders.family import Family, Identity, Told
+from acquisition.decoders.family import DeviceStatus, Family, Identity
 from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
 from acquisition.readings import NAN, Reading
@@ -22,13 +22,11 @@ LONGEST = 96
 """Longest line without its line feed, bytes."""
 
 SETTINGS = ("rate_hz", "near_us", "far_us", "spread_us", "thermometer")
-"""What a device says of itself behind model, version and name: rate, gate, spread of the pings, thermometer or none."""
+"""Settings that a device sends after model, version and name: rate, gate, spread of the pings, thermometer."""
 
 _WRAP = 1 << 32
-_row = tuple.__new__
 _FIELDS = rb"R1,([0-9]{1,10}),([0-9]{1,10}),([0-9]{1,6}\.[0-9]{2})?,(-?[0-9]{1,5})?,([A-Z])"
-_LINE = re.compile(rb"\A\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?\Z")
-_fields_of = _LINE.findall  # matches and gives the fields in one call
+_LINE = re.compile(rb"\$(" + _FIELDS + rb")\*([0-9A-F]{4})\r?")
 _IDENTITY = re.compile(
     rb"I1,([a-z0-9-]{1,32}),([0-9]{1,3}\.[0-9]{1,3}\.[0-9]{1,3}),([A-Za-z0-9._-]{0,12}),"
     rb"([0-9]{1,3}),([0-9]{1,5}),([0-9]{1,5}),([0-9]{1,4}),([01])"
@@ -44,18 +42,18 @@ CONDITIONS = {
     b"A": "no_answer",
     b"S": "stuck",
 }
-"""What a status other than ``E`` is counted as; a letter of a later version as ``other``."""
+"""Names of the conditions by status letter; an unknown letter of a later version counts as ``other``."""
 
 COMPLAINTS = {
     b"A": "the transducer does not answer its trigger: check its 5 V and ground, TRIG on D9 and ECHO on D8",
     b"S": "ECHO stays high: check its wire on D8, and switch the transducer off and on",
 }
-"""Statuses that are a fault of the wiring or the transducer, and what to check."""
+"""Statuses caused by the wiring or the transducer, and what to check."""
 _ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable, neither $ nor * within
 
 
 def checksum(body: bytes) -> int:
-    """Return the CRC-16/CCITT-FALSE (polynomial 1021, initial value FFFF) of what stands between ``$`` and ``*``.
+    """Return the CRC-16/CCITT-FALSE (polynomial 1021, initial value FFFF) of the bytes between ``$`` and ``*``.
 
     Examples
     --------
@@ -66,7 +64,7 @@ def checksum(body: bytes) -> int:
 
 
 def frame(body: bytes) -> bytes:
-    """Return the line that carries a body."""
+    """Return the line with a body."""
     return b"$%s*%04X\n" % (body, checksum(body))
 
 
@@ -75,9 +73,9 @@ class LineProtocolDecoder(FramedDecoder):
 
     Notes
     -----
-    The CRC finds every change of one or two bits and every burst of up to 16 within the body, and all but one in
-    65536 of the rest. Comment lines (``#``) are counted as ``comment``, commands that the device did not understand
-    as ``refused_command``, and sound lines of a later version as ``unknown_record``.
+    The CRC detects every change of one or two bits, every burst of up to 16 bits within the body, and all but one in
+    65536 of other changes. Comment lines (``#``) are counted as ``comment``, commands that the device did not
+    understand as ``refused_command``, and valid lines of a later version as ``unknown_record``.
     """
 
     def __init__(self) -> None:
@@ -85,83 +83,82 @@ class LineProtocolDecoder(FramedDecoder):
             ("garbage_bytes", "bad_checksum", "bad_frame", "unknown_record", "refused_command", "comment"), 0
         )
         super().__init__(LineSplitter(b"\n", LONGEST, faults))
-        self.told = Told()
+        self.status = DeviceStatus()
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return what a line carries, or count why it carries nothing."""
+        """Return the reading of a line; count the fault of a line without one."""
         row = _reading(host_ns, frame)
         if row is None:
-            return self._behind_noise(host_ns, frame)
-        if row[3] != row[3]:  # no echo: the letter says why
-            self._silent(frame)
-        elif self.told.complaint:
-            self.told.complaint = ""
+            return self._after_noise(host_ns, frame)
+        if row[3] != row[3]:  # no echo: the status letter gives the reason
+            self._count_no_echo(frame)
+        elif self.status.complaint:
+            self.status.complaint = ""
         return row
 
-    def _silent(self, frame: bytes) -> None:
-        """Count why nothing was measured."""
+    def _count_no_echo(self, frame: bytes) -> None:
+        """Count a reading without an echo, by the reason that the device gives."""
         letter = frame[frame.rindex(b"*") - 1 :][:1]
         name = CONDITIONS.get(letter, "other")
-        self.told.conditions[name] = self.told.conditions.get(name, 0) + 1
-        self.told.complaint = COMPLAINTS.get(letter, "")
+        self.status.conditions[name] = self.status.conditions.get(name, 0) + 1
+        self.status.complaint = COMPLAINTS.get(letter, "")
 
-    def _behind_noise(self, host_ns: int, line: bytes) -> Reading | None:
-        """Return what a line that is not sound from its beginning carries, and count what is wrong with it."""
-        # What stands before the last $ is noise, or a line whose end was lost; the rest may be whole.
+    def _after_noise(self, host_ns: int, line: bytes) -> Reading | None:
+        """Return the reading of a line that does not begin correctly, and count its fault."""
+        # Before the last $ there is noise, or a line whose end was lost; the rest may be a whole line.
         start = max(line.rfind(b"$"), 0)
         reading = _reading(host_ns, line[start:]) if start else None
         identity = _identity(line, start)
         if reading or identity:
-            self.told.identity = identity or self.told.identity
+            self.status.identity = identity or self.status.identity
             if start:
                 self._count("bad_frame", start)
             return reading
         if line.startswith(_FIRST_GREETING):
-            self.told.identity = _FIRST
+            self.status.identity = _FIRST
         self._count(_fault(line, start), len(line) + 1)
         return None
 
 
 def _reading(host_ns: int, line: bytes) -> Reading | None:
-    """Return the reading of a line without its line feed, None where anything is wrong with it."""
-    fields = _fields_of(line)
-    if not fields:
+    """Return the reading of a line without its line feed; None if the line is not valid."""
+    fields = _LINE.fullmatch(line)
+    if fields is None:
         return None
-    body, sequence, device_us, echo, temperature, status, crc = fields[0]
+    body, sequence, device_us, echo, temperature, status, crc = fields.groups()
     count, clock_us = int(sequence), int(device_us)
     if crc_hqx(body, 0xFFFF) != int(crc, 16) or count >= _WRAP or clock_us >= _WRAP:
         return None
-    # Only status E vouches for an echo; with any other letter nothing was measured. No echo takes no time.
+    # Only status E means an echo; with any other letter nothing was measured. An echo time of 0 is impossible.
     echo_us = float(echo) if status == b"E" and echo else 0.0
     celsius = int(temperature) / 100 if temperature else NAN
-    # Not Reading(...), whose Python in between takes as long as the checksum: a day has millions of them.
-    return _row(Reading, (host_ns, count, clock_us, echo_us or NAN, NAN, celsius))
+    return Reading(host_ns, count, clock_us, echo_us or NAN, NAN, celsius)
 
 
 def _identity(line: bytes, start: int) -> Identity | None:
-    """Return what a line says of the device, None where it is no such line."""
-    sealed = _ENVELOPE.fullmatch(line, start)
-    if sealed is None or checksum(sealed[1]) != int(sealed[2], 16):
+    """Return the identity of the device from a line; None if the line has none."""
+    envelope = _ENVELOPE.fullmatch(line, start)
+    if envelope is None or checksum(envelope[1]) != int(envelope[2], 16):
         return None
-    said = _IDENTITY.fullmatch(sealed[1])
-    if said is None:
+    identity = _IDENTITY.fullmatch(envelope[1])
+    if identity is None:
         return None
-    model, version, name, *numbers = (field.decode("ascii") for field in said.groups())
+    model, version, name, *numbers = (field.decode("ascii") for field in identity.groups())
     return Identity(model, version, name, dict(zip(SETTINGS, map(int, numbers), strict=True)))
 
 
 def _fault(line: bytes, start: int) -> str:
-    """Return the name of what is wrong with a line that carries no reading."""
-    sealed = _ENVELOPE.fullmatch(line, start)
-    if sealed is None:
+    """Return the name of the fault of a line without a reading."""
+    envelope = _ENVELOPE.fullmatch(line, start)
+    if envelope is None:
         return "comment" if line.startswith(b"#") else "bad_frame"
-    if checksum(sealed[1]) != int(sealed[2], 16):
+    if checksum(envelope[1]) != int(envelope[2], 16):
         return "bad_checksum"
-    return "refused_command" if sealed[1] == b"X1,command" else "unknown_record"
+    return "refused_command" if envelope[1] == b"X1,command" else "unknown_record"
 
 
 class LineProtocolEncoder:
-    """Writes the line protocol, echo times in steps of 0.25 us as the firmware's."""
+    """Writes the line protocol, with echo times in steps of 0.25 us as in the firmware."""
 
     def encode(
         self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float

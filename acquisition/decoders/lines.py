@@ -1,4 +1,4 @@
-"""Cuts a stream into lines with bounded memory, the same lines however the stream was cut into reads."""
+"""Cut a stream into lines with limited memory; the lines do not depend on how the stream was cut into reads."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ __all__ = ["LineSplitter"]
 
 
 class LineSplitter:
-    """Holds the line that has begun and hands out those that have ended.
+    """Holds an incomplete line and returns complete ones.
 
     Parameters
     ----------
@@ -15,10 +15,10 @@ class LineSplitter:
     limit : int
         Longest line, bytes without its end. A longer one is dropped and counted as ``bad_frame``.
     faults : dict of str to int
-        Where to count; its ``garbage_bytes`` are the bytes that were part of no frame.
+        The counts; ``garbage_bytes`` counts the bytes outside of frames.
     skip_first : bool
-        Whether the first line after the start or a flush is dropped and counted as ``partial_line``: reading may
-        have begun midway, and half a number looks like a number.
+        Whether the first line after the start or a flush is dropped and counted as ``partial_line``. Reading may have
+        begun within that line, and half a number looks like a number.
     """
 
     def __init__(self, end: bytes, limit: int, faults: dict[str, int], *, skip_first: bool = False) -> None:
@@ -32,17 +32,17 @@ class LineSplitter:
 
     @property
     def pending(self) -> int:
-        """Bytes of the line that has begun."""
+        """Bytes of the incomplete line."""
         return len(self._held)
 
     def split(self, data: bytes) -> list[bytes]:
-        """Return the lines that these bytes end, without their ends."""
+        """Return the lines that these bytes complete, without their ends."""
         if self._held:
             data = self._held + data
         lines = data.split(self._end)
         self._held = lines.pop()
         if len(data) <= self._limit and not (self._skip or self._overlong):
-            return lines  # none of them can be too long
+            return lines  # no line can be too long
         if lines and (self._skip or self._overlong):
             self._drop(lines.pop(0), "partial_line" if self._skip else "bad_frame")
             self._skip = self._overlong = False
@@ -58,7 +58,7 @@ class LineSplitter:
         return lines
 
     def flush(self) -> None:
-        """Forget the line that has begun."""
+        """Discard the incomplete line."""
         if self._held or self._overlong:
             self.faults["garbage_bytes"] += len(self._held)
             self.faults["bad_frame"] += 1

@@ -1,8 +1,8 @@
 """MaxBotix ASCII: ``R``, a fixed number of digits, carriage return, sent by the sensor itself.
 
-The digits mean inches, centimetres or millimetres by the model, and nothing in the bytes says which: the unit is
-chosen with the family's name. LV models may add ``Pn`` (proximity), HRUSB models put a space before the return.
-RS-232 polarity at 0 to Vcc: a TTL adapter without an inverter reads noise.
+The digits are inches, centimetres or millimetres, depending on the model. The bytes do not show which, so the name of
+the family selects the unit. LV models may add ``Pn`` (proximity), HRUSB models a space before the return. The signal
+has RS-232 polarity at 0 to Vcc: a TTL adapter without an inverter reads noise.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from acquisition.readings import NAN, Reading
 
 __all__ = ["FAMILIES", "MaxbotixDecoder", "MaxbotixEncoder", "Variant"]
 
-_LONGEST = 64  # bytes; the start-up banner's lines are shorter, and are faults like any other text
+_LONGEST = 64  # bytes; the lines of the start-up banner are shorter and count as faults like any other text
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One model line's way of writing a distance.
+    """How a line of models writes a distance.
 
     Parameters
     ----------
     digits : int
-        Always so many, with leading zeros: a lost digit shows.
+        Number of digits, including leading zeros, so that a lost digit is detected.
     unit_m : float
-        What the last digit counts, m.
+        Value of the last digit, m.
     no_target : tuple of int
-        Numbers that mean nothing was there; the last of them is what the encoder writes. 0 is one always.
+        Numbers that mean no target, besides 0; the encoder writes the last of them.
     tail : str
-        What the encoder writes between digits and carriage return.
+        Text that the encoder writes between digits and carriage return.
     """
 
     digits: int
@@ -53,8 +53,8 @@ class MaxbotixDecoder(FramedDecoder):
 
     Notes
     -----
-    There is no checksum. A reading is a whole ``R`` line of the right length; a flipped bit that makes another digit
-    cannot be seen.
+    There is no checksum. A reading is a whole ``R`` line of the right length; a flipped bit that gives another digit
+    cannot be detected.
     """
 
     def __init__(self, variant: Variant) -> None:
@@ -64,18 +64,18 @@ class MaxbotixDecoder(FramedDecoder):
         self._form = re.compile(rb"R([0-9]{%d})(?: P[0-9]| )?" % variant.digits)
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return a line's distance, and count what stands before it or in its place."""
-        # What stands before the last R is noise, or a line whose return was lost; the rest may be whole.
+        """Return the distance of a line, and count garbage before it or instead of it."""
+        # Before the last R there is noise, or a line whose return was lost; the rest may be a whole line.
         start = max(frame.rfind(b"R"), 0)
-        found = self._form.fullmatch(frame, start)
-        garbage = start if found else len(frame) + 1
+        match = self._form.fullmatch(frame, start)
+        garbage = start if match else len(frame) + 1
         if frame[:garbage] == b"\n":  # adapters that end lines with CR LF
             self._frames.faults["garbage_bytes"] += garbage
         elif garbage:
             self._count("bad_frame", garbage)
-        if found is None:
+        if match is None:
             return None
-        number = int(found[1])
+        number = int(match[1])
         return Reading(host_ns, distance_m=NAN if number in self._no_target else number * self._unit_m)
 
 
@@ -91,7 +91,7 @@ class MaxbotixEncoder:
         self._variant = variant
 
     def encode(self, *, distance_m: float, **_: float) -> bytes:
-        """Return one line; it carries the distance alone."""
+        """Return one line; it contains only the distance."""
         form = self._variant
         number = 0 if math.isnan(distance_m) else round(distance_m / form.unit_m)
         if not 0 < number < form.no_target[-1]:

@@ -1,7 +1,7 @@
-"""Which families of rangefinders there are, and which one some bytes look like.
+"""The families of rangefinders, and the recognition of a family by its bytes.
 
-The table holds names only: a family's module is imported when it is asked for. A package elsewhere adds one with an
-entry point in the group ``springmass.sensors`` that names a :class:`acquisition.decoders.family.Family`.
+The table holds only names; the module of a family is imported on demand. Another package adds a family with an entry
+point in the group ``springmass.sensors`` that names a :class:`acquisition.decoders.family.Family`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _TABLE: dict[str, tuple[str, str]] = {
 }
 
 _ENOUGH = 0.5
-"""Share of the bytes that must be in sound frames before a family is named."""
+"""Smallest share of the bytes in valid frames for a family to be recognised."""
 
 
 def families() -> tuple[Family, ...]:
@@ -58,7 +58,7 @@ def get_family(name: str) -> Family:
     Raises
     ------
     SensorError
-        If there is none, or the package that brings it is broken.
+        If there is none, or the package that provides it cannot be loaded.
     """
     if name in _TABLE:
         return _built_in(name)
@@ -66,28 +66,30 @@ def get_family(name: str) -> Family:
     if name in entries:
         return _load(entries[name])
     known = ", ".join(dict.fromkeys([*_TABLE, *entries]))
-    raise SensorError(f"sensor {name!r} is not known; it must be one of {known}")
+    raise SensorError(f"sensor must be one of {known}, got {name!r}")
 
 
 def probe(data: bytes) -> list[str]:
-    """Tell which families recognise bytes that came off a port, the best first.
+    """Return the families that recognise bytes from a port, the best first.
 
-    A family is named where at least half of the bytes stand in its sound frames. One without mark or checksum is
-    named only where no other is and all of two or more replies are in range.
+    A family recognises them if at least half of the bytes are in valid frames. A family without mark or checksum is
+    returned only if there is no other, and all of two or more replies are in range.
 
     Examples
     --------
     >>> probe(bytes.fromhex("ff07a1a7 ff07a2a8"))
     ['ffhls']
     """
-    every = families()
-    shares = {family.name: _share(family, data) for family in every if family.self_framing}
-    named = sorted((name for name, share in shares.items() if share >= _ENOUGH), key=lambda name: -shares[name])
-    return named or [family.name for family in every if not family.self_framing and _all_in_range(family, data)]
+    all_families = families()
+    shares = {family.name: _share(family, data) for family in all_families if family.self_framing}
+    recognised = sorted((name for name, share in shares.items() if share >= _ENOUGH), key=lambda name: -shares[name])
+    return recognised or [
+        family.name for family in all_families if not family.self_framing and _all_in_range(family, data)
+    ]
 
 
 def describe_bytes(data: bytes) -> str:
-    """Return one line for people on what bytes off a port look like.
+    """Return one line for the user that describes bytes from a port.
 
     Examples
     --------
@@ -102,14 +104,14 @@ def describe_bytes(data: bytes) -> str:
     if names:
         return "looks like " + " or ".join(f"{get_family(name).title} [{name}]" for name in names)
     if len(set(data)) == 1:
-        return f"{len(data)} bytes 0x{data[0]:02X} and no other: a line held at one level, or the wrong baud rate?"
+        return f"{len(data)} bytes, all 0x{data[0]:02X}: a line held at one level, or the wrong baud rate?"
     if _is_text(data):
         return f"looks like text lines without a distance ({_sample(data)!r})"
     return "looks like noise: wrong baud rate, or inverted polarity (RS-232 levels on a TTL adapter)?"
 
 
 def _share(family: Family, data: bytes) -> float:
-    """Return the share of the bytes that stand in sound frames, not counting a first and a last piece of one."""
+    """Return the share of the bytes in valid frames, without an incomplete frame at the end."""
     decoder = family.decoder()
     readings = decoder.feed(0, data)
     whole = len(data) - decoder.pending
@@ -126,7 +128,7 @@ def _is_text(data: bytes) -> bool:
 
 
 def _sample(data: bytes) -> str:
-    """Return the first line that is whole and not empty, shortened."""
+    """Return the beginning of the first line that is not empty."""
     lines: Iterable[str] = data.decode("ascii", "replace").splitlines()
     return next((line.strip()[:40] for line in lines if line.strip()), "")
 
@@ -136,9 +138,9 @@ def _built_in(name: str) -> Family:
     return _checked(name, getattr(import_module(module), attribute))
 
 
-def _checked(name: str, found: Any) -> Family:
-    """Take a family, or the one of that name from a table of several."""
-    family = found.get(name) if isinstance(found, dict) else found
+def _checked(name: str, loaded: Any) -> Family:
+    """Return a loaded family, or the one of that name from a table of several."""
+    family = loaded.get(name) if isinstance(loaded, dict) else loaded
     if not isinstance(family, Family):
         raise SensorError(f"sensor {name!r}: expected a Family, got {type(family).__name__}; repair the package")
     return family
@@ -149,5 +151,5 @@ def _entry_points() -> dict[str, EntryPoint]:
 
 
 def _load(entry: EntryPoint) -> Family:
-    found = load_entry(entry, f"sensor {entry.name!r}", SensorError, lambda found: _checked(entry.name, found))
-    return cast(Family, found)
+    family = load_entry(entry, f"sensor {entry.name!r}", SensorError, lambda family: _checked(entry.name, family))
+    return cast(Family, family)

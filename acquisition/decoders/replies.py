@@ -1,4 +1,4 @@
-"""Polled sensors that answer in summed frames of one size: what the URM37 and the SEN0149 have in common."""
+"""Polled sensors that reply in summed frames of one size, such as the URM37 and the SEN0149."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ __all__ = ["ReplyDecoder", "ReplyForm"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplyForm:
-    """How one family of them writes a reply: head, two bytes of value with the high one first, sum.
+    """The replies of one family: head, two bytes of value (high byte first), sum.
 
     Parameters
     ----------
     distance_head, temperature_head : bytes
-        All before the value, as the encoder writes it; the last byte is the command.
+        The bytes before the value, as the encoder writes them; the last one is the command.
     ask_distance, ask_temperature : bytes
         The requests.
     plausible : callable
-        Whether a frame whose sum is right can be one.
+        Returns whether a frame with a correct sum is possible.
     metres, celsius : callable
-        From a value to m and degC, NaN where there is none.
+        Convert a value to m and degC; NaN for a code without a value.
     distance_code, temperature_code : callable
-        The way back, from a number that may be NaN or out of range.
+        Convert back, from a number that may be NaN or out of range.
     """
 
     distance_head: bytes
@@ -51,13 +51,13 @@ class ReplyForm:
 
 
 class ReplyDecoder(FramedDecoder):
-    """Decodes such replies; a temperature goes with the next distance.
+    """Decodes such replies; a temperature becomes part of the next distance reading.
 
     Parameters
     ----------
     form : ReplyForm
     temperature_every : int
-        Ask for the temperature after so many distances; 0 never does.
+        Number of distances between two temperatures; 0 for no temperatures.
     """
 
     def __init__(self, form: ReplyForm, temperature_every: int = 0) -> None:
@@ -71,7 +71,7 @@ class ReplyDecoder(FramedDecoder):
 
     @property
     def request(self) -> bytes:
-        """What to send next."""
+        """The next request."""
         return self._cycle.request
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
@@ -86,6 +86,6 @@ class ReplyDecoder(FramedDecoder):
         return Reading(host_ns, distance_m=self._form.metres(value), temperature_c=celsius)
 
     def flush(self) -> None:
-        """Forget a half-received reply; the next request is for a distance."""
+        """Discard an incomplete reply; the next request is for a distance."""
         super().flush()
         self._cycle.restart()

@@ -24,7 +24,7 @@ _FARTHEST_MM = 12_000
 
 
 def _plausible(frame: bytes) -> bool:
-    """Take a reply from any address."""
+    """Return whether a frame can be a reply, from any address."""
     value = frame[5] << 8 | frame[6]
     if frame[1] != 0xAA or frame[3] != 2:
         return False

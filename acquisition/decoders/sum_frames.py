@@ -1,4 +1,4 @@
-"""Finds frames of one size that begin with a known byte and end in the sum of the bytes before."""
+"""Find frames of one size that begin with a known byte and end with the sum of the bytes before."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ def with_sum(body: bytes) -> bytes:
 
 
 class SumFrames:
-    """Cuts a stream into frames, byte by byte from the left, so that the cuts of the reads do not matter.
+    """Cuts a stream into frames, byte by byte from the left, so that it does not matter how reads cut the stream.
 
     Parameters
     ----------
     size : int
-        Bytes of a frame.
+        Size of a frame, bytes.
     starts : bytes
-        What its first byte may be.
+        Possible first bytes.
     plausible : callable
-        Whether a frame with the right sum can be one. An eight-bit sum passes one wrong frame in 256, and a steady
-        distance can repeat one for ever; what no sensor sends must not hold the decoder out of step.
+        Returns whether a frame with a correct sum is possible. One wrong frame in 256 has a correct eight-bit sum, and
+        a steady distance can repeat it for ever. Values that no sensor sends must not keep the decoder out of step.
 
     Notes
     -----
-    After a frame that fails, the search goes on at its second byte: a frame that was cut costs itself and at most
-    the one that it was run into.
+    After an invalid frame the search continues at its second byte. So an incomplete frame costs itself and at most the
+    next one.
     """
 
     def __init__(self, size: int, starts: bytes, plausible: Callable[[bytes], bool]) -> None:
@@ -46,7 +46,7 @@ class SumFrames:
 
     @property
     def pending(self) -> int:
-        """Bytes of the frame that has begun."""
+        """Bytes of an incomplete frame."""
         return len(self._held)
 
     def split(self, data: bytes) -> list[bytes]:
@@ -75,6 +75,6 @@ class SumFrames:
         return frames
 
     def flush(self) -> None:
-        """Forget the frame that has begun."""
+        """Discard an incomplete frame."""
         self.faults["garbage_bytes"] += len(self._held)
         self._held = b""

@@ -1,8 +1,8 @@
 r"""Lines of text from a microcontroller's sketch: a number in a column, or after a name.
 
-``12.34``, ``512;12.34``, ``t=512 d=12.34 cm``: which column, which unit and which separator is said by options,
-because no line says it. A first line may have begun before the port was opened, and the end of a number is a number:
-it is dropped and counted as ``partial_line``. A line without a number where one belongs is counted as ``bad_frame``.
+``12.34``, ``512;12.34``, ``t=512 d=12.34 cm``: options state column, unit and separator, because the lines do not. The
+port may be opened in the middle of a line, and the last digits of a number look like a whole number. So the first
+line is dropped and counted as ``partial_line``. A line without the expected number is counted as ``bad_frame``.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ LONGEST = 256
 LENGTHS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 TIMES_US = {"us": 1.0, "ms": 1e3, "s": 1e6}
 
-_FARTHEST_M = 20.0  # no rangefinder in air hears an echo from there
-_LATEST_US = 38_000.0  # what an HC-SR04 sends when it heard none
+_FARTHEST_M = 20.0  # no rangefinder in air receives an echo from there
+_LATEST_US = 38_000.0  # an HC-SR04 sends this value if there was no echo
 
 _OPTIONS = {
     "column": "of the reading: a number from 0, or a name as in d=12.3 (default 0)",
@@ -41,7 +41,7 @@ _OPTIONS = {
 
 
 class _Form:
-    """What stands where in a line; the parameters are the family's options.
+    """The columns of a line; the parameters are the family's options.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ class _Form:
     unit : str
         m, cm, mm, in, or us for an echo time there and back.
     separator : str, optional
-        One character; left out, blanks, commas and semicolons separate.
+        One character; by default blanks, commas and semicolons separate.
     time_unit : str
         us, ms or s.
 
     Raises
     ------
     SensorError
-        If an option has no such value.
+        If the value of an option is not allowed.
     """
 
     def __init__(
@@ -86,18 +86,18 @@ class TextLinesDecoder(FramedDecoder):
     Parameters
     ----------
     **options
-        Those of the family.
+        Options of the family.
 
     Raises
     ------
     SensorError
-        If an option has no such value.
+        If the value of an option is not allowed.
 
     Notes
     -----
-    There is no checksum. A reading is a number in a line that was received from its beginning to its end; a flipped
-    bit that makes another digit cannot be seen. Zero, a negative number, an echo from 38 ms and a distance from 20 m
-    are missing samples.
+    There is no checksum. A reading is a number in a line that was received completely; a flipped bit that gives another
+    digit cannot be detected. Zero, negative numbers, echo times of 38 ms or more and distances of 20 m or more are
+    missing samples.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -106,7 +106,7 @@ class TextLinesDecoder(FramedDecoder):
         super().__init__(LineSplitter(b"\n", LONGEST, faults, skip_first=True))
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return a line's numbers, or count why there are none."""
+        """Return the reading of a line; count the fault of a line without one."""
         text = frame.strip(b"\r ")
         if not text:
             self._count("blank_line", 0)
@@ -126,7 +126,7 @@ class TextLinesDecoder(FramedDecoder):
 
 
 def _whole(column: Column | None, text: bytes, cells: list[bytes], scale: float) -> int | None:
-    """Return a column as a whole number from 0, -1 where it is not asked for, None where it is not there."""
+    """Return the whole number in a column: -1 if the column is not used, None if there is no number from 0."""
     if column is None:
         return -1
     value = column.number(text, cells)
@@ -140,12 +140,12 @@ def _factor(option: str, unit: str, known: Mapping[str, float], *more: str) -> f
 
 
 class TextLinesEncoder:
-    """Writes text lines as a decoder with the same options reads them."""
+    """Writes text lines for a decoder with the same options."""
 
     def __init__(self, **options: Any) -> None:
         self._form = form = _Form(**options)
-        asked = {"column": form.reading, "sequence": form.sequence, "time": form.time, "temperature": form.temperature}
-        self._columns = {what: column for what, column in asked.items() if column is not None}
+        chosen = {"column": form.reading, "sequence": form.sequence, "time": form.time, "temperature": form.temperature}
+        self._columns = {what: column for what, column in chosen.items() if column is not None}
 
     def encode(
         self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
@@ -172,7 +172,7 @@ FAMILY = Family(
     rate_hz=20.0,
     resolution_m=1e-3,
     range_m=(0.02, 4.0),
-    limits="Column and unit are as the options say, and nothing in a line shows that a digit was changed.",
+    limits="Column and unit come from options, and a changed digit in a line cannot be detected.",
     decoder=TextLinesDecoder,
     encoder=TextLinesEncoder,
     options=_OPTIONS,

@@ -1,7 +1,7 @@
 """DFRobot URM37 (SEN0001): polled, frames of command, two data bytes, sum.
 
-``22 00 00 22`` asks for the distance (reply ``22 H L SUM``, cm), ``11 00 00 11`` for the temperature (reply
-``11 H L SUM``, 0.1 degC: twelve bits, the upper four all 1 below zero). FF FF is invalid in either.
+``22 00 00 22`` requests the distance (reply ``22 H L SUM``, cm), ``11 00 00 11`` the temperature (reply
+``11 H L SUM``, 0.1 degC: twelve bits, the upper four all 1 below zero). FF FF is invalid in both.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ def _plausible(frame: bytes) -> bool:
 
 
 def _metres(value: int) -> float:
-    # 0 is nearer than the transducer can hear: no target, as FF FF.
+    # 0 is nearer than the transducer can measure, so it means no target like FF FF.
     return NAN if value in (0, _INVALID) else value / 100
 
 
 def _celsius(value: int) -> float:
-    """Return degC; below zero, sign and magnitude as the manual says, or two's complement as some firmware sends.
+    """Return degC. Below zero it is sign and magnitude as in the manual, or two's complement as some firmware sends.
 
-    The two never claim the same code: the range of either is an impossible temperature in the other.
+    No code is valid in both forms: the range of one is an impossible temperature in the other.
     """
     if value == _INVALID:
         return NAN
@@ -78,7 +78,7 @@ FAMILY = Family(
     rate_hz=10.0,
     resolution_m=1e-2,
     range_m=(0.02, 8.0),
-    limits="Steps of 1 cm and 10 Hz: enough to see a swing of a decimetre, not to weigh its damping.",
+    limits="Steps of 1 cm and 10 Hz: enough to see an oscillation of 10 cm, not to measure its damping.",
     decoder=partial(ReplyDecoder, _FORM),
     encoder=_FORM.encoder,
     poll=Poll(request=_FORM.ask_distance, interval_s=0.1, timeout_s=0.25),

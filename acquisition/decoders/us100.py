@@ -1,13 +1,13 @@
 """US-100: polled, replies without header and checksum.
 
-0x55 asks for the distance (reply H L, mm), 0x50 for the temperature (reply one byte, T + 45 degC). What the bytes
-are is known only from what was asked, so a byte too many or too few shifts every reply after it: a temperature of
--44 degC was seen that way. Three things keep it in step:
+0x55 requests the distance (reply H L, mm), 0x50 the temperature (reply one byte, T + 45 degC). Only the request shows
+what the bytes mean, so a surplus or missing byte shifts every later reply: a temperature of -44 degC was seen that way.
+Three rules keep the decoder in step:
 
-- The reader flushes after a time-out, and before a request if ``pending`` bytes of no whole reply are left over.
-- A distance outside 20 to 4500 mm is a missing sample. Out of step, the low byte stands where the high byte belongs,
-  which takes 14 of 15 readings out of that range.
-- Two such readings in a row that make a distance in range when read one byte later are proof enough: one byte is
+- The reader flushes after a time-out, and before a request if bytes are ``pending``.
+- A distance outside 20 to 4500 mm is a missing sample. Out of step, the low byte takes the place of the high byte, and
+  14 of 15 readings are out of that range.
+- If two consecutive readings are out of range, but give a distance in range when read one byte later, one byte is
   skipped and counted as ``resynchronised``.
 """
 
@@ -33,12 +33,12 @@ def _in_range(high: int, low: int) -> bool:
 
 
 class Us100Decoder:
-    """Decodes US-100 replies; a temperature goes with the next distance.
+    """Decodes US-100 replies; a temperature becomes part of the next distance reading.
 
     Parameters
     ----------
     temperature_every : int
-        Ask for the temperature after so many distances; 0 never does. It needs a reader that sends ``request``.
+        Number of distances between two temperatures; 0 for no temperatures. It needs a reader that sends ``request``.
     """
 
     def __init__(self, temperature_every: int = 0) -> None:
@@ -46,27 +46,27 @@ class Us100Decoder:
         self._faults = {"garbage_bytes": 0, "bad_temperature": 0, "resynchronised": 0}
         self._held = b""
         self._celsius = NAN
-        self._odd_low: int | None = None  # low byte of the reply before, if that was a distance out of range
+        self._odd_low: int | None = None  # low byte of the last reply, if its distance was out of range
 
     @property
     def faults(self) -> Mapping[str, int]:
-        """Counts of what was no reading; a distance out of range is a missing sample instead."""
+        """Counts of faults; a distance out of range is a missing sample instead."""
         return MappingProxyType(self._faults)
 
     @property
     def pending(self) -> int:
-        """Bytes held until the reply they began is whole; should be 0 when a request is due."""
+        """Bytes of an incomplete reply; should be 0 when a request is due."""
         return len(self._held)
 
     @property
     def request(self) -> bytes:
-        """What to send next."""
+        """The next request."""
         return self._cycle.request
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the distances whose replies these bytes complete."""
+        """Return the readings of the replies that these bytes complete."""
         data = self._held + data
-        found: list[Reading] = []
+        readings: list[Reading] = []
         at, size = 0, len(data)
         while at < size:
             if self._cycle.wants_temperature:
@@ -74,16 +74,16 @@ class Us100Decoder:
                 at += 1
             elif at + 1 < size:
                 distance_m = self._distance(data[at], data[at + 1])
-                found.append(Reading(host_ns, distance_m=distance_m, temperature_c=self._celsius))
+                readings.append(Reading(host_ns, distance_m=distance_m, temperature_c=self._celsius))
                 self._celsius = NAN
                 at += 2 - self._slips(data[at], data[at + 1])
             else:
                 break
         self._held = data[at:]
-        return Readings(found)
+        return Readings(readings)
 
     def flush(self) -> None:
-        """Forget a half-received reply; the next request is for a distance."""
+        """Discard an incomplete reply; the next request is for a distance."""
         self._faults["garbage_bytes"] += len(self._held)
         self._held = b""
         self._odd_low = None
@@ -103,7 +103,7 @@ class Us100Decoder:
         return (high << 8 | low) / 1000 if _in_range(high, low) else NAN
 
     def _slips(self, high: int, low: int) -> int:
-        """Return 1 where the low byte just read must be the next reply's high byte, else 0."""
+        """Return 1 if the last low byte must be the high byte of the next reply, else 0."""
         before = self._odd_low
         self._odd_low = None if _in_range(high, low) else low
         if before is None or self._odd_low is None or not _in_range(before, high):
@@ -134,7 +134,7 @@ FAMILY = Family(
     rate_hz=20.0,
     resolution_m=1e-3,
     range_m=(_NEAREST_MM / 1000, _FARTHEST_MM / 1000),
-    limits="No checksum: a byte that was changed or lost may give a wrong reading before it is noticed.",
+    limits="No checksum: a changed or lost byte may give a wrong reading before it is detected.",
     decoder=Us100Decoder,
     encoder=_encoder,
     poll=Poll(request=_ASK_DISTANCE, interval_s=0.05, timeout_s=0.15),

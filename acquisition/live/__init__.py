@@ -1,7 +1,7 @@
-"""The live side: ports are read, and what they send becomes samples.
+"""Read ports and turn their bytes into samples.
 
-In: bytes off serial and network ports, each read with the host's stamp. Out: those reads, as they came, to a sink; and
-through a sensor's chain (decoder, timebase, calibration) its :class:`~acquisition.block.Block` of samples.
-To change: how a port is opened or named (``serial_port``), how a sensor is calibrated (``calibration``). ``timebase``
-and ``decoding`` also rebuild every recorded run from its log: what they give must stay the same bit for bit.
+In: bytes from serial and network ports, each read with its host time. Out: these reads, unchanged, to a sink; and
+through a sensor's chain (decoder, timebase, calibration) a :class:`~acquisition.block.Block` of samples.
+``serial_port`` opens and names ports, ``calibration`` calibrates a sensor. ``timebase`` and ``decoding`` also rebuild
+every recorded run from its log, so their results must stay the same bit for bit.
 """

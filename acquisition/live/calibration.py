@@ -1,4 +1,4 @@
-"""Calibration: from echo times and stated distances to metres, with what was used kept with the result."""
+"""Calibration: convert echo times and stated distances to metres. The numbers used are stored with the result."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ MAD_TO_SIGMA = 1.482602218505602
 class Calibration:
     """How readings become distances.
 
-    :math:`d = s\\,c\\,\\tau/2 + d_0` of an echo time, :math:`d = s\\,d_r + d_0` of a distance that the device states.
+    :math:`d = s\\,c\\,\\tau/2 + d_0` for an echo time, :math:`d = s\\,d_r + d_0` for a distance that the device states.
 
     Parameters
     ----------
     speed_of_sound_m_per_s : float
-        Applied to echo times. Echo times are what is recorded, so another speed can be applied later.
+        Used for echo times. The recording holds echo times, so another speed can be applied later.
     scale : float
-        Of distances, from a known one.
+        Factor of the distances, from known ones.
     offset_m : float
-        Added, m: the transducer's face is not the scale's zero.
+        Added to the distances, m, because the transducer's face is not the zero of the scale.
     u_scale, u_offset_m : float
         Standard uncertainties.
     """
@@ -48,7 +48,7 @@ class Calibration:
         if not 100.0 < self.speed_of_sound_m_per_s < 2000.0:
             raise CalibrationError(
                 f"the speed of sound must lie between 100 and 2000 m/s, got {self.speed_of_sound_m_per_s:g}; "
-                "air at room temperature has 344"
+                "use 344 for air at room temperature"
             )
         for name, (low, high) in RANGES.items():
             if not low <= getattr(self, name) <= high:
@@ -57,15 +57,15 @@ class Calibration:
                 )
 
     def distance(self, echo_us: ArrayLike, distance_m: ArrayLike) -> F8:
-        """Return distances in m of echo times in us, or of stated ones in m where there are none; NaN for neither."""
+        """Return distances, m, from echo times, us, or from stated distances, m, without an echo time; else NaN."""
         raw = np.where(np.isfinite(echo_us), 0.5e-6 * self.speed_of_sound_m_per_s * np.asarray(echo_us), distance_m)
         return np.asarray(self.scale * raw + self.offset_m)
 
     def restated(self, point: StillPoint, before: Calibration) -> StillPoint:
-        """Return a rest position that was measured with ``before``, another scale and offset, as this one states it."""
+        """Convert a rest position that was measured with the calibration ``before`` to this calibration."""
         ratio = self.scale / before.scale
-        rest = (point.rest_m - before.offset_m) * ratio + self.offset_m
-        return StillPoint(rest, point.u_rest_m * ratio, point.noise_m * ratio, point.samples)
+        rest_m = (point.rest_m - before.offset_m) * ratio + self.offset_m
+        return StillPoint(rest_m, point.u_rest_m * ratio, point.noise_m * ratio, point.samples)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the numbers by name, for the log and the run file."""
@@ -78,13 +78,13 @@ class Calibration:
             return cls(**{name: float(value) for name, value in numbers.items()})
         except (TypeError, ValueError) as error:
             raise CalibrationError(
-                f"a calibration holds numbers by name ({', '.join(cls.__slots__)}), got {dict(numbers)}"
+                f"expected numbers of a calibration ({', '.join(cls.__slots__)}), got {dict(numbers)}"
             ) from error
 
 
 @dataclass(frozen=True, slots=True)
 class StillPoint:
-    """A bob at rest, as the sensor sees it.
+    """A measurement of the bob at rest.
 
     Parameters
     ----------
@@ -107,38 +107,39 @@ def from_still(distance: F8) -> StillPoint:
     Raises
     ------
     CalibrationError
-        If fewer than ten distances are there, or the bob moves: its slow motion exceeds five times the noise.
+        If there are fewer than ten distances, or the bob moves: its slow motion exceeds five times the noise.
     """
     known = distance[np.isfinite(distance)]
     if known.size < 10:
         raise CalibrationError(
-            f"a rest position needs ten distances at least, got {known.size} of {distance.size}; is a target in view?"
+            f"a rest position needs at least ten distances, got {known.size} in {distance.size} readings; "
+            "check that the sensor sees the bob"
         )
-    rest = float(np.median(known))
-    total = MAD_TO_SIGMA * float(np.median(np.abs(known - rest)))
-    # First differences see noise and hardly any slow motion.
+    rest_m = float(np.median(known))
+    total = MAD_TO_SIGMA * float(np.median(np.abs(known - rest_m)))
+    # First differences contain the noise and hardly any slow motion.
     steps = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(known)))) / math.sqrt(2.0)
     floor = max(steps, 1e-6)
     if total > 5.0 * floor and total > 5e-4:
         raise CalibrationError(
-            f"the bob moves: positions scatter by {total * 1e3:.2g} mm where the noise is {steps * 1e3:.2g} mm; "
-            "let it hang still"
+            f"the bob moves: its positions scatter by {total * 1e3:.2g} mm, but the noise is {steps * 1e3:.2g} mm; "
+            "wait until it hangs still"
         )
     noise = max(total, steps)
-    return StillPoint(rest, 1.2533 * noise / math.sqrt(known.size), noise, int(known.size))
+    return StillPoint(rest_m, 1.2533 * noise / math.sqrt(known.size), noise, int(known.size))
 
 
 def against_ruler(
     measured: tuple[StillPoint, ...], known_m: tuple[float, ...], u_known_m: float, base: Calibration | None = None
 ) -> Calibration:
-    """Return the calibration that carries measured rest positions to known distances.
+    """Return the calibration that maps measured rest positions to known distances.
 
     Parameters
     ----------
     measured : tuple of StillPoint
         Taken with ``base``.
     known_m : tuple of float
-        Distances by the ruler, m. One gives the offset; two or more, apart by a tenth of their size, the scale too.
+        Distances by the ruler, m. One gives the offset; two or more that differ by a tenth also give the scale.
     u_known_m : float
         Standard uncertainty of one ruler reading, m.
     base : Calibration, optional
@@ -146,11 +147,13 @@ def against_ruler(
     Raises
     ------
     CalibrationError
-        If numbers do not pair, or the scale comes out further than a tenth from 1: then a unit is wrong.
+        If the numbers of distances differ, or the scale differs from 1 by more than a tenth, as with a wrong unit.
     """
     base = base or Calibration()
     if not measured or len(measured) != len(known_m):
-        raise CalibrationError(f"each ruler distance needs its measurement, got {len(known_m)} and {len(measured)}")
+        raise CalibrationError(
+            f"expected a measurement for each ruler distance, got {len(measured)} for {len(known_m)}; measure again"
+        )
     x = np.array([point.rest_m for point in measured])
     y = np.array(known_m)
     u = np.hypot(u_known_m, [point.u_rest_m for point in measured])
@@ -163,7 +166,7 @@ def against_ruler(
     covariance = np.linalg.inv(design.T @ design)
     scale, shift = covariance @ design.T @ (y / u)
     if abs(scale - 1.0) > 0.1:
-        raise CalibrationError(f"the ruler asks for a scale of {scale:.3g}; more than a tenth off means a wrong unit")
+        raise CalibrationError(f"expected a scale within a tenth of 1, got {scale:.3g}; check the unit of the ruler")
     return Calibration(
         base.speed_of_sound_m_per_s,
         base.scale * float(scale),

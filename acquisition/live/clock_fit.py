@@ -1,7 +1,8 @@
-"""The device's clock against the host's: how fast it runs, and what in the stamps says nothing about that.
+"""Compare the device's clock with the host's: its rate error, without the readings that a stall delayed.
 
-A stamp is late by transport and scheduling. Most of that is a few milliseconds; a network or a bridge that stalls
-makes it seconds, and brings all that it held at once. Such readings are told by their stamps alone and left out.
+A host time is late because of transport and scheduling, usually by a few milliseconds. A network or bridge that stalls
+delays readings by seconds and then delivers all of them together. These readings are recognised by their host times
+and left out.
 """
 
 from __future__ import annotations
@@ -17,45 +18,45 @@ from acquisition.block import F8, I8
 __all__ = ["COUNTER_PPM", "ClockFit", "ClockSamples", "fit_clock"]
 
 COUNTER_PPM = 100_000.0
-"""What the pace of a program may be off its nominal rate, ppm: a loop that waits 10 ms takes the ping's time on top."""
+"""Largest error of a program's rate, ppm: a loop that waits 10 ms also needs the time of the ping."""
 
 STALL_S = 0.25
-"""Lateness that no jitter explains, s."""
+"""Smallest delay of a stall, s; jitter is shorter."""
 SILENCE_S = 0.05
-"""A step of the offsets that is a silence, s."""
+"""Smallest step of the delays that counts as a silence, s."""
 STEP_S = 0.02
-"""A step of the least delay that is none of the rate's, s: a USB bridge holds bytes for 16 ms (FTDI AN232B-04)."""
-FEWEST = 24
-MOST = 1 << 19
-"""At most so many samples, at least half as many, evenly spread over a run, tell how the clocks run."""
+"""Smallest step of the least delay that is a clock jump, s: a USB bridge holds bytes for 16 ms (FTDI AN232B-04)."""
+MIN_SAMPLES = 24
+MAX_SAMPLES = 1 << 19
+"""Largest number of samples of a run that are used for the fit; they are evenly spread."""
 NANO = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class ClockFit:
-    """The host clock against the sensor's.
+    """The comparison of the sensor's clock with the host's.
 
     Parameters
     ----------
     rate_error_ppm : float
-        How much faster the sensor's clock runs than the host's, parts per million; NaN where the stamps do not tell.
+        How much faster the sensor's clock runs than the host's, ppm; NaN if the host times do not determine it.
     u_rate_error_ppm : float
-        Its standard uncertainty from the stamps' scatter alone; the host's own crystal comes on top.
+        Its standard uncertainty from the scatter of the host times; the error of the host's crystal is not included.
     jitter_s : float
-        Standard deviation of the host stamps about the line, s.
+        Standard deviation of the host times about the line, s.
     readings : int
-        All of them, those left out too.
+        Number of all readings, including those left out.
     held : int
-        Readings that came too late by a stall, and were left out.
+        Readings that were delayed by a stall and left out.
     stalls : int
-        Stretches of such readings: each came as a burst, at the end of a silence.
+        Number of stalls; the readings of each came as a burst after a silence.
     longest_stall_s : float
-        By which the latest of them was late, s.
+        Longest delay by a stall, s.
     steps : int
-        Times at which one clock jumped against the other and stayed so: a host that slept, a device that paused or
-        counts anew. What lies on either side is compared by itself.
+        Number of permanent jumps of one clock relative to the other: the host slept, or the device paused or restarted
+        its counter. The two sides of a jump are fitted with separate offsets.
     span_s : float
-        Time over which the clocks were compared without a step, s.
+        Longest time without a jump, s.
     """
 
     rate_error_ppm: float
@@ -70,7 +71,7 @@ class ClockFit:
 
 
 class ClockSamples:
-    """Times by both clocks of samples spread evenly over a run of any length."""
+    """Collects the times of both clocks for samples that are spread evenly over a run of any length."""
 
     def __init__(self) -> None:
         self._step = 1
@@ -78,23 +79,23 @@ class ClockSamples:
         self._count = 0
 
     def take(self, first: int, t: F8, host_ns: I8) -> None:
-        """Take the next samples: the index of the first, sensor times in s, host stamps in ns."""
-        kept = slice(-first % self._step, None, self._step)
-        t, host_ns = t[kept], host_ns[kept]
+        """Add the next samples: the index of the first, sensor times in s, host times in ns."""
+        chosen = slice(-first % self._step, None, self._step)
+        t, host_ns = t[chosen], host_ns[chosen]
         before, self._count = self._count, self._count + t.size
-        if self._count > self._t.size:  # room grows by doubling; an array a read would take ten times as much
+        if self._count > self._t.size:  # doubling the arrays is ten times faster than one array per read
             room = max(self._count, 2 * self._t.size) - before
             self._t = np.concatenate([self._t[:before], np.empty(room)])
             self._host_ns = np.concatenate([self._host_ns[:before], np.empty(room, np.int64)])
         self._t[before : self._count], self._host_ns[before : self._count] = t, host_ns
-        if self._count > MOST:
+        if self._count > MAX_SAMPLES:
             self._step *= 2
             t, host_ns = self.columns()
             self._t, self._host_ns = t[::2].copy(), host_ns[::2].copy()
             self._count = self._t.size
 
     def columns(self) -> tuple[F8, I8]:
-        """Return sensor times in s and host stamps in ns."""
+        """Return sensor times in s and host times in ns."""
         return self._t[: self._count], self._host_ns[: self._count]
 
 
@@ -104,24 +105,25 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     Parameters
     ----------
     t : (n,) float64, s
-        Sensor times: of the pings, where the device stamps these. A time of reflection moves with the bob, and the
-        stamps do not.
+        Sensor times of the pings, if the device sends them. The times of the reflections would vary with the position
+        of the bob.
     host_ns : (n,) int64, ns
-        Host stamps of the same readings.
+        Host times of the same readings.
 
     Notes
     -----
-    A stamp is never early: transport and scheduling only delay it. The least delay in each of a dozen stretches
-    therefore lies on a line whose slope is the rate error, found far more closely than by least squares through all
-    stamps [1]_. Where stamps scatter to both sides (a stamped bridge, a virtual machine) the minima scatter more than
-    the mean does; both lines are fitted and the one with the smaller uncertainty is returned.
+    A host time is never early, because transport and scheduling only delay it. The least delays in a dozen stretches
+    therefore lie on a line whose slope is the rate error. This determines the slope far better than least squares
+    through all host times [1]_. If the host times scatter to both sides (a bridge with its own clock, a virtual
+    machine), the minima scatter more than the mean. So both lines are fitted, and the one with the smaller uncertainty
+    is returned.
 
-    Readings that a stall held come in a burst: back in time their offsets grow by a second in a second, which no clock
-    does. With offsets :math:`d_i` at times :math:`t_i`, reading i is one of them where
-    :math:`d_i > d_j + (t_j - t_i)/2` of a later reading j: it is late by twice the difference, and left out.
+    Readings that a stall delayed come in a burst: going back in time, their delays grow by one second per second,
+    which no clock does. With delays :math:`d_i` at times :math:`t_i`, reading i belongs to a burst if
+    :math:`d_i > d_j + (t_j - t_i)/2` for a later reading j. Its delay is twice the difference, and it is left out.
 
-    Where the least delay jumps and stays there, the lines on either side share their slope and not their zero, as the
-    offsets of streams that started again are treated by LSL's importers [2]_.
+    If the least delay jumps permanently, the lines on either side have the same slope but different offsets. LSL's
+    importers treat streams that restarted in the same way [2]_.
 
     References
     ----------
@@ -131,16 +133,16 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
        2025, doi:10.1162/IMAG.a.136.
     """
     n = int(t.size)
-    nothing = ClockFit(math.nan, math.inf, math.nan, n)
-    if n < FEWEST or not np.isfinite(t).all() or t[-1] <= t[0]:
-        return nothing
-    # Stamps half the range of their type apart are no clock's, and their difference would wrap.
+    no_fit = ClockFit(math.nan, math.inf, math.nan, n)
+    if n < MIN_SAMPLES or not np.isfinite(t).all() or t[-1] <= t[0]:
+        return no_fit
+    # Host times so far apart come from no clock, and their difference would overflow.
     if int(host_ns.max()) - int(host_ns.min()) >= 1 << 62:
-        return nothing
+        return no_fit
     if not (ahead := np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])).all():
-        t, host_ns = t[ahead], host_ns[ahead]  # repeats, and what runs backward
-        if t.size < FEWEST:
-            return nothing
+        t, host_ns = t[ahead], host_ns[ahead]  # without repeated times and times that run backward
+        if t.size < MIN_SAMPLES:
+            return no_fit
     x = t - 0.5 * (t[0] + t[-1])
     delay = (host_ns - host_ns[0]) * NANO - (t - t[0])
     late = _lateness(x, delay)
@@ -148,68 +150,68 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     held = np.zeros(t.size, np.bool_)
     for start, stop in stalls:
         held[start:stop] = True
-    found = (int(held.sum()), len(stalls), max((float(late[a:b].max()) for a, b in stalls), default=0.0))
+    stall_facts = (int(held.sum()), len(stalls), max((float(late[a:b].max()) for a, b in stalls), default=0.0))
     if stalls:
         x, delay = x[~held], delay[~held]
-        if x.size < FEWEST or x[-1] <= x[0]:
-            return ClockFit(math.nan, math.inf, math.nan, n, *found)
+        if x.size < MIN_SAMPLES or x[-1] <= x[0]:
+            return ClockFit(math.nan, math.inf, math.nan, n, *stall_facts)
     steps = _steps(x, delay)
     part = np.searchsorted(steps, np.arange(x.size), side="right")
     candidates = [_through_minima(x, delay, part), _through_all(x, delay, part)]
     slope, u_slope = min(candidates, key=lambda line: line[1])
     if not (math.isfinite(u_slope) and slope > -1.0):
-        return ClockFit(math.nan, math.inf, math.nan, n, *found, len(steps))
+        return ClockFit(math.nan, math.inf, math.nan, n, *stall_facts, len(steps))
     return ClockFit(
-        # Exactly, and not -slope: at 50 ppm the square is many times a long run's uncertainty.
+        # Not simply -slope: at 50 ppm the quadratic term is many times the uncertainty of a long run.
         -slope / (1.0 + slope) * 1e6,
         u_slope * 1e6,
         float(np.std(_within(delay - slope * x, part))),
         n,
-        *found,
+        *stall_facts,
         len(steps),
         max(float(np.ptp(rows)) for rows in np.split(x, steps) if rows.size),
     )
 
 
 def _lateness(x: F8, delay: F8) -> F8:
-    """Return by how much each reading is late, were it one of a burst, s: a later one came sooner. Else 0."""
+    """Return the delay of each reading, s, if it belongs to a burst, because a later reading came sooner; else 0."""
     sooner = np.minimum.accumulate((delay + 0.5 * x)[::-1])[::-1] - 0.5 * x
     return np.asarray(2.0 * (delay - sooner))
 
 
 def _stalls(x: F8, delay: F8, late: F8) -> list[tuple[int, int]]:
-    """Return from where to where readings came too late by a stall.
+    """Return the first row of each stall and the row after its last.
 
-    A counter whose nominal rate is wrong by a multiple is late everywhere too: its stamps are spread evenly, where a
-    stall has a silence, or brings its readings at once.
+    A counter whose nominal rate is wrong by a factor also looks late everywhere. But its host times are evenly spread,
+    while a stall has a silence or delivers its readings together.
     """
     change = np.diff(delay)
     silence = np.concatenate([[False], change > max(SILENCE_S, 5.0 * float(np.median(np.abs(change))))])
     edges = np.flatnonzero(np.diff(np.concatenate([[False], late > 0.0, [False]]).astype(np.int8)))
-    found = []
+    stalls = []
     for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         last = min(stop, x.size - 1)
         at_once = delay[start] - delay[last] > 0.9 * (x[last] - x[start])
         if late[start:stop].max() >= STALL_S and (at_once or silence[start:stop].any()):
-            found.append((start, stop))
-    return found
+            stalls.append((start, stop))
+    return stalls
 
 
 def _steps(x: F8, delay: F8, stretches: int = 48) -> I8:
-    """Return at which readings one clock has jumped against the other: the least delay of stretches steps there."""
+    """Return the readings at which one clock jumped relative to the other: the least delay has a step there."""
     parts = [part for part in _parts(x, stretches) if part.size]
     if len(parts) < stretches // 4:
         return np.empty(0, np.int64)
     lowest = np.array([part[np.argmin(delay[part])] for part in parts])
     dx, rise = np.diff(x[lowest]), np.diff(delay[lowest])
-    left = rise - float(np.median(rise / dx)) * dx
-    scatter = 1.4826 * float(np.median(np.abs(left - np.median(left))))
-    jumps = np.flatnonzero(np.abs(left) > max(STEP_S, 10.0 * scatter))
+    deviation = rise - float(np.median(rise / dx)) * dx
+    scatter = 1.4826 * float(np.median(np.abs(deviation - np.median(deviation))))
+    jumps = np.flatnonzero(np.abs(deviation) > max(STEP_S, 10.0 * scatter))
     return np.array([parts[at + 1][0] for at in jumps.tolist()], np.int64)
 
 
 def _parts(x: F8, stretches: int) -> list[I8]:
-    """Return the readings of stretches of equal length."""
+    """Return the rows of the readings in stretches of equal duration."""
     edges = np.linspace(x[0], x[-1], stretches + 1)
     return np.split(np.arange(x.size), np.searchsorted(x, edges[1:-1]))
 
@@ -217,12 +219,12 @@ def _parts(x: F8, stretches: int) -> list[I8]:
 def _through_minima(x: F8, delay: F8, part: NDArray[np.int64], stretches: int = 12) -> tuple[float, float]:
     slope, line_u = 0.0, math.inf
     parts = [rows for rows in _parts(x, stretches) if rows.size]
-    if len(parts) < stretches // 2:  # a few points always lie near some line
+    if len(parts) < stretches // 2:  # a few points are always close to a line
         return 0.0, math.inf
-    # The least of `delay` is sought along the line found so far, else a steep line hides it at a stretch's end.
+    # The minima are taken relative to the current line, because with a steep line they would lie at the ends.
     for _ in range(3):
-        rest = delay - slope * x
-        lowest = np.array([rows[np.argmin(rest[rows])] for rows in parts])
+        offset = delay - slope * x
+        lowest = np.array([rows[np.argmin(offset[rows])] for rows in parts])
         slope, line_u = _line(x[lowest], delay[lowest], part[lowest])
     return slope, line_u
 
@@ -230,12 +232,12 @@ def _through_minima(x: F8, delay: F8, part: NDArray[np.int64], stretches: int = 
 def _through_all(x: F8, delay: F8, part: NDArray[np.int64]) -> tuple[float, float]:
     slope, u = _line(x, delay, part)
     residual = _within(delay - slope * x, part)
-    power = _dot(residual, residual)
+    power = float(residual @ residual)
     if power == 0.0:
         return slope, u
     length = 1.0
     for lag in range(1, min(x.size // 4, 1000)):
-        rho = _dot(residual[lag:], residual[:-lag]) / power
+        rho = float(residual[lag:] @ residual[:-lag]) / power
         if rho < 2.0 / math.sqrt(x.size):
             break
         length += 2.0 * rho
@@ -243,7 +245,7 @@ def _through_all(x: F8, delay: F8, part: NDArray[np.int64]) -> tuple[float, floa
 
 
 def _within(y: F8, part: NDArray[np.int64]) -> F8:
-    """Return values less the mean of their part."""
+    """Return values minus the mean of their part."""
     if part[0] == part[-1]:
         return np.asarray(y - y.mean())
     number = np.unique(part, return_inverse=True)[1]
@@ -251,21 +253,16 @@ def _within(y: F8, part: NDArray[np.int64]) -> F8:
 
 
 def _line(x: F8, y: F8, part: NDArray[np.int64]) -> tuple[float, float]:
-    """Slope of least-squares lines of one slope, each part's with its own zero, and its u from the residuals.
+    """Return the common slope of least-squares lines with an offset for each part, and its u from the residuals.
 
-    A scatter that few points tell is itself uncertain: the uncertainty is the standard deviation of Student's
-    distribution, not its scale.
+    The scatter of a few points is itself uncertain, so u is the standard deviation of Student's distribution and not
+    its scale.
     """
     centred = _within(x, part)
-    power = _dot(centred, centred)
-    if power == 0.0:  # a point in each part
+    power = float(centred @ centred)
+    if power == 0.0:  # one point in each part
         return 0.0, math.inf
-    slope = _dot(centred, y) / power
+    slope = float(centred @ y) / power
     residual = _within(y, part) - slope * centred
     free = x.size - 3 - np.unique(part).size
-    return slope, math.sqrt(_dot(residual, residual) / max(free, 1) / power)
-
-
-def _dot(a: F8, b: F8) -> float:
-    """Return the sum of products, without BLAS: on a busy machine its threads take four times as long."""
-    return float(np.einsum("i,i->", a, b))
+    return slope, math.sqrt(float(residual @ residual) / max(free, 1) / power)

@@ -1,4 +1,4 @@
-"""One port as the reader sees it: where bytes come from, who takes them, and how its sensor is spoken to."""
+"""The interfaces of the reader of ports: the port, the receiver of its bytes, and how to poll its sensor."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ __all__ = ["Line", "Proof", "Sink", "Transport"]
 
 
 class Transport(Protocol):
-    """Bytes from somewhere: a serial port, a socket, a test's own."""
+    """A source of bytes: a serial port, a socket, a test double."""
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Name for messages."""
         ...
 
     def fileno(self) -> int:
-        """Return a descriptor to wait on and to read without blocking, or -1 where there is none."""
+        """Return a descriptor to wait on and to read without blocking; -1 if there is none."""
         ...
 
     def read(self, wait_s: float) -> bytes:
-        """Return what is there, or what comes within that time; asked of a transport without a descriptor only.
+        """Return the bytes that are there or arrive within that time; only for a transport without a descriptor.
 
         Raises
         ------
@@ -45,12 +45,12 @@ class Transport(Protocol):
         ...
 
     def discard_input(self) -> None:
-        """Forget what came and was not read."""
+        """Discard unread bytes."""
         ...
 
     @property
     def identified(self) -> bool:
-        """Whether a serial number makes sure that :meth:`reopen` opens the same device."""
+        """Whether a serial number guarantees that :meth:`reopen` opens the same device."""
         ...
 
     def reopen(self) -> None:
@@ -64,38 +64,38 @@ class Transport(Protocol):
         ...
 
     def close(self) -> None:
-        """Close; again does no harm."""
+        """Close. Further calls do nothing."""
         ...
 
 
 class Proof(Protocol):
-    """Tells the sensor that was lost from another that came in its place."""
+    """Checks whether the device on a port that came back is the sensor that was lost."""
 
     @property
     def facts(self) -> Mapping[str, Any]:
-        """What the event "reopened" shall say besides, once it is proven."""
+        """Further facts for the event "reopened", after the check."""
         ...
 
     def feed(self, host_ns: int, data: bytes) -> bool | None:
-        """Take the bytes of one read; return whether it is the sensor, None while that is open."""
+        """Check the bytes of one read; return whether it is the sensor, or None while this is undecided."""
         ...
 
 
 class Sink(Protocol):
-    """Who keeps the bytes; called on the I/O thread, so it must not block."""
+    """The receiver of the bytes. It is called on the I/O thread, so it must not block."""
 
     def reads(self, reads: Sequence[Read]) -> None:
-        """Take what one wake-up read, of each port its bytes; called by several threads where lines may block."""
+        """Receive the reads of one wake-up, one for each port. Several threads may call this if lines block."""
         ...
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Take "lost", "reopened" (with gap_s), "refused" (another device came back) or "timeout"."""
+        """Receive "lost", "reopened" (with gap_s), "refused" (another device came back) or "timeout"."""
         ...
 
 
 @dataclass(slots=True)
 class Line:
-    """One port and how its sensor is spoken to.
+    """One port and how to poll its sensor.
 
     Parameters
     ----------
@@ -104,12 +104,12 @@ class Line:
         Number of the sensor within the run.
     poll : Poll or None
     decoder : callable or None
-        Returns a polled sensor's decoder, where the sink feeds it within ``reads`` and flushes it at "timeout": then
-        that says what to ask next, and a reply that came short counts as timed out before the next request.
+        Returns the decoder of a polled sensor, if the sink feeds it within ``reads`` and flushes it at "timeout". The
+        decoder then chooses the next request, and an incomplete reply counts as timed out before that request.
     proof : callable or None
-        Returns what a port that came back has to prove before its bytes are the sensor's again; None: nothing.
+        Returns the check that a port must pass after it came back; None for no check.
     greeting : bytes
-        Sent to a port that came back: makes the device say what it is.
+        Sent to a port that came back; makes the device identify itself.
     """
 
     transport: Transport
@@ -119,7 +119,7 @@ class Line:
     proof: Callable[[], Proof | None] | None = None
     greeting: bytes = b""
     _lost_ns: int | None = field(default=None, init=False)
-    """Since when its readings are missing."""
+    """Host time at which it was lost."""
     _closed: bool = field(default=False, init=False)
     _proving: Proof | None = field(default=None, init=False)
     _unproven: list[Read] = field(default_factory=list, init=False)

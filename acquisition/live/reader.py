@@ -1,7 +1,7 @@
-"""Reading ports: one I/O thread for all of them, and nothing between the wire and whoever keeps the bytes.
+"""Read ports: one I/O thread for all of them, which passes the bytes on unchanged.
 
-Every byte is handed on as it came, with the host clock's stamp of the wake-up that read it. A port that goes away is
-reported with its time and opened again when it comes back; the run goes on.
+Every read has the host time of the wake-up that read it. A port that is lost is reported with its time and reopened
+when it comes back; the run goes on.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ POLLED_WAIT_S = 0.01
 
 
 class PortReader:
-    """Reads every line on one thread with ``selectors``; a line that may block it gets a thread of its own.
+    """Reads all lines on one thread with ``selectors``; a line that may block gets a separate thread.
 
-    That is one without a descriptor (Windows, RFC 2217), and one at a network address, which may take seconds to open
-    again after a loss.
+    Such lines are those without a descriptor (Windows, RFC 2217) and those at a network address, which may take
+    seconds to reopen.
 
     Parameters
     ----------
     lines : sequence of Line
-        Open.
+        They must be open.
     sink : Sink
     clock : Clock
-        The system's: real ports know no other.
+        The system clock, because real ports run in real time.
     """
 
     def __init__(self, lines: Sequence[Line], sink: Sink, clock: Clock) -> None:
@@ -49,11 +49,11 @@ class PortReader:
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
         self._failure: BaseException | None = None
-        # Nothing reads the pipe, it only ends a wait, so it may block: Windows can set that only from Python 3.12.
+        # The pipe only ends a wait and is never read, so it may block; Windows can change that only from Python 3.12.
         self._wake_read, self._wake_write = os.pipe()
 
     def start(self) -> None:
-        """Begin to read."""
+        """Start reading."""
         shared = [line for line in self._lines if not _may_block(line)]
         loops = [(self._select_loop, shared)] if shared else []
         for line in filter(_may_block, self._lines):
@@ -64,7 +64,7 @@ class PortReader:
             thread.start()
 
     def stop(self) -> None:
-        """End reading and close the ports; raises what a thread tripped over, if any did. Again does no harm."""
+        """Stop reading, close the ports, and raise the error of a thread, if any. Further calls do nothing."""
         if self._stop.is_set():
             return
         self._stop.set()
@@ -80,14 +80,14 @@ class PortReader:
 
     @property
     def failure(self) -> BaseException | None:
-        """What a reading thread tripped over last, if over anything: a defect, or a sink that refused."""
+        """The last error of a reading thread, if any: a defect, or an error of the sink."""
         return self._failure
 
     def _guarded(self, loop: Any, lines: list[Line]) -> None:
         while not self._stop.is_set():
             try:
                 loop(lines)
-            except Exception as error:  # handed to stop(), which raises it on the caller's thread; the reading goes on
+            except Exception as error:  # stop() raises it on the caller's thread; the reading goes on
                 self._failure = error
                 for line in lines:
                     if not line._closed and line.transport.fileno() < 0 and loop == self._select_loop:
@@ -106,7 +106,7 @@ class PortReader:
                     _leave(selector, line)
                 for line in lines:
                     if line._closed:
-                        if self._tries_again(line):
+                        if self._retry(line):
                             selector.register(line.transport.fileno(), selectors.EVENT_READ, line)
                     elif line.poll is not None and not self._ask(line, line.poll):
                         _leave(selector, line)
@@ -115,19 +115,19 @@ class PortReader:
         (line,) = lines
         while not self._stop.is_set():
             if line._closed:
-                if not self._tries_again(line):
+                if not self._retry(line):
                     self._stop.wait(IDLE_WAIT_S)
                 continue
             if line.poll is not None and not self._ask(line, line.poll):
                 line.transport.close()
                 continue
-            # A reply is not waited for so long that the next request comes late.
+            # Do not wait so long for a reply that the next request is late.
             wait_s = BLOCKING_WAIT_S if line.poll is None else POLLED_WAIT_S
             if not self._wait_for(line, wait_s):
                 line.transport.close()
 
     def _wait_s(self, lines: list[Line]) -> float:
-        """How long nothing can be due."""
+        """Return the time until the next reopening or request may be due, s."""
         now = self._clock.now_ns()
         wait = IDLE_WAIT_S
         for line in lines:
@@ -138,7 +138,7 @@ class PortReader:
         return max(wait, 0.0)
 
     def _read(self, ready: Sequence[Line], now_ns: int) -> list[Line]:
-        """Read the ports that have something and hand it on; return those that are gone."""
+        """Read the ports with data and pass it on; return the ports that are lost."""
         reads: list[Read] = []
         gone: list[tuple[Line, str]] = []
         for line in ready:
@@ -161,26 +161,26 @@ class PortReader:
         if reads:
             self._sink.reads(reads)
         for line, why in gone:
-            self._gone(line, f"{line.transport.name}: the port has gone ({why})")
+            self._gone(line, f"{line.transport.name}: the port was disconnected ({why})")
         return [line for line, _ in gone]
 
     def _prove(self, line: Line, proof: Proof, now_ns: int, data: bytes) -> list[Read] | None:
-        """Return the reads of a port that came back, once it proved to be the sensor's; None where it is another's."""
+        """Return the reads of a port that came back, after the sensor is confirmed; None if it is another device."""
         verdict = proof.feed(now_ns, data)
         line._unproven.append((line.channel, now_ns, data))
         if verdict is None:
             return []
         if not verdict:
             size = sum(len(unproven) for _, _, unproven in line._unproven)
-            facts = {"port": line.transport.name, "why": "what came back does not speak as the sensor", "bytes": size}
+            facts = {"port": line.transport.name, "why": "another device answered on the port", "bytes": size}
             self._sink.event(line.channel, now_ns, "refused", facts)
             return None
-        self._back(line, now_ns, proof.facts)
+        self._came_back(line, now_ns, proof.facts)
         proven, line._unproven, line._proving = line._unproven, [], None
         return proven
 
     def _wait_for(self, line: Line, wait_s: float) -> bool:
-        """Hand on what comes within that time; False where the port is gone."""
+        """Pass on the bytes that arrive within that time; return False if the port is lost."""
         try:
             data = line.transport.read(wait_s)
         except PortError as error:
@@ -198,7 +198,7 @@ class PortReader:
         return True
 
     def _ask(self, line: Line, poll: Poll) -> bool:
-        """Send the request when it is due, drop a late answer's remains first; False where the port is gone."""
+        """Send the request if it is due, after discarding a late reply; return False if the port is lost."""
         now = self._clock.now_ns()
         if now < line._ask_ns:
             return True
@@ -206,7 +206,7 @@ class PortReader:
             decoder = None if line.decoder is None else line.decoder()
             short = decoder is not None and line._answer_by_ns is None and decoder.pending > 0
             if short or (line._answer_by_ns is not None and now >= line._answer_by_ns):
-                # Without header and checksum the rest of a late reply would be read as the next one.
+                # Without header and checksum the end of a late reply would be read as the next reply.
                 line.transport.discard_input()
                 self._sink.event(line.channel, now, "timeout", {"after_s": poll.timeout_s})
                 line._answer_by_ns = None
@@ -217,7 +217,7 @@ class PortReader:
             self._gone(line, str(error))
             return False
         step = int(poll.interval_s * 1e9)
-        # An absolute schedule: a late wake-up does not push the ones after it.
+        # The schedule is absolute, so a late wake-up does not delay later requests.
         line._ask_ns = max(line._ask_ns + step, now) if line._ask_ns else now + step
         return True
 
@@ -226,11 +226,11 @@ class PortReader:
         line._closed, line._retry_ns = True, now + REOPEN_EVERY_NS
         line._answer_by_ns = line._proving = None
         line._unproven = []
-        if line._lost_ns is None:  # one that came back and did not prove itself was never anything but lost
+        if line._lost_ns is None:  # a port that came back without the sensor is still lost
             line._lost_ns = now
             self._sink.event(line.channel, now, "lost", {"port": line.transport.name, "why": why})
 
-    def _tries_again(self, line: Line) -> bool:
+    def _retry(self, line: Line) -> bool:
         now = self._clock.now_ns()
         if now < line._retry_ns:
             return False
@@ -245,11 +245,11 @@ class PortReader:
         line._closed, line._ask_ns = False, 0
         line._proving = None if line.proof is None else line.proof()
         if line._proving is None:
-            self._back(line, now, {})
+            self._came_back(line, now, {})
         return True
 
-    def _back(self, line: Line, now_ns: int, more: Mapping[str, Any]) -> None:
-        """Tell that the sensor is there again."""
+    def _came_back(self, line: Line, now_ns: int, more: Mapping[str, Any]) -> None:
+        """Report that the sensor is there again."""
         gap_s = 0.0 if line._lost_ns is None else (now_ns - line._lost_ns) * 1e-9
         line._lost_ns = None
         facts = {"port": line.transport.name, "gap_s": gap_s, **more}
@@ -261,6 +261,6 @@ def _may_block(line: Line) -> bool:
 
 
 def _leave(selector: selectors.BaseSelector, line: Line) -> None:
-    """Wait no more on a port that is gone, and close it."""
+    """Stop waiting on a lost port and close it."""
     selector.unregister(line.transport.fileno())
     line.transport.close()

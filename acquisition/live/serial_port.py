@@ -1,4 +1,4 @@
-"""Serial ports through pyserial: opened and configured by it, read by descriptor where there is one."""
+"""Serial ports: opened and configured by pyserial, and read by descriptor if there is one."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ __all__ = ["READ_BYTES", "PortFacts", "SerialPort", "list_ports"]
 
 READ_BYTES = 65536
 KEEPALIVE_S = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
-"""A connection whose other side vanished without a word is given up after five seconds of silence and three probes."""
+"""A connection that vanished silently is closed after five seconds without data and three probes."""
 
 
 @dataclass(frozen=True, slots=True)
 class PortFacts:
-    """One port of this machine.
+    """One port of this computer.
 
     Parameters
     ----------
     device : str
-        As ``--port`` takes it.
+        Its address.
     description : str
-        As the operating system names it.
+        Its name in the operating system.
     """
 
     device: str
@@ -46,11 +46,11 @@ class PortFacts:
 
 
 def list_ports() -> tuple[PortFacts, ...]:
-    """Return the serial ports of this machine, in the order of their names."""
+    """Return the serial ports of this computer, sorted by name."""
     from serial.tools.list_ports import comports
 
-    found = (PortFacts(p.device, p.description or "") for p in comports())
-    return tuple(sorted(found, key=lambda port: port.device))
+    ports = (PortFacts(p.device, p.description or "") for p in comports())
+    return tuple(sorted(ports, key=lambda port: port.device))
 
 
 class SerialPort:
@@ -59,13 +59,13 @@ class SerialPort:
     Parameters
     ----------
     address : str
-        A device (``/dev/ttyUSB0``, ``COM3``) or any address pyserial takes (``socket://host:port``, ``rfc2217://...``).
+        A device (``/dev/ttyUSB0``, ``COM3``) or another address of pyserial (``socket://host:port``, ``rfc2217://...``).
     baud : int
 
     Raises
     ------
     PortError
-        One line: absent (with the ports that are there), no permission (with the group), busy.
+        If the port is absent (the message lists the ports that exist), not permitted (it names the group) or busy.
     """
 
     def __init__(self, address: str, baud: int) -> None:
@@ -80,37 +80,37 @@ class SerialPort:
         self._device = _devices().get(os.path.realpath(address))
 
     def reopen(self) -> None:
-        """Open again after a loss: the same device, whatever name it has now, and no other that took its name.
+        """Open the same device again after a loss, even under another name, but no other device under its name.
 
-        What stands in the way is not looked into, for a reader may try twice a second.
+        The error has no explanation of the cause, because a reader may try this twice a second.
         """
         self.close()
         if self._device is None and "://" not in self.name:
-            other = _devices().get(os.path.realpath(self.name))
-            if other is not None:
-                raise PortError(f"{self.name}: what is there now is {other}, what was lost was no USB device")
-        self._open(self.name if self._device is None else self._found(self._device))
+            present = _devices().get(os.path.realpath(self.name))
+            if present is not None:
+                raise PortError(f"{self.name}: expected the lost port, which was no USB device, got {present}")
+        self._open(self.name if self._device is None else self._current_name(self._device))
 
     @property
     def identified(self) -> bool:
-        """Whether the port is a USB device's that has a serial number, so that no other is taken for it."""
+        """Whether the port belongs to a USB device with a serial number, so that no other can be mistaken for it."""
         return self._device is not None and bool(self._device.serial_number)
 
-    def _found(self, device: _Device) -> str:
-        """Return the name under which a USB device stands now: its own, or that of its serial number."""
+    def _current_name(self, device: _Device) -> str:
+        """Return the current name of a USB device: the old one, or that of its serial number."""
         there = _devices()
         if there.get(os.path.realpath(self.name)) == device:
             return self.name
-        for name, other in there.items():
-            if other == device and device.serial_number:
+        for name, present in there.items():
+            if present == device and device.serial_number:
                 return name
-        raise PortError(f"{self.name}: {device} is not there")
+        raise PortError(f"{self.name}: {device} is not connected")
 
     def _open(self, address: str) -> None:
         import serial
 
         try:
-            # pyserial's network ports know no write timeout (RFC 2217 refuses one) and no exclusive use.
+            # pyserial's network ports have no write timeout (RFC 2217 refuses one) and no exclusive use.
             options: dict[str, Any] = {} if "://" in address else {"exclusive": True, "write_timeout": 1.0}
             port = serial.serial_for_url(address, baudrate=self._baud, timeout=0, **options)
         except (serial.SerialException, OSError, ValueError, NotImplementedError) as error:
@@ -121,14 +121,14 @@ class SerialPort:
         _keep_alive(port)
 
     def fileno(self) -> int:
-        """Return the descriptor to wait on, -1 where the address has none (RFC 2217, Windows)."""
+        """Return the descriptor to wait on; -1 if the address has none (RFC 2217, Windows)."""
         return self._descriptor
 
     def read(self, wait_s: float) -> bytes:
-        """Return what comes within that time, at once what is there: for an address without a descriptor."""
-        with self._or_gone("the port has gone"):
+        """Return the bytes that are there, or arrive within that time; for an address without a descriptor."""
+        with self._as_port_error("the port was disconnected"):
             try:
-                if self._port.timeout != wait_s:  # RFC 2217 negotiates the whole port anew when it is set
+                if self._port.timeout != wait_s:  # setting it makes RFC 2217 negotiate the whole port again
                     self._port.timeout = wait_s
                 data = self._port.read(1)
                 return bytes(data + self._port.read(min(self._port.in_waiting, READ_BYTES))) if data else b""
@@ -136,27 +136,27 @@ class SerialPort:
                 return b""
 
     def write(self, data: bytes) -> None:
-        """Send bytes whole."""
-        with self._or_gone("cannot be written to"):
+        """Send all bytes."""
+        with self._as_port_error("cannot be written to"):
             self._port.write(data)
 
     def discard_input(self) -> None:
-        """Forget what came and was not read."""
-        with self._or_gone("the port has gone"):
+        """Discard unread bytes."""
+        with self._as_port_error("the port was disconnected"):
             self._port.reset_input_buffer()
 
     @contextlib.contextmanager
-    def _or_gone(self, what: str) -> Iterator[None]:
+    def _as_port_error(self, what: str) -> Iterator[None]:
         import serial
 
         try:
             yield
         except (serial.SerialException, OSError, TypeError, AttributeError, ValueError, *_TERMIOS_ERRORS) as error:
-            # pyserial trips over its own closed members where the cable goes in the middle of a call.
+            # If the cable is pulled during a call, pyserial accesses members that it has already closed.
             raise PortError(f"{self.name}: {what} ({error})") from error
 
     def close(self) -> None:
-        """Close; again does no harm."""
+        """Close. Further calls do nothing."""
         port, descriptor = self._port, self._descriptor
         self._port, self._descriptor = None, -1
         if port is not None:
@@ -164,13 +164,13 @@ class SerialPort:
             try:
                 port.close()
             except OSError:
-                # The device is gone already; there is nothing left to give back.
+                # The device is disconnected already, so there is nothing to release.
                 return
 
 
 @dataclass(frozen=True, slots=True)
 class _Device:
-    """What a USB adapter says of itself; one without a serial number is like all others of its make."""
+    """Identity of a USB adapter; those of one make without serial numbers are all equal."""
 
     vendor: int
     product: int
@@ -182,7 +182,7 @@ class _Device:
 
 
 def _devices() -> dict[str, _Device]:
-    """Return the USB devices among the ports, by the names without links."""
+    """Return the USB devices among the ports, by their names with links resolved."""
     from serial.tools.list_ports import comports
 
     return {
@@ -193,14 +193,14 @@ def _devices() -> dict[str, _Device]:
 
 
 def _claim(descriptor: int, *, release: bool = False) -> None:
-    """Keep other programs from opening a terminal device: pyserial's lock stops only those that ask for one."""
+    """Keep other programs from opening a terminal device; pyserial's lock stops only programs that check for it."""
     if termios is not None and descriptor >= 0:
-        with contextlib.suppress(OSError):  # a socket, or a device that is gone
+        with contextlib.suppress(OSError):  # a socket, or a disconnected device
             fcntl.ioctl(descriptor, termios.TIOCNXCL if release else termios.TIOCEXCL)
 
 
 def _keep_alive(port: Any) -> None:
-    """Have the system notice a network connection whose other side vanished without a word."""
+    """Let the system detect a network connection whose other side vanished."""
     connection = getattr(port, "_socket", None)
     if isinstance(connection, socket.socket):
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -221,32 +221,32 @@ def _descriptor(port: Any) -> int:
 
 
 def _explain(address: str, error: BaseException) -> str:
-    """One line from whatever pyserial or the system said."""
+    """Return one line from an error of pyserial or the system."""
     code = getattr(error, "errno", None)
     text = str(error)
     if code == errno.ENOENT or "FileNotFoundError" in text:
         there = ", ".join(port.device for port in list_ports()) or "none"
-        return f"{address}: no such port; this machine has: {there}. Is the cable in?"
+        return f"{address}: no such port; check the cable, or use one of the ports of this computer: {there}"
     if code in (errno.EACCES, errno.EPERM) or "PermissionError" in text:
         return f"{address}: no permission to open the port{_group(address)}"
-    if code == errno.EBUSY or "exclusively lock" in text or "Resource temporarily unavailable" in text:
-        return f"{address}: the port is busy: another program holds it; close that one first"
+    if code in (errno.EBUSY, errno.EAGAIN):
+        return f"{address}: the port is used by another program; close that program"
     return f"{address}: cannot be opened ({' '.join(text.split())}); check the address and the cable"
 
 
 def _group(address: str) -> str:
-    """Which group may use the port, and how to join it; none that would open more than ports."""
+    """Return which group may use the port and how to join it, unless that group would give further rights."""
     try:
         import grp
 
-        found = os.stat(address)
-        name = grp.getgrgid(found.st_gid).gr_name
+        status = os.stat(address)
+        name = grp.getgrgid(status.st_gid).gr_name
     except (ImportError, OSError, KeyError):
-        return "; ask whoever runs this machine"
+        return "; ask the administrator of this computer"
     shared = stat.S_IRGRP | stat.S_IWGRP
-    if found.st_gid == 0 or found.st_mode & shared != shared:
+    if status.st_gid == 0 or status.st_mode & shared != shared:
         return (
-            f": it is {name}'s alone; have whoever runs this machine give it to a group of its own, "
-            'such as dialout (a udev rule with GROUP="dialout", MODE="0660")'
+            f": it belongs to {name} only; ask the administrator to give it to a group such as dialout "
+            '(udev rule GROUP="dialout", MODE="0660")'
         )
     return f": it belongs to the group {name}; join it with `sudo usermod -aG {name} $USER` and log in again"

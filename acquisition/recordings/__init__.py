@@ -1,5 +1,5 @@
-"""Old recordings: which family a file is of, what it holds, and its samples with everything that was seen on the way.
+"""Recordings of other programs: identify the format of a file, list its content, and read its samples.
 
 In: the path of a file of any program. Out: a :class:`~acquisition.recordings.recording.Recording`; nothing is dropped.
-A newcomer adds a file to ``families/`` and a line to ``identify``; ``tables/`` and ``sampling/`` serve every family.
+To add a format, add a file to ``families/`` and a line to ``identify``. All families use ``tables/`` and ``sampling/``.
 """

@@ -1,13 +1,14 @@
-"""What a family of recordings must offer, and how a file's bytes are fetched for it."""
+"""The interface of a family of recordings, and the reading of a file's bytes."""
 
 from __future__ import annotations
 
 import mmap
 import os
-import sys
 from io import FileIO
 from pathlib import Path
 from typing import Protocol, runtime_checkable
+
+from platformdirs import user_config_path
 
 from acquisition.errors import FormatError
 from acquisition.recordings.inspection import Survey
@@ -18,27 +19,27 @@ from acquisition.regular_file import open_regular
 __all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "dialect_folder", "read_bytes", "read_head"]
 
 HEAD_BYTES = 8192
-"""How much of a file a format sees to recognise it."""
+"""Bytes of a file that a format sees to recognise it."""
 
 _LONGEST_LINE = 1 << 20
-_MARKUP = b"\xef\xbb\xbf \t\r\n"  # XML may well stand in one line
+_MARKUP = b"\xef\xbb\xbf \t\r\n"  # may come before XML, which may be a single line
 
 
 class Format(Protocol):
-    """A family of recordings, told by content and never by suffix."""
+    """A family of recordings. Files are identified by content, not by suffix."""
 
     @property
     def name(self) -> str:
-        """As the registry and the command line call it."""
+        """Name in the registry and on the command line."""
         ...
 
     @property
     def title(self) -> str:
-        """One line for people."""
+        """One line for the user."""
         ...
 
     def recognises(self, head: bytes) -> bool:
-        """Tell from the first :data:`HEAD_BYTES` whether the file is of this family; cheap, never raises."""
+        """Return whether a file belongs to this family, from its first :data:`HEAD_BYTES`; fast, never raises."""
         ...
 
     def read(
@@ -58,43 +59,43 @@ class Format(Protocol):
         Parameters
         ----------
         path : str
-            For messages and the recording's name; it is not opened.
+            Used in messages and as the recording's name; it is not opened.
         data : bytes
-            The file's content.
+            The content of the file.
         channel : str, optional
-            Which quantity or column to take.
+            The quantity or column to read.
         rate_hz : float, optional
-            The rate where the file does not say it, Hz. It is an error where the file contradicts it.
+            The rate if the file does not state it, Hz. It is an error if the file contradicts it.
         unit : str, optional
-            The channel's unit where the file does not say it.
+            The unit of the channel if the file does not state it.
         run : str, optional
-            Which run, where the file holds several. This and the next two are passed only where they were given.
+            The run, if the file holds several. This and the next two are passed only if they are given.
         time, time_unit : str, optional
-            Which column is the time, and in which unit, where the file does not say it.
+            The column of the times and their unit if the file does not state them.
 
         Raises
         ------
         FormatError
-            With one line for the user, whatever is wrong with the content.
+            For any fault of the content; one line for the user.
         """
         ...
 
 
 @runtime_checkable
 class SurveyFormat(Protocol):
-    """A family that says why a file is one of its own, and what the file holds before anything is chosen."""
+    """A family that states why it recognises a file, and lists what the file holds."""
 
     def evidence(self, head: bytes) -> str:
-        """Say in a few words why the head of a file is of this family; empty where it is not."""
+        """Return in a few words why a file belongs to this family; empty if it does not."""
         ...
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
-        """Tell of every channel what the file says by itself."""
+        """Return the description of every channel, as far as the file states it."""
         ...
 
 
 class PairFormat(Format, Protocol):
-    """A family that keeps position and velocity in files of their own."""
+    """A family that stores position and velocity in separate files."""
 
     def read_pair(
         self, position: tuple[str, bytes], velocity: tuple[str, bytes], *, rate_hz: float | None = None
@@ -104,11 +105,13 @@ class PairFormat(Format, Protocol):
 
 
 def dialect_folder() -> Path:
-    """Return where a user's dialects are: under ``XDG_CONFIG_HOME``, or where the system keeps settings."""
-    told = os.environ.get("XDG_CONFIG_HOME") or (os.environ.get("APPDATA") if sys.platform == "win32" else None)
-    usual = "~/Library/Application Support" if sys.platform == "darwin" else "~/.config"
-    # For every file that is read: pathlib's own ways take five times as long.
-    return Path(os.path.join(told or os.path.expanduser(usual), "springmass", "dialects"))
+    """Return the folder of a user's dialects, in the system's place for settings.
+
+    Version 0.1 used ``XDG_CONFIG_HOME`` on every system; a folder of that version is still used.
+    """
+    if (base := os.environ.get("XDG_CONFIG_HOME")) and (earlier := Path(base, "springmass", "dialects")).is_dir():
+        return earlier
+    return user_config_path("springmass", appauthor=False, roaming=True) / "dialects"
 
 
 def read_head(path: str | os.PathLike[str]) -> bytes:
@@ -117,18 +120,18 @@ def read_head(path: str | os.PathLike[str]) -> bytes:
     Raises
     ------
     FormatError
-        If it is absent, empty, unreadable or no regular file.
+        If it is absent, empty, unreadable or not a regular file.
     """
     return _read(path, HEAD_BYTES)
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return a file's content; of a text give up at the first MiB that holds no line end.
+    """Return the content of a file; stop reading a text at the first MiB without a line end.
 
     Raises
     ------
     FormatError
-        If it is absent, empty, unreadable, no regular file, or a text with a line of more than 1 MiB.
+        If it is absent, empty, unreadable, not a regular file, or a text with a line of more than 1 MiB.
     """
     return _read(path, None)
 
@@ -152,16 +155,16 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
             name, f"cannot be opened ({error.strerror or error})", "check its name and permissions"
         ) from error
     except ValueError as error:  # a NUL in the name
-        raise FormatError(repr(name), f"is no file name ({error})", "check its name") from error
+        raise FormatError(repr(name), f"not a valid file name ({error})", "check the name") from error
 
 
 def _demand_lines(name: str, file: FileIO) -> None:
-    """Give up at the first MiB that holds no line end, before a file of any size is read into memory."""
+    """Raise at the first MiB without a line end, before the file is read into memory."""
     with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
         for start in range(0, len(text) - _LONGEST_LINE + 1, _LONGEST_LINE):
             stop = start + _LONGEST_LINE
             if text.find(b"\n", start, stop) < 0 and text.find(b"\r", start, stop) < 0:
                 before = text[:start]
                 line = 1 + (before.count(b"\n") or before.count(b"\r"))
-                demand = "expected lines of text, got a line of more than 1 MiB"
-                raise FormatError(name, demand, "this is no text recording; export it again", line=line)
+                problem = "expected lines of text, got a line of more than 1 MiB"
+                raise FormatError(name, problem, "export the recording as text again", line=line)

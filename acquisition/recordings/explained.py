@@ -1,4 +1,4 @@
-"""How a recording is read, shown: the text above its rows, and what each column is taken for, with its first cells."""
+"""Show how a recording is read: the text above its rows, and the meaning and first cells of each column."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FIRST_ROWS = 4
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column: its name, its unit, what it is taken for, and its first cells as they stand."""
+    """One column: its name, its unit, how it is interpreted, and the text of its first cells."""
 
     name: str
     unit: str
@@ -34,11 +34,11 @@ class Layout:
     Parameters
     ----------
     runs : tuple of str
-        Runs that it holds; empty names where it does not say.
+        Its runs; a run without a name is an empty text.
     above : tuple of (int, str)
         Number and text of the lines above its rows: preamble, names, units.
     first_line : int or None
-        Where its rows begin; None where they are no text.
+        Line of its first row; None for a file that is not text.
     columns : tuple of Column
     """
 
@@ -49,24 +49,22 @@ class Layout:
 
 
 def explain(path: str | os.PathLike[str]) -> tuple[str, str, tuple[Layout, ...]]:
-    """Return the family of a file, why it is of it, and its tables.
+    """Return the family of a file, the evidence for it, and its tables.
 
     Raises
     ------
     FormatError
-        If it cannot be read, or is of a family that has no columns to show.
+        If it cannot be read, or its family has no columns.
     """
     name = os.fspath(path)
     family = sniff(path)
     reader = get_format(family)
-    # MotionSensor.vi pairs files; one of them is columns as any table's.
-    shown = reader if isinstance(reader, ColumnFormat) else get_format("table")
-    if not isinstance(shown, ColumnFormat):
-        raise FormatError(
-            name, f"expected a family of columns, got {family}", "look at what it holds without its columns"
-        )
-    contents = shown.contents(name, read_bytes(path))
-    why = getattr(reader, "evidence", shown.evidence)(read_head(path))
+    # MotionSensor.vi uses pairs of files; each of them has columns like any table.
+    columns_of = reader if isinstance(reader, ColumnFormat) else get_format("table")
+    if not isinstance(columns_of, ColumnFormat):
+        raise FormatError(name, f"expected a format with columns, got {family}", "leave out the explanation of columns")
+    contents = columns_of.contents(name, read_bytes(path))
+    why = getattr(reader, "evidence", columns_of.evidence)(read_head(path))
     return family, why, tuple(_layouts(contents.channels))
 
 
@@ -107,25 +105,27 @@ def _of_sheet(sheet: Sheet, channels: Sequence[Channel]) -> Iterator[Column]:
         if column in times:
             yield Column(name, times[column], "time", cells)
         elif each is None:
-            yield Column(name, "", "passed over", cells)
+            yield Column(name, "", "ignored", cells)
         else:
             yield Column(each.name, each.unit, _meaning(each), cells)
 
 
 def _of_arrays(channels: Sequence[Channel]) -> Iterator[Column]:
-    told = set()
+    shown_times = set()
     for each in channels:
         source = each.source
         if isinstance(source, Arrays):
-            if source.t is not None and source.time_name not in told:
-                told.add(source.time_name)
+            if source.t is not None and source.time_name not in shown_times:
+                shown_times.add(source.time_name)
                 first = tuple(f"{x:.6g}" for x in source.t[:_FIRST_ROWS])
                 yield Column(source.time_name, each.time_unit, "time", first)
             yield Column(each.name, each.unit, _meaning(each), tuple(f"{x:.6g}" for x in source.values[:_FIRST_ROWS]))
 
 
 def _meaning(channel: Channel) -> str:
-    told = "beside others: taken where it is named" if channel.aside else "channel"
+    meaning = "read only if it is named" if channel.aside else "channel"
     return (
-        f"{told}, times {channel.formula.start_s:g} s + i * {channel.formula.step_s:g} s" if channel.formula else told
+        f"{meaning}, times {channel.formula.start_s:g} s + i * {channel.formula.step_s:g} s"
+        if channel.formula
+        else meaning
     )

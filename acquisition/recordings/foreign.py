@@ -1,4 +1,4 @@
-"""Files that are no recording of a family read here, and what a user can do about each."""
+"""Known files that cannot be read here, and what the user can do with each."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import PurePath
 from acquisition.errors import FormatError, UnknownFormat
 from acquisition.recordings.tables.text import head_lines
 
-__all__ = ["named", "refuse"]
+__all__ = ["foreign_format", "unknown_format"]
 
 _TEXT = 'export time and position as text, tab separated, under a line "Time (s)<TAB>Distance (m)"'
 _AS_CSV = "save the sheet as xlsx or CSV"
@@ -23,7 +23,7 @@ _LIST = re.compile(rb"^[ \t]*[^\W\d][\w.]*\s*=\s*(?:(?:np\.)?array\(\s*)?\[(?:\s
 _TUPLES = re.compile(rb"^\((?:[-+.\deE]+, *)+[-+.\deE]*\),?[ \t]*\r?$", re.MULTILINE)
 _BARS = re.compile(rb"^[ \t]*\|.*\|[ \t]*\r?\n[ \t]*\|[-:| \t]+\|[ \t]*\r?$", re.MULTILINE)
 _OF_TEXT = 0.3
-"""The share of a text that lists must take, if they are what it holds: a program may have one somewhere."""
+"""Smallest share of lists in a text that counts as lists; a program may contain a few lists too."""
 
 
 def _is_json(head: bytes) -> bool:
@@ -31,7 +31,7 @@ def _is_json(head: bytes) -> bool:
 
 
 def _is_lists(head: bytes) -> bool:
-    """Tell tuples of Python a line each, or lists with names that are most of the text."""
+    """Return whether a text is Python tuples, one per line, or mostly named lists."""
     listed = sum(len(line) for line in head.split(b"\n") if _LIST.match(line))
     return bool(_TUPLES.search(head)) or listed >= max(1, _OF_TEXT * len(head))
 
@@ -41,7 +41,7 @@ def _is_hdf5(head: bytes) -> bool:
 
 
 def _is_yaml(head: bytes) -> bool:
-    """Tell YAML by numbers behind hyphens below a key, or by a list in line with it, that are most of the text."""
+    """Return whether a text is mostly YAML lists: numbers after hyphens below a key, or a list after the key."""
     listed = sum(len(line) for line in head.split(b"\n") if _YAML_LINE.match(line))
     return bool(_YAML.search(head)) and listed >= max(1, _OF_TEXT * len(head))
 
@@ -52,9 +52,9 @@ def _begins(with_bytes: bytes) -> Callable[[bytes], bool]:
 
 _CONTENTS = (
     ("a MATLAB file", _begins(b"MATLAB 5.0 MAT"), 'in MATLAB writematrix([t x], "run.csv")'),
-    ("an HDF5 file", _is_hdf5, "if it is a run file, open it as a run; it is not an old recording"),
+    ("an HDF5 file", _is_hdf5, "if it is a run file of springmass, open it as a run file"),
     ("an OpenDocument file", lambda head: b"application/vnd.oasis.opendocument" in head[:200], _AS_CSV),
-    ("a TDMS index", _begins(b"TDSh"), "name the .tdms file beside it"),
+    ("a TDMS index", _begins(b"TDSh"), "name the .tdms file next to it"),
     ("a numpy file", _begins(b"\x93NUMPY"), 'in Python numpy.savetxt("run.csv", array, delimiter=",")'),
     ("YAML", _is_yaml, "export its lists as columns of a CSV file, times first"),
     ("JSON", _is_json, 'in Python pandas.read_json(FILE).to_csv("run.csv", index=False)'),
@@ -85,11 +85,11 @@ _PROGRAMS = {
     ".mat": ("a MATLAB file", 'in MATLAB writematrix([t x], "run.csv")'),
     ".pkl": ("a pickle of Python", "save the numbers as CSV where they were made"),
 }
-"""Files of programs that say too little of themselves in their first bytes, by suffix."""
+"""Files of programs that cannot be identified by their first bytes, by suffix."""
 
 
-def named(path: str, head: bytes) -> UnknownFormat | None:
-    """Return the error for a file that is known and not read; None where it is not known.
+def foreign_format(path: str, head: bytes) -> UnknownFormat | None:
+    """Return the error for a known file that cannot be read; None for an unknown file.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def named(path: str, head: bytes) -> UnknownFormat | None:
     return UnknownFormat(path, f"expected a recording, got {title}", remedy) if title else None
 
 
-def refuse(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
+def unknown_format(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
     """Return the error for a file that no format recognises.
 
     Parameters
@@ -118,9 +118,9 @@ def refuse(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
     Returns
     -------
     UnknownFormat
-        Naming what the file is where that is known.
+        With the kind of file, if it is known.
     """
-    if (known := named(path, head)) is not None:
+    if (known := foreign_format(path, head)) is not None:
         return known
     if not "".join(head_lines(head)).strip("\0 \t"):
         return UnknownFormat(path, "expected a recording, got binary data or nothing", _TEXT)

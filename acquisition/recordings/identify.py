@@ -1,9 +1,8 @@
-"""Which formats of recordings there are, and which one a file is of.
+"""The formats of recordings, and the identification of a file's format.
 
-The table holds names only: a format's module is imported when it is asked. A package elsewhere adds one with
-an entry point in the group ``springmass.formats`` that names an object like
-:class:`acquisition.recordings.base.Format`; a user declares one without code
-(:mod:`acquisition.recordings.families.declared`).
+The table holds only names; the module of a format is imported on demand. Another package adds a format with an entry
+point in the group ``springmass.formats`` that names an object like :class:`acquisition.recordings.base.Format`. A user
+can declare one without code (:mod:`acquisition.recordings.families.declared`).
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from acquisition.recordings.base import (
     read_bytes,
     read_head,
 )
-from acquisition.recordings.foreign import refuse
+from acquisition.recordings.foreign import unknown_format
 from acquisition.recordings.inspection import Inspection
 from acquisition.recordings.recording import Recording
 
@@ -52,12 +51,12 @@ _TABLE = {
     "bare": "bare",
     "table": "any_table",
 }
-"""The module in ``families`` of each name."""
-_LAST = "table"  # takes any rows of numbers, so that everybody else is asked before
+"""The module in ``families`` for each name."""
+_LAST = "table"  # accepts any rows of numbers, so all other formats are tried first
 
 
 def formats() -> tuple[Format, ...]:
-    """Return every format: those that the user declares, those of this package, those of others.
+    """Return all formats: those that the user declares, those of this package, those of other packages.
 
     Examples
     --------
@@ -88,7 +87,7 @@ def get_format(name: str) -> Format:
 
 
 def sniff(path: str | os.PathLike[str]) -> str:
-    """Tell the name of a file's format from its first bytes.
+    """Return the name of a file's format, from its first bytes.
 
     Raises
     ------
@@ -110,17 +109,17 @@ def open_recording(
     time_unit: str | None = None,
     velocity_path: str | os.PathLike[str] | None = None,
 ) -> Recording:
-    """Read an old recording.
+    """Read a recording of another program.
 
     Parameters
     ----------
     path : path
     format : str, optional
-        Name of the format; told by content if left out.
+        Name of the format; by default it is identified by content.
     channel, rate_hz, unit, run, time, time_unit : optional
-        What the file leaves out or leaves open; see :meth:`acquisition.recordings.base.Format.read`.
+        What the file does not state or leaves open; see :meth:`acquisition.recordings.base.Format.read`.
     velocity_path : path, optional
-        The velocity file that belongs to a position file, joined to it by time.
+        The velocity file of a position file; they are joined by time.
 
     Returns
     -------
@@ -129,24 +128,24 @@ def open_recording(
     Raises
     ------
     FormatError
-        With one line for the user, whatever is wrong with the file.
+        For any fault of the file; one line for the user.
     """
     name = os.fspath(path)
     reader = get_format(format) if format else _recognise(name, read_head(path))
     data = read_bytes(path)
-    rare = {"run": run, "time": time, "time_unit": time_unit}
-    said = {name: value for name, value in rare.items() if value is not None}
+    optional = {"run": run, "time": time, "time_unit": time_unit}
+    answers = {name: value for name, value in optional.items() if value is not None}
     if velocity_path is None:
-        return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **said)
+        return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **answers)
     if not hasattr(reader, "read_pair"):
-        demand = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
-        raise UnknownFormat(name, demand, "leave the velocity file out")
+        problem = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
+        raise UnknownFormat(name, problem, "leave the velocity file out")
     velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
     return cast("PairFormat", reader).read_pair((name, data), velocity, rate_hz=rate_hz)
 
 
 def inspect(path: str | os.PathLike[str]) -> Inspection:
-    """Tell what a file is and what it holds, with nothing chosen and nothing given.
+    """Return the format and the content of a file, before a channel is chosen.
 
     Raises
     ------
@@ -167,11 +166,11 @@ def _recognise(path: str, head: bytes) -> Format:
         if candidate.recognises(head[:HEAD_BYTES]):
             return candidate
         names.append(candidate.name)
-    raise refuse(path, head, tuple(names))
+    raise unknown_format(path, head, tuple(names))
 
 
 def _every() -> Iterator[Format]:
-    """Yield one format after the other, what the user declares first; entry points only if the table is used up."""
+    """Yield the formats, those that the user declares first, and entry points only after those of this package."""
     yield from _declared()
     for name in _TABLE:
         if name != _LAST:
@@ -183,13 +182,13 @@ def _every() -> Iterator[Format]:
 
 
 def _declared() -> Iterator[Format]:
-    """Yield the user's own dialects; their reader is imported where there are any."""
+    """Yield the dialects of the user; their reader is imported only if there are any."""
     if not dialect_folder().is_dir():
         return
     for each in import_module("acquisition.recordings.families.declared").dialects():
         if each.name in _TABLE:
             where = dialect_folder() / f"{each.name}.toml"
-            raise AcquisitionError(f'{where}: "{each.name}" is a family already; give the file another name')
+            raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"; rename the file')
         yield each
 
 

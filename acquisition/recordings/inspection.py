@@ -1,4 +1,4 @@
-"""What a file is and what it holds, before anything of it is taken as a recording."""
+"""The format and the content of a file, before a channel is chosen."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ __all__ = ["Inspection", "Survey"]
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """What one channel of a file is, as far as the file says it by itself.
+    """One channel of a file, as far as the file describes it.
 
     Parameters
     ----------
     run, channel, unit : str
-        Empty where the file does not say.
+        Empty if the file does not state them.
     samples : int
     rate_hz : float or None
-        None where it must be given.
+        None if the user must give it.
     traps : tuple of Trap
     span_s : float or None
-        From the first time to the last; None where they must be given.
+        From the first time to the last; None if the user must give the rate.
     """
 
     run: str
@@ -36,16 +36,16 @@ class Survey:
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
-    """What a file is and what it holds.
+    """The format and the content of a file.
 
     Parameters
     ----------
     format, title : str
-        Name of the family, and one line on it.
+        Name of the family, and one line about it.
     why : str
-        By what the file was told to be of it.
+        The evidence for the family.
     surveys : tuple of Survey
-        One for each channel of each run; empty where the family does not tell.
+        One for each channel of each run; empty if the family cannot list them.
     """
 
     format: str

@@ -1,9 +1,8 @@
-"""What a reader needs from the user, as data.
+"""Questions of a reader to the user, as data.
 
-A file may leave out what must not be guessed: a unit, a rate, which of several channels. The reader then raises
-:class:`acquisition.errors.NeedsAnswer` with a :class:`Question`. It holds everything that can be answered, so that a
-program can choose without reading text. How to type the answer depends on who asked, a command or a script, and is
-worded there.
+A file may lack what must not be guessed: a unit, a rate, the choice of a channel. The reader then raises
+:class:`acquisition.errors.NeedsAnswer` with a :class:`Question`. It holds all possible answers, so that a program can
+choose without parsing text. A command and a script need different answers, so the caller words how to answer.
 """
 
 from __future__ import annotations
@@ -11,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["Missing", "Need", "Question", "Times"]
+__all__ = ["Missing", "MissingItem", "Question", "Times"]
 
 
 class Missing(StrEnum):
-    """What can be missing. The value is the keyword argument of ``open_recording`` that answers it."""
+    """The kinds of missing items. The value is the keyword argument of ``open_recording`` that gives the answer."""
 
     RUN = "run"
     CHANNEL = "channel"
@@ -26,23 +25,22 @@ class Missing(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Need:
+class MissingItem:
     """One thing that is missing.
 
     Parameters
     ----------
     what : Missing
     choices : tuple of str
-        Everything to choose from: all runs, all channels that may be meant, all units. Empty for a rate, which is any
-        positive number.
+        All choices: runs, possible channels, or units. Empty for a rate, which may be any positive number.
     example : str or float
-        One of the choices; of a rate a round number in Hz without any basis in the file.
+        One of the choices; for a rate a round number in Hz, which does not come from the file.
     of : str
-        The column that a unit is asked of; empty where the file does not name it.
+        The column whose unit is missing; empty if the file does not name it.
     stated : str
-        The unit that the file states and nobody knows; empty where it states none.
-    instead : Need or None
-        Another answer that makes this one unnecessary: of a rate the column of times.
+        The unknown unit that the file states; empty if it states none.
+    instead : MissingItem or None
+        Another item that can be given instead, such as the column of times instead of a rate.
     """
 
     what: Missing
@@ -50,10 +48,10 @@ class Need:
     example: str | float
     of: str = ""
     stated: str = ""
-    instead: Need | None = None
+    instead: MissingItem | None = None
 
     def __str__(self) -> str:
-        """Return the question without its mark: ``which channel of "x", "y"``."""
+        """Return the question without its question mark: ``which channel of "x", "y"``."""
         listed = ", ".join(f'"{each}"' for each in self.choices)
         match self.what:
             case Missing.RUN:
@@ -76,7 +74,7 @@ class Need:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """Where the times of a channel run, in the file's unit.
+    """The range of the times of a channel, in the file's unit.
 
     Parameters
     ----------
@@ -103,20 +101,20 @@ class Question:
     ----------
     path : str
         The file.
-    needs : tuple of Need
-        At least one, in the order in which they depend on each other: run, channel, rate or time unit, unit. All
-        examples together answer the question. Who chooses something else than the example of the first need answers
-        that one alone and asks again, because the others are asked of the run and the channel of the examples.
+    needs : tuple of MissingItem
+        At least one, in the order of their dependence: run, channel, rate or time unit, unit. All examples together
+        answer the question. To choose something else than the first example, answer only that item and read again,
+        because the later items refer to the run and the channel of the examples.
     columns : tuple of str
         The columns of the run, with their units.
     times : Times or str
-        Where the times run, or their name alone; empty where there are none.
+        The range of the times, or only their name; empty if there are none.
     reason : str
-        Why the question is asked where the columns do not show it, for example an answer that fits nothing.
+        The reason for the question, if the columns do not show it, for example an answer that does not fit.
 
     Examples
     --------
-    >>> unit = Need(Missing.UNIT, ("m", "rad"), "rad", of="theta")
+    >>> unit = MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta")
     >>> question = Question("pendulum.csv", (unit,), ("theta",), Times("t", 0.0, 31.2, 0.033))
     >>> question.sentence
     'columns "t" (0 to 31.2, 0.033 apart) and "theta": what is theta\\'s unit?'
@@ -125,7 +123,7 @@ class Question:
     """
 
     path: str
-    needs: tuple[Need, ...]
+    needs: tuple[MissingItem, ...]
     columns: tuple[str, ...] = ()
     times: Times | str = ""
     reason: str = ""
@@ -147,16 +145,16 @@ class Question:
         *others, last = [*([times] if times else []), *(f'"{each}"' for each in self.columns)] or [""]
         columns = f"columns {', '.join(others)} and {last}" if others else last and f"column {last}"
         about = ", ".join(each for each in (self.reason, columns) if each)
-        asked = ", and ".join(str(need) for need in self.needs)
-        return f"{about}: {asked}?" if about else f"{asked}?"
+        questions = ", and ".join(str(need) for need in self.needs)
+        return f"{about}: {questions}?" if about else f"{questions}?"
 
     @property
     def remedy(self) -> str:
-        """What to do, for whoever shows the question without knowing how the answer is given."""
+        """What to do, in words that do not depend on the interface."""
         return f"state {', and '.join(_stated(need) for need in self.needs)}"
 
 
-def _stated(need: Need) -> str:
+def _stated(need: MissingItem) -> str:
     if need.what is Missing.RATE_HZ:
         return "rate_hz, a number" + (", or time, a column" if need.instead else "")
     return f'{need.what.value}, for example "{need.example}"'

@@ -1,4 +1,4 @@
-"""An old recording as its format read it: samples, what was seen on the way, and the file's own bytes."""
+"""A recording as its format read it: samples, remarks of the reader, and the bytes of the file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Original", "Recording", "Trap"]
 
 @dataclass(frozen=True, slots=True)
 class Original:
-    """A file's own bytes, so that it can be given back bit for bit.
+    """The bytes of a file, so that it can be restored bit for bit.
 
     Parameters
     ----------
@@ -29,25 +29,25 @@ class Original:
     @property
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the bytes."""
-        import hashlib  # a twentieth of a cold start that does not ask for it
+        import hashlib  # imported here, because it takes a twentieth of the start-up time
 
         return hashlib.sha256(self.data).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
 class Trap:
-    """Something in the file that a careless reader would have got wrong.
+    """A peculiarity of a file that is easy to misread; the analysis reports it as a finding.
 
     Parameters
     ----------
     code : str
-        A finding code of the program where one fits ("truncated_row", "nominal_clock", ...), else a word.
+        The code of the finding ("truncated_row", "nominal_clock", ...), or another word.
     message : str
-        One sentence that names what was seen and what was done about it.
+        One sentence that states the peculiarity and how it was treated.
     count : int
-        How many rows or samples it concerns.
+        Number of rows or samples that it concerns.
     line : int, optional
-        One-based line of the first.
+        One-based line of the first of them.
     """
 
     code: str
@@ -58,33 +58,32 @@ class Trap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """A recording, read whole.
+    """A recording that was read completely.
 
     Parameters
     ----------
     format : str
         Name of the family that read it, as in the registry.
     path : str
-        Where it was read from.
+        The path of the file.
     info : SourceInfo
-        Rate, quantum, clock; ``kind`` is "replay" unless the file says that it was simulated.
+        Rate, quantum, clock; ``kind`` is "replay" unless the file states that it was simulated.
     channel : str
-        The quantity or column taken as distance.
+        The quantity or column that is read as distance.
     samples : Block
-        All samples, ``first`` = 0. Nothing that was a row of data is missing here: what could not be read is
-        flagged.
+        All samples, ``first`` = 0. Every row of data is a sample; samples that could not be read are flagged.
     traps : tuple of Trap
-        What was seen on the way.
+        Remarks of the reader.
     malformed_rows : int
-        Rows that were not samples at all (text in the middle, a truncated last row).
+        Rows that were not samples (text in the middle, a truncated last row).
     originals : tuple of Original
         The bytes of the file, or of the two files of a position and velocity pair.
     title : str
-        The file's own title line, if any.
+        The title line of the file, if any.
     run : str
-        Name of the run inside the file; empty where it holds one without a name.
+        Name of the run inside the file; empty for a single run without a name.
     start_time : str
-        ISO 8601, as the file states it; empty where it does not.
+        ISO 8601, if the file states it; else empty.
     """
 
     format: str

@@ -1,4 +1,4 @@
-"""Units as files print them: what they are units of, and what makes them SI."""
+"""Units in files: their quantities, and their conversion to SI."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ __all__ = [
 ]
 
 LENGTHS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
-"""Lengths by the power of ten that makes them metres."""
+"""Units of length, with the power of ten that converts them to metres."""
 TIMES = {"s": 0, "ms": -3, "us": -6, "ns": -9, "min": 0, "h": 0}
-"""Times by the power of ten that makes them seconds, but for :func:`time_factor`."""
+"""Units of time, with the power of ten that converts them to seconds, apart from :func:`time_factor`."""
 _TIME_FACTORS = {"min": 60.0, "h": 3600.0}
 
 _OTHERS = {
@@ -73,7 +73,7 @@ _PER_SECOND = re.compile(
 
 
 class Measure(NamedTuple):
-    """What a unit is of: ``x * 10**power * factor`` of it is SI."""
+    """The quantity of a unit, and its conversion: ``x * 10**power * factor`` is in the SI unit."""
 
     quantity: str
     symbol: str
@@ -82,7 +82,7 @@ class Measure(NamedTuple):
 
     @property
     def si(self) -> str:
-        """The quantity's one SI unit."""
+        """The SI unit of the quantity."""
         return UNITS[self.quantity]
 
 
@@ -91,11 +91,11 @@ MEASURES = {
     for quantity, units in (("length", LENGTHS), *_OTHERS.items())
     for unit, power in units.items()
 }
-"""What each unit that a channel may be given in is of."""
+"""The measure of each unit that a channel may have."""
 
 
 def unit_words(unit: str) -> str:
-    """Return a unit's symbol where it is spelled out; else as it is.
+    """Return the symbol of a unit that is spelled out; other units unchanged.
 
     Examples
     --------
@@ -106,9 +106,9 @@ def unit_words(unit: str) -> str:
     lower = plain.lower()
     if plain in MEASURES:
         return plain
-    found = _WORDS.get(lower) or _WORDS.get(lower.removesuffix("s")) or _WORDS.get(lower.removesuffix("es"))
-    if found:
-        return found
+    symbol = _WORDS.get(lower) or _WORDS.get(lower.removesuffix("s")) or _WORDS.get(lower.removesuffix("es"))
+    if symbol:
+        return symbol
     if (per := _PER_SECOND.fullmatch(lower.translate(_PLAIN))) is not None:
         rate = f"{unit_words(per['what'] or per['of'])}/s" + ("^2" if per["two"] or per["power"] == "2" else "")
         if rate in MEASURES:
@@ -117,7 +117,7 @@ def unit_words(unit: str) -> str:
 
 
 def measure_of(unit: str) -> Measure | None:
-    """Return what a unit is of; None where it is of nothing that a sample may be.
+    """Return the measure of a unit; None if no sample can have it.
 
     Examples
     --------
@@ -128,10 +128,10 @@ def measure_of(unit: str) -> Measure | None:
 
 
 def time_power(unit: str) -> int | None:
-    """Return the power of ten that makes a time seconds; None for what is no time."""
+    """Return the power of ten that converts a time to seconds; None for other units."""
     return TIMES.get(unit_words(unit))
 
 
 def time_factor(unit: str) -> float:
-    """Return by what else than a power of ten a time is multiplied to be in seconds: 60 of minutes."""
+    """Return the factor besides a power of ten that converts a time to seconds, for example 60 for minutes."""
     return _TIME_FACTORS.get(unit_words(unit), 1.0)

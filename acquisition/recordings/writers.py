@@ -1,6 +1,6 @@
-"""Recordings written in the forms that other programs read: MotionSensor.vi, LVM, and CSV with units.
+"""Write recordings in the formats of other programs: MotionSensor.vi, LVM, and CSV with units.
 
-Each form has room for less than a run file. What does not fit is told, never left out in silence.
+Each format stores less than a run file. Whatever it cannot store is reported.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from acquisition.source import SourceInfo
 __all__ = ["WRITERS", "Written", "write_csv", "write_lvm", "write_motion_sensor"]
 
 _TITLE = "Motion Sensor Data File"
-_SHOWN = np.uint8(Flag.MISSING)  # what NaN says as well
+_SHOWN = np.uint8(Flag.MISSING)  # a NaN shows it
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +29,9 @@ class Written:
     Parameters
     ----------
     files : tuple of (str, bytes)
-        What is added to the name that the user gave, and the content; empty for the file of that very name.
+        Suffix to the name that the user gave, and content; the suffix is empty for the file of that name.
     lost : tuple of str
-        What the form has no room for, one sentence each.
+        What the format cannot store, one sentence each.
     """
 
     files: tuple[tuple[str, bytes], ...]
@@ -39,7 +39,7 @@ class Written:
 
 
 def write_motion_sensor(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> Written:
-    """Write the pair of files of MotionSensor.vi: position, and velocity beside it.
+    """Write the pair of files of MotionSensor.vi: position and velocity.
 
     Parameters
     ----------
@@ -53,21 +53,21 @@ def write_motion_sensor(path: str, samples: Block, info: SourceInfo, title: str 
     Returns
     -------
     Written
-        The position under the name given, the velocity under ``_velocity`` added.
+        The position under the given name, the velocity with the suffix ``_velocity``.
 
     Raises
     ------
     FormatError
-        If two samples would get one time: the form prints milliseconds.
+        If two samples would get the same time, because the format prints milliseconds.
 
     Notes
     -----
-    A velocity that the recording does not state is the backward difference over one sample, as the instrument
-    computes it; behind a gap and beside a missing sample it is NaN.
+    If the recording states no velocity, it is the backward difference over one sample, as in the instrument; after a
+    gap and next to a missing sample it is NaN.
     """
     _demand_times(path, samples.t, 3, "MotionSensor.vi prints times to 1 ms")
     head = title if title.lower().startswith(_TITLE.lower()) else f"{_TITLE} {title or start_time}".strip()
-    head = " ".join(_said_simulated(head, info).split())
+    head = " ".join(_with_simulated_note(head, info).split())
     velocity = _velocity(samples, info.rate_hz) if samples.velocity is None else samples.velocity
     error = "" if info.stated_error_m is None else f"\t{info.stated_error_m * 100:.3f}"
     columns = "Time (s)\tDistance (cm)" + ("\tDist Error (cm)" if error else "")
@@ -77,16 +77,16 @@ def write_motion_sensor(path: str, samples: Block, info: SourceInfo, title: str 
         ("", "\r\n".join([head, columns, *position]).encode()),
         ("_velocity", "\r\n".join([head, "Time (s)\tVelocity (cm/s)", *speeds]).encode()),
     )
-    return Written(files, _lost(samples, rounding_m=1e-5))
+    return Written(files, _losses(samples, rounding_m=1e-5))
 
 
 def write_lvm(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> Written:
-    """Write LabVIEW Measurement: tabs, decimal points, one column of times; see :func:`write_motion_sensor`."""
+    """Write a LabVIEW Measurement file: tabs, decimal points, one column of times; see :func:`write_motion_sensor`."""
     _demand_times(path, samples.t, 9, "LVM is written with times to 1 ns")
     channels = [("Distance", "m", samples.distance)]
     if samples.velocity is not None:
         channels.append(("Velocity", "m/s", samples.velocity))
-    note = " ".join(_said_simulated(title, info).split())
+    note = " ".join(_with_simulated_note(title, info).split())
     date, _, clock = (start_time or "1903-12-31T19:00:00").removesuffix("Z").partition("T")
     head: list[tuple[str, list[str]]] = [
         ("LabVIEW Measurement", []),
@@ -117,13 +117,15 @@ def write_lvm(path: str, samples: Block, info: SourceInfo, title: str = "", star
     head += [(key, units if key == "Y_Unit_Label" else [cell] * len(channels)) for key, cell in cells]
     head += [("***End_of_Header***", []), ("X_Value", [*(name for name, _, _ in channels), "Comment"])]
     lines = ["\t".join([key, *values]) for key, values in head]
-    return Written((("", _rows(lines, "\t", samples.t, [values for _, _, values in channels])),), _lost(samples, 1e-9))
+    return Written(
+        (("", _rows(lines, "\t", samples.t, [values for _, _, values in channels])),), _losses(samples, 1e-9)
+    )
 
 
 def write_csv(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> Written:
     """Write columns under headings with units; see :func:`write_motion_sensor`.
 
-    Simulated data say so in the heading, for the form has no other place.
+    The heading marks simulated data, because the format has no other place for that.
     """
     _demand_times(path, samples.t, 9, "CSV is written with times to 1 ns")
     name = "Simulated distance (m)" if info.kind == "simulated" else "Distance (m)"
@@ -131,7 +133,7 @@ def write_csv(path: str, samples: Block, info: SourceInfo, title: str = "", star
     if samples.velocity is not None:
         headings.append("Velocity (m/s)")
         columns.append(samples.velocity)
-    lost = [*_lost(samples, 1e-9), *(f"the {what} has no place" for what in _titles(title, start_time))]
+    lost = [*_losses(samples, 1e-9), *(f"CSV cannot store the {what}" for what in _titles(title, start_time))]
     return Written((("", _rows([",".join(headings)], ",", samples.t, columns)),), tuple(lost))
 
 
@@ -140,7 +142,7 @@ WRITERS: dict[str, Callable[[str, Block, SourceInfo, str, str], Written]] = {
     ".lvm": write_lvm,
     ".csv": write_csv,
 }
-"""The writer of each suffix."""
+"""The writer for each suffix."""
 
 
 def _rows(lines: list[str], mark: str, t: F8, columns: list[F8]) -> bytes:
@@ -150,7 +152,7 @@ def _rows(lines: list[str], mark: str, t: F8, columns: list[F8]) -> bytes:
 
 
 def _fixed(value: float, decimals: int) -> str:
-    """Print fixed point, NaN as such, and no minus before zero."""
+    """Return a number in fixed-point notation, NaN as "NaN", and zero without a minus sign."""
     if value != value:
         return "NaN"
     shown = f"{value:.{decimals}f}"
@@ -162,12 +164,12 @@ def _pairs(t: F8, values: F8) -> Iterable[tuple[float, float]]:
 
 
 def _demand_times(path: str, t: F8, decimals: int, why: str) -> None:
-    """Demand that the print tells apart all samples that the recording does."""
+    """Check that no two samples with different times get the same printed time."""
     printed = np.rint(t * 10.0**decimals)
     merged = int(np.count_nonzero((np.diff(printed) == 0) & (np.diff(t) != 0)))
     if merged:
-        demand = f"expected times that can be told apart, got {merged} samples closer together: {why}"
-        raise FormatError(path, demand, "write .csv, .lvm or a run file instead")
+        problem = f"{why}, but {merged} samples are closer together"
+        raise FormatError(path, problem, "write .csv, .lvm or a run file instead")
 
 
 def _velocity(samples: Block, rate_hz: float) -> F8:
@@ -178,7 +180,7 @@ def _velocity(samples: Block, rate_hz: float) -> F8:
     return velocity
 
 
-def _said_simulated(title: str, info: SourceInfo) -> str:
+def _with_simulated_note(title: str, info: SourceInfo) -> str:
     if info.kind != "simulated" or says_simulated(title):
         return title
     return f"{title} (simulated)".strip()
@@ -188,16 +190,17 @@ def _titles(title: str, start_time: str) -> list[str]:
     return [what for what, value in (("title", title), ("start time", start_time)) if value]
 
 
-def _lost(samples: Block, rounding_m: float) -> tuple[str, ...]:
-    """Say what rows of numbers cannot say."""
+def _losses(samples: Block, rounding_m: float) -> tuple[str, ...]:
+    """Return what rows of numbers cannot store."""
     lost = []
     flagged = int(np.count_nonzero(samples.flags & ~_SHOWN))
     if flagged:
-        lost.append(f"the flags of {flagged} samples have no place; their distances are written as they are")
+        those = "1 sample" if flagged == 1 else f"{flagged} samples"
+        lost.append(f"the flags of {those} cannot be stored; the distances are unchanged")
     known = samples.distance[np.isfinite(samples.distance)]
     finer = int(np.count_nonzero(np.abs(np.rint(known / rounding_m) * rounding_m - known) > 1e-3 * rounding_m))
     if finer:
-        lost.append(f"{finer} distances were rounded to {rounding_m:g} m")
+        lost.append(f"{finer} distance{'s were' if finer > 1 else ' was'} rounded to {rounding_m:g} m")
     if samples.host_ns is not None:
-        lost.append("the host's clock has no place")
+        lost.append("the host's clock cannot be stored")
     return tuple(lost)

@@ -1,6 +1,6 @@
-"""The simulated rangefinder on a pseudo-terminal: the real serial code reads it as it reads a sensor.
+"""The simulated rangefinder on a pseudo-terminal, which the real serial code reads like a sensor.
 
-POSIX only. A pseudo-terminal ignores the baud rate, so the device paces itself against the clock.
+POSIX only. A pseudo-terminal ignores the baud rate, so the simulated device waits for the clock.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ __all__ = ["Faults", "VirtualPort"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Faults:
-    """What goes wrong on the line; seeded chance, or at set seconds of the run.
+    """The faults of a line, at random or at given seconds of the run.
 
     Parameters
     ----------
     noise_rate, drop_rate, flip_rate : float
         Probability per frame of bytes inserted, a byte dropped, a bit flipped (which breaks a checksum).
     stall : tuple of float
-        (at, for) seconds: silence, and then everything at once.
+        (start, duration), s: silence, and then all bytes together.
     unplug : tuple of float
-        (at, for) seconds: the port goes and comes back; what was measured meanwhile is lost.
+        (start, duration), s: the port vanishes and comes back; readings in between are lost.
     flood : tuple of float
-        (at, bytes): that many random bytes at once.
+        (start, s, number of bytes): random bytes in one piece.
     wrong_baud : bool
-        Every byte is garbled, as a port at another speed reads it.
+        Every byte is garbled, as with a wrong speed of the port.
     """
 
     noise_rate: float = 0.0
@@ -57,16 +57,16 @@ class VirtualPort:
     Parameters
     ----------
     family : Family
-        In whose wire form it speaks; a polled family answers requests, the others send by themselves.
+        Family of the simulated sensor. A polled family answers requests, the others send by themselves.
     rangefinder : VirtualRangefinder
     clock : Clock
     seconds : float
-        It falls silent after this.
+        Time after which it stops sending.
     faults : Faults, optional
     rng : numpy.random.Generator, optional
-        For the faults.
+        Random numbers of the faults.
     options : mapping, optional
-        Of the family's encoder.
+        Options of the family's encoder.
     """
 
     def __init__(
@@ -102,14 +102,14 @@ class VirtualPort:
         return self
 
     def start(self) -> None:
-        """Begin to measure and send."""
+        """Start measuring and sending."""
         self._thread.start()
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
-        """Fall silent and take the port away."""
+        """Stop sending and remove the port."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -135,11 +135,11 @@ class VirtualPort:
         start_ns = self._clock.now_ns()
         frames = self._answers(start_ns) if self._family.poll is not None else self._stream(start_ns)
         try:
-            self._speak(frames)
+            self._send_frames(frames)
         finally:
             self.done.set()
 
-    def _speak(self, frames: Iterator[tuple[Shot, bytes]]) -> None:
+    def _send_frames(self, frames: Iterator[tuple[Shot, bytes]]) -> None:
         held: list[bytes] = []
         flooded = False
         for shot, frame in frames:
@@ -160,7 +160,7 @@ class VirtualPort:
         self.sent += len(held)
 
     def _plugged(self, t: float) -> bool:
-        """Pull or plug as the faults say for this second of the run; True where the cable is in."""
+        """Plug or unplug according to the faults at this time; return whether the cable is plugged."""
         out = self._within(self._faults.unplug, t)
         if out and self._master >= 0:
             self._pull()
@@ -176,7 +176,7 @@ class VirtualPort:
             yield shot, self._frame(shot)
 
     def _answers(self, start_ns: int) -> Iterator[tuple[Shot, bytes]]:
-        """One shot for each request that comes, taken at the moment it comes."""
+        """Yield one shot for each request, taken when the request arrives."""
         assert self._family.poll is not None
         waiting = b""
         sequence = 0
@@ -201,12 +201,12 @@ class VirtualPort:
         except BlockingIOError:
             return b""
         except OSError as error:
-            if error.errno == errno.EIO:  # nobody has the other end open
+            if error.errno == errno.EIO:  # the other end is not open
                 return b""
             raise
 
     def _answer(self, request: bytes, shot: Shot) -> bytes:
-        # A request for the temperature gets that, where the encoder knows such requests.
+        # Some encoders answer requests for the temperature.
         reply = getattr(self._encoder, "reply", None)
         if reply is None:
             return self._frame(shot)
@@ -235,11 +235,11 @@ class VirtualPort:
         return bytes(data)
 
     def _send(self, data: bytes) -> None:
-        """Write all of it; a reader that does not read makes a real sensor's bytes overrun, and these wait."""
-        left = memoryview(data)
-        while left and not self._stop.is_set():
+        """Write all bytes. With a slow reader a real sensor would lose bytes; the simulated one waits."""
+        remaining = memoryview(data)
+        while remaining and not self._stop.is_set():
             try:
-                left = left[os.write(self._master, left) :]
+                remaining = remaining[os.write(self._master, remaining) :]
             except BlockingIOError:
                 self._clock.sleep_until_ns(self._clock.now_ns() + 1_000_000)
 

@@ -1,4 +1,4 @@
-"""The simulated rangefinder: a position function in, readings, blocks or wire bytes out, with a real one's faults."""
+"""The simulated rangefinder: it turns a position function into readings with the errors of a real sensor."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ __all__ = ["Shot", "VirtualRangefinder", "VirtualSensor"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VirtualSensor:
-    """How good the simulated rangefinder is.
+    """The quality of the simulated rangefinder.
 
     Parameters
     ----------
     rate_hz : float
-        Nominal readings per second of its own clock, Hz.
+        Nominal readings per second of the sensor's clock, Hz.
     tick_s : float
         Resolution of an echo time, s; 0.25 us is 43 um.
     noise_m : float
@@ -31,19 +31,19 @@ class VirtualSensor:
     false_echo_rate_hz : float
         Clusters of false echoes per second, at the turning points nearest to the sensor.
     false_echo_m : float
-        How far beyond the bob they read, m.
+        Distance of the false echoes beyond the bob, m.
     far_limit_m : float
-        A fixed object there returns every echo that should come from beyond it, m.
+        Distance of a fixed object behind the bob, m; no reading is larger.
     dead_time_s : float
-        Echoes sooner than this are not heard: no target.
+        Shortest time of flight, s; an earlier echo gives no target.
     jitter_s : float
-        Standard deviation of the moment a reading is taken, s; the time stamped is the one intended.
+        Standard deviation of the time of a reading, s; the stated time is the intended one.
     crystal_ppm : float
         How much faster its clock runs than true time.
     speed_of_sound_m_per_s : float
-        In the simulated air.
+        Speed of sound in the simulated air.
     temperature_c : float
-        As its thermometer reads.
+        Reading of its thermometer.
     """
 
     rate_hz: float = 100.0
@@ -74,14 +74,14 @@ class Shot:
     Parameters
     ----------
     true_s : float
-        When it is taken, s of true time since the start.
+        True time of the reading since the start, s.
     sequence : int
     device_us : int
-        By its own clock, wrapping at 2^32.
+        Time by the sensor's clock, which wraps at 2^32.
     echo_us : float
-        Time of flight on its tick lattice, NaN for no target.
+        Time of flight in whole ticks, NaN for no target.
     distance_m : float
-        The same as it would state it, NaN for no target.
+        The distance that a sensor would state, NaN for no target.
     temperature_c : float
     """
 
@@ -102,14 +102,14 @@ class VirtualRangefinder:
         Distance of the bob from the sensor, m, at a time, s.
     sensor : VirtualSensor
     rng : numpy.random.Generator
-        All its chance comes from here.
+        The source of all random numbers.
     """
 
     def __init__(self, position: Callable[[float], float], sensor: VirtualSensor, rng: np.random.Generator) -> None:
         self.sensor = sensor
         self._position = position
         self._rng = rng
-        self._cluster_left = 0
+        self._cluster_remaining = 0
         self._cluster_m = 0.0
 
     def shots(self) -> Iterator[Shot]:
@@ -124,11 +124,11 @@ class VirtualRangefinder:
         sensor = self.sensor
         intended_s = sequence / sensor.rate_hz / (1.0 + sensor.crystal_ppm * 1e-6)
         moment = intended_s + (self._rng.normal(0.0, sensor.jitter_s) if sensor.jitter_s else 0.0)
-        # Sound that leaves now meets the bob half its time of flight later.
-        met = moment + self._position(moment) / sensor.speed_of_sound_m_per_s
-        away = self._position(met) + self._false_echo(moment) + self._rng.normal(0.0, sensor.noise_m)
-        away = min(away, sensor.far_limit_m)
-        flight_s = 2.0 * away / sensor.speed_of_sound_m_per_s
+        # The sound meets the bob half the time of flight later.
+        met_s = moment + self._position(moment) / sensor.speed_of_sound_m_per_s
+        distance_m = self._position(met_s) + self._false_echo(moment) + self._rng.normal(0.0, sensor.noise_m)
+        distance_m = min(distance_m, sensor.far_limit_m)
+        flight_s = 2.0 * distance_m / sensor.speed_of_sound_m_per_s
         device_us = round(sequence / sensor.rate_hz * 1e6) % (1 << 32)
         if flight_s < sensor.dead_time_s:
             return Shot(intended_s, sequence, device_us, math.nan, math.nan, sensor.temperature_c)
@@ -137,32 +137,32 @@ class VirtualRangefinder:
         return Shot(intended_s, sequence, device_us, echo_us, distance, sensor.temperature_c)
 
     def block(self, seconds: float) -> Block:
-        """Return the readings of so much true time from the start; :class:`acquisition.replay.Replay` paces them."""
+        """Return the readings of the first ``seconds`` of true time; see :class:`acquisition.replay.Replay`."""
         true_rate_hz = self.sensor.rate_hz * (1.0 + self.sensor.crystal_ppm * 1e-6)
-        # Rounded: 0.07 s at 100 Hz are seven samples and not the eight of 7.000000000000001.
+        # Rounded, so that 0.07 s at 100 Hz give seven samples: the product is 7.000000000000001.
         shots = [self.shot(sequence) for sequence in range(math.ceil(round(seconds * true_rate_hz, 6)))]
         distance = np.array([shot.distance_m for shot in shots], np.float64)
         flags = np.isnan(distance) * np.uint8(Flag.MISSING)
         host_ns = np.array([round(shot.true_s * 1e9) for shot in shots], np.int64)
-        # The moments at which sound met the bob, by the sensor's clock; of one that met nothing, as the one before.
+        # The time at which the sound met the bob, by the sensor's clock; without an echo the last travel time counts.
         ways_s = np.array([0.5e-6 * shot.echo_us for shot in shots], np.float64)
         t = np.arange(len(shots)) / self.sensor.rate_hz + carried(ways_s, np.isfinite(ways_s), 0.0)
         return Block(0, t, distance, flags, host_ns)
 
     def info(self, name: str) -> SourceInfo:
-        """Return what is known of it as a source."""
+        """Return its description as a source."""
         quantum_m = 0.5 * self.sensor.tick_s * self.sensor.speed_of_sound_m_per_s
         return SourceInfo("simulated", name, self.sensor.rate_hz, quantum_m=quantum_m, clock="device")
 
     def _false_echo(self, t: float) -> float:
-        """Displacement of this reading; clusters begin where the bob turns nearest to the sensor."""
-        if self._cluster_left > 0:
-            self._cluster_left -= 1
+        """Return the error of this reading, m; a cluster begins when the bob turns nearest to the sensor."""
+        if self._cluster_remaining > 0:
+            self._cluster_remaining -= 1
             return self._cluster_m
         step = 1.0 / self.sensor.rate_hz
         before, now, after = (self._position(t + k * step) for k in (-1, 0, 1))
-        # About one nearest turning point a second: the chance at each makes the rate asked for.
+        # There is about one such turning point per second, so the rate is the probability at each.
         if now <= before and now < after and self._rng.random() < self.sensor.false_echo_rate_hz:
-            self._cluster_left = int(self._rng.integers(3, 18))
+            self._cluster_remaining = int(self._rng.integers(3, 18))
             self._cluster_m = self.sensor.false_echo_m * float(self._rng.uniform(0.5, 1.5))
         return 0.0

@@ -9,7 +9,7 @@ import argparse
 import sys
 from concurrent.futures import ProcessPoolExecutor
 
-from checks import CHECKS, Bench, Line
+from benchmarks.accuracy.checks import CHECKS, Bench, Line
 
 
 def main() -> int:
@@ -17,7 +17,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="benchmarks/accuracy", description=__doc__)
     parser.add_argument("--seeds", type=int, default=2000, metavar="N", help="records a case (default 2000)")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes (default 2)")
-    parser.add_argument("--only", choices=sorted(CHECKS), action="append", help="one part; again for another")
+    parser.add_argument("--only", choices=sorted(CHECKS), action="append", help="run only this part; may be repeated")
     options = parser.parse_args()
     bad = 0
     with ProcessPoolExecutor(options.jobs) as pool:

@@ -1,7 +1,7 @@
 """The requirements, each as a check over seeds that yields lines with a limit, what was measured, and whether it holds.
 
 A share or a root mean square over finitely many seeds scatters. A limit counts as broken where the measurement is
-beyond it by more than three of its own standard errors: with 2000 seeds 3 % of a share of 68 %, 5 % of an rms error.
+beyond it by more than three standard errors of it: with 2000 seeds 3 % of a share of 68 %, 5 % of an rms error.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from trials import QUANTITIES, Case, Outcome, bounds, evaluate, record, synthetic
 
+from benchmarks.accuracy.trials import QUANTITIES, Case, Outcome, bounds, evaluate, record, synthetic
 from pipeline.accuracy import TIERS
 from pipeline.results.classic import classic
 

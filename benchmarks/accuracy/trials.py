@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import sys
 from dataclasses import dataclass, field
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -16,27 +12,11 @@ from pipeline.accuracy import params_for
 from pipeline.analyse import Oscillation, analyse
 from pipeline.errors import PipelineError
 from pipeline.track import Track
+from tests import synthetic
 
 __all__ = ["QUANTITIES", "Case", "Outcome", "bounds", "evaluate"]
 
 QUANTITIES = ("frequency", "amplitude", "phase", "gamma")
-SYNTHETIC = Path(__file__).resolve().parents[2] / "tests" / "synthetic.py"
-
-
-def _load(path: Path) -> ModuleType:
-    """Import the tests' generator of records, which shares no code with what is judged."""
-    if path.stem in sys.modules:
-        return sys.modules[path.stem]
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-synthetic = _load(SYNTHETIC)
 
 
 @dataclass(frozen=True, kw_only=True)

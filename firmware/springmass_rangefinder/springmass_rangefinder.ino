@@ -1,17 +1,17 @@
-/* An ultrasonic rangefinder that reads at 10 to 125 Hz and speaks the springmass line protocol.
+/* An ultrasonic rangefinder with 10 to 125 readings per second, which uses the springmass line protocol.
  *
- * Board:  ATmega328P at 16 MHz and 5 V (Arduino Uno, Nano), transducer HC-SR04 or alike.
- * Wiring: TRIG on D9 (OC1A), ECHO on D8 (ICP1), 5 V, ground; the timer's own pins, no others will do.
- *         If wanted, a DS18B20 thermometer: DQ on D2 with 4.7 kOhm to 5 V, 5 V, ground.
+ * Board:  ATmega328P at 16 MHz and 5 V (Arduino Uno, Nano), transducer HC-SR04 or similar.
+ * Wiring: TRIG on D9 (OC1A), ECHO on D8 (ICP1), 5 V, ground; these are the pins of the timer, others do not work.
+ *         Optional, a DS18B20 thermometer: DQ on D2 with 4.7 kOhm to 5 V, 5 V, ground.
  * Port:   115200 baud, 8N1. Protocol and commands: docs/reference/line-protocol.md.
  * Build:  open it in the Arduino IDE and press Upload, or `make firmware`; `springmass firmware --flash` needs neither.
  *
- * Nothing that is measured waits for software. Timer 1 raises and drops TRIG at the tick that was asked for, and stores
- * the tick of each edge of ECHO: 62.5 ns each, sent in steps of 0.25 us, which is 43 um of distance. What limits a
- * reading is then the transducer, which hears one wave of 25 us or the next, and not the clock.
+ * The measurement does not depend on software delays. Timer 1 switches TRIG at the planned tick, and stores the tick of
+ * each edge of ECHO. A tick is 62.5 ns; times are sent in steps of 0.25 us, which is 43 um of distance. The accuracy is
+ * limited by the transducer, which may detect one wave of 25 us or the next, and not by the clock.
  *
- * A line goes out for every period, with or without an echo: a missing number in the sequence is a lost line. The
- * watchdog stays off: the bootloader of older Nanos does not stop it and starts again and again.
+ * Every period sends a line, with or without an echo, so a missing sequence number means a lost line. The watchdog
+ * stays off, because the bootloader of older Nanos does not stop it and would restart for ever.
  */
 #include <avr/eeprom.h>
 #include <avr/interrupt.h>
@@ -35,39 +35,39 @@
 #define TICKS_PER_STEP 4UL /* 0.25 us */
 #define PULSE_TICKS (40 * TICKS_PER_US) /* the modules ask for 10 us or more; other interrupts may take 20 */
 #define SOON_TICKS (20 * TICKS_PER_US)
-#define LATE_US 300UL     /* a ping is planned so long ahead at least */
-#define INSIST_US 80000UL /* triggered again while ECHO is up, but not for longer than this */
-#define STUCK_US 250000UL /* no module holds ECHO up so long by itself */
+#define LATE_US 300UL     /* a ping is planned at least this long ahead */
+#define INSIST_US 80000UL /* while ECHO is high, trigger again for at most this long */
+#define STUCK_US 250000UL /* a working module never holds ECHO high for so long */
 #define IDENTIFY_US 5000000UL
 
 #define RATE_HZ_LEAST 10
 #define RATE_HZ_MOST 125
 #define BLANK_US 116 /* 2 cm: the transducer still rings */
-#define FAR_US 25000U /* 4.3 m; HC-SR04 end their pulse after 38 ms where they heard nothing */
+#define FAR_US 25000U /* 4.3 m; an HC-SR04 ends its pulse after 38 ms if there was no echo */
 #define FAR_US_MOST 30000U
 #define SPREAD_US_MOST 2000
 #define NAME_BYTES 12
 #define NO_TEMPERATURE (-32768)
 
-/* What can be set; it lasts in the EEPROM, for opening the port restarts most boards. */
+/* The settings; they are stored in the EEPROM, because opening the port restarts most boards. */
 struct settings {
   uint8_t version;
   uint8_t rate_hz;
   uint16_t near_us, far_us; /* the gate: times of flight that count as an echo */
-  uint16_t spread_us;       /* each ping comes up to so much later, at random */
+  uint16_t spread_us;       /* each ping is later by a random time up to this */
   char name[NAME_BYTES + 1];
   uint8_t check;
 };
 
-/* What a ping has come to. */
+/* The result of a ping. */
 enum ping_state { CLOSED, WAIT_RISE, WAIT_FALL, BUSY, DONE };
 
 struct ping {
   uint32_t sequence, at_us;
   uint32_t echo_ticks;
   uint8_t state;
-  uint8_t was_busy;  /* ECHO was up from an earlier ping when this one went out */
-  uint8_t too_close; /* a pulse shorter than the gate was passed over */
+  uint8_t was_busy;  /* ECHO was high from an earlier ping when this one was sent */
+  uint8_t too_close; /* a pulse shorter than the gate was ignored */
 };
 
 enum trigger_state { RESTING, WAITING, HIGH_NOW };
@@ -80,13 +80,13 @@ static volatile uint32_t overflows;
 
 ISR(TIMER1_OVF_vect) { overflows++; }
 
-/* With interrupts off. An overflow that waits for its interrupt belongs to a small count, not to a large one. */
+/* Call with interrupts off. A pending overflow belongs to a small count, not to a large one. */
 static uint32_t overflows_at(uint16_t count)
 {
   return overflows + ((TIFR1 & _BV(TOV1)) && count < 0x8000 ? 1 : 0);
 }
 
-/* Microseconds since the start; wraps at 2^32 as the protocol says (65536 ticks are 4096 us exactly). */
+/* Microseconds since the start; wraps at 2^32 as in the protocol (65536 ticks are exactly 4096 us). */
 static uint32_t now_us(void)
 {
   uint8_t saved = SREG;
@@ -99,19 +99,19 @@ static uint32_t now_us(void)
 
 /* ---- Ping and echo: compare unit A drives TRIG, the capture unit stores the count at each edge of ECHO. ---- */
 
-static volatile struct ping ping;   /* the one under way */
-static volatile struct ping closed; /* the one that a line is due for */
+static volatile struct ping ping;   /* the current ping */
+static volatile struct ping closed; /* the ping whose line is due */
 static volatile uint8_t closed_waits;
 
 static volatile uint8_t trigger_state = RESTING;
 static volatile uint8_t laps;  /* rounds of the timer before the ping */
 static volatile uint8_t quiet; /* the next ping is not triggered */
 static volatile uint32_t next_sequence, next_us;
-static volatile uint32_t high_since_us; /* the ping during which ECHO went up and stayed */
+static volatile uint32_t high_since_us; /* time of the ping during which ECHO went high and stayed */
 
 static uint32_t echo_rise;
 
-/* What a match does to TRIG; nothing between two pings, where the port holds it low. */
+/* The effect of a match on TRIG: none between two pings, when the port holds it low. */
 #define ON_MATCH_NOTHING 0
 #define ON_MATCH_CLEAR _BV(COM1A1)
 #define ON_MATCH_SET (_BV(COM1A1) | _BV(COM1A0))
@@ -145,7 +145,7 @@ ISR(TIMER1_CAPT_vect)
       ping.state = DONE;
     }
     break;
-  case BUSY: /* a module that takes a ping in its stride goes up again for it */
+  case BUSY: /* a module that accepts the ping raises ECHO again */
     ping.state = WAIT_RISE;
     capture_on(1);
     break;
@@ -198,7 +198,7 @@ ISR(TIMER1_COMPA_vect)
     TCCR1A = ON_MATCH_CLEAR;
     OCR1A = fall;
     trigger_state = HIGH_NOW;
-    if ((int16_t)(TCNT1 - fall) >= 0) /* the match that drops it has gone by, which no known path does */
+    if ((int16_t)(TCNT1 - fall) >= 0) /* the match that lowers it was missed, which should not happen */
       TCCR1C = _BV(FOC1A);
     begin_ping();
     return;
@@ -250,8 +250,8 @@ static void plan_ping(void)
   }
 }
 
-/* Whether a line is due: for a ping that the next one has ended. Not as soon as the echo is there, for then a bob that
-   comes to rest would make lines later and later, and the host take that for the clock's. */
+/* Return whether a line is due: after the next ping has ended this one. If lines were sent at the echo, their delay
+   would change with the distance of the bob, and the host would mistake that for an error of the clock. */
 static uint8_t take_closed(struct ping *taken)
 {
   uint8_t took = 0;
@@ -287,7 +287,7 @@ static char status_of(const struct ping *p)
 /* ---- Serial out: lines wait in a ring while pings are timed. ---- */
 
 #define LINE_ROOM 100           /* more than the longest line */
-#define ANSWER_ROOM (2 * LINE_ROOM) /* an answer never takes a reading's */
+#define ANSWER_ROOM (2 * LINE_ROOM) /* so that an answer leaves room for a reading */
 
 static volatile char ring[256]; /* its indices wrap by themselves */
 static volatile uint8_t ring_head, ring_tail;
@@ -303,7 +303,7 @@ ISR(USART_UDRE_vect)
 
 static uint8_t room(void) { return (uint8_t)(ring_tail - ring_head - 1); }
 
-/* Nobody writes a line without room for it, so nothing waits here. */
+/* A line is written only if there is room for it, so this never waits. */
 static void put(char c)
 {
   ring[ring_head] = c;
@@ -345,8 +345,8 @@ static void put_field(uint32_t value)
   put_number(value);
 }
 
-/* Ten digits always: lines that grow with their numbers would end later and later, which a host that compares the
-   clocks takes for 17 ppm in half a minute. */
+/* Always ten digits: with fewer at the start the lines would become longer and end later, and a host that compares the
+   clocks would see an error of 17 ppm in half a minute. */
 static void put_wide(uint32_t value)
 {
   char digits[11];
@@ -377,7 +377,7 @@ static void end_line(void)
 
 #define CONVERT_US 800000UL
 #define LOOK_AGAIN_US 2000000UL
-#define POWER_ON (85 * 16) /* what it says before it has measured */
+#define POWER_ON (85 * 16) /* its value before the first measurement */
 
 enum thermometer_step { LOOK, PRESENT, SKIP_FOR_CONVERT, CONVERT, SKIP_FOR_READ, READ, READING };
 
@@ -438,7 +438,7 @@ static void scratch_read(void)
   temperature_cc = (int16_t)((int32_t)sixteenths * 100 / 16);
 }
 
-/* One step of at most 0.7 ms, where one is due. */
+/* Do one step of at most 0.7 ms, if one is due. */
 static void thermometer(void)
 {
   uint32_t now = now_us();
@@ -450,7 +450,7 @@ static void thermometer(void)
     cli();
     dq_free();
     _delay_us(5);
-    uint8_t idle_high = PIND & DQ; /* no pull-up, no thermometer */
+    uint8_t idle_high = PIND & DQ; /* without a pull-up there is no thermometer */
     sei();
     _delay_us(65);
     uint8_t present = idle_high && !(PIND & DQ);
@@ -499,14 +499,14 @@ static void thermometer(void)
 
 /* ---- The protocol ---- */
 
-static volatile uint8_t identify; /* what it is, is to be said */
+static volatile uint8_t identify; /* the identity must be sent */
 static uint32_t identified_us;
 
 static void send_reading(const struct ping *p)
 {
   char status = status_of(p);
   if (room() < LINE_ROOM)
-    return; /* never so at 115200 baud; the sequence would tell */
+    return; /* impossible at 115200 baud; a missing sequence number would show it */
   begin_line();
   put_flash(PSTR("R1"));
   put_wide(p->sequence);
@@ -572,7 +572,7 @@ static void load_settings(void)
   settings.far_us = FAR_US;
 }
 
-/* One byte at a time, and only what differs: a write takes 3.4 ms, and a cell bears 100,000 of them. */
+/* Write one byte at a time, and only if it differs: a write takes 3.4 ms, and a cell lasts for 100,000 writes. */
 static void save_settings(void)
 {
   if (saved_upto < sizeof settings && eeprom_is_ready()) {
@@ -592,17 +592,17 @@ ISR(USART_RX_vect)
   if (command_waits)
     return; /* one at a time */
   if (c == '\n' || c == '\r') {
-    command[command_length < COMMAND_BYTES ? command_length : 0] = 0; /* one that was too long is none */
+    command[command_length < COMMAND_BYTES ? command_length : 0] = 0; /* a line that was too long is no command */
     command_waits = command_length > 0;
     command_length = 0;
   } else if (command_length < COMMAND_BYTES - 1) {
     command[command_length++] = c;
   } else {
-    command_length = COMMAND_BYTES; /* too long: passed over up to its end */
+    command_length = COMMAND_BYTES; /* too long: ignored to its end */
   }
 }
 
-/* A number of digits up to an end or a comma; steps behind it. Returns 0 where it is none or out of range. */
+/* Parse a number up to the end or a comma, and step after it. Return 0 if there is none or it is out of range. */
 static uint8_t parse(const char **text, uint16_t least, uint16_t most, uint16_t *value)
 {
   uint32_t number = 0;
@@ -631,7 +631,7 @@ static uint8_t is_name(const char *text)
   return 1;
 }
 
-/* Returns whether it was understood. */
+/* Return whether the command was understood. */
 static uint8_t obey(const char *text)
 {
   const char *rest = text + 1;
@@ -693,7 +693,7 @@ static void commands(void)
 void setup(void)
 {
   TIMSK0 = 0; /* the core's millisecond clock would be one more interrupt */
-  TCCR0B = 0; /* nor are its PWM, its converter and the comparator used */
+  TCCR0B = 0; /* PWM, converter and comparator are not used either */
   TCCR2B = 0;
   ADCSRA = 0;
   ACSR = _BV(ACD);
@@ -701,14 +701,14 @@ void setup(void)
   PORTB &= (uint8_t)~(TRIG | ECHO);
   DDRB = (DDRB | TRIG) & (uint8_t)~ECHO;
   PORTD &= (uint8_t)~DQ;
-  TCCR1B = 0; /* the core has begun a PWM on timer 1 */
+  TCCR1B = 0; /* the core has started a PWM on timer 1 */
   TCCR1A = ON_MATCH_NOTHING;
   TCNT1 = 0;
   TIFR1 = _BV(TOV1) | _BV(ICF1) | _BV(OCF1A);
   TIMSK1 = _BV(TOIE1) | _BV(ICIE1);
   TCCR1B = _BV(ICNC1) | _BV(CS10); /* noise canceller (four equal ticks), no prescaler */
   UCSR0A = _BV(U2X0);
-  UBRR0 = 16; /* 117647 baud: 2.1 % fast, within what 8N1 bears, and what the Arduino core sets too */
+  UBRR0 = 16; /* 117647 baud: 2.1 % fast, within the tolerance of 8N1, and the same as in the Arduino core */
   UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
   UCSR0B = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
   set_sleep_mode(SLEEP_MODE_IDLE);
@@ -718,7 +718,7 @@ void setup(void)
   next_sequence = (uint32_t)-1;
 }
 
-/* With interrupts off: whether something waits that no interrupt will announce. */
+/* Call with interrupts off. Return whether work is pending that no interrupt will announce. */
 static uint8_t has_work(void)
 {
   return trigger_state == RESTING || closed_waits || (command_waits && room() >= ANSWER_ROOM) ||

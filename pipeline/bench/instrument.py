@@ -68,7 +68,7 @@ class Instrument:
 
         Notes
         -----
-        A clock that nobody compared with another is as good as its crystal's specification. A comparison of the
+        A clock that nobody compared with another is only known to its crystal's specification. A comparison of the
         sensor's clock with the host's tells two crystals apart and not which of them is right, so it changes nothing
         as long as both can keep their specification. Where it contradicts that by more than three standard
         uncertainties (a ceramic resonator is off by thousands of ppm) the host is the reference: frequencies are
@@ -112,11 +112,11 @@ def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
             f"a rate error needs a finite value and an uncertainty that is not negative, got {rate} and "
             f"{u}; leave both out where the clocks were not compared"
         )
-    told = f"the device's clock runs {rate * 1e6:+.0f} ppm against the host's (u {u * 1e6:.0f} ppm)"
+    text = f"the device's clock runs {rate * 1e6:+.0f} ppm against the host's (u {u * 1e6:.0f} ppm)"
     if abs(rate) > limit:
         half = min(abs(rate), 1.0)
         words = (
-            f"{told}, and {limit * 1e6:.0f} ppm are all that the two can be apart: nothing is corrected, and "
+            f"{text}, and {limit * 1e6:.0f} ppm are all that the two can be apart: nothing is corrected, and "
             f"{half * 1e6:.0f} ppm stand in every frequency's uncertainty as the half-width of a rectangle"
         )
         return Estimate(1.0, math.hypot(u_crystal, half / math.sqrt(3.0))), words, True
@@ -125,17 +125,17 @@ def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
         apart_s = abs(rate) * (span_s if track.compared_s is None else min(track.compared_s, span_s))
         if apart_s < HOST_DELAY_S:
             words = (
-                f"{told}, {apart_s * 1e3:.2g} ms in all, which the host's delays may be too: nothing is corrected, and "
+                f"{text}, {apart_s * 1e3:.2g} ms in all, which the host's delays may be too: nothing is corrected, and "
                 "the difference stands in every frequency's uncertainty"
             )
             return Estimate(1.0, math.hypot(u_crystal, rate / math.sqrt(3.0))), words, False
-        words = f"{told}, more than two crystals can differ: frequencies are corrected to the host's"
+        words = f"{text}, more than two crystals can differ: frequencies are corrected to the host's"
         return Estimate(1.0 + rate, (1.0 + rate) * math.hypot(u, u_crystal)), words, False
     if track.held_samples:
         u_all = math.hypot(u_crystal, min(u, limit / math.sqrt(3.0), 1.0))
-        words = f"{told}, as two crystals may: {u_all * 1e6:.0f} ppm stand in every frequency's uncertainty"
+        words = f"{text}, as two crystals may: {u_all * 1e6:.0f} ppm stand in every frequency's uncertainty"
         return Estimate(1.0, u_all), words, False
-    words = f"{told}, as two crystals may: {spec} stand in every frequency's uncertainty"
+    words = f"{text}, as two crystals may: {spec} stand in every frequency's uncertainty"
     return Estimate(1.0, u_crystal), words, False
 
 

@@ -10,17 +10,20 @@ from typing import Any, NamedTuple
 from pipeline.bench.air import saturation_pressure
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
+from pipeline.registry.laws import LAW_NAMES
 
 __all__ = ["PLACES", "Scene"]
 
 POSITIONS = ("below", "above")
+_CHOICES = {("sensor", "position"): ("sensor_position", POSITIONS), ("damping", "law"): ("damping_law", LAW_NAMES)}
+"""The keys of a scene file that take a text: the attribute that each becomes, and the texts that it allows."""
 
 
 class _Quantity(NamedTuple):
     """One key of a scene file: the attribute that it becomes, its unit, and its range, both ends allowed.
 
     The ends lie far beyond any bench: they are where the arithmetic behind is known to hold, so that whatever lies
-    between gives a number or a finding, and what was typed with a wrong exponent is refused at once.
+    between gives a number or a finding, and a value typed with a wrong exponent is refused when it is read.
     """
 
     attribute: str
@@ -41,8 +44,8 @@ class _Quantity(NamedTuple):
         """Ask whether a number stands in another unit, where that makes it a usual one; empty where none does."""
         low, high = max(self.usual[0], self.least), min(self.usual[1], self.greatest)
         likely = [(name, (number - zero) * size) for name, zero, size in self.mistaken]
-        told = [f"{name}: {value:.6g}" for name, value in likely if low <= value <= high]
-        return f" (did you mean {' or '.join(told)}?)" if told else ""
+        suggestions = [f"{name}: {value:.6g}" for name, value in likely if low <= value <= high]
+        return f" (did you mean {' or '.join(suggestions)}?)" if suggestions else ""
 
 
 _GRAMS = (("grams", 0.0, 1e-3),)
@@ -83,7 +86,8 @@ class Scene:
 
     Every quantity is an :class:`Estimate` or None where it is not known; a plain number in the scene file has
     ``u`` = 0. The attributes ``spring_constant_n_per_m``, ``spring_cubic_n_per_m3``, ``start_*`` and the damping
-    coefficients are what a simulation needs; an analysis measures them instead.
+    coefficients are what a simulation needs; an analysis measures them instead. ``damping_law`` is the name of the
+    damping law, where it is known; an analysis states its results by that law.
     """
 
     bob_mass_kg: Estimate | None = None
@@ -104,6 +108,7 @@ class Scene:
     gamma_per_s: Estimate | None = None
     beta_per_m_s: Estimate | None = None
     mu_m_per_s: Estimate | None = None
+    damping_law: str | None = None
 
     @classmethod
     def from_mapping(cls, tables: Mapping[str, Any], *, where: str = "scene") -> Scene:
@@ -129,9 +134,7 @@ class Scene:
         """
         known: dict[str, Any] = {}
         for table, content in tables.items():
-            allowed = [key for name, key in _QUANTITIES if name == table]
-            if table == "sensor":
-                allowed.append("position")
+            allowed = [key for name, key in (*_QUANTITIES, *_CHOICES) if name == table]
             if not allowed:
                 names = ", ".join(dict.fromkeys(name for name, _ in _QUANTITIES))
                 raise SceneError(f"{where}: unknown table [{_short(table)[1:-1]}]; allowed are {names}")
@@ -145,8 +148,9 @@ class Scene:
                         f"{where}: unknown key {_short(key)} in [{table}] (value {_short(value)}); "
                         f"allowed are {', '.join(allowed)}"
                     )
-                if (table, key) == ("sensor", "position"):
-                    known["sensor_position"] = _position(value, where)
+                if (table, key) in _CHOICES:
+                    attribute, texts = _CHOICES[table, key]
+                    known[attribute] = _choice(table, key, value, texts, where)
                 else:
                     known[_QUANTITIES[table, key].attribute] = _quantity(table, key, value, where)
         scene = cls(**known)
@@ -163,8 +167,9 @@ class Scene:
                 tables.setdefault(table, {})[key] = (
                     estimate.value if plain else {"value": estimate.value, "u": estimate.u}
                 )
-        if self.sensor_position is not None:
-            tables.setdefault("sensor", {})["position"] = self.sensor_position
+        for (table, key), (attribute, _) in _CHOICES.items():
+            if (text := getattr(self, attribute)) is not None:
+                tables.setdefault(table, {})[key] = text
         return tables
 
     def unusual(self) -> tuple[str, ...]:
@@ -178,18 +183,20 @@ class Scene:
                 usual = f"{q.usual[0]:g} to {q.usual[1]:g} {q.unit}"
                 clauses.append(f"[{table}] {key} = {found.value:g} is beyond {usual}{q.meant(found.value)}")
             elif q.least > 0.0 and found.u >= found.value:
-                clauses.append(f"[{table}] {key} = {found.value:g} has an uncertainty of its own size, u = {found.u:g}")
+                clauses.append(
+                    f"[{table}] {key} = {found.value:g} has an uncertainty as large as the value, u = {found.u:g}"
+                )
         return tuple(clauses)
 
     @property
     def tells_of_bench(self) -> bool:
-        """Whether it says what hangs there or in which air, and not of the sensor or a simulation alone."""
-        told = (self.bob_mass_kg, self.spring_mass_kg, self.disc_diameter_m, self.air_temperature_c)
-        return any(x is not None for x in (*told, self.air_pressure_pa, self.air_relative_humidity))
+        """Whether it describes the bob or the air, and not only the sensor or a simulation."""
+        given = (self.bob_mass_kg, self.spring_mass_kg, self.disc_diameter_m, self.air_temperature_c)
+        return any(x is not None for x in (*given, self.air_pressure_pa, self.air_relative_humidity))
 
 
 def _check_vapour(scene: Scene, where: str) -> None:
-    """Refuse air that holds more vapour than its pressure allows: each value alone may be possible."""
+    """Refuse air with more vapour than its pressure allows, although each single value may be possible."""
     celsius, pascal, humidity = scene.air_temperature_c, scene.air_pressure_pa, scene.air_relative_humidity
     if celsius is None or pascal is None or humidity is None:
         return
@@ -202,9 +209,9 @@ def _check_vapour(scene: Scene, where: str) -> None:
         )
 
 
-def _position(value: object, where: str) -> str:
-    if value not in POSITIONS:
-        raise SceneError(f"{where}: [sensor] position must be one of {', '.join(POSITIONS)}, got {_short(value)}")
+def _choice(table: str, key: str, value: object, texts: tuple[str, ...], where: str) -> str:
+    if value not in texts:
+        raise SceneError(f"{where}: [{table}] {key} must be one of {', '.join(texts)}, got {_short(value)}")
     return str(value)
 
 

@@ -46,7 +46,7 @@ class SensorFilter:
 
     @classmethod
     def of(cls, scene: Scene, rate_hz: float) -> SensorFilter | None:
-        """Return the filter that a scene states of a sensor with so many samples a second; None where it states none.
+        """Return the filter that a scene states for a sensor with this sampling rate, 1/s; None if it states none.
 
         Examples
         --------

@@ -7,8 +7,9 @@ import math
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 
-__all__ = ["HEAVIEST_SHARE", "oscillating_mass_kg", "unstated_spring_kg"]
+__all__ = ["GRAVITY_M_PER_S2", "HEAVIEST_SHARE", "oscillating_mass_kg", "unstated_spring_kg"]
 
+GRAVITY_M_PER_S2 = 9.80665  # standard gravity, by definition (3rd CGPM, 1901)
 HEAVIEST_SHARE = 0.3
 """Of the bob's mass: springs of laboratories weigh 5 to 50 g under bobs of 0.1 to 0.5 kg; a heavier one is weighed."""
 SERIES = 1e-4  # of the load: up to here the series is exact to 1e-13

@@ -13,20 +13,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.damping.evidence import NEGATIVE
 from pipeline.damping.law_fit import LawFit
-from pipeline.damping.laws import LAWS, Drag
+from pipeline.damping.laws import Drag, Law, free_power
 from pipeline.damping.select import Damping
 from pipeline.track import F8
 
-__all__ = ["Weighted", "average_over_laws", "spread_counts"]
+__all__ = ["Weighted", "average_over_laws", "scaled", "spread_counts"]
 
-MIXED = "linear+quadratic"
-FAMILY = (*LAWS[MIXED].cases, MIXED)
 SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0 and quadratic drag's 2 are well inside
 OTHER_LAW = 0.15  # prior odds of a law with friction, or of one that the user made, against linear and quadratic drag
 BELOW_LINEAR = 0.03  # the same of a power below 1: nothing that is known to damp grows so slowly, friction aside
 APART = 5.0  # how many u rates lie apart where evidence on a power counts half as much again, and not twice
-STEEPNESS, FAR = 5.0, 5.0  # of what the spread between laws counts; chosen with those above for what intervals hold
+STEEPNESS, FAR = (
+    5.0,
+    5.0,
+)  # of what the spread between laws counts; chosen with those above for the coverage of the intervals
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +50,8 @@ class Weighted:
 def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, ...]:
     """Return the laws by which quantities are stated, the one whose coefficients are stated first.
 
+    A law that the user stated is the only one.
+
     Parameters
     ----------
     damping : Damping
@@ -57,7 +61,7 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     Notes
     -----
     Linear and quadratic drag together hold "none", "linear" and "quadratic"; which of the four is selected says that a
-    term does not show, not that it is zero. So unless the record speaks against it, what is stated is this law's,
+    term does not show, not that it is zero. So unless the recording contradicts it, what is stated is this law's,
     with what is known beforehand: the power :math:`1 + \\beta A/(\\gamma + \\beta A)` by which drag grows is
     :math:`1 \\pm 1.4`, which makes :math:`\\beta = 0 \\pm \\tau` with :math:`\\tau = 1.4\\,\\gamma_l/\\bar A` from the
     lone exponential's rate. The fit alone knows :math:`\\beta` to u; together parameters and covariance are
@@ -69,11 +73,15 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     friction to quadratic; those of the fit where it does. The other admissible laws weigh
     :math:`0.15\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it if they have friction, and a free power, which is as
     likely beforehand, :math:`w\\,e^{-s\\Delta\\mathrm{BIC}/2}`. Wherever it weighs it does so by the probability P that
-    it is above 1, :math:`P + 0.03 (1 - P)`: a smaller one stands for friction beside drag, which has laws of its own,
-    and imitates it so well that records cannot tell. A power has as many parameters as both drags, and where a record
-    tells the two apart at all the other is soon left out, or its share would widen the interval of nearly every record:
+    it is above 1, :math:`P + 0.03 (1 - P)`: a smaller one stands for friction together with drag, which has
+    separate laws, and no recording can distinguish the two. A power has as many parameters as both drags. Where a
+    recording distinguishes the two at all, the less likely one is soon left out, or nearly every interval would widen:
     :math:`s = 1 + 1/(1 + (d/5)^4)` for rates at the start that lie d standard uncertainties apart. Far apart s is 1,
-    for there the rare record that speaks for the wrong one would be wrong by as much.
+    for there the rare record that supports the wrong one would be wrong by as much.
+
+    Both drags take part although a coefficient of their free fit is negative, where none is by more than two standard
+    uncertainties once what is known beforehand is in it: a record that knows no curvature gives one drag a negative
+    coefficient by chance as often as not.
 
     Laws that are not rejected and no longer admissible weigh too, for a small weight counts where the rates lie far
     apart; those that only add a term to the selected one do not. Where linear and quadratic drag is out of reach, the
@@ -87,43 +95,51 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
     ----------
     .. [1] Particle Data Group, "Review of Particle Physics", Phys. Rev. D 110 (2024) 030001, section 5.2.2.
     """
+    if damping.by_statement:
+        return (Weighted(scaled(damping.best), 1.0),)
     if not damping.admissible:
         return _nearest(damping)
     names = damping.admissible
-    mixed = damping.fits.get(MIXED)
-    if mixed is not None and mixed.rejected:
+    mixed = damping.of_powers(1, 2)
+    if mixed is not None and mixed.rejected and not _allowed_by_prior(mixed, damping.of_powers(1), amplitude_m):
         mixed = None
-    stands = mixed is not None and (damping.selected in FAMILY or MIXED in names)
+    stands = mixed is not None and (_in_family(damping.best.law) or mixed.name in names)
     names = (*names, *_far(damping, names))
     evidence: list[tuple[LawFit, float]]  # logarithms of the odds
-    if mixed is None or not (stands or damping.selected == "power"):
+    if mixed is None or not (stands or free_power(damping.best.law)):
         evidence = [(fit, _belief(fit) - 0.5 * fit.bic) for fit in (damping.fits[name] for name in names)]
     else:
-        share, fit = _with_prior(mixed, damping.fits.get("linear"), amplitude_m)
+        share, fit = _with_prior(mixed, damping.of_powers(1), amplitude_m)
         evidence = [(fit, -0.5 * mixed.bic)]
         for name in names:
-            if name not in FAMILY and share > 0.0:
-                other = damping.fits[name]
+            other = damping.fits[name]
+            if not _in_family(other.law) and share > 0.0:
                 prior = sharpness = 1.0
-                if stands and name == "power":
-                    sharpness = _sharpness(other, _scaled(fit))
+                if stands and free_power(other.law):
+                    sharpness = _sharpness(other, scaled(fit))
                 elif stands:
                     prior = OTHER_LAW
                 against = 0.5 * sharpness * (other.bic - mixed.bic)
                 evidence.append((other, _belief(other) + math.log(share * prior) - against - 0.5 * mixed.bic))
     # The coefficients of a power or of a function are stated where it is selected; else both drags', within reach.
-    first = MIXED if stands and isinstance(damping.best.law, Drag) else damping.selected
+    first = mixed.name if mixed is not None and stands and isinstance(damping.best.law, Drag) else damping.selected
     evidence.sort(key=lambda one: one[0].name != first)
     most = max(log for _, log in evidence)
     odds = [math.exp(log - most) for _, log in evidence]
-    return tuple(Weighted(_scaled(fit), odd / sum(odds)) for (fit, _), odd in zip(evidence, odds, strict=True))
+    return tuple(Weighted(scaled(fit), odd / sum(odds)) for (fit, _), odd in zip(evidence, odds, strict=True))
+
+
+def _in_family(law: Law) -> bool:
+    """Whether a law is linear and quadratic drag together, or a case of it."""
+    return isinstance(law, Drag) and set(law.powers) <= {1, 2}
 
 
 def _belief(fit: LawFit) -> float:
     """Logarithm of how likely a free power's value is beforehand; 0 of other laws."""
-    if fit.name != "power":
+    name = free_power(fit.law)
+    if name is None:
         return 0.0
-    power = fit.joint["n"]
+    power = fit.joint[name]
     above = 0.5 * math.erfc((1.0 - power.value) / (math.sqrt(2.0) * max(power.u, 1e-300)))
     return math.log(above + BELOW_LINEAR * (1.0 - above))
 
@@ -136,7 +152,7 @@ def _sharpness(power: LawFit, mixed: LawFit) -> float:
 
 
 def spread_counts(weights: F8, rates: F8, variances: F8) -> float:
-    """Return by how much the spread of quantities between laws counts in their variances.
+    """Return the factor by which the spread of quantities between laws enters their variances.
 
     Parameters
     ----------
@@ -150,8 +166,8 @@ def spread_counts(weights: F8, rates: F8, variances: F8) -> float:
     With the mean own variance :math:`W` and the variance :math:`B = \\sum_i w_i (x_i - x)^2` between laws it is
     :math:`5 \\min(B/W, 1)^5`: hardly anything where laws agree within their own uncertainties, for an
     interval of these holds the neighbours too; and more than all of it where they do not, for then the truth is one
-    law's value and not a mean, and the interval has to reach the one that weighs less. With 1 throughout intervals
-    hold too often in the first case and too seldom in the second (``tests/trials/test_law_coverage.py``).
+    law's value and not a mean, and the interval has to reach the one that weighs less. With 1 throughout, intervals
+    cover the truth too often in the first case and too seldom in the second (``tests/trials/test_law_coverage.py``).
     """
     own, between = float(weights @ variances), float(weights @ (rates - weights @ rates) ** 2)
     if between == 0.0:
@@ -178,10 +194,10 @@ def _nearest(damping: Damping) -> tuple[Weighted, ...]:
         if name != best.name and fit.rejection == "misfit" and fit.joint.values.min() >= 0.0:
             odds[name] = math.exp(min(0.5 * (best.bic - fit.bic) / max(best.reduced_chi2, 1.0), 0.0))
     total = sum(odds.values())
-    return tuple(Weighted(_scaled(damping.fits[name]), odd / total) for name, odd in odds.items())
+    return tuple(Weighted(scaled(damping.fits[name]), odd / total) for name, odd in odds.items())
 
 
-def _scaled(fit: LawFit) -> LawFit:
+def scaled(fit: LawFit) -> LawFit:
     """Return a fit with its covariance times the reduced chi-square where that exceeds 1 and is not in it already."""
     if not fit.reduced_chi2 > 1.0 or fit.widening != 1.0:
         return fit
@@ -204,6 +220,14 @@ def _with_prior(mixed: LawFit, linear: LawFit | None, amplitude_m: float) -> tup
         covariance=_between(covariance, mixed.joint.covariance, share),
     )
     return share, replace(mixed, joint=joint)
+
+
+def _allowed_by_prior(mixed: LawFit, linear: LawFit | None, amplitude_m: float) -> bool:
+    """Whether linear and quadratic drag are rejected only for a negative coefficient, which the prior removes."""
+    joint = _with_prior(mixed, linear, amplitude_m)[1].joint
+    return mixed.rejection == "negative" and bool(
+        np.all(joint.values >= -NEGATIVE * np.sqrt(np.diag(joint.covariance)))
+    )
 
 
 def _between(one: F8, other: F8, share: float) -> F8:

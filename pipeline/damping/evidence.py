@@ -1,7 +1,7 @@
 """Evidence: what the points say for and against fitted laws, and the choice among them.
 
 Kept by hand: libraries rank models by an information criterion alone, which names a winner though none fits. Here
-chi-square on correlated points may reject a law, a coefficient below zero speaks against it, and a law that says the
+chi-square on correlated points may reject a law, a coefficient below zero contradicts it, and a law that says the
 same as a simpler one is no other answer. The true law is admissible in at least 95 % of simulated records and rejected
 in at most 2 % (``tests/trials/test_law_selection.py``).
 """
@@ -14,18 +14,20 @@ from typing import Protocol
 
 import numpy as np
 
-from pipeline.damping.law_fit import LawFit, Minimum, Rejection
+from pipeline.damping.law_fit import LawFit, Minimum, Rejection, joint_of
 from pipeline.damping.laws import LAWS, Law
-from pipeline.numerics.estimate import Joint
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 
 __all__ = ["BARE_MENTION", "NEGATIVE", "Weighed", "choose", "least_chi2", "weigh"]
 
-BARE_MENTION = 2.0  # difference of BIC below which evidence is none
+# Difference of BIC below which evidence is "not worth more than a bare mention": Kass and Raftery, J. Am. Stat. Assoc.
+# 90 (1995) 773.
+BARE_MENTION = 2.0
 ALIKE = 0.1  # share of the damping that two laws may differ by and still say the same
 SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # of the first amplitude, to which at most and at least it is compared
-NEGATIVE = 3.0  # standard uncertainties below zero at which a coefficient speaks against its law
+# Standard uncertainties below zero at which a coefficient rejects its law: a probability of 0.023 if it is truly zero.
+NEGATIVE = 2.0
 
 
 def least_chi2(fits: Mapping[str, Minimum], laws: Mapping[str, Law] = LAWS) -> dict[str, float]:
@@ -71,8 +73,7 @@ def weigh(law: Law, fit: Minimum, least_chi2: float, points: int, correlation: f
         rejection = "negative"
     elif not fit.converged:
         rejection = "not converged"
-    joint = Joint(law.parameters, fit.theta, covariance, law.units)
-    return LawFit(law, joint, reduced, dof, bic, fit.converged, rejection, fit.tried)
+    return LawFit(law, joint_of(law, fit.theta, covariance), reduced, dof, bic, fit.converged, rejection, fit.tried)
 
 
 class Weighed(Protocol):

@@ -11,20 +11,18 @@ import numpy as np
 
 from pipeline.damping.evidence import NEGATIVE, choose
 from pipeline.damping.law_fit import rates_of
-from pipeline.damping.laws import LAWS, Law
+from pipeline.damping.laws import LAWS, Law, in_units, words_of
 from pipeline.damping.select import Damping, Params
 from pipeline.errors import AnalysisError
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import chi2_quantile, covariance_of
-from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
+from pipeline.windows.demodulate import Demodulated
 
 __all__ = ["JointDamping", "JointFit", "fit_joint"]
 
 Rejection = Literal["", "misfit", "differ", "negative", "not converged"]
-
-PRECISION = 0.01  # of the standard uncertainties, at which a fit stops
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +69,7 @@ class JointFit:
 
     def rates(self, amplitude: F8) -> tuple[F8, F8]:
         """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
-        # A rate depends on the coefficients alone: any first amplitude will do.
+        # A rate depends only on the coefficients, so any first amplitude will do.
         theta = np.concatenate([[1.0], self.coefficients.values])
         covariance = np.zeros((theta.size, theta.size))
         covariance[1:, 1:] = self.coefficients.covariance
@@ -80,7 +78,7 @@ class JointFit:
     def span(self, times: Sequence[F8]) -> F8:
         """Return the greatest and the least amplitude over all runs' times since their first samples, m."""
         ends = [
-            self.law.amplitude(np.array([0.0, float(t[-1])]), np.concatenate([[a.value], self.coefficients.values]))
+            self.law.curve(np.array([0.0, float(t[-1])]), np.concatenate([[a.value], self.coefficients.values]))[0]
             for t, a in zip(times, self.amplitudes, strict=True)
         ]
         return np.array([np.max(ends), np.min(ends)])
@@ -131,7 +129,7 @@ class _Points:
 
 
 def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params | None = None) -> JointDamping:
-    """Fit each damping law with coefficients that all runs share and an amplitude of its own for each run.
+    """Fit each damping law with coefficients that all runs share and one amplitude for each run.
 
     Parameters
     ----------
@@ -201,7 +199,7 @@ def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:
 def _curve(law: Law, points: _Points, theta: F8) -> F8:
     """Amplitudes of all runs, (n,); parameters are the runs' amplitudes, then the coefficients."""
     count = len(points.t)
-    return np.concatenate([law.amplitude(t, np.append(theta[run], theta[count:])) for run, t in enumerate(points.t)])
+    return np.concatenate([law.curve(t, np.append(theta[run], theta[count:]))[0] for run, t in enumerate(points.t)])
 
 
 def _slopes(law: Law, points: _Points, theta: F8) -> F8:
@@ -209,7 +207,7 @@ def _slopes(law: Law, points: _Points, theta: F8) -> F8:
     count = len(points.t)
     slopes = np.zeros((points.y.size, theta.size))
     for run, (t, part) in enumerate(zip(points.t, points.parts, strict=True)):
-        by = law.jacobian(t, np.append(theta[run], theta[count:]))
+        _, by = law.curve(t, np.append(theta[run], theta[count:]))
         slopes[part, run], slopes[part, count:] = by[:, 0], by[:, 1:]
     return slopes
 
@@ -224,7 +222,6 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
         lambda at: (_curve(law, points, at) - y) / u,
         theta,
         lambda at: _slopes(law, points, at) / u[:, None],
-        least_squares.Params(precision=PRECISION),
     )
     values = _scaled(law, end.values, 1.0 / length, count)
     with np.errstate(all="ignore"):
@@ -251,7 +248,7 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
     amplitudes = tuple(
         Estimate(float(a), float(u), units[0]) for a, u in zip(values[:count], deviation[:count], strict=True)
     )
-    joint = Joint(law.parameters[1:], values[count:], covariance[count:, count:], units[1:])
+    joint = Joint(tuple(law.parameters)[1:], values[count:], covariance[count:, count:], units[1:])
     bic = chi2 + values.size * math.log(max(size, 2.0))
     return JointFit(law, joint, amplitudes, chi2, dof, bic, excess, saved, rejection)
 
@@ -266,7 +263,7 @@ def _start(joints: Sequence[Joint]) -> F8:
 
 def _scaled(law: Law, theta: F8, length_m: float, count: int) -> F8:
     """All parameters with lengths divided by ``length_m``."""
-    coefficients = law.rescaled(np.concatenate([[1.0], theta[count:]]), length_m)[1:]
+    coefficients = in_units(law, np.concatenate([[1.0], theta[count:]]), length_m=length_m)[1:]
     return np.concatenate([theta[:count] / length_m, coefficients])
 
 
@@ -280,8 +277,8 @@ def _message(names: tuple[str, ...], fits: Mapping[str, JointFit], selected: str
     if admissible:
         values = ", ".join(f"{name} = {value}" for name, value in best.coefficients.estimates().items()) or "none"
         rest = f"; {', '.join(admissible[1:])} would do as well" if len(admissible) > 1 else ""
-        return f"One damping law holds across {together}: {best.law.words} ({values}){rest}."
-    alike = [fit.law.words for fit in fits.values() if fit.rejection == "differ"]
+        return f"One damping law holds across {together}: {words_of(best.law)} ({values}){rest}."
+    alike = [words_of(fit.law) for fit in fits.values() if fit.rejection == "differ"]
     if alike:
-        return f"No common coefficients: {together} each follow {alike[0]}, with coefficients of their own."
-    return f"No one damping law holds across {together}; the least bad is {best.law.words}."
+        return f"No common coefficients: {together} each follow {alike[0]}, with different coefficients."
+    return f"No one damping law holds across {together}; the least bad is {words_of(best.law)}."

@@ -9,18 +9,15 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.damping.laws import Drag, Law
+from pipeline.damping.laws import Drag, Law, in_units, units_of
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import covariance_of, solve_weighted
 from pipeline.track import F8
 
-__all__ = ["LawFit", "Minimum", "Rejection", "mean_squared_rate", "minimum_of", "rates_of"]
+__all__ = ["LawFit", "Minimum", "Rejection", "joint_of", "mean_squared_rate", "minimum_of", "rates_of"]
 
 Rejection = Literal["", "misfit", "negative", "not converged"]
-
-# A hundredth of a standard uncertainty is left. One method is enough: a law that MINPACK loses has no chance.
-OPTIONS = least_squares.Params(precision=0.01, steps=40, again=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +60,7 @@ class LawFit:
         coefficient below zero.
     converged : bool
     rejection : {"", "misfit", "negative", "not converged"}
-        Why the law is rejected, if it is: chi-square is improbable, a coefficient is negative beyond three standard
+        Why the law is rejected, if it is: chi-square is improbable, a coefficient is negative by more than two standard
         uncertainties, or the fit did not converge.
     tried : str
         What was tried where the fit did not converge.
@@ -100,11 +97,11 @@ class LawFit:
 
     def amplitude(self, t: F8) -> F8:
         """Return (n,) float64, m, at times since the first sample used, s."""
-        return self.law.amplitude(t, self.joint.values)
+        return self.law.curve(t, self.joint.values)[0]
 
     def u_amplitude(self, t: F8) -> F8:
         """Return the standard uncertainty of :meth:`amplitude`, (n,) float64, m."""
-        jacobian = self.law.jacobian(t, self.joint.values)
+        _, jacobian = self.law.curve(t, self.joint.values)
         variance = np.einsum("ni,ij,nj->n", jacobian, self.joint.covariance, jacobian)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
@@ -117,18 +114,8 @@ class LawFit:
         return _relative_rate(self.law, self.joint.values)
 
     def by_parameters(self, f: Callable[[F8], F8 | float]) -> F8:
-        """Return the derivatives (p, ...) of a number or an array by the parameters of which it is a function.
-
-        Notes
-        -----
-        Central differences over a thousandth of each parameter's uncertainty, so that their error is far below it.
-        """
-        theta = self.joint.values
-        u = np.sqrt(np.maximum(np.diag(self.joint.covariance), 0.0))
-        steps = np.maximum(1e-3 * u, 1e-7 * np.abs(theta))
-        steps = np.where(steps > 0.0, steps, 1e-16)
-        shifts = zip(np.diag(steps), steps, strict=True)
-        return np.array([(np.asarray(f(theta + d)) - f(theta - d)) / (2.0 * h) for d, h in shifts])
+        """Return the derivatives (p, ...) of a number or an array by the parameters of which it is a function."""
+        return _slopes(f, self.joint.values, self.joint.covariance)
 
     def slopes_of_rate(self) -> F8:
         """Return the derivatives (p,) of :meth:`rate_at_start` by the parameters."""
@@ -141,23 +128,54 @@ class LawFit:
         return Estimate(self.rate_at_start(), math.sqrt(max(variance, 0.0)), "1/s")
 
 
+def joint_of(law: Law, theta: F8, covariance: F8) -> Joint:
+    """Return a law's parameters (p,) and their covariance (p, p) with names and units."""
+    return Joint(tuple(law.parameters), theta, covariance, units_of(law))
+
+
 def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
     """Return a law's -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
-    gradient = law.rate_jacobian(amplitude, theta)
-    variance = np.einsum("ni,ij,nj->n", gradient, covariance, gradient)
-    return law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+    gradient = _slopes(lambda at: law.rate(amplitude, at), theta, covariance)
+    variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
+    return -law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def _slopes(f: Callable[[F8], F8 | float], theta: F8, covariance: F8) -> F8:
+    """Derivatives (p, ...) by central differences over a thousandth of each parameter's uncertainty."""
+    u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    steps = np.maximum(1e-3 * u, 1e-7 * np.abs(theta))
+    steps = np.where(steps > 0.0, steps, 1e-16)
+    shifts = zip(np.diag(steps), steps, strict=True)
+    return np.array([(np.asarray(f(theta + d)) - f(theta - d)) / (2.0 * h) for d, h in shifts])
 
 
 def _relative_rate(law: Law, theta: F8) -> float:
     """-dA/dt over A at the first amplitude, 1/s."""
-    return float(law.rate(theta[:1], theta)[0] / theta[0])
+    return -float(law.rate(theta[:1], theta)[0] / theta[0])
 
 
 def mean_squared_rate(fit: LawFit, amplitude: F8) -> float:
-    """Return the mean of :math:`(\\dot A/A)^2` at a law's amplitudes (n,) m, weighted by :math:`A^2`, 1/s^2."""
+    """Return the mean by which drag lowers the square of the angular frequency, 1/s^2.
+
+    Parameters
+    ----------
+    fit : LawFit
+    amplitude : (n,) float64, m
+        Of the law; their squares are the weights.
+
+    Notes
+    -----
+    With :math:`r(A) = -\\dot A` it is taken as :math:`r r'/A`: :math:`\\gamma^2` for linear drag and nothing for dry
+    friction, whose half-cycles all last as long as without it; both exactly. For quadratic drag the exact motion has
+    1.85 :math:`(r/A)^2` in place of 2.
+    """
     power = float(amplitude @ amplitude)
-    rate = fit.law.rate(amplitude, fit.joint.values)
-    return float(rate @ rate) / power if power > 0.0 else 0.0
+    if not power > 0.0:
+        return 0.0
+    theta, step = fit.joint.values, 1e-4 * amplitude
+    rate = -fit.law.rate(amplitude, theta)
+    slope = fit.law.rate(amplitude - step, theta) - fit.law.rate(amplitude + step, theta)
+    return float(np.sum(rate * slope)) / (2e-4 * power)
 
 
 def minimum_of(law: Law, t: F8, y: F8, u: F8) -> Minimum:
@@ -186,20 +204,20 @@ def minimum_of(law: Law, t: F8, y: F8, u: F8) -> Minimum:
     at, inverse_u = y / u, length / u
 
     def both(theta: F8) -> tuple[F8, F8]:
-        amplitude, by = law.both(t, theta)
+        amplitude, by = law.curve(t, theta)
         return amplitude * inverse_u - at, by * inverse_u[:, None]
 
     def in_metres(theta: F8) -> F8:
-        return law.rescaled(theta, 1.0 / length)
+        return in_units(law, theta, length_m=1.0 / length)
 
     residuals, jacobian = least_squares.evaluated_once(both)
-    fit = least_squares.minimise(residuals, law.guess(t, y / length), jacobian, OPTIONS)
+    fit = least_squares.minimise(residuals, law.guess(t, y / length), jacobian)
     with np.errstate(all="ignore"):
         theta = in_metres(fit.values)
         if fit.converged:
             turn = least_squares.central_differences(in_metres, fit.values)
             return Minimum(theta, turn @ fit.covariance @ turn.T, fit.cost, True, "")
-        covariance = covariance_of(law.jacobian(t, theta) / u[:, None])
+        covariance = covariance_of(law.curve(t, theta)[1] / u[:, None])
     return Minimum(
         theta, covariance, fit.cost, False, f"{fit.steps} steps of Levenberg-Marquardt from the law's own guess"
     )

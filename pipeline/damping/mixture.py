@@ -1,4 +1,4 @@
-"""Mixed drag: whether a record demands two kinds of drag or friction at once, though no law may fit it to the noise."""
+"""Mixed drag: whether a recording needs two kinds of drag or friction together, even where no law fits."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pipeline.damping.evidence import NEGATIVE
 from pipeline.damping.laws import Drag
 from pipeline.damping.select import Damping, LawFit
 
 __all__ = ["MixedDrag", "Params", "find_mixed"]
+
+PRESENT = 3.0  # standard uncertainties above zero that a term must have: a probability of 0.0013 if it is truly zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,15 +75,15 @@ def find_mixed(damping: Damping, params: Params | None = None) -> MixedDrag | No
         return None
     best = min(mixtures, key=lambda fit: fit.bic)
     against = {fit.name: _excess(fit, best) for fit in alone}
-    rivals = [fit for fit in mixtures if not set(best.law.parameters) <= set(fit.law.parameters)]
+    rivals = [fit for fit in mixtures if not set(best.joint.names) <= set(fit.joint.names)]
     if min(against.values()) <= params.evidence or any(_excess(fit, best) <= params.rival for fit in rivals):
         return None
     return MixedDrag(best, against)
 
 
 def _positive(fit: LawFit) -> bool:
-    terms = [fit.joint[name] for name in fit.law.parameters[1:]]
-    return fit.converged and all(term.value > NEGATIVE * term.u for term in terms)
+    terms = [fit.joint[name] for name in fit.joint.names[1:]]
+    return fit.converged and all(term.value > PRESENT * term.u for term in terms)
 
 
 def _chi2(fit: LawFit) -> float:

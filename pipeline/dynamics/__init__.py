@@ -1,8 +1,8 @@
 """The equation of motion, the integrators that solve it, and the step halving that shows their error.
 
-In comes a scene or an equation with a start; out goes a trajectory with its stated error (``halving.py``). A newcomer
-adds an integrator: one entry in ``methods.py`` and in ``INTEGRATORS``, and it must pass
-tests/conformance/test_integrators.py by its name.
+In: a scene, or an equation with an initial state. Out: a trajectory with its stated error (``halving.py``). To add an
+integrator, add one entry to ``methods.py`` and to ``INTEGRATORS``; it must pass tests/conformance/test_integrators.py
+under its name.
 
 Examples
 --------

@@ -51,7 +51,7 @@ def stopping_time(start: float, gamma: float, beta: float, mu: float) -> float:
     Notes
     -----
     The numerator of the closed form is 0 where :math:`\\tanh(\\kappa t)/\\kappa = A_0/(\\mu + \\gamma A_0/2)` with
-    :math:`\\kappa^2 = \\gamma^2/4 - \\beta\\mu`, a tangent where that is negative.
+    :math:`\\kappa^2 = \\gamma^2/4 - \\beta\\mu`, with tan in place of tanh if that is negative.
 
     Examples
     --------

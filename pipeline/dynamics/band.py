@@ -164,7 +164,9 @@ def _normal(joint: Joint, members: int, seed: int) -> F8:
     from scipy.special import ndtri
 
     u = np.sqrt(np.diag(joint.covariance))
-    correlation = _correlation(joint) + 1e-12 * np.eye(u.size)  # of 1 is as good as its square root without rounding
+    correlation = _correlation(joint) + 1e-12 * np.eye(
+        u.size
+    )  # a correlation of 1 needs it: its matrix has no Cholesky factor
     shares = np.tile((np.arange(members) + 0.5) / members, (u.size, 1))
     normal = ndtri(np.random.default_rng(seed).permuted(shares, axis=1))
     return np.asarray((np.linalg.cholesky(correlation) @ normal).T)

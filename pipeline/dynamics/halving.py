@@ -48,7 +48,7 @@ class Solution:
         Stated errors of displacement and velocity over the starting amplitude, and over that times the angular
         frequency, with what the terms left out may change; None where halving shows nothing of them.
     no_estimate : str
-        Why there is none; empty where there is one.
+        Why there is no estimate; empty if there is one.
     running_s : float
         What the returned run took, s.
     terms : tuple of Term
@@ -282,5 +282,5 @@ def _difference(one: Trajectory, other: Trajectory) -> tuple[float, float]:
 
 
 def _needed(integrator: Integrator, steps: int, times: float) -> float:
-    """Return how many steps an error that is so many times less takes, by the order of the method."""
+    """Return the number of steps for an error smaller by this factor, from the order of the method."""
     return float(steps * times ** (1.0 / integrator.order)) if integrator.order else 0.0

@@ -45,8 +45,8 @@ class Integrator(ABC):
     words: str
     order: int
 
-    def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - some take only certain problems
-        """Return why it cannot solve this problem; empty where it can."""
+    def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - some integrators override this
+        """Return why the integrator cannot solve this problem; empty if it can."""
         return ""
 
     def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - for some it depends on the problem
@@ -59,7 +59,7 @@ class Integrator(ABC):
 
     @abstractmethod
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        """Return displacements and velocities (n,) of a problem in units of its amplitude, every so many steps."""
+        """Return displacements and velocities (n,) in units of the amplitude, once per ``every`` steps."""
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
         """Solve a problem: check what is asked, march in units of the amplitude, check what came.

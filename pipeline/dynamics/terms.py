@@ -45,7 +45,7 @@ class Term:
 
 
 def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Problem, tuple[Term, ...]]:
-    """Return the problem without the terms that the tolerance does not require, and what became of each.
+    """Return the problem without the terms that the tolerance does not require, and the decision on each term.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def _kept(sizes: dict[str, float], tolerance: float) -> set[str]:
 def _why(acts: bool, kept: bool, size: float, tolerance: float) -> str:
     if not acts:
         return "the scene has none"
-    told = f"up to {min(size, 1.0):.1g} of the amplitude"
+    text = f"up to {min(size, 1.0):.1g} of the amplitude"
     if kept:
-        return f"it changes the motion by {told}, more than its share of the tolerance {tolerance:g}"
-    return f"it changes the motion by {told}, less than its share of the tolerance {tolerance:g}"
+        return f"it changes the motion by {text}, more than its share of the tolerance {tolerance:g}"
+    return f"it changes the motion by {text}, less than its share of the tolerance {tolerance:g}"

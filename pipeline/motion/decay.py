@@ -17,12 +17,7 @@ from pipeline.track import F8
 
 __all__ = ["DecayFit", "best_decay", "critical_decay", "lone_exponential"]
 
-# A hundredth of a standard uncertainty is left. One attempt is enough: starts are many.
-ROUGH = least_squares.Params(precision=0.1, steps=15, again=False)
-FINE = least_squares.Params(precision=0.01, steps=40, again=False)
 FAR = 20.0
-FINISHED = 2  # of the starts, the best, also where the steps were too few
-EACH = 2  # starts of each kind of damping
 DIFFERENCE = 1e-5  # of a rate, by which it is moved for the covariance
 
 Shape = Callable[[F8, F8], F8]
@@ -99,16 +94,16 @@ def best_decay(tau: F8, y: F8, noise: float, rate_hz: float) -> DecayFit | None:
     has the two rates :math:`g \\mp \\sqrt q` for q > 0.
     """
     starts = _grid(tau, y, noise, rate_hz)
-    ends = sorted((_search(_motion, tau, y, noise, start, ROUGH) for start in starts), key=lambda end: end.cost)
+    ends = [_search(_motion, tau, y, noise, start) for start in starts]
     # Two rates of which the record knows one make a valley without a floor; on its side there may be a minimum.
-    tried = ends[:FINISHED] + [end for end in ends[FINISHED:] if end.converged]
-    fits = (_decay(tau, y, noise, end.values) for end in tried)
-    return next((fit for fit in fits if fit is not None), None)
+    minima = [end for end in ends if end.converged]
+    return _described(tau, y, noise, min(minima, key=lambda end: end.cost)) if minima else None
 
 
 def critical_decay(tau: F8, y: F8, near: DecayFit) -> DecayFit | None:
     """Return the critically damped motion near another; None where it was not found."""
-    return _decay(tau, y, near.noise, near.theta[3:4])
+    end = _search(_motion, tau, y, near.noise, near.theta[3:4])
+    return _described(tau, y, near.noise, end) if end.converged else None
 
 
 def lone_exponential(tau: F8, y: F8, noise: float, rate: float) -> tuple[float, float]:
@@ -117,25 +112,23 @@ def lone_exponential(tau: F8, y: F8, noise: float, rate: float) -> tuple[float, 
     Where the record shows no such rate the search runs away; it is followed for :data:`FAR` powers of e.
     """
     start = math.log(rate)
-    end = _search(_exponential, tau, y, noise, np.array([start]), FINE)
+    end = _search(_exponential, tau, y, noise, np.array([start]))
     return math.exp(min(max(float(end.values[0]), start - FAR), start + FAR)), end.cost
 
 
-def _decay(tau: F8, y: F8, noise: float, start: F8) -> DecayFit | None:
-    end = _search(_motion, tau, y, noise, start, FINE)
-    if not end.converged:
-        return None
+def _described(tau: F8, y: F8, noise: float, end: least_squares.Fit) -> DecayFit:
+    """A fit with the linear parameters, and the covariance of all."""
     design = _motion(tau, end.values)
     linear = solve_weighted(design, y, np.ones(y.size)).values
     moved = [
         (_motion(tau, end.values + step) - _motion(tau, end.values - step)) @ linear / (2.0 * DIFFERENCE)
-        for step in DIFFERENCE * np.eye(start.size)
+        for step in DIFFERENCE * np.eye(end.values.size)
     ]
     covariance = covariance_of(np.column_stack([design, *moved]) / noise)
     return DecayFit(np.concatenate([linear, end.values]), covariance, end.cost, noise)
 
 
-def _search(shape: Shape, t: F8, y: F8, noise: float, start: F8, options: least_squares.Params) -> least_squares.Fit:
+def _search(shape: Shape, t: F8, y: F8, noise: float, start: F8) -> least_squares.Fit:
     """Fit what does not enter linearly, by what the best linear parameters leave (n,)."""
 
     def residuals(theta: F8) -> F8:
@@ -145,7 +138,7 @@ def _search(shape: Shape, t: F8, y: F8, noise: float, start: F8, options: least_
         base = np.linalg.qr(design)[0]
         return np.asarray((y - base @ (base.T @ y)) / noise)
 
-    return least_squares.minimise(residuals, start, params=options)
+    return least_squares.minimise(residuals, start)
 
 
 def _grid(tau: F8, y: F8, noise: float, rate_hz: float) -> F8:
@@ -157,7 +150,7 @@ def _grid(tau: F8, y: F8, noise: float, rate_hz: float) -> F8:
     rows = np.unique(np.concatenate([np.arange(min(60, tau.size)), np.geomspace(1, tau.size, 240).astype(int) - 1]))
     share = np.sqrt(np.gradient(rows.astype(np.float64)))[:, None]
 
-    def best(shape: Shape, thetas: F8, keep: int) -> F8:
+    def best(shape: Shape, thetas: F8, keep: int = 2) -> F8:
         base = np.linalg.qr(np.array([shape(tau[rows], theta) * share for theta in thetas]))[0]
         explained = np.sum((base.transpose(0, 2, 1) @ (y[rows] * share[:, 0])) ** 2, axis=1)
         return np.asarray(thetas[np.argsort(-explained)[:keep]])
@@ -169,7 +162,7 @@ def _grid(tau: F8, y: F8, noise: float, rate_hz: float) -> F8:
     near = np.array([(g, g * g * (1.0 - x)) for g in rates for x in (0.04, 0.3)])
     turning = np.array([(g, g * g * (1.0 + x * x)) for g in rates for x in (0.4, 1.0, 2.0, 4.0, 8.0, 16.0)])
     apart = np.stack([0.5 * (slow + fast), slow * fast], axis=1)
-    return np.concatenate([best(_motion, np.log(kind), EACH) for kind in (apart, near, turning)])
+    return np.concatenate([best(_motion, np.log(kind)) for kind in (apart, near, turning)])
 
 
 def _exponential(t: F8, theta: F8) -> F8:

@@ -13,25 +13,32 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.damping.laws import LAWS, Drag
+from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.select import Damping
 from pipeline.damping.select import Params as DampingParams
 from pipeline.motion.equation_model import COEFFICIENTS, STATE, envelope
-from pipeline.motion.equation_search import Search
+from pipeline.motion.equation_search import (
+    Cleaned,
+    Samples,
+    choose_law,
+    first_solution,
+    full,
+    samples_of,
+    without_echoes,
+)
 from pipeline.motion.phase import PhaseFit, wrapped
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.quantity import amount
-from pipeline.numerics.robust import median
-from pipeline.oscillation.condition import Conditioned
-from pipeline.oscillation.demodulate import Demodulated
-from pipeline.track import F8, U8, Quality
+from pipeline.samples.condition import Conditioned
+from pipeline.samples.stopping import stop_row
+from pipeline.track import U8, Quality
+from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["EquationFit", "EquationMisfit", "Params", "fit_equation", "moving_part"]
+__all__ = ["EquationFit", "EquationMisfit", "Params", "fit_equation"]
 
 STATE_UNITS = ("m", "m", "m/s", "rad/s")
-BLOCK = 25  # samples over which a bob is seen to move or not
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +107,8 @@ class EquationFit:
 
         Notes
         -----
-        Of the undamped :math:`\\omega_0` the frequency is :math:`\\sqrt{\\omega_0^2 - \\overline{\\lambda^2}}` with
-        the mean of :math:`(\\dot A/A)^2`: what a line through the phases shows, to second order.
+        The square of the frequency is that of the undamped :math:`\\omega_0` less what drag takes, see
+        :meth:`pipeline.damping.select.Damping.squared_rate`: what a line through turning points shows, to second order.
         """
         t, (_, y, v, natural) = demodulated.t, self.state.values.tolist()
         omega = math.sqrt(natural**2 - self.damping.squared_rate(t))
@@ -128,7 +135,7 @@ class EquationFit:
         )
 
     def windows(self, demodulated: Demodulated) -> Demodulated:
-        """Return the windows with what the solution leaves: a sinusoid of their own fails where the bob stops."""
+        """Return the windows with the residuals of the solution: a sinusoid per window fails where the bob stops."""
         noise = np.full(demodulated.noise.shape, self.waveform.rms_m)
         return replace(demodulated, flags=self.flags, residual=self.waveform.residual, noise=noise)
 
@@ -136,48 +143,6 @@ class EquationFit:
         """Return the rest position, one for the whole record: where friction holds the bob is another."""
         rest = self.state["rest"]
         return Rest(rest, 0.0, False, demodulated.t, np.full(demodulated.t.size, rest.value))
-
-
-def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
-    """Return the record up to where its bob stops for good; None where it moves for a share of the record, or never.
-
-    A bob that friction stops early leaves a record in whose spectrum the oscillation drowns.
-    """
-    if (stop := _stop_row(conditioned)) is None:
-        return None
-    rows = np.flatnonzero(conditioned.used)
-    if not np.count_nonzero(rows < stop) < share * rows.size:
-        return None
-    track = conditioned.track
-    cut = replace(track, t=track.t[:stop], y=track.y[:stop], flags=track.flags[:stop], velocity=None)
-    return replace(conditioned, track=cut, flags=conditioned.flags[:stop])
-
-
-def _stop_row(conditioned: Conditioned) -> int | None:
-    """Index of the sample by which the bob has stopped for good; None where it moves to the end, or never."""
-    rows = np.flatnonzero(conditioned.used)
-    count = rows.size // BLOCK
-    noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)
-    if count < 8 or not noise > 0.0:
-        return None
-    y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
-    end = median(y[blocks[-max(count // 10, 2) :]].ravel())
-    # Of a sensor that counts, distances are whole steps: two of them are two in every unit, however that rounds.
-    least = (2.0 + 1e-6) * noise
-    # Most bobs move at the end of their record, and the last blocks say so.
-    if _away(y[blocks[-4:]], end).max() > least:
-        return None
-    moving = np.flatnonzero(_away(y[blocks], end) > least)
-    # A few blocks that deep noise lifts are no motion: of those before the stop a share must stand off.
-    if moving.size < 3 or moving.size < 0.3 * (moving[-1] + 1):
-        return None
-    return int(blocks[int(moving[-1]) + 2, 0])
-
-
-def _away(blocks: F8, end: float) -> F8:
-    """Median distance of each block's samples from where the record ends, m."""
-    # The middle one of an odd number; the library's median takes ten times as long for a few blocks.
-    return np.asarray(np.partition(np.abs(blocks - end), BLOCK // 2, axis=1)[:, BLOCK // 2])
 
 
 def fit_equation(
@@ -222,8 +187,8 @@ def fit_equation(
     """
     params, laws = params or Params(), laws or DampingParams()
     ratio = damping.best.rate_at_start() / demodulated.angular_frequency
-    names, unit = _fittable(damping), conditioned.track.unit
-    if not names or not _required(damping, demodulated, ratio, params, stopped=stopped):
+    drags, unit = _fittable(damping), conditioned.track.unit
+    if not drags or not _required(damping, demodulated, ratio, params, stopped=stopped):
         return None
     periods = demodulated.angular_frequency / (2.0 * math.pi) * float(np.ptp(demodulated.t))
     if ratio <= params.least_damping and periods > params.most_periods:
@@ -232,26 +197,28 @@ def fit_equation(
             f"periods the equation of motion takes too long to solve (at most {params.most_periods}); the averaged "
             "law stands"
         )
-    search = Search.of(conditioned, demodulated, damping, names, _stop_row(conditioned), params.clip_sigmas)
-    search.clean()
-    if math.isinf(search.noise_m):
+    samples = samples_of(conditioned, demodulated, damping, stop_row(conditioned))
+    start, richest = first_solution(samples, demodulated, damping, drags, params.misfit), drags[-1]
+    cleaned = without_echoes(samples, richest, start, params.clip_sigmas)
+    if cleaned is None:
         return EquationMisfit(
             f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err, and no motion with "
-            f"{LAWS[search.richest].words} comes near the samples: the averaged law stands"
+            f"{richest.words} comes near the samples: the averaged law stands"
         )
-    if not search.noise_m <= params.misfit * search.expected_m:
+    if not cleaned.noise_m <= params.misfit * samples.expected_m:
         return EquationMisfit(
             f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err, and the equation of "
-            f"motion with {LAWS[search.richest].words} leaves {amount(search.noise_m, unit)} where samples scatter by "
-            f"{amount(search.expected_m, unit)}: the averaged law stands"
+            f"motion with {richest.words} leaves {amount(cleaned.noise_m, unit)} where samples scatter by "
+            f"{amount(samples.expected_m, unit)}: the averaged law stands"
         )
-    chosen = search.choose(laws)
+    chosen = choose_law(samples, cleaned, damping, drags, laws)
     if chosen is None:
         return EquationMisfit(f"the damping ratio is {ratio:.2g} at the start, and no fit of the equation converged")
-    found = _described(search, *chosen)
+    law = next(drag for drag in drags if drag.name == chosen[0].selected)
+    found = _described(samples, cleaned, law, *chosen)
     if found.damping.best.rate_at_start() < 0.0:
         return EquationMisfit(
-            f"the bob stops within the record, but the equation of motion with {LAWS[found.damping.selected].words} "
+            f"the bob stops within the record, but the equation of motion with {law.words} "
             "would let it swing up: no damping ended this motion, and the averaged law stands"
         )
     if not found.damping.squared_rate(demodulated.t) < found.state["angular_frequency"].value ** 2:
@@ -259,41 +226,41 @@ def fit_equation(
     return found
 
 
-def _fittable(damping: Damping) -> list[str]:
-    """Names of the laws to be fitted that have an equation of motion, the richest last."""
-    names = [n for n in LAWS if (n in damping.fits or n in damping.unfitted) and isinstance(LAWS[n], Drag)]
-    return sorted((n for n in names if n != "none"), key=lambda name: len(LAWS[name].parameters))
+def _fittable(damping: Damping) -> list[Drag]:
+    """The laws to be fitted that have an equation of motion with damping, the richest last."""
+    wanted = [law for law in DRAGS if law.powers and (law.name in damping.fits or law.name in damping.unfitted)]
+    return sorted(wanted, key=lambda law: len(law.powers))
 
 
 def _required(damping: Damping, demodulated: Demodulated, ratio: float, params: Params, *, stopped: bool) -> bool:
     if stopped or ratio > params.always:
         return True
-    if damping.selected in ("none", "linear"):
-        return False
+    best = damping.best.law
+    if isinstance(best, Drag) and set(best.powers) <= {1}:
+        return False  # the amplitude's law is exact
     last = damping.best.amplitude(np.array([float(np.max(demodulated.t)) - damping.t0]))
     return ratio > params.least_damping or bool(last[0] <= 0.0)
 
 
-def _described(search: Search, damping: Damping, fit: least_squares.Fit) -> EquationFit:
+def _described(samples: Samples, cleaned: Cleaned, law: Drag, damping: Damping, fit: least_squares.Fit) -> EquationFit:
     """Return the result at every sample."""
-    theta = search.full(damping.selected, fit.values)
-    every = search.model(np.ones(search.used.size, np.bool_))
+    conditioned, every, theta = samples.conditioned, samples.model(), full(law, fit.values)
     position, velocity = every.position(theta), every.velocity(theta)
-    residual = search.conditioned.track.y - position
-    rms = math.sqrt(float(np.mean(residual[search.used] ** 2)))
-    flags = search.conditioned.flags.copy()
-    dropped = search.within & ~search.used
-    plateau = dropped & search.conditioned.near_plateau(position, search.noise_m)
+    residual = conditioned.track.y - position
+    rms = math.sqrt(float(np.mean(residual[cleaned.used] ** 2)))
+    flags = conditioned.flags.copy()
+    dropped = samples.within & ~cleaned.used
+    plateau = dropped & conditioned.near_plateau(position, cleaned.noise_m)
     flags[plateau] |= np.uint8(Quality.CLIPPED)
     flags[dropped & ~plateau] |= np.uint8(Quality.FALSE_ECHO)
     count = len(STATE)
-    state = Joint(STATE, fit.values[:count], fit.covariance[:count, :count] * search.correlation, STATE_UNITS)
-    law, ratio = LAWS[damping.selected].words, damping.best.rate_at_start() / state["angular_frequency"].value
-    stops = damping.best.amplitude(np.array([np.max(search.elapsed)]))[0] <= 0.0
+    state = Joint(STATE, fit.values[:count], fit.covariance[:count, :count] * cleaned.correlation, STATE_UNITS)
+    ratio = damping.best.rate_at_start() / state["angular_frequency"].value
+    stops = damping.best.amplitude(np.array([np.max(samples.elapsed)]))[0] <= 0.0
     why = (
         f"the damping ratio is {ratio:.2g} at the first sample"
         + (" and friction ends the motion within the record" if stops else "")
-        + f": the equation of motion with {law} was fitted to the samples; it leaves "
-        + amount(rms, search.conditioned.track.unit)
+        + f": the equation of motion with {law.words} was fitted to the samples; it leaves "
+        + amount(rms, conditioned.track.unit)
     )
     return EquationFit(why, damping, state, Waveform(position, partial(np.asarray, velocity), residual, rms), flags)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.dynamics import Equation, Problem, Trajectory
 from pipeline.dynamics.equation import Real
 from pipeline.dynamics.strang import STRANG
@@ -14,7 +15,6 @@ from pipeline.track import F8
 __all__ = ["COEFFICIENTS", "STATE", "FreeMotion", "envelope"]
 
 STATE = ("rest", "displacement", "velocity", "angular_frequency")
-COEFFICIENTS = ("mu", "gamma", "beta")
 STEP = 0.08  # of the oscillation's angle: splitting and interpolation then err by less than 1e-4 of the amplitude
 REACH = 3.0  # factor by which a frequency may leave that of the start
 DIFFERENCE = 1e-6  # of each coefficient's scale, by which it is moved for a derivative
@@ -77,8 +77,6 @@ class FreeMotion:
         About the angular frequency, rad/s: it sets the integrator's step.
     amplitude_m : float
         About the first amplitude, m, for the size of differences.
-    step : float
-        Of the integrator, rad.
 
     Notes
     -----
@@ -87,9 +85,9 @@ class FreeMotion:
     coefficient of a few standard uncertainties feels.
     """
 
-    def __init__(self, t: F8, omega: float, amplitude_m: float, step: float = STEP) -> None:
+    def __init__(self, t: F8, omega: float, amplitude_m: float) -> None:
         self.t, self._omega = t, omega
-        self._spacing = step / omega
+        self._spacing = STEP / omega
         self._steps = max(2, math.ceil(float(np.max(t)) / self._spacing))
         self._kept: dict[bytes, Trajectory] = {}
         rate = 0.01 * omega

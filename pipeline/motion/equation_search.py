@@ -1,301 +1,311 @@
-"""Search for the solution of the equation of motion that a record follows: starts, false echoes, laws."""
+"""Search for the solution of the equation of motion that a record follows: start, false echoes, law.
+
+1. :func:`samples_of` collects what a solution is compared with.
+2. :func:`first_solution` fits the richest law from the first start that leads to one that stands.
+3. :func:`without_echoes` fits it until the set of false echoes stays; its residual is the noise.
+4. :func:`choose_law` fits the other laws to the same samples and chooses among all.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.damping.evidence import choose, least_chi2, weigh
+from pipeline.damping.evidence import NEGATIVE, least_chi2, weigh
 from pipeline.damping.law_fit import Minimum
-from pipeline.damping.laws import LAWS
-from pipeline.damping.select import Damping, LawFit
+from pipeline.damping.laws import Drag
+from pipeline.damping.select import Damping, LawFit, select_law
 from pipeline.damping.select import Params as DampingParams
-from pipeline.motion.equation_model import COEFFICIENTS, STATE, STEP, FreeMotion, envelope
+from pipeline.motion.equation_model import COEFFICIENTS, STATE, FreeMotion, envelope
 from pipeline.numerics import least_squares
+from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import mad_sigma
-from pipeline.oscillation.condition import Conditioned
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE
+from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["Search"]
+__all__ = ["Cleaned", "Samples", "choose_law", "first_solution", "full", "samples_of", "without_echoes"]
 
-NAMES = (*STATE, *COEFFICIENTS)
-PRECISION = 0.01  # of the standard uncertainties, at which a fit stops
-FEW = 6  # windows under which the laws of the amplitude say too little to start from
-COARSE, ROUGH, FIRST_STEPS = 0.2, 0.1, 30  # step in rad, precision and most steps while a start is looked for
-SETTLED = 1.05  # times the noise: what a fit of the richest law may leave and need no other start
-HOPELESS = 1000.0  # rise of chi-square, to first order, from which a law is not fitted any more
+COUNT = len(STATE) + len(COEFFICIENTS)
 
 
-class Search:
-    """One record: what is compared, and with which samples.
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """What a solution is compared with.
 
     Parameters
     ----------
     conditioned : Conditioned
+    elapsed : (n,) float64, s
+        Since the first sample used, and within the samples used.
+    within : (n,) bool
+        Usable samples of the moving bob: at rest they show noise alone, and in their number hide what the moving ones
+        do not fit.
     used : (n,) bool
-        The samples to begin with.
-    damping : Damping
-        The laws of the amplitude.
-    theta : (7,) float64
-        Rest position, displacement, velocity, angular frequency and the coefficients to begin with.
-    laws : list of str
-        Names of the laws to be fitted, the richest last.
-    stop : int or None
-        Index of the sample by which the bob has stopped for good.
+        Those of them that the windows used; false echoes that the solution explains come back later.
+    stopped : bool
+        Whether the bob stops within the record and stays at rest.
+    omega : float
+        About the angular frequency, rad/s.
+    size_m, expected_m : float
+        About the first amplitude, and the noise of one sample.
     """
 
-    def __init__(
+    conditioned: Conditioned
+    elapsed: F8
+    within: NDArray[np.bool_]
+    used: NDArray[np.bool_]
+    stopped: bool
+    omega: float
+    size_m: float
+    expected_m: float
+
+    def model(self, rows: NDArray[np.bool_] | slice = slice(None)) -> FreeMotion:
+        """Return the motion at some samples, all by default."""
+        return FreeMotion(self.elapsed[rows], self.omega, self.size_m)
+
+    def fit(
         self,
-        conditioned: Conditioned,
-        used: NDArray[np.bool_],
-        damping: Damping,
-        theta: F8,
-        laws: list[str],
-        stop: int | None,
-    ) -> None:
-        self.conditioned, self.damping, self.laws = conditioned, damping, laws
-        self.richest = laws[-1]
-        self.theta = theta
-        quantum = (conditioned.quantum_m or 0.0) / math.sqrt(12.0)
-        floor = 1e-9 * float(np.hypot(theta[1], theta[2] / theta[3]))
-        self.expected_m = self.noise_m = max(conditioned.noise_m, quantum, floor)
-        self.clip_sigmas, self.step = 4.0, STEP
-        # Samples of a bob at rest show noise alone, and in their number hide what the moving ones do not fit.
-        self.stopped = stop is not None
-        self.within = conditioned.used & (np.arange(used.size) < (used.size if stop is None else stop))
-        self.used = used & self.within
-        track = conditioned.track
-        last = float(np.max(track.t[conditioned.used]))
-        inside = np.clip(np.where(np.isfinite(track.t), track.t, damping.t0), damping.t0, last) - damping.t0
-        self.elapsed: F8 = inside
-        self.size_m = float(np.hypot(theta[1], theta[2] / theta[3]))
-
-    @classmethod
-    def of(
-        cls,
-        conditioned: Conditioned,
-        demodulated: Demodulated,
-        damping: Damping,
-        laws: list[str],
-        stop: int | None,
-        clip_sigmas: float,
-    ) -> Search:
-        """Start from the windows: of their false echoes, those that the model explains come back later."""
-        omega, first = demodulated.angular_frequency, damping.best.joint.values[0]
-        angle = float(demodulated.phase[0]) - omega * (float(demodulated.t[0]) - damping.t0)
-        rest = float(np.average(demodulated.offset, weights=np.maximum(demodulated.amplitude, 0.0) ** 2))
-        task = cls(
-            conditioned,
-            (demodulated.flags & UNUSABLE) == 0,
-            damping,
-            np.array([rest, first * math.cos(angle), -first * omega * math.sin(angle), omega, 0.0, 0.0, 0.0]),
-            laws,
-            stop,
-        )
-        task.clip_sigmas = clip_sigmas
-        task.step = COARSE
-        task.theta = task.first(demodulated)
-        task.step = STEP
-        return task
-
-    def first(self, demodulated: Demodulated) -> F8:
-        """Return the richest law's fit from the best two of what the amplitude's laws, or a grid of them, say."""
-        starts = []
-        for name in self.laws:
-            law, fit = LAWS[name], self.damping.fits.get(name)
-            if fit is None and demodulated.t.size < len(law.parameters):
-                continue
-            values = (
-                law.guess(demodulated.t - self.damping.t0, demodulated.amplitude) if fit is None else fit.joint.values
-            )
-            theta = self.theta.copy()
-            theta[self.slots(name)[len(STATE) :]] = np.maximum(values[1:], 0.0)
-            starts.append(theta)
-        if demodulated.t.size < FEW or self.stopped:
-            starts += self.grid()
-        model, y = self.model(), self.conditioned.track.y[self.used]
-        costs = [float(np.sum((model.position(theta) - y) ** 2)) for theta in starts]
-        best = np.argsort(np.where(np.isfinite(costs), costs, np.inf))[
-            : 4 if self.stopped or demodulated.t.size < FEW else 1
-        ]
-        ends = [self.fit(self.richest, starts[i], ROUGH, FIRST_STEPS) for i in best]
-        end = min(ends, key=lambda end: end.cost)
-        if self.stopped and not self.settled(end):
-            # Where friction ends the motion the number of swings is whole, and each number has a minimum of its own.
-            others = self.exchanged(self.full(self.richest, end.values)) + self.by_friction(starts[int(best[0])])
-            tried = [self.fit(self.richest, start, ROUGH, FIRST_STEPS) for start in others]
-            end = min([end, *tried], key=lambda end: end.cost)
-        return self.full(self.richest, end.values)
-
-    def settled(self, end: least_squares.Fit) -> bool:
-        """Whether a fit leaves noise alone with no term that drives: no other minimum can be better."""
-        rms = math.sqrt(end.cost / max(int(np.count_nonzero(self.used)) - len(NAMES), 1))
-        least = -2.0 * np.sqrt(np.diag(end.covariance))
-        return rms < SETTLED and bool(np.all((end.values > least)[len(STATE) :]))
-
-    def by_friction(self, theta: F8) -> list[F8]:
-        """Return where the simpler laws with friction end: none of their terms hides in another's negative."""
-        slot = NAMES.index("mu")
-        # Friction alone that takes as much as all terms do, at half the first amplitude.
-        share = (0.5 * self.size_m) ** np.array([0.0, 1.0, 2.0])
-        start = theta.copy()
-        start[len(STATE) :] = 0.0
-        start[slot] = float(np.maximum(theta[len(STATE) :], 0.0) @ share)
-        names = [n for n in self.laws if "mu" in LAWS[n].parameters and n != self.richest]
-        return [self.full(name, self.fit(name, start, ROUGH, FIRST_STEPS).values) for name in names]
-
-    def exchanged(self, theta: F8) -> list[F8]:
-        """Return starts with one kind of damping put in place of another, alike at half the first amplitude."""
-        share = (0.5 * self.size_m) ** np.array([-1.0, 0.0, 1.0])
-        rates = np.maximum(theta[len(STATE) :], 0.0) * share
-        found = []
-        present = [NAMES.index(c) - len(STATE) for c in LAWS[self.richest].parameters[1:]]
-        for one in present:
-            others = [j for j in present if j != one]
-            for weights in ((1.0, 0.0), (0.0, 1.0), (0.5, 0.5))[: 3 if len(others) == 2 else 1]:
-                moved = rates.copy()
-                moved[one] = 0.0
-                for other, weight in zip(others, weights, strict=False):
-                    moved[other] += weight * rates[one]
-                start = theta.copy()
-                start[len(STATE) :] = moved / share
-                found.append(start)
-        return found
-
-    def grid(self) -> list[F8]:
-        """Return starts from the first samples' parabola, for each kind of damping and a range of its strength."""
-        y = self.conditioned.track.y[self.used]
-        tau = self.elapsed[self.used]
-        rest = float(np.median(y[-max(y.size // 10, 5) :]))
-        omega = float(self.theta[3])
-        early = tau < 0.8 / omega
-        found: list[F8] = []
-        if np.count_nonzero(early) < 5:
-            return found
-        speed, level = np.polynomial.polynomial.polyfit(tau[early], y[early] - rest, 2)[1::-1]
-        scale = np.array([np.hypot(level, speed / omega) * omega, omega, omega / np.hypot(level, speed / omega)])
-        for near in (0.9, 1.0, 1.1):
-            for ratio in (0.03, 0.06, 0.1, 0.15, 0.25):
-                for kind in range(3):
-                    theta = np.array([rest, level, speed, near * omega, 0.0, 0.0, 0.0])
-                    theta[len(STATE) + kind] = ratio * scale[kind]
-                    found.append(theta)
-        return found
-
-    def model(self, rows: NDArray[np.bool_] | None = None) -> FreeMotion:
-        """Return the motion at the samples used, or at others."""
-        return FreeMotion(
-            self.elapsed[self.used if rows is None else rows], float(self.theta[3]), self.size_m, self.step
-        )
-
-    def clean(self, rounds: int = 3) -> None:
-        """Fit the richest law until the set of false echoes stays; its residual is the noise, infinite without any."""
-        every = np.ones(self.used.size, np.bool_)
-        for _ in range(rounds):
-            fit = self.fit(self.richest, self.theta)
-            self.theta = self.full(self.richest, fit.values)
-            whole = self.model(every).position(self.theta)
-            residual = self.conditioned.track.y - whole
-            candidates = self.within & ~self.conditioned.near_plateau(whole, self.noise_m)
-            spread = max(mad_sigma(residual[candidates]), self.expected_m)
-            kept = candidates & (np.abs(residual) <= self.clip_sigmas * spread)
-            if np.count_nonzero(kept) <= len(NAMES):
-                # It explains no sample: no motion that these laws know.
-                self.noise_m = math.inf
-                return
-            same = np.array_equal(kept, self.used)
-            self.used = kept
-            if same:
-                break
-        free = max(int(np.count_nonzero(self.used)) - len(NAMES), 1)
-        self.noise_m = max(math.sqrt(float(np.sum(residual[self.used] ** 2)) / free), 0.01 * self.expected_m)
-        self.correlation = correlation_length(residual[self.used])
-
-    def slots(self, name: str) -> list[int]:
-        """Places of a law's parameters among all."""
-        return [*range(len(STATE)), *(NAMES.index(c) for c in LAWS[name].parameters[1:])]
-
-    def full(self, name: str, values: F8) -> F8:
-        """All parameters, absent coefficients zero."""
-        theta = np.zeros(len(NAMES))
-        theta[self.slots(name)] = values
-        return theta
-
-    def fit(self, name: str, start: F8, precision: float = PRECISION, steps: int = 60) -> least_squares.Fit:
-        """Fit one law to the samples used, in units of their noise."""
-        model, slots = self.model(), self.slots(name)
-        y = self.conditioned.track.y[self.used]
+        law: Drag,
+        start: F8,
+        rows: NDArray[np.bool_],
+        noise_m: float,
+    ) -> Fit:
+        """Fit one law to some samples, in units of their noise, from all parameters (7,)."""
+        model, own, y = self.model(rows), slots(law), self.conditioned.track.y[rows]
 
         def residuals(values: F8) -> F8:
-            return np.asarray((model.position(self.full(name, values)) - y) / self.noise_m)
+            return np.asarray((model.position(full(law, values)) - y) / noise_m)
 
         def jacobian(values: F8) -> F8:
-            return np.asarray(model.derivatives(self.full(name, values), slots) / self.noise_m)
+            return np.asarray(model.derivatives(full(law, values), own) / noise_m)
 
-        options = least_squares.Params(precision=precision, steps=steps)
-        return least_squares.minimise(residuals, start[slots], jacobian, options)
+        return least_squares.minimise(residuals, start[own], jacobian)
 
-    def choose(self, laws: DampingParams) -> tuple[Damping, least_squares.Fit] | None:
-        """Fit every law and choose among them; None where no fit converged."""
-        unfitted = {n: "it has no equation of motion" for n in self.damping.fits if n not in self.laws}
-        whole = self.fit(self.richest, self.theta)
-        # Where the richest law ended at a term that drives, say, the way from there to the others is no straight one.
-        own = self.weigh({self.richest: whole}, laws) if np.all(np.isfinite(whole.covariance)) else {}
-        holds = bool(own) and not own[self.richest].rejected
-        fits: dict[str, least_squares.Fit] = {}
-        for name in reversed(self.laws):
-            start, rise = self.without(name, whole) if holds else (self.full(self.richest, whole.values), 0.0)
-            if rise > HOPELESS * self.correlation:
-                unfitted[name] = f"in the equation of motion it would raise chi-square by about {rise:.2g}"
-                continue
-            fit = whole if name == self.richest else self.fit(name, start)
-            if np.all(np.isfinite(fit.covariance)):
-                fits[name] = fit
-            else:
-                unfitted[name] = f"its equation of motion was not solved for its coefficients: {fit.tried}"
-        weighed = self.weigh(fits, laws)
-        if not weighed:
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cleaned:
+    """The richest law's solution and the samples that it was fitted to.
+
+    Parameters
+    ----------
+    theta : (7,) float64
+        Rest position, displacement, velocity, angular frequency and the coefficients.
+    used : (n,) bool
+    noise_m, correlation : float
+        Root mean square of the residual, and the samples that count as one.
+    """
+
+    theta: F8
+    used: NDArray[np.bool_]
+    noise_m: float
+    correlation: float
+
+
+def slots(law: Drag) -> list[int]:
+    """Return the places of state and coefficients of a law among all parameters."""
+    return [*range(len(STATE)), *(len(STATE) + power for power in law.powers)]
+
+
+def full(law: Drag, values: F8) -> F8:
+    """Return all parameters (7,) from a law's, absent coefficients zero."""
+    theta = np.zeros(COUNT)
+    theta[slots(law)] = values
+    return theta
+
+
+def samples_of(conditioned: Conditioned, demodulated: Demodulated, damping: Damping, stop: int | None) -> Samples:
+    """Collect the samples; ``stop`` is the index of the sample from which on the bob rests."""
+    track, size_m = conditioned.track, abs(float(damping.best.joint.values[0]))
+    within = conditioned.used & (np.arange(track.t.size) < (track.t.size if stop is None else stop))
+    last = float(np.max(track.t[conditioned.used]))
+    elapsed: F8 = np.clip(np.where(np.isfinite(track.t), track.t, damping.t0), damping.t0, last) - damping.t0
+    quantum = (conditioned.quantum_m or 0.0) / math.sqrt(12.0)
+    return Samples(
+        conditioned,
+        elapsed,
+        within,
+        within & ((demodulated.flags & UNUSABLE) == 0),
+        stop is not None,
+        demodulated.angular_frequency,
+        size_m,
+        max(conditioned.noise_m, quantum, 1e-9 * size_m),
+    )
+
+
+def first_solution(
+    samples: Samples, demodulated: Demodulated, damping: Damping, laws: Sequence[Drag], misfit: float
+) -> F8:
+    """Return the richest law's solution (7,), from the first start that leads to one that stands, or the best.
+
+    Parameters
+    ----------
+    samples : Samples
+    demodulated : Demodulated
+    damping : Damping
+    laws : sequence of Drag
+        The richest one last.
+    misfit : float
+        Greatest root mean square of what a solution leaves, in units of the noise.
+
+    Notes
+    -----
+    Where friction ends the motion the number of swings is whole, and each number has its own minimum: one that
+    does not stand leaves more than noise, or has a coefficient below zero. Starts are the best of those by the laws of
+    the amplitude, then where each kind of damping alone ends from the best of a grid.
+    """
+    model, y = samples.model(samples.used), samples.conditioned.track.y[samples.used]
+
+    def cost(theta: F8) -> float:
+        squares = float(np.sum((model.position(theta) - y) ** 2))
+        return squares if math.isfinite(squares) else math.inf
+
+    ends: list[Fit] = []
+    alone = [law for law in laws if len(law.powers) == 1]
+    for law in (None, *alone):
+        if law is None:
+            start = min(_by_amplitude(demodulated, damping, laws), key=cost)
+        else:
+            first = min(_by_first_samples(samples, law), key=cost)
+            start = full(law, samples.fit(law, first, samples.used, samples.expected_m).values)
+        end = samples.fit(laws[-1], start, samples.used, samples.expected_m)
+        ends.append(end)
+        u = np.sqrt(np.diag(end.covariance))
+        if end.cost <= misfit**2 * y.size and np.all((end.values >= -NEGATIVE * u)[len(STATE) :]):
+            break
+    return full(laws[-1], min(ends, key=lambda end: end.cost).values)
+
+
+def _by_amplitude(demodulated: Demodulated, damping: Damping, laws: Sequence[Drag]) -> list[F8]:
+    """Starts without damping, and from the laws of the amplitude."""
+    omega, first = demodulated.angular_frequency, damping.best.joint.values[0]
+    angle = float(demodulated.phase[0]) - omega * (float(demodulated.t[0]) - damping.t0)
+    rest = float(np.average(demodulated.offset, weights=np.maximum(demodulated.amplitude, 0.0) ** 2))
+    state = [rest, first * math.cos(angle), -first * omega * math.sin(angle), omega]
+    starts = [np.array([*state, 0.0, 0.0, 0.0])]
+    for law in laws:
+        fit = damping.fits.get(law.name)
+        if fit is not None:
+            values = fit.joint.values
+        elif demodulated.t.size >= len(law.parameters):
+            values = law.guess(demodulated.t - damping.t0, demodulated.amplitude)
+        else:
+            continue
+        starts.append(full(law, np.array([*state, *np.maximum(values[1:], 0.0)])))
+    return starts
+
+
+def _by_first_samples(samples: Samples, law: Drag) -> list[F8]:
+    """Starts from the first samples' parabola, with a range of strengths of the one kind of damping in a law."""
+    y, tau, omega = samples.conditioned.track.y[samples.used], samples.elapsed[samples.used], samples.omega
+    rest = float(np.median(y[-max(y.size // 10, 5) :]))
+    # A parabola through samples of less than a radian, or five at least.
+    early = slice(max(int(np.count_nonzero(tau < 0.8 / omega)), 5))
+    speed, level = np.polynomial.polynomial.polyfit(tau[early], y[early] - rest, 2)[1::-1]
+    size = np.hypot(level, speed / omega)
+    (power,) = law.powers
+    return [
+        full(law, np.array([rest, level, speed, near * omega, ratio * omega * size ** (1 - power)]))
+        for near in (0.9, 1.0, 1.1)
+        for ratio in (0.03, 0.06, 0.1, 0.15, 0.25)
+    ]
+
+
+def without_echoes(samples: Samples, law: Drag, start: F8, clip_sigmas: float, rounds: int = 3) -> Cleaned | None:
+    """Fit a law until the set of false echoes stays; None where it explains no sample.
+
+    Parameters
+    ----------
+    samples : Samples
+    law : Drag
+        The richest one.
+    start : (7,) float64
+    clip_sigmas : float
+        Residuals beyond this many standard deviations are false echoes.
+    rounds : int
+        Most fits.
+    """
+    theta, used, y = start, samples.used, samples.conditioned.track.y
+    for _ in range(rounds):
+        theta = full(law, samples.fit(law, theta, used, samples.expected_m).values)
+        whole = samples.model().position(theta)
+        residual = y - whole
+        candidates = samples.within & ~samples.conditioned.near_plateau(whole, samples.expected_m)
+        spread = max(mad_sigma(residual[candidates]), samples.expected_m)
+        kept = candidates & (np.abs(residual) <= clip_sigmas * spread)
+        if np.count_nonzero(kept) <= COUNT:
             return None
-        last = float(np.max(self.elapsed))
-        selected, admissible = choose(
-            weighed, laws.evidence, lambda name: weighed[name].amplitude(np.array([0.0, last]))
-        )
-        scatter = replace(self.damping.scatter, correlation=self.correlation)
-        damping = Damping(self.damping.t0, weighed, selected, admissible, scatter, unfitted)
-        return damping, fits[selected]
+        same, used = np.array_equal(kept, used), kept
+        if same:
+            break
+    left = residual[used]
+    noise_m = max(math.sqrt(float(left @ left) / max(left.size - COUNT, 1)), 0.01 * samples.expected_m)
+    return Cleaned(theta, used, noise_m, correlation_length(left))
 
-    def without(self, name: str, whole: least_squares.Fit) -> tuple[F8, float]:
-        """Return where a special case of the richest law should end, and the rise of chi-square, to first order."""
-        slots = self.slots(self.richest)
-        absent = [i for i, slot in enumerate(slots) if slot not in self.slots(name)]
-        if not absent:
-            return self.full(self.richest, whole.values), 0.0
-        pull = np.linalg.solve(whole.covariance[np.ix_(absent, absent)], whole.values[absent])
-        values = whole.values - whole.covariance[:, absent] @ pull
-        return self.full(self.richest, values), float(whole.values[absent] @ pull)
 
-    def weigh(self, fits: Mapping[str, least_squares.Fit], laws: DampingParams) -> dict[str, LawFit]:
-        """Hold each law to the noise, with the amplitude at the start in place of displacement and velocity."""
-        found = {}
-        for name, fit in fits.items():
+def choose_law(
+    samples: Samples, cleaned: Cleaned, damping: Damping, laws: Sequence[Drag], params: DampingParams
+) -> tuple[Damping, Fit] | None:
+    """Fit every law and choose among them; None where no fit converged.
 
-            def start(values: F8, name: str = name) -> F8:
-                return np.array([envelope(*self.full(name, values)[1:].tolist())[0]])
+    Parameters
+    ----------
+    samples : Samples
+    cleaned : Cleaned
+    damping : Damping
+        The laws of the amplitude.
+    laws : sequence of Drag
+        The richest one last.
+    params : pipeline.damping.select.Params
+    """
+    richest = laws[-1]
+    unfitted = {n: "it has no equation of motion" for n in damping.fits if n not in [law.name for law in laws]}
+    whole = samples.fit(richest, cleaned.theta, cleaned.used, cleaned.noise_m)
+    fits: dict[str, Fit] = {}
+    for law in reversed(laws):
+        fit = whole if law is richest else samples.fit(law, full(richest, whole.values), cleaned.used, cleaned.noise_m)
+        if np.isfinite(fit.covariance).all():
+            fits[law.name] = fit
+        else:
+            unfitted[law.name] = f"its equation of motion was not solved for its coefficients: {fit.tried}"
+    if not fits:
+        return None
+    weighed = _weighed(cleaned, laws, fits, params)
+    selected, admissible, stated = select_law(weighed, params, float(np.max(samples.elapsed)))
+    scatter = replace(damping.scatter, correlation=cleaned.correlation)
+    return Damping(damping.t0, weighed, selected, admissible, scatter, unfitted, stated), fits[selected]
 
-            *_, u_envelope = envelope(*self.full(name, fit.values)[1:].tolist())
-            turn = np.zeros((len(LAWS[name].parameters), fit.values.size))
-            turn[0] = least_squares.central_differences(start, fit.values)[0]
-            turn[1:, len(STATE) :] = np.eye(len(LAWS[name].parameters) - 1)
-            covariance = turn @ fit.covariance @ turn.T
-            covariance[0, 0] += u_envelope**2
-            theta = np.concatenate([start(fit.values), fit.values[len(STATE) :]])
-            found[name] = Minimum(theta, covariance, fit.cost, fit.converged, fit.tried)
-        least = least_chi2(found)
-        points = int(np.count_nonzero(self.used)) - len(STATE) + 1
-        return {n: weigh(LAWS[n], fit, least[n], points, self.correlation, laws.rejection) for n, fit in found.items()}
+
+def _weighed(
+    cleaned: Cleaned, laws: Sequence[Drag], fits: Mapping[str, Fit], params: DampingParams
+) -> dict[str, LawFit]:
+    """Compare each law with the noise, the amplitude at the start in place of displacement and velocity."""
+    by_name = {law.name: law for law in laws if law.name in fits}
+    minima = {name: _minimum(law, fits[name]) for name, law in by_name.items()}
+    least = least_chi2(minima, by_name)
+    points = int(np.count_nonzero(cleaned.used)) - len(STATE) + 1
+    return {
+        name: weigh(by_name[name], minima[name], least[name], points, cleaned.correlation, params.rejection)
+        for name in fits
+    }
+
+
+def _minimum(law: Drag, fit: Fit) -> Minimum:
+    """A law's fit in the parameters of the amplitude's law."""
+
+    def start(values: F8) -> F8:
+        return np.array([envelope(*full(law, values)[1:].tolist())[0]])
+
+    *_, u_envelope = envelope(*full(law, fit.values)[1:].tolist())
+    turn = np.zeros((len(law.parameters), fit.values.size))
+    turn[0] = least_squares.central_differences(start, fit.values)[0]
+    turn[1:, len(STATE) :] = np.eye(len(law.powers))
+    covariance = turn @ fit.covariance @ turn.T
+    covariance[0, 0] += u_envelope**2
+    theta = np.concatenate([start(fit.values), fit.values[len(STATE) :]])
+    return Minimum(theta, covariance, fit.cost, fit.converged, fit.tried)

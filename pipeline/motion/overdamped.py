@@ -15,9 +15,9 @@ from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.motion.decay import DecayFit, best_decay, critical_decay, lone_exponential
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import noun
-from pipeline.oscillation.condition import Conditioned
-from pipeline.oscillation.cycles import NoOscillation
+from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
+from pipeline.windows.cycles import NoOscillation
 
 __all__ = ["Kind", "Overdamped", "Params", "find_overdamped", "spring_constant"]
 
@@ -40,7 +40,7 @@ class Params:
     least_damping : float
         Damping ratio zeta from which an oscillation counts as strongly damped; below, its cycles are analysed.
     u_clock : float
-        Relative standard uncertainty of a nominal clock.
+        Relative standard uncertainty of the clock, whatever kept the time: that of its crystal.
     """
 
     evidence: float = 10.0
@@ -144,8 +144,7 @@ def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params
     kind, fit = choice
     # Uncertainties grow with what the fit leaves beyond the noise.
     fit = replace(fit, covariance=fit.covariance * max(1.0, fit.chi2 / max(t.size - 5, 1)))
-    u_clock = params.u_clock if conditioned.track.clock == "nominal" else 0.0
-    found = _described(fit, kind, float(t[0]), t.size, u_clock, conditioned.track.unit)
+    found = _described(fit, kind, float(t[0]), t.size, params.u_clock, conditioned.track.unit)
     return None if kind == "strong" and found.damping_ratio.value < params.least_damping else found
 
 
@@ -217,8 +216,7 @@ def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float, unit: str) -> tuple[Kin
         if rate > fastest:
             return None
         return NoOscillation(
-            f"the {noun(unit)} follows one exponential, at {rate:.3g} 1/s: "
-            "an overdamped motion whose fast part is over or too small, or a drift"
+            f"the {noun(unit)} follows one exponential, at {rate:.3g} 1/s: a drift or an overdamped motion"
         )
     if one is not None and critical <= free:
         return ("critical", one) if one.rate <= fastest else None
@@ -228,7 +226,7 @@ def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float, unit: str) -> tuple[Kin
 
 
 def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: float, unit: str) -> Overdamped:
-    """Return what follows from a fit of so many samples with a clock of this relative standard uncertainty."""
+    """Return the results of a fit to ``count`` samples with a clock of this relative standard uncertainty."""
     from uncertainties import correlated_values, ufloat, umath
 
     clock = ufloat(1.0, u_clock)
@@ -263,7 +261,7 @@ def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: f
         found["amplitude"] = _estimate(umath.sqrt(a**2 + side**2), unit)
         found["phase"] = _estimate(umath.atan2(-side, a), "rad")
         found["damping_rate"] = _estimate(rate, "1/s")
-        found["quality_factor"] = _estimate(0.5 * omega / rate, "")
+        found["quality_factor"] = _estimate(0.5 * natural / rate, "")
         why = f"the oscillation is strongly damped: its damping ratio is {ratio}"
     return Overdamped(why, kind, ratio, squared, found, start_s)
 

@@ -10,13 +10,24 @@ import numpy as np
 from pipeline.damping.select import Damping, LawFit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, solve_weighted
-from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
+from pipeline.windows.demodulate import Demodulated
 
 TABLE = 2049  # points of the integral of the amplitude
+MOST_LAG = 0.75  # rad: of friction that takes half of the amplitude within a radian
+NODES = 8  # of the quadrature of a rate below an amplitude: exact for friction, linear and quadratic drag
 EXPONENTS = (2.0, 1.0, 0.5)  # a spring that is not linear; carried air that grows with the stroke, as vortices do
 
-__all__ = ["Params", "PhaseFit", "amplitude_integral", "backbone_unit", "fit_phase", "words_on_exponent", "wrapped"]
+__all__ = [
+    "Params",
+    "PhaseFit",
+    "amplitude_integral",
+    "backbone_unit",
+    "fit_phase",
+    "lag_of",
+    "words_on_exponent",
+    "wrapped",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +77,9 @@ class PhaseFit:
         Whose amplitude the backbone integrates.
     exponent : float
         p: 2, the first correction of any smooth spring, unless 1 or 0.5 describes the phase far better.
+    lag : tuple of (g,) float64, or None
+        Times, s, and by how much the sinusoid of a period is late there, rad, see :func:`lag_of`; None where that is
+        constant.
     """
 
     t0: float
@@ -79,6 +93,7 @@ class PhaseFit:
     middle: float
     damping: Damping
     exponent: float = 2.0
+    lag: tuple[F8, F8] | None = None
 
     def total(self, t: F8) -> F8:
         """Return the model's total phase at times t (n,), rad."""
@@ -86,7 +101,7 @@ class PhaseFit:
         total = level + slope * (t - self.middle)
         if bend:
             total += bend[0] * _integral_at(t, self.middle, self.damping, self.exponent)
-        return np.asarray(total)
+        return np.asarray(total if self.lag is None else total - np.interp(t, *self.lag))
 
     def rate(self, amplitude: F8) -> F8:
         """Return the model's angular frequency at amplitudes (n,), m, of its law, rad/s."""
@@ -118,9 +133,12 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
     An ideal spring has one frequency. A spring that is not linear shifts it by the square of the amplitude; the air
     that a disc carries grows with the stroke like its drag coefficient, and on real discs shifts it by about the root.
     Where the square is shown, the powers 1 and 0.5 are tried in its place: as many parameters, so chi-square decides.
+
+    By how much the sinusoid of a period is late, :func:`lag_of`, is known from the damping law and taken out before.
     """
     params = params or Params()
-    t, phase = demodulated.t, demodulated.phase
+    t, lag = demodulated.t, lag_of(damping.best, damping.t0, demodulated)
+    phase = demodulated.phase if lag is None else demodulated.phase + np.interp(t, *lag)
     noise = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
     if t.size < 2:
         return _single(demodulated, damping, float(noise[0]))
@@ -134,7 +152,7 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
     line = design = _design(points, middle, damping, None)
     straight = solve_weighted(line[:-1][kept], phase[kept], u)
     bent, exponent = None, EXPONENTS[0]
-    if u.size >= 8 and damping.selected != "none":
+    if u.size >= 8 and len(damping.best.law.parameters) > 1:
         curve = _design(points, middle, damping, exponent)
         trial = solve_weighted(curve[:-1][kept], phase[kept], u)
         gain = (straight.chi2 - trial.chi2) / spread.correlation - math.log(u.size / spread.correlation)
@@ -150,7 +168,7 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
     covariance = straight.covariance * widened
     model = bent or straight
     start = np.array([1.0, damping.t0 - middle])
-    at_start = float(design[-1] @ model.values)
+    at_start = float(design[-1] @ model.values) - (0.0 if lag is None else float(lag[1][0]))
     residual = phase - line[:-1] @ straight.values
     free = max(u.size - model.values.size, 1)
     return PhaseFit(
@@ -165,7 +183,46 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
         middle,
         damping,
         exponent,
+        lag,
     )
+
+
+def lag_of(fit: LawFit, t0: float, demodulated: Demodulated) -> tuple[F8, F8] | None:
+    """Return times from ``t0`` (2049,), s, and by how much drag makes the sinusoid of a period late there, rad.
+
+    None where that is constant, as of linear drag.
+
+    Parameters
+    ----------
+    fit : LawFit
+        Gives the amplitude, counted from ``t0``, and :math:`r(A) = -\\dot A`.
+    t0 : float, s
+    demodulated : Demodulated
+
+    Notes
+    -----
+    Drag works where the bob is fast, so a period is no sinusoid, and the first harmonic of its exact waveform is late
+    against a phase that turns at a constant rate. To first order, for a force :math:`\\propto v^n` averaging gives
+    :math:`\\frac{n + 3}{2(n + 1)}\\frac{r}{\\omega A} = (\\frac12 + \\frac1{n + 1})\\frac{r}{\\omega A}`, so for any
+    sum of powers
+
+    .. math:: \\frac{1}{\\omega A}\\Bigl(\\frac{r(A)}{2} + \\frac1A\\int_0^A r(a)\\,da\\Bigr).
+
+    For friction it is :math:`3\\delta/\\pi A`, with :math:`\\delta` half of what a half-cycle loses. Near the stop the
+    formula fails, and the lag is held to what it is where a radian takes half of the amplitude.
+    """
+    omega, last = demodulated.angular_frequency, max(float(np.max(demodulated.t)), t0 + 1e-9)
+    t = np.linspace(t0, last, TABLE)
+    amplitude = np.abs(fit.amplitude(t - t0))
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    below = amplitude[:, None] * 0.5 * (nodes + 1.0)
+    theta = fit.joint.values
+    with np.errstate(all="ignore"):
+        rate = -fit.law.rate(amplitude, theta)
+        mean = -0.5 * fit.law.rate(below.ravel(), theta).reshape(below.shape) @ weights
+        lag = (0.5 * rate + mean) / (omega * amplitude)
+    lag = np.clip(np.where(np.isfinite(lag), lag, 0.0), -MOST_LAG, MOST_LAG)
+    return (t, lag) if float(np.ptp(lag)) > 1e-12 else None
 
 
 def _design(t: F8, middle: float, damping: Damping, exponent: float | None) -> F8:

@@ -13,9 +13,9 @@ from pipeline.motion.phase import PhaseFit
 from pipeline.motion.waveform import Rest
 from pipeline.numerics.random_walk import Chain
 from pipeline.numerics.spectrum import Blocks, smooth_density
-from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.disturbances import Disturbances
 from pipeline.track import F8, UNUSABLE, Quality, Track
+from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.disturbances import Disturbances
 
 __all__ = ["Params", "Smoothed", "smooth"]
 
@@ -91,7 +91,7 @@ class _Carried:
             raise AnalysisError("the damping law leaves no amplitude to smooth: record while the bob swings")
         # A law may end at zero; the walk carries on from a thousandth.
         amplitude = np.maximum(amplitude, 1e-3 * largest)
-        decay = law.law.rate(amplitude, law.joint.values) / amplitude
+        decay = -law.law.rate(amplitude, law.joint.values) / amplitude
         angle, rate = phase.total(t), phase.rate(phase.damping.best.amplitude(t - phase.t0))
         return cls(amplitude / largest, np.cos(angle), np.sin(angle), rate, decay)
 
@@ -198,7 +198,7 @@ def _freedom(t: F8, phase: PhaseFit, law: LawFit, last: float) -> F8:
     x = _centred(t)
     turning = np.array([x**power for power in range(1, max(phase.coefficients.size, 2))])
     gain = _Carried.at(t, phase, law, last).gain
-    slopes = law.law.jacobian(np.clip(t, phase.t0, last) - phase.t0, law.joint.values)
+    _, slopes = law.law.curve(np.clip(t, phase.t0, last) - phase.t0, law.joint.values)
     slopes = slopes / np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
     # A law says the same in any unit of length: the plain scale is a sum of its slopes.
     slopes -= np.outer(gain, gain @ slopes) / (gain @ gain)

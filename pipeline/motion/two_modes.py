@@ -1,4 +1,4 @@
-"""Two modes of like strength: a motion that is no one oscillation, but two at once that can both be named."""
+"""Two modes of like strength: a motion of two oscillations together, both of which can be named."""
 
 from __future__ import annotations
 
@@ -9,26 +9,46 @@ import numpy as np
 
 from pipeline.bench.instrument import U_CRYSTAL
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.least_squares import Params, minimise
+from pipeline.numerics.least_squares import minimise
 from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
-from pipeline.oscillation.condition import Conditioned
+from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-__all__ = ["TwoModes", "find_two_modes"]
+__all__ = ["Params", "TwoModes", "find_two_modes"]
 
-LEFT = 0.1  # of the variance: what two modes may leave
-MOST, THIN = 100_000, 50.0  # samples that are fitted, and how many sample intervals each may stand for
-WEAKER = 1.0 / 3.0  # of the stronger amplitude: below it one of them is the oscillation
-APART = 0.8  # of a beat within the record, and
-FEWEST = 3.0  # periods of the slower mode, without which two are not told from one that changes
 ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # of the values: what a still record scatters by
-SEARCH = Params(precision=1e-3, steps=60, again=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`find_two_modes`.
+
+    Parameters
+    ----------
+    left : float
+        Share of the variance that two modes may leave.
+    weaker : float
+        Of the stronger mode's amplitude; with less the stronger one is the oscillation.
+    beats, periods : float
+        Beats and periods of the slower mode that the record must have to distinguish two modes from one that changes.
+    most : int
+        Longer records are not fitted.
+    thin : float
+        Sample intervals that a sample may stand for on average.
+    """
+
+    left: float = 0.1
+    weaker: float = 1.0 / 3.0
+    beats: float = 0.8
+    periods: float = 3.0
+    most: int = 100_000
+    thin: float = 50.0
 
 
 @dataclass(frozen=True, slots=True)
 class TwoModes:
-    """Two oscillations at once.
+    """Two oscillations that run together.
 
     Parameters
     ----------
@@ -42,12 +62,13 @@ class TwoModes:
     estimates: dict[str, Estimate]
 
 
-def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
+def find_two_modes(conditioned: Conditioned, params: Params | None = None) -> TwoModes | None:
     """Return the two modes that a record consists of; None where two do not describe it.
 
     Parameters
     ----------
     conditioned : Conditioned
+    params : Params, optional
 
     Notes
     -----
@@ -55,28 +76,33 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     from the strongest line of the spectrum and that of what the first leaves. Covariances are by the residuals, with
     their correlation. Longer records, and samples strewn thinly over their time, are not searched.
     """
+    params = params or Params()
     used = conditioned.used & np.isfinite(conditioned.track.t)
     t, y, unit = conditioned.track.t[used], conditioned.track.y[used], conditioned.track.unit
     tau, span = t - t[0], float(t[-1] - t[0])
     scale = float(np.std(y))
     if (
-        not 32 <= y.size <= MOST
+        not 32 <= y.size <= params.most
         or scale <= ROUNDING * float(np.max(np.abs(y)))
-        or not 0.0 < span < THIN * y.size * float(np.median(np.diff(t)))
+        or not 0.0 < span < params.thin * y.size * float(np.median(np.diff(t)))
     ):
         return None
     values = (y - y.mean()) / scale
     first = _strongest(tau, values)
     second = _strongest(tau, values - _model(_linear(tau, values, (first,)), tau)[0])
     start = _linear(tau, values, (first, second))
-    fit = minimise(lambda x: _model(x, tau)[0] - values, start, lambda x: _model(x, tau)[1], SEARCH)
-    if not np.all(np.isfinite(fit.covariance)) or not float(fit.residual @ fit.residual) < LEFT * y.size:
+    fit = minimise(lambda x: _model(x, tau)[0] - values, start, lambda x: _model(x, tau)[1])
+    if not np.all(np.isfinite(fit.covariance)) or not float(fit.residual @ fit.residual) < params.left * y.size:
         return None
     places = sorted((1, 5), key=lambda i: -float(np.hypot(*fit.values[i : i + 2])))
     omegas = [abs(float(fit.values[i + 2])) for i in places]
     sizes = [float(np.hypot(*fit.values[i : i + 2])) for i in places]
     beats = abs(omegas[0] - omegas[1]) * span / (2.0 * math.pi)
-    if min(omegas) * span < 2.0 * math.pi * FEWEST or beats < APART or sizes[1] < WEAKER * sizes[0]:
+    if (
+        min(omegas) * span < 2.0 * math.pi * params.periods
+        or beats < params.beats
+        or sizes[1] < params.weaker * sizes[0]
+    ):
         return None
     slow, fast = sorted(omegas)
     # What keeps step with the other is no mode but its shape: a signal that switches, say.
@@ -90,11 +116,11 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
         relative = math.hypot(float(u[i + 2]) / omega, U_CRYSTAL)
         found[f"{name}_mode_period"] = Estimate(period, period * relative, "s")
         found[f"{name}_mode_amplitude"] = Estimate(scale * size, scale * float(np.max(u[i : i + 2])), unit)
-    told = [
+    descriptions = [
         f"{found[f'{name}_mode_period']} ({amount(found[f'{name}_mode_amplitude'].value, unit)})"
         for name in ("first", "second")
     ]
-    why = f"two modes of like strength oscillate at once, at periods of {told[0]} and {told[1]}: "
+    why = f"two modes of like strength oscillate together, at periods of {descriptions[0]} and {descriptions[1]}: "
     return TwoModes(f"{why}they beat every {span / beats:.3g} s", found)
 
 

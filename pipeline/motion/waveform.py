@@ -11,12 +11,11 @@ import numpy as np
 
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.regression import beating_length, correlation_length
-from pipeline.numerics.smooth_curve import fit_curve
-from pipeline.oscillation.demodulate import Demodulated
-from pipeline.oscillation.disturbances import Disturbances
-from pipeline.oscillation.steps import Step, staircase
+from pipeline.numerics.regression import beating_length, correlation_length, scatter, smooth_curve
 from pipeline.track import F8, UNUSABLE, Track
+from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.disturbances import Disturbances
+from pipeline.windows.steps import Step, staircase
 
 __all__ = ["Rest", "Waveform", "fit_rest", "reconstruct"]
 
@@ -99,16 +98,17 @@ def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.
     """
     t, offset = demodulated.t, demodulated.offset
     u = np.maximum(np.sqrt(demodulated.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
-    found = fit_curve(t, offset, u, degree=degree, evidence=evidence)
-    constant, spread = found.constant, found.spread
-    mean = float(constant.values[0])
-    left = constant.residual / spread.u[spread.kept]
+    spread = scatter(t, offset, u, degree=degree)
+    polynomial, gain = smooth_curve(t, offset, spread, degree=degree)
+    weight = 1.0 / spread.u[spread.kept]
+    mean = float(np.average(offset[spread.kept], weights=weight**2))
+    left = (offset[spread.kept] - mean) * weight
     if (length := beating_length(left)) is None:
         length = max(spread.correlation, correlation_length(left))
-    widened = length * max(1.0, constant.chi2 / max(constant.residual.size - 1, 1))
-    estimate = Estimate(mean, math.sqrt(float(constant.covariance[0, 0]) * widened), "m")
-    curve = found.at(t)
-    return Rest(estimate, float(np.ptp(curve)), found.bends, t, curve)
+    widened = length * max(1.0, float(left @ left) / max(left.size - 1, 1))
+    estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), "m")
+    curve = np.asarray(polynomial(t), np.float64)
+    return Rest(estimate, float(np.ptp(curve)), gain > evidence, t, curve)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,5 +175,5 @@ def reconstruct(track: Track, demodulated: Demodulated, phase: PhaseFit, rest: R
 
 def _velocity(phase: PhaseFit, amplitude: F8, angle: F8) -> F8:
     law = phase.damping.best
-    falling = law.law.rate(amplitude, law.joint.values)
-    return np.asarray(-falling * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))
+    growth = law.law.rate(amplitude, law.joint.values)
+    return np.asarray(growth * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))

@@ -11,23 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.damping.evidence import BARE_MENTION
-from pipeline.damping.laws import LAWS, Law
+from pipeline.damping.law_fit import joint_of
+from pipeline.damping.laws import LAWS, Law, free_power
+from pipeline.damping.laws import in_units as in_length_units
 from pipeline.damping.select import Damping, LawFit
 from pipeline.motion.phase import PhaseFit, amplitude_integral, backbone_unit, wrapped
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_model import Chooser, Record, Rows, State, WaveformModel
 from pipeline.numerics import least_squares
-from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import beating_length, correlation_length, solve_weighted
-from pipeline.oscillation.condition import Conditioned
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality, Track
+from pipeline.windows.demodulate import Demodulated
 
 __all__ = ["FullFit", "Params", "fit_record"]
 
 FEW_WINDOWS = 4  # below which the amplitudes of windows select no law
-PRECISION = 1e-3  # of the standard uncertainties, that may be left
-STEADY = 1e-4  # share of the samples that may still come or go; one at the limit moves nothing by a tenth of its u
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,15 +40,19 @@ class Params:
         Residuals beyond this many standard deviations are false echoes and leave the fit.
     rounds : int
         Most rounds of clipping and fitting again.
+    steady : float
+        Share of the samples that may still come or go at the end. At the limit of 4 sigmas and with either sign they
+        move an estimate by 4 sqrt(steady) of its standard uncertainty, 0.04.
     steps : int
         Most evaluations of the model in one fit.
     besides : tuple of str
-        Laws that are fitted besides the selected one and the admissible ones, though the windows speak against them:
+        Laws that are fitted besides the selected one and the admissible ones, though the windows contradict them:
         everyone compares with the one exponential.
     """
 
     clip_sigmas: float = 4.0
     rounds: int = 5
+    steady: float = 1e-4
     steps: int = 25
     besides: tuple[str, ...] = ("linear",)
 
@@ -134,7 +138,7 @@ def fit_record(
     extra: F8 | None = None,
     params: Params | None = None,
 ) -> FullFit:
-    """Fit rest position, damping law and phase to all samples at once.
+    """Fit rest position, damping law and phase to all samples together.
 
     Parameters
     ----------
@@ -168,12 +172,15 @@ def fit_record(
     record = Record.of(conditioned, demodulated, phase, rest, extra)
     chooser = Chooser(conditioned, demodulated, record, params.clip_sigmas)
     area_of = functools.partial(_area, record, damping.best, phase)
-    if demodulated.t.size < FEW_WINDOWS:
+    if demodulated.t.size < FEW_WINDOWS and not damping.by_statement:
+        phase = replace(phase, lag=None)  # no damping and linear drag, which alone are tried, have none
         damping, start = _select_short(record, chooser.by_windows, demodulated, damping, phase, params)
     else:
         theta = damping.best.joint.values
         area = area_of(theta) if phase.coefficients.size == 3 else None
         start = _state(record, damping.best.law, theta, phase.coefficients, area, phase.exponent)
+        if phase.lag is not None:
+            start = replace(start, lag=(phase.lag[0] - phase.middle, phase.lag[1]))
     solved = _settled(record, chooser, start, area_of, params)
     if isinstance(solved, str):
         noise_m = demodulated.noise_m
@@ -218,8 +225,8 @@ def _area(record: Record, fit: LawFit, phase: PhaseFit, theta: F8) -> tuple[F8, 
 
 def _solve(record: Record, state: State, rows: Rows, params: Params) -> _Solved:
     model = WaveformModel(record, state, rows)
-    options = least_squares.Params(precision=PRECISION, steps=params.steps, again=False)
-    if state.law.units[-1] != "":
+    options = least_squares.Params(steps=params.steps)
+    if free_power(state.law) is None:
         fit = least_squares.minimise(model.residuals, state.values, model.jacobian, options)
     else:
         fit = _solve_by_amplitude(model, state, options)
@@ -232,7 +239,7 @@ def _solve_by_amplitude(model: WaveformModel, state: State, options: least_squar
     length = abs(float(state.theta[0])) or 1.0
 
     def in_units(values: F8, unit_m: float) -> F8:
-        return np.concatenate([own.rescaled(values[:count], unit_m), values[count:]])
+        return np.concatenate([in_length_units(own, values[:count], length_m=unit_m), values[count:]])
 
     def in_metres(values: F8) -> F8:
         return in_units(values, 1.0 / length)
@@ -265,7 +272,7 @@ def _settled(
         if not solved.fit.converged:
             return solved.fit.tried
         chosen = chooser.near(record.y - solved.position, rows)
-        if np.count_nonzero(chosen != rows) <= STEADY * rows.size:
+        if np.count_nonzero(chosen != rows) <= params.steady * rows.size:
             break
         rows, state = chooser.settled(solved.state, chosen)
     return solved
@@ -289,7 +296,7 @@ def _select_short(
         states[name] = solved.state
         count = float(np.count_nonzero(rows))
         # Sums of squares are compared at the noise of the fuller model, as a test of chi-square would.
-        joint = Joint(law.parameters, solved.state.theta, np.zeros((theta.size, theta.size)), law.units)
+        joint = joint_of(law, solved.state.theta, np.zeros((theta.size, theta.size)))
         bic = count * math.log(max(solved.fit.cost, 1e-300) / count) + solved.size * math.log(count)
         fits[name] = LawFit(law, joint, 1.0, solved.dof, bic, True, "")
     if not fits:
@@ -325,7 +332,7 @@ def _covariance(solved: _Solved, demodulated: Demodulated) -> tuple[F8, F8]:
 
 def _with_joint(fit: LawFit, solved: _Solved, covariance: F8) -> LawFit:
     law, theta = solved.state.law, solved.state.theta
-    joint = Joint(law.parameters, theta, covariance[: theta.size, : theta.size], law.units)
+    joint = joint_of(law, theta, covariance[: theta.size, : theta.size])
     return replace(fit, joint=joint, converged=True)
 
 
@@ -354,7 +361,7 @@ def _refined_phase(
         backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), backbone_unit(phase.exponent))
         tau = demodulated.t - phase.middle
         u = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
-        line = solve_weighted(np.stack([np.ones(tau.size), tau], axis=1), state.angle(tau), u)
+        line = solve_weighted(np.stack([np.ones(tau.size), tau], axis=1), state.steady_angle(tau), u)
         omega = Estimate(float(line.values[1]), phase.angular_frequency.u, "rad/s")
     u_start = math.sqrt(float(gradient @ covariance @ gradient))
     return replace(
@@ -388,4 +395,4 @@ def _velocity(state: State, amplitude: F8, tau: F8) -> F8:
     angle, rate = state.angle(tau), state.turning[1]
     if state.area is not None:
         rate = rate + state.turning[2] * np.abs(amplitude) ** state.exponent
-    return np.asarray(-state.law.rate(amplitude, state.theta) * np.cos(angle) - amplitude * rate * np.sin(angle))
+    return np.asarray(state.law.rate(amplitude, state.theta) * np.cos(angle) - amplitude * rate * np.sin(angle))

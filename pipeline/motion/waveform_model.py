@@ -12,15 +12,14 @@ from pipeline.motion.phase import PhaseFit
 from pipeline.motion.waveform import Rest
 from pipeline.numerics import least_squares
 from pipeline.numerics.robust import mad_sigma
-from pipeline.oscillation.condition import Conditioned
-from pipeline.oscillation.demodulate import Demodulated, model_error
+from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality
+from pipeline.windows.demodulate import Demodulated, model_error
 
 __all__ = ["Chooser", "Record", "Rows", "State", "WaveformModel"]
 
 Rows = NDArray[np.bool_]
 
-TABLE = 2049  # points of the amplitude
 DEPENDENT = 1e-13  # share of the largest eigenvalue, below which columns say the same
 ROUNDS = 20  # most, of choosing samples on a tangent
 TANGENT = 1.1  # greatest ratio of the squares that a model leaves to those that its tangent predicts
@@ -122,6 +121,9 @@ class State:
         Times from the middle and the integral of A^p, m^p s; with a backbone only.
     exponent : float
         p.
+    lag : tuple of (g,) float64, or None
+        Times from the middle, s, and by how much the sinusoid of a period is late there, rad. It is that of the
+        windows' law: what the parameters change of it is of second order.
     """
 
     law: Law
@@ -129,6 +131,7 @@ class State:
     constant: bool
     area: tuple[F8, F8] | None = None
     exponent: float = 2.0
+    lag: tuple[F8, F8] | None = None
 
     @property
     def theta(self) -> F8:
@@ -153,18 +156,17 @@ class State:
 
     def angle(self, tau: F8) -> F8:
         """Return the total phase at times from the middle, rad."""
+        steady = self.steady_angle(tau)
+        return steady if self.lag is None else np.asarray(steady - np.interp(tau, *self.lag))
+
+    def steady_angle(self, tau: F8) -> F8:
+        """Return the total phase without the lag, rad."""
         angle = self.turning[0] + self.turning[1] * tau
         return np.asarray(angle if self.area is None else angle + self.turning[2] * np.interp(tau, *self.area))
 
     def amplitude(self, elapsed: F8) -> F8:
-        """Return the amplitude (m,), m; of many samples from a table, for laws are slow and smooth.
-
-        Straight lines between its points err by 3e-6 of the amplitude where it falls by e^10 in the record.
-        """
-        if elapsed.size < 2 * TABLE:
-            return self.law.amplitude(elapsed, self.theta)
-        grid = np.linspace(float(elapsed.min()), float(elapsed.max()), TABLE)
-        return np.interp(elapsed, grid, self.law.amplitude(grid, self.theta))
+        """Return the amplitude (m,), m."""
+        return self.law.curve(elapsed, self.theta)[0]
 
     def position(self, elapsed: F8, tau: F8) -> F8:
         """Return the distances (m,) at times from the first sample and the middle, less level and linear columns, m."""
@@ -173,13 +175,7 @@ class State:
 
     def evaluate(self, elapsed: F8, tau: F8) -> tuple[F8, F8]:
         """Return the distances as :meth:`position` does and their derivatives by the values, (m, q)."""
-        grid = elapsed
-        if elapsed.size >= 2 * TABLE:
-            grid = np.linspace(float(elapsed.min()), float(elapsed.max()), TABLE)
-        amplitude, slopes = self.law.both(grid, self.theta)
-        if elapsed.size >= 2 * TABLE:
-            amplitude = np.interp(elapsed, grid, amplitude)
-            slopes = np.array([np.interp(elapsed, grid, column) for column in slopes.T]).T
+        amplitude, slopes = self.law.curve(elapsed, self.theta)
         angle = self.angle(tau)
         cosine = np.cos(angle)
         first = self.theta.size
@@ -245,7 +241,7 @@ class WaveformModel:
 
 
 class Chooser:
-    """Chooses the samples of one record: those within the noise of its own model, and no cut crest.
+    """Chooses the samples of one record: those within the noise of its model, and no cut crest.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Chain: a Gaussian random walk in two dimensions seen through noise, solved exactly for all its nodes at once.
+"""Chain: a Gaussian random walk in two dimensions seen through noise, solved exactly for all its nodes together.
 
 Kept by hand: ``scipy.linalg.solveh_banded`` gives the means, and no library the covariances of the nodes. Their
 recursion, two steps of a loop for every node, takes 42 ms for 1,024 nodes where this takes 1.5.

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 
 from pipeline.numerics.robust import mad_sigma, median
@@ -16,12 +17,14 @@ __all__ = [
     "Line",
     "Scatter",
     "beating_length",
+    "beyond",
     "chi2_quantile",
     "correlation_length",
     "covariance_of",
     "decompose",
     "scatter",
     "smooth_columns",
+    "smooth_curve",
     "solve_weighted",
 ]
 
@@ -84,6 +87,13 @@ def _smooth_columns(times: bytes, degree: int) -> F8:
     columns = np.asarray(np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, degree))
     columns.flags.writeable = False
     return columns
+
+
+def beyond(basis: F8, columns: F8) -> F8:
+    """Return what columns (n, k) hold beyond an orthonormal basis (n, p), orthogonal to it."""
+    left = columns - basis @ (basis.T @ columns)
+    # A second projection takes out what rounding left of the basis where columns nearly lie in it.
+    return np.asarray(left - basis @ (basis.T @ left))
 
 
 def solve_weighted(design: F8, y: F8, u: F8) -> Line:
@@ -195,6 +205,31 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
     return Scatter(total, excess, kept, correlation_length(residual[kept] / total[kept]))
 
 
+def smooth_curve(t: F8, y: F8, spread: Scatter, *, degree: int = 6) -> tuple[Legendre, float]:
+    """Return a polynomial through points, and by how much its BIC is lower than that of their mean.
+
+    Parameters
+    ----------
+    t, y : (n,) float64
+        Times in ascending order, and values.
+    spread : Scatter
+        Of the points; those that are correlated count as fewer.
+    degree : int
+        Lower for few points (one coefficient for four points): only the mean under eight points.
+    """
+    kept = spread.kept
+    values, weight = y[kept], 1.0 / spread.u[kept]
+    mean = float(np.average(values, weights=weight**2))
+    order = min(degree, t.size // 4 - 1)
+    if order < 1:
+        return Legendre([mean]), 0.0
+    ends = [float(t[0]), float(t[-1])]
+    curve = Legendre.fit(t[kept], values, order, domain=ends, w=weight)
+    chi2, of_mean = (float(np.sum(((values - at) * weight) ** 2)) for at in (curve(t[kept]), mean))
+    price = order * math.log(max(values.size / spread.correlation, 2.0))
+    return curve, (of_mean - chi2) / spread.correlation - price
+
+
 def _excess(residual: F8, u: F8, spread: float) -> float:
     typical = median(u)
     # Under twice its own error a difference of variances is none: the median deviation is known to 1.17/sqrt(2n).
@@ -216,7 +251,7 @@ def correlation_length(residual: F8) -> float:
     total, least = 1.0, 2.0 * power / math.sqrt(n)
     for first in range(1, n // 3, LAGS):
         stop = min(first + LAGS, n // 3)
-        # A few lags at once, what lies beyond the end taken as 0.
+        # A few lags together, what lies beyond the end taken as 0.
         ahead = np.concatenate([centred[first:], np.zeros(stop - 1)])
         for product in np.correlate(ahead, centred, "valid").tolist():
             if product < least:
@@ -226,7 +261,7 @@ def correlation_length(residual: F8) -> float:
 
 
 def beating_length(residual: F8) -> float | None:
-    """How many points count as one where residuals go to and fro at a period of their own; None where they do not.
+    """How many points count as one where residuals swing at some period; None where they do not.
 
     A beating mode does that to the rest positions of periods. Half a period later they are the opposite, a whole one
     later the same again, by the share r of their power; of noise that remembers they are neither. Over c periods in n

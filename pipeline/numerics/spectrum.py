@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.linear_model import LinearModel
+from pipeline.numerics.regression import beyond
 from pipeline.numerics.robust import median
 from pipeline.track import F8
 
@@ -132,7 +132,7 @@ class Peak:
     density : float, m^2
         Variance of one full block's noise at that frequency.
     evidence : float
-        Half the fall of chi-square that the line brings: exponentially distributed where there is none.
+        Half the reduction of chi-square by the line; exponentially distributed if there is no line.
     false_alarm : float
         Probability that noise shows as strong a line anywhere in the band.
     """
@@ -184,14 +184,16 @@ def _trials(inside: NDArray[np.bool_], spacing_hz: float, blocks: Blocks) -> flo
     return max(CONTINUUM * float(np.count_nonzero(inside)) * spacing_hz * blocks.seconds, 1.0)
 
 
-def strongest(blocks: Blocks, model: LinearModel, band: Band) -> Peak | None:
-    """Find the strongest line and say how likely noise alone shows one like it.
+def strongest(blocks: Blocks, left: F8, basis: F8, band: Band) -> Peak | None:
+    """Find the strongest line, and the probability that pure noise shows one as strong.
 
     Parameters
     ----------
     blocks : Blocks
-    model : LinearModel
-        Of the blocks' values, rows multiplied by the weights: what a line shares with its columns does not count.
+    left : (b,) float64
+        What a linear model leaves of the blocks' values, multiplied by their weights.
+    basis : (b, p) float64
+        Orthonormal columns of that model: what a line shares with them does not count.
     band : Band
 
     Returns
@@ -212,7 +214,7 @@ def strongest(blocks: Blocks, model: LinearModel, band: Band) -> Peak | None:
     .. [1] D. J. Thomson, "Spectrum estimation and harmonic analysis", Proc. IEEE 70 (1982) 1055,
        doi:10.1109/PROC.1982.12433.
     """
-    residual = blocks.unweighted(model.left)
+    residual = blocks.unweighted(left)
     frequency, power = spectrum(blocks, residual)
     inside = band.inside(frequency)
     if np.count_nonzero(inside) < 4:
@@ -225,13 +227,14 @@ def strongest(blocks: Blocks, model: LinearModel, band: Band) -> Peak | None:
     # The line itself first; then what it may vary by, which must not pass for noise beside it.
     powers = np.polynomial.legendre.legvander(2.0 * blocks.t / blocks.seconds - 1.0, VARYING)
     rows = (powers.T[:, None] * pair).reshape(-1, angle.size)
-    line = model.terms((rows / np.linalg.norm(rows, axis=1)[:, None]).T)
-    if np.linalg.eigvalsh(line.normal[:2, :2])[0] < 0.04:  # the model holds it already
+    line = beyond(basis, (rows / np.linalg.norm(rows, axis=1)[:, None]).T)
+    if np.linalg.norm(line[:, :2], -2) < 0.2:  # its least singular value: the model holds it already
         return None
-    left = blocks.unweighted(model.left_by(line, line.fitted()[0]))
-    density = spectral_density(blocks, left, f, band, smooth_density(left, f * blocks.step))
+    noise = blocks.unweighted(left - line @ np.linalg.lstsq(line, left)[0])
+    density = spectral_density(blocks, noise, f, band, smooth_density(noise, f * blocks.step))
     # Rows are weighted by samples, the density is one full block's.
-    evidence = 0.5 * line.only(slice(2)).fitted()[2] / (density * blocks.samples)
+    own = line[:, :2] @ np.linalg.lstsq(line[:, :2], left)[0]
+    evidence = 0.5 * float(own @ own) / (density * blocks.samples)
     return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
 
 

@@ -49,7 +49,7 @@ one_thread = _OneThread()
 @functools.cache
 def _libraries() -> Any:
     """Return the loaded linear algebra libraries; looking for them takes a millisecond, so it is done once."""
-    # scipy brings a library of its own: loaded later it would not be found.
+    # scipy brings another library: loaded later, it would not be found.
     import scipy.linalg  # noqa: F401
     from threadpoolctl import ThreadpoolController
 

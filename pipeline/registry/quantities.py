@@ -28,6 +28,8 @@ class Quantity:
         Whether the unit depends on what was recorded.
     in_table : bool
         Whether Table 1 shows it.
+    by_law : bool
+        Whether Table 1 says by which law it is stated: the law of damping decides on its value.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Quantity:
     unit: str
     of_record: bool = False
     in_table: bool = True
+    by_law: bool = False
 
     def unit_in(self, record_unit: str) -> str:
         """Return the unit of the estimate in a run recorded in ``record_unit``.
@@ -87,21 +90,22 @@ _QUANTITIES = (
     Quantity("phase", "phase at the start", "phi0", "φ₀", r"\varphi_0", "rad", in_table=False),
     Quantity("offset", "rest position", "y0", "y₀", "y_0", "m", of_record=True),
     Quantity("noise", "noise of one sample", "sigma", "σ", r"\sigma", "m", of_record=True),
-    Quantity("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda", "1/s"),
+    Quantity("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda", "1/s", by_law=True),
     Quantity("relaxation_rate", "relaxation rate", "r", "r", "r", "1/s"),
     Quantity("relaxation_rate_slow", "slow relaxation rate", "r_1", "r 1", "r_1", "1/s"),
     Quantity("relaxation_rate_fast", "fast relaxation rate", "r_2", "r 2", "r_2", "1/s"),
-    Quantity("quality_factor", "quality factor", "Q", "Q", "Q", ""),
+    Quantity("quality_factor", "quality factor", "Q", "Q", "Q", "", by_law=True),
     # Of whatever moves: an angle's is in rad/s, whether the angle or its rate was recorded.
     Quantity("velocity_rms", "velocity, root mean square", "v_rms", "v rms", r"v_\mathrm{rms}", "m/s"),
     Quantity("reynolds_number", "Reynolds number", "Re", "Re", r"\mathit{Re}", ""),
+    Quantity("reynolds_number_start", "Reynolds number at the start", "Re_0", "Re 0", r"\mathit{Re}_0", ""),
     Quantity("keulegan_carpenter_number", "Keulegan-Carpenter number", "KC", "KC", r"\mathit{KC}", ""),
-    Quantity("drag_coefficient", "drag coefficient", "C_d", "C d", r"C_\mathrm{d}", ""),
-    Quantity("gamma", "linear damping", "gamma", "γ", r"\gamma", "1/s"),
-    Quantity("beta", "quadratic damping", "beta", "β", r"\beta", "1/(m s)", of_record=True),
-    Quantity("mu", "dry friction", "mu", "μ", r"\mu", "m/s", of_record=True),
-    Quantity("c", "drag by a power of the amplitude", "c", "c", "c", "m^(1-n)/s", of_record=True),
-    Quantity("n", "that power", "n", "n", "n", ""),
+    Quantity("drag_coefficient", "quadratic drag coefficient", "C_d", "C d", r"C_\mathrm{d}", ""),
+    Quantity("gamma", "linear damping", "gamma", "γ", r"\gamma", "1/s", by_law=True),
+    Quantity("beta", "quadratic damping", "beta", "β", r"\beta", "1/(m s)", of_record=True, by_law=True),
+    Quantity("mu", "dry friction", "mu", "μ", r"\mu", "m/s", of_record=True, by_law=True),
+    Quantity("c", "drag by a power of the amplitude", "c", "c", "c", "m^(1-n)/s", of_record=True, by_law=True),
+    Quantity("n", "that power", "n", "n", "n", "", by_law=True),
 )
 QUANTITIES: Mapping[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
 """Every estimate by name, in the order of Table 1."""
@@ -138,10 +142,6 @@ INPUTS: Mapping[str, Input] = {
     "choice_of_fit": Input("fit of windows against fit of the whole waveform"),
     "held_samples": Input("distances held by the sensor"),
     "sensor_smoothing": Input("smoothing by the sensor"),
-    "modulation": Input("a second oscillation that beats slowly"),
-    "rows_lost": Input("rows that are missing"),
-    "rows_doubled": Input("rows that repeat the one before"),
-    "mains_hum": Input("hum of the mains"),
     "implausible_motion": Input("motion that no bob on a spring makes"),
     "implausible_distance": Input("distances that no sensor measures"),
 }

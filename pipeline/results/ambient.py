@@ -29,8 +29,8 @@ class Ambient:
 
     Notes
     -----
-    The formulas have uncertainties of their own, as inputs of value 1. One variable for the temperature: where it
-    moves density and speed of sound together, a result sees both at once.
+    The uncertainties of the formulas are inputs of value 1. One variable for the temperature: where it
+    moves density and speed of sound together, a result sees both.
     """
 
     def __init__(self, scene: Scene, inputs: Inputs, *, u_temperature_k: float) -> None:

@@ -186,7 +186,7 @@ def _crests(t: F8, y: F8) -> list[int]:
 
 
 def _exponential(t: F8, amplitude: F8) -> tuple[float, float]:
-    """Unweighted least squares for gamma alone, and the uncertainty that the fit's covariance states."""
+    """Fit only gamma by unweighted least squares; return it with the uncertainty from the covariance of the fit."""
     start = float(amplitude[0])
 
     def residuals(theta: F8) -> F8:

@@ -38,7 +38,7 @@ class SpringRun:
         Of the undamped motion, rad/s, from the record's scatter alone: the clock's part is common to runs and stated
         apart.
     mass_kg : Estimate
-        What swings in this run alone: bob, disc, air carried along, kg.
+        Mass that moves only in this run: bob, disc, air carried along, kg.
     u_clock : float
         Relative standard uncertainty of the clock's rate.
     clock : str
@@ -353,7 +353,7 @@ def _known_spring(masses: Sequence[Estimate], stated: Estimate | None) -> Estima
 def _suspects(
     runs: Sequence[SpringRun], masses: Sequence[Estimate], stated: Estimate | None, mass_correlation: float
 ) -> list[int]:
-    """Return the runs farthest from a robust line through all, in their order: soft-L1, which few outliers move little.
+    """Return the runs farthest from a robust line (soft-L1, which a few outliers move little), in their order.
 
     The line is linear in the constant and in the spring's mass, over the constants with a spring of the known mass.
     """

@@ -87,7 +87,7 @@ class Suspect:
         The likeliest, one of :data:`Cause`.
     message : str
     other : str
-        The run, spring or disc that it was taken for; empty where there is none.
+        The run, spring or disc that it was mistaken for; empty if there is none.
     """
 
     name: str
@@ -106,7 +106,7 @@ class Agreement:
     mean : Estimate
         Over benches, with the scatter between them.
     within, between : float
-        Standard deviation of runs of one bench, and of benches beyond it; NaN where there is one of them.
+        Standard deviation of runs at one bench, and of benches in addition to it; NaN if there is only one.
     stated : float
         Root mean square of the runs' own standard uncertainties.
     runs, benches : int
@@ -162,7 +162,7 @@ def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Se
     14.060 +- 0.050 N/m 0.014 0.070
     """
     if not values:
-        raise AnalysisError(f"{quantity} of {group}: a run that gives it was demanded, got none")
+        raise AnalysisError(f"{quantity} of {group}: expected a run that gives it, got none")
     x = np.array([value.value for value in values])
     stated = math.sqrt(float(np.mean([value.u**2 for value in values])))
     names = list(dict.fromkeys(benches))
@@ -273,19 +273,19 @@ def _springs(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
     for run in far:
         middle = middles[run.spring]
         off = _log(run.spring_constant) - middle.centre
-        told = f"k is {100 * math.expm1(off):+.3g} % off the {middle.label or 'course'}'s"
+        text = f"k is {100 * math.expm1(off):+.3g} % off the {middle.label or 'course'}'s"
         powers = [p for p in POWERS if abs(_away(run, middles, mass=run.bob_mass_kg * 10.0**p)) < NEAR]
         if run.name in partners:
             other = partners[run.name]
-            message = f"{told}; with its mass and that of {other} exchanged both agree with their springs"
+            message = f"{text}; with its mass and that of {other} exchanged both agree with their springs"
             yield Suspect(run.name, "masses exchanged", message, other)
         elif powers:
-            message = f"{told}; with 10^{powers[0]:+d} of its mass it agrees: the unit of its mass"
+            message = f"{text}; with 10^{powers[0]:+d} of its mass it agrees: the unit of its mass"
             yield Suspect(run.name, "unit of the mass", message)
         elif near := [m.label for s, m in middles.items() if s != run.spring and abs(_away(run, middles, m)) < NEAR]:
-            yield Suspect(run.name, "wrong spring", f"{told}, and that of spring {near[0]}", near[0])
+            yield Suspect(run.name, "wrong spring", f"{text}, and that of spring {near[0]}", near[0])
         else:
-            yield Suspect(run.name, "unknown", f"{told}: look at its mass and its spring")
+            yield Suspect(run.name, "unknown", f"{text}: look at its mass and its spring")
 
 
 def _away(
@@ -332,15 +332,15 @@ def _discs(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
             y, x, u = _log(run.drag), math.log(run.keulegan_carpenter), run.drag.u / run.drag.value  # type: ignore[union-attr]
             if abs(away := middles[disc].away(y, u, x)) <= FAR:
                 continue
-            told = f"its drag coefficient is {away:+.0f} standard deviations off that of its disc"
+            text = f"its drag coefficient is {away:+.0f} standard deviations off that of its disc"
             step = {d: math.log(run.diameter_m / diameters[d]) for d in groups if d != disc}
             sizes = [(abs(middles[d].away(y + 2 * s, u, x + s)), d) for d, s in step.items()]
             if sizes and min(sizes)[0] < NEAR:
                 near = min(sizes)[1]
-                message = f"{told}; with the diameter of {near}, {diameters[near]:.4g} m, it is that of {near}"
+                message = f"{text}; with the diameter of {near}, {diameters[near]:.4g} m, it is that of {near}"
                 yield Suspect(run.name, "wrong disc", message, near)
             else:
-                yield Suspect(run.name, "unknown", f"{told}: look at its disc and its mass")
+                yield Suspect(run.name, "unknown", f"{text}: look at its disc and its mass")
 
 
 def _groups(runs: Sequence[CourseRun], by: Literal["spring", "disc"]) -> dict[str, list[CourseRun]]:

@@ -13,8 +13,8 @@ from pipeline.damping.average import Weighted
 from pipeline.damping.select import Damping, LawFit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import solve_weighted
-from pipeline.oscillation.demodulate import Demodulated
 from pipeline.track import F8
+from pipeline.windows.demodulate import Demodulated
 
 __all__ = ["Curve", "drag_curve", "energy_curve"]
 
@@ -34,7 +34,7 @@ class Curve:
     unit : str
         Of y.
     x_points, y_points, u_points : (m,) float64
-        From the windows' amplitudes; ``u_points`` is their scatter alone, which the points do not share.
+        From the windows' amplitudes; ``u_points`` is only their scatter, which the points do not share.
     """
 
     x: F8
@@ -85,7 +85,7 @@ def energy_curve(
         unit,
         t,
         points,
-        2.0 * factor.value * demodulated.amplitude * damping.scatter.u,
+        2.0 * factor.value * np.abs(demodulated.amplitude) * damping.scatter.u,
     )
 
 
@@ -119,7 +119,7 @@ def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, law
 
     def coefficient(fit: LawFit, theta: F8) -> F8:
         friction = _friction(best, theta if fit.name == best.name else best.joint.values)
-        return factor.value * (fit.law.rate(x, theta) - friction) / x**2
+        return factor.value * (-fit.law.rate(x, theta) - friction) / x**2
 
     y = coefficient(best, best.joint.values)
     variance = (y * factor.u / factor.value) ** 2

@@ -5,8 +5,8 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -16,27 +16,24 @@ from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
-from pipeline.damping.average import Weighted, average_over_laws, spread_counts
+from pipeline.checks.misfit import Misfit
+from pipeline.damping.average import Weighted, average_over_laws, scaled, spread_counts
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
-from pipeline.damping.laws import FunctionLaw, Power
+from pipeline.damping.laws import Law, free_power
 from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.waveform import Rest
-from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.robust import mad_sigma
-from pipeline.oscillation.demodulate import Demodulated
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, estimate_of, function_of, joint_of
-from pipeline.results.checks.finding import Misfit
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality
+from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["Derived", "Params", "derive"]
-
-# Powers of length and of one over time in the unit of a law's parameter.
-_DIMENSIONS = {"A0": (1, 0), "gamma": (0, 1), "beta": (-1, 1), "mu": (1, 1)}
+__all__ = ["Derived", "Params", "derive", "limited"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,14 +62,21 @@ class Derived:
     estimates : mapping of str to Estimate
         With every known contribution to the uncertainty, the clock's and the scale's among them.
     coefficients : mapping of str to Estimate
-        Of linear and quadratic drag, whichever of its terms show, where the record allows it; else of the selected
-        law. With every known contribution.
+        Of linear and quadratic drag together, where the record allows it; else of the selected law, which is always a
+        stated one. They are those of the law ``laws[0]``, with every known contribution. Those that are not
+        determined are upper limits.
     budgets : mapping of str to Budget
         Of every estimate and coefficient: which input contributes what.
     laws : tuple of Weighted
         The laws by which amplitude and damping rate are stated; the coefficients are the first one's.
     parts : mapping of str to (variable, str)
         What the properties below are read from, with units; absent where the scene does not give it.
+    law : str
+        Name of the one law by which the results are stated; empty where they are an average over laws. Both drags
+        together are such an average where the record selects one of them: they hold either.
+    alone : callable or None
+        Gives the same by the law that is clearly ahead (:attr:`pipeline.damping.select.Damping.ahead`), where the
+        results are an average over laws.
     """
 
     estimates: Mapping[str, Estimate]
@@ -80,10 +84,57 @@ class Derived:
     budgets: Mapping[str, Budget]
     laws: tuple[Weighted, ...]
     parts: Mapping[str, tuple[Any, str]]
+    law: str
+    alone: Callable[[], Derived] | None = None
+
+    @cached_property
+    def of_law(self) -> frozenset[str]:
+        """Names of the estimates whose values and uncertainties depend on the law of damping."""
+        return frozenset(
+            name
+            for name in self.estimates
+            if any(c.name in ("damping_law", "choice_of_law") for c in self.budgets[name].contributions)
+        )
+
+    @cached_property
+    def leading(self) -> Derived | None:
+        """What the results are if the law that is clearly ahead holds; None where none is, or where one was stated."""
+        return None if self.alone is None else self.alone()
+
+    def coefficients_of(self, law: str) -> Mapping[str, Estimate]:
+        """Return the coefficients that the results state of a law; nothing where they state none of it."""
+        for stated in (self, self.leading):
+            if stated is not None and stated.laws[0].fit.name == law:
+                return stated.coefficients
+        return {}
+
+    def parameters_of(self, fit: LawFit) -> dict[str, Estimate]:
+        """Return the parameters of a law in true seconds and metres, with every known contribution, by name.
+
+        They are the results' own where these are of this law. Coefficients that are not determined are upper limits.
+        """
+        from uncertainties import correlated_values
+
+        coefficients = self.coefficients_of(fit.name)
+        for stated in (self, self.leading):
+            if stated is not None and stated.law == fit.name:
+                return {"A0": stated.estimates["amplitude"], **coefficients}
+        joint = scaled(fit).joint
+        variables = list(correlated_values(joint.values.tolist(), joint.covariance))
+        found = {
+            name: estimate_of(x, unit)
+            for name, (x, unit) in _in_true_units(fit.law, joint, variables, *self._scales).items()
+        }
+        return {**{name: limited(fit.law, name, x) for name, x in found.items()}, **coefficients}
+
+    @property
+    def _scales(self) -> tuple[Any, Any]:
+        """True seconds in a second of the record and true lengths in a recorded one, as factors of rate and length."""
+        return self.parts["rates"][0], self.parts["lengths"][0]
 
     @cached_property
     def statistical(self) -> Mapping[str, Estimate]:
-        """The estimates with what the record's own scatter contributes to their uncertainties alone (Type A)."""
+        """The estimates with only the part of their uncertainties from the scatter of the recording (Type A)."""
         return {name: Estimate(e.value, self.budgets[name].u_of("A"), e.unit) for name, e in self.estimates.items()}
 
     @cached_property
@@ -98,7 +149,7 @@ class Derived:
 
     @cached_property
     def own_mass_kg(self) -> Estimate | None:
-        """What of the mass belongs to this run alone."""
+        """The part of the mass that belongs only to this run."""
         return self._part("own_mass")
 
     @cached_property
@@ -197,8 +248,11 @@ def derive(
     :math:`\\omega = r\\omega_0`, :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`,
     :math:`k = (\\omega^2 + \\overline{\\lambda^2}) m_s/x^2` with :math:`x \\tan x = m_s/(m + m_a)`,
     :math:`A_0 = s a_0`, :math:`\\beta = r b/s`,
-    :math:`Q = \\omega/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start,
-    :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta`,
+    :math:`Q = \\omega_0/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start and
+    :math:`\\omega_0^2 = \\omega^2 + \\overline{\\lambda^2}`, which is the quality factor of linear drag, and for other
+    laws :math:`2\\pi` times the energy over the loss in a period, at the start and to first order of the damping,
+    :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta` of the
+    whole record and with :math:`\\omega A_0/\\sqrt 2` at its start,
     :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
     Of an acceleration of amplitude a the displacement's is :math:`a/(\\omega^2 + \\lambda^2)`, of a velocity
     :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`, and with it everything that needs a length, as of an angular velocity the
@@ -226,14 +280,38 @@ def derive(
             x = terms[formula.name] = formula.expression(**{name: terms[name] for name in formula.requires})
             of_run = found if formula.name in QUANTITIES else parts
             of_run[formula.name] = x, formula.unit_in(unit)
+    parts |= {name: (terms[name], "") for name in ("rates", "lengths")}
     budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
+    law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == damping.selected else ""
+    alone = None
+    if damping.ahead and not law:
+        alone = partial(
+            derive,
+            demodulated,
+            replace(damping, stated=damping.selected),
+            phase,
+            rest,
+            scene,
+            effects,
+            instrument=instrument,
+            params=params,
+            misfits=misfits,
+            smoothing=smoothing,
+        )
     return Derived(
         estimates={name: budgets[name].estimate for name in found},
-        coefficients={name: budgets[name].estimate for name in coefficients},
+        coefficients={name: limited(laws.stated.law, name, budgets[name].estimate) for name in coefficients},
         budgets=budgets,
         laws=laws.weighted,
         parts=parts,
+        law=law,
+        alone=alone,
     )
+
+
+def limited(law: Law, name: str, estimate: Estimate) -> Estimate:
+    """Return a law's parameter, as an upper limit where it is a coefficient that the record does not determine."""
+    return estimate if name in ("A0", free_power(law)) else UpperLimit.of(estimate)
 
 
 @dataclass(frozen=True)
@@ -287,7 +365,7 @@ _FORMULAS = (
         lambda omega, lengths, root_mean_square, per_value: omega * lengths * root_mean_square * per_value,
         {"rad": "rad/s", "rad/s": "rad/s"},
     ),
-    _Formula("quality_factor", lambda omega, decay: 0.5 * omega / decay),
+    _Formula("quality_factor", lambda natural, decay: 0.5 * natural**0.5 / decay),
     _Formula("displacement", lambda displacement: displacement, {"m": "", "m/s": "s", "m/s^2": "s^2"}),
     _Formula(
         "half_stiffness",
@@ -306,6 +384,12 @@ _FORMULAS = (
     _Formula(
         "reynolds_number",
         lambda density, velocity_rms, diameter, viscosity: density * velocity_rms * diameter / viscosity,
+    ),
+    _Formula(
+        "reynolds_number_start",
+        lambda density, omega, displacement_amplitude, diameter, viscosity: (
+            density * omega * displacement_amplitude / math.sqrt(2.0) * diameter / viscosity
+        ),
     ),
     _Formula(
         "drag_length",
@@ -374,6 +458,7 @@ def _terms(
         "scale": scale,
         "gain": filtered.gain,
         "lengths": lengths,
+        "rates": rates,
         "start": start,
         "rest": offset + zero + amiss["offset"],
         "start_phase": _start_phase(phase, slope, inputs, free) + amiss["phase"] + filtered.delay,
@@ -488,7 +573,7 @@ def _root(covariance: F8) -> F8:
 
 def _of_law(fit: LawFit, elapsed: F8) -> tuple[F8, F8]:
     """Amplitude and its rate at the start and the rms displacement over the windows, (3,), and their slopes (3, p)."""
-    amplitude, jacobian = fit.law.both(elapsed, fit.joint.values)
+    amplitude, jacobian = fit.law.curve(elapsed, fit.joint.values)
     size = math.sqrt(float(amplitude @ amplitude) / (2.0 * elapsed.size))
     by_size = amplitude @ jacobian / max(2.0 * elapsed.size * size, 1e-300)
     by_start = np.eye(1, fit.joint.values.size)[0]
@@ -507,20 +592,19 @@ def _start_phase(phase: PhaseFit, slope: Any, inputs: Inputs, dof: float) -> Any
 
 
 def _coefficients(laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
-    """The stated law's parameters in true seconds and metres."""
-    joint = laws.stated.joint
+    """The stated law's coefficients in true seconds and metres."""
+    found = _in_true_units(laws.stated.law, laws.stated.joint, laws.variables, rate, scale)
+    return {name: found[name] for name in laws.stated.joint.names[1:]}
+
+
+def _in_true_units(law: Law, joint: Joint, variables: list[Any], rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
+    """A law's parameters in true seconds and metres, with their units."""
+    values = dict(zip(joint.names, variables, strict=True))
     found: dict[str, tuple[Any, str]] = {}
-    law = laws.stated.law
-    # A law made of a function states its own dimensions; the powers of another law are not numbers beforehand.
-    dimensions = law.dimensions if isinstance(law, FunctionLaw) else _DIMENSIONS
-    for name, unit, x in zip(joint.names, joint.units, laws.variables, strict=True):
-        if name in dimensions and name != "A0":
-            length, per_time = dimensions[name]
-            found[name] = (x * scale**length * rate**per_time, unit)
-    if isinstance(laws.stated.law, Power):
-        c, n = (laws.variables[joint.names.index(name)] for name in ("c", "n"))
-        found["c"] = (c * rate * scale ** (1 - n), joint.units[joint.names.index("c")])
-        found["n"] = (n, "")
+    for name, printed in zip(joint.names, joint.units, strict=True):
+        unit = law.parameters[name]
+        metres = unit.metre - values[unit.less] if unit.less else unit.metre
+        found[name] = (values[name] * scale**metres * rate**-unit.second, printed)
     return found
 
 

@@ -20,8 +20,8 @@ from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.waveform import Rest
 from pipeline.numerics.quantity import amount, in_unit
-from pipeline.oscillation.disturbances import Disturbances
 from pipeline.registry.effects import check_effect
+from pipeline.windows.disturbances import Disturbances
 
 __all__ = ["Effect", "tabulate"]
 
@@ -177,11 +177,11 @@ def _rest_drift(rest: Rest, noise_m: float) -> Effect:
 
 
 def _modes(disturbances: Disturbances | None, unit: str) -> Iterator[Effect]:
-    """A mode of its own frequency, and what turns with the main oscillation or with both."""
+    """A mode of another frequency, and the harmonics and products of the main oscillation."""
     found = () if disturbances is None else disturbances.sideways.modes
     own = [mode for mode in found if mode.kind == "mode"]
     locked = [mode for mode in found if mode.kind != "mode"]
-    names = (("sideways_mode", own, "mode of a frequency of its own"), ("harmonics", locked, "harmonic or product"))
+    names = (("sideways_mode", own, "mode of another frequency"), ("harmonics", locked, "harmonic or product"))
     for name, members, what in names:
         if disturbances is None or disturbances.sideways.carrier is None:
             yield Effect(name, None, None, unit, False, "not sought: too few periods, or not at this accuracy")

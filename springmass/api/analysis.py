@@ -34,7 +34,8 @@ class Analysis(Found):
     -----
     ``a["period"]`` is an :class:`~pipeline.numerics.estimate.Estimate`; names are those of
     ``docs/reference/estimates.md``, their symbols (``a["k"]``, ``a["T"]``), the coefficients of the selected law
-    (``a["gamma"]``) and ``LAW.PARAMETER`` of any law (``a["quadratic.beta"]``). Estimates of one analysis are
+    (``a["gamma"]``), ``LAW.PARAMETER`` of any law (``a["quadratic.beta"]``), and ``LAW.NAME`` of any estimate if the
+    law that is clearly ahead holds (``a["linear.damping_rate"]``). Estimates of one analysis are
     correlated, and calculate so; estimates of two analyses are taken as independent: :func:`springmass.compare` knows
     what two runs share.
 
@@ -61,12 +62,17 @@ class Analysis(Found):
         if name in everything:
             return everything[name]
         for row in table_rows([self]):
-            if name in (row.symbol, row.page_symbol.replace(" ", "_")):
-                return everything[row.name]
+            (estimate,) = row.estimates
+            if estimate is not None and name in (row.symbol, row.page_symbol.replace(" ", "_")):
+                return estimate
         law, _, parameter = name.partition(".")
-        fits = self.motion.damping.fits if isinstance(self.motion, Oscillation) else {}
-        if law in fits and parameter in fits[law].joint.names:
-            return fits[law].joint[parameter]
+        if isinstance(self.motion, Oscillation) and law in self.motion.damping.fits:
+            derived = self.motion.derived
+            parameters = derived.parameters_of(self.motion.damping.fits[law])
+            if derived.leading is not None and derived.leading.law == law:
+                parameters = {**derived.leading.estimates, **parameters}
+            if parameter in parameters:
+                return parameters[parameter]
         raise _NoEstimate(
             f"no estimate {name!r} of this run; there are {', '.join(everything)}: see docs/reference/estimates.md for "
             "what others need of record and scene"
@@ -106,7 +112,7 @@ class Analysis(Found):
         return Plot(self)
 
     def to_dataframe(self, *, correlations: bool = False) -> pd.DataFrame:
-        """Return a row an estimate, by name.
+        """Return one row per estimate, by name.
 
         Parameters
         ----------

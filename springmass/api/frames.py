@@ -24,16 +24,16 @@ __all__ = ["comparison_frame", "estimates_frame", "run_dataset"]
 
 
 def estimates_frame(analysis: Analysis, *, correlations: bool = False) -> pd.DataFrame:
-    """Return a row an estimate; see :meth:`springmass.api.analysis.Analysis.to_dataframe`."""
+    """Return one row per estimate; see :meth:`springmass.api.analysis.Analysis.to_dataframe`."""
     import pandas as pd
 
     motion = analysis.motion
     derived = motion.derived if isinstance(motion, Oscillation) else None
     everything = {**analysis.estimates, **({} if derived is None else derived.coefficients)}
-    told = {row.name: row for row in table_rows([analysis])}
+    by_name = {row.name: row for row in table_rows([analysis])}
     rows: list[dict[str, Any]] = []
     for name, x in everything.items():
-        row = told.get(name)
+        row = by_name.get(name)
         words = {"quantity": name.replace("_", " "), "symbol": ""}
         if row is not None:
             words = {"quantity": row.quantity, "symbol": row.symbol}
@@ -54,7 +54,7 @@ def _expanded(budget: Budget | None) -> dict[str, float]:
 
 
 def comparison_frame(found: Comparison, periods: dict[str, Estimate]) -> pd.DataFrame:
-    """Return a row a run and one for their mean, by name.
+    """Return one row per run and one for their mean, by name.
 
     Parameters
     ----------

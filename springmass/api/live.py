@@ -7,19 +7,18 @@ import os
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
-from acquisition.errors import NeedsAnswer
+from springmass.api.sources import load_file
 from springmass.errors import USAGE, ProgramError
 from springmass.page.feeds import LogFeed, view_of
 from springmass.page.view import View
-from springmass.runs.loading import kind_of, load
-from springmass.runs.questions import for_python
+from springmass.runs.loading import kind_of
 
 if TYPE_CHECKING:
     import anywidget
 
-__all__ = ["live", "script"]
+__all__ = ["Transmission", "live", "script"]
 
 STATIC = Path(__file__).parent.parent / "page" / "static"
 TURN_S = 0.05
@@ -31,7 +30,7 @@ def script() -> str:
     return "\n".join((STATIC / name).read_text(encoding="utf-8") for name in names)
 
 
-def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0, **completions: Any) -> anywidget.AnyWidget:
+def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0, **options: Any) -> anywidget.AnyWidget:
     """Return a chart of a recording for a notebook, which goes on as long as the recording does.
 
     Parameters
@@ -40,8 +39,8 @@ def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0, **comp
         The wire log of a recording, or any recording that :func:`springmass.load` reads.
     seconds : float or None
         How much of its end is shown, s; None: all of it. A recording that is over is shown whole.
-    **completions
-        What a recording that is over leaves open, as :func:`springmass.load` takes it.
+    **options
+        Of a recording that is over, as :func:`springmass.load` takes them.
 
     Raises
     ------
@@ -58,66 +57,72 @@ def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0, **comp
     binary messages do (``docs/reference/page-messages.md``). ``chart.stop()`` ends the reading.
     """
     try:
-        import anywidget
-        import traitlets
+        from springmass.api.live_widget import LiveChart
     except ImportError as error:
         raise ProgramError(
             "springmass.live needs anywidget, which is not installed: pip install springmass[notebook]", USAGE
         ) from error
-    path = Path(source)
-    view, poll = _opened(path, completions)
-
-    class Live(anywidget.AnyWidget):
-        """The chart in the notebook."""
-
-        _esm = script()
-        _css = (STATIC / "uPlot.min.css").read_text(encoding="utf-8") or " "
-        seconds = traitlets.Float(0.0).tag(sync=True)
-
-        def stop(self) -> None:
-            """Read no further."""
-            over.set()
-
-    over = threading.Event()
+    view, poll = _opened(Path(source), options)
     shown = 0.0 if view.ended or seconds is None or not math.isfinite(seconds) else seconds
-    widget = Live(seconds=shown)
-    lock = threading.Lock()
-    sent = 0
-
-    def send() -> None:
-        nonlocal sent
-        series = view.series[0]
-        while sent < len(series):
-            message = series.message(0, sent)
-            sent += (len(message) - 16) // 16
-            widget.send({"type": "samples"}, buffers=[message])
-
-    def asked(_: Any, content: Any, _buffers: Any) -> None:
-        nonlocal sent
-        if isinstance(content, dict) and content.get("type") == "begin":
-            with lock:
-                sent = 0
-                widget.send(view.hello(controls=False))
-                send()
-
-    def go_on() -> None:
-        while not over.wait(TURN_S) and not (view.ended or view.error):
-            with lock:
-                poll()
-                if sent:
-                    send()
-
-    widget.on_msg(asked)
-    threading.Thread(target=go_on, name="springmass-live", daemon=True).start()
-    return widget
+    return LiveChart(Transmission(view, poll), seconds=shown)
 
 
-def _opened(path: Path, completions: Mapping[str, Any]) -> tuple[View, Callable[[], None]]:
+class Transmission:
+    """Sends the samples of one recording to one chart, from its beginning and as they come.
+
+    Parameters
+    ----------
+    view : View
+    poll : callable
+        Takes what has come into the view.
+    """
+
+    def __init__(self, view: View, poll: Callable[[], None]) -> None:
+        self._view, self._poll = view, poll
+        self._lock, self._over = threading.Lock(), threading.Event()
+        self._sent = 0
+
+    def start(self, chart: Chart) -> None:
+        """Send in a thread until the recording has ended."""
+        threading.Thread(target=self._go_on, args=(chart,), name="springmass-live", daemon=True).start()
+
+    def begin(self, chart: Chart) -> None:
+        """Send all from the beginning to a chart that asks for it."""
+        with self._lock:
+            self._sent = 0
+            chart.send(self._view.hello(controls=False))
+            self._send(chart)
+
+    def stop(self) -> None:
+        """Read no further."""
+        self._over.set()
+
+    def _send(self, chart: Chart) -> None:
+        series = self._view.series[0]
+        while self._sent < len(series):
+            message = series.message(0, self._sent)
+            self._sent += (len(message) - 16) // 16
+            chart.send({"type": "samples"}, buffers=[message])
+
+    def _go_on(self, chart: Chart) -> None:
+        while not self._over.wait(TURN_S) and not (self._view.ended or self._view.error):
+            with self._lock:
+                self._poll()
+                if self._sent:  # nobody asked to begin yet
+                    self._send(chart)
+
+
+class Chart(Protocol):
+    """What samples are sent to."""
+
+    def send(self, content: Any, buffers: list[bytes] | None = None) -> None:
+        """Send a message to the browser."""
+        ...
+
+
+def _opened(path: Path, options: Mapping[str, Any]) -> tuple[View, Callable[[], None]]:
     if kind_of(path) == "wire":
         feed = LogFeed(path)
         feed.poll()
         return feed.view, feed.poll
-    try:
-        return view_of(load(path, **completions)), lambda: None
-    except NeedsAnswer as asked:
-        raise asked.with_remedy(for_python(asked.question, "springmass.live", completions)) from None
+    return view_of(load_file(path, "springmass.live", options)), lambda: None

@@ -40,7 +40,7 @@ class Plot:
         return self.position(ax=ax)
 
     def position(self, ax: Axes | None = None, *, from_s: float | None = None, to_s: float | None = None) -> Axes:
-        """Draw the distance against time with its fit; flagged samples have markers of their own.
+        """Draw the distance against time with its fit; flagged samples have other markers.
 
         Parameters
         ----------

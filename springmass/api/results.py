@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from springmass.batch.results_table import read_rows
-from springmass.batch.rows import NUMBERS, UNITS, WHOLE
+from springmass.batch.rows import NUMBERS, UNITS, WHOLE, columns_of
+from springmass.batch.store import open_course, table_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +18,7 @@ __all__ = ["results"]
 def results(
     folder: str | os.PathLike[str], *, form: Literal["frame", "dataset"] = "frame"
 ) -> pd.DataFrame | xr.Dataset:
-    """Return the table that ``springmass batch`` made, a row a run.
+    """Return the table that ``springmass batch`` made, with one row per run.
 
     Parameters
     ----------
@@ -36,12 +35,12 @@ def results(
     Raises
     ------
     springmass.errors.ProgramError
-        If the folder holds no table.
+        If the folder holds no complete course, or its rows are damaged.
     """
     import pandas as pd
 
-    rows = list(read_rows(Path(folder)))
-    frame = pd.DataFrame(rows)
+    store = open_course(folder)
+    frame = pd.DataFrame(list(table_rows(store)), columns=columns_of(store.tags))
     for name in frame.columns:
         if name in NUMBERS:
             frame[name] = frame[name].astype("float64")

@@ -11,7 +11,7 @@ import numpy as np
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from springmass.report.laws import laws_of
-from springmass.report.tables import pretty, pretty_number, table_rows
+from springmass.report.tables import law_status, pretty, pretty_number, table_rows
 
 __all__ = ["html_summary", "text_summary"]
 
@@ -49,7 +49,8 @@ def text_summary(analysis: Analysis) -> str:
     rows = {row.name: row for row in table_rows([analysis])}
     shown = [name for name in FIRST if name in rows][:MOST_ROWS]
     lines = [_cut(visible(_head(analysis)))]
-    lines += [f"  {rows[name].quantity:26}{rows[name].symbol:8}{rows[name].estimates[0]!r}" for name in shown]
+    width = max(len(rows[name].quantity) for name in shown) + 2
+    lines += [f"  {rows[name].quantity:{width}}{rows[name].symbol:8}{rows[name].estimates[0]!r}" for name in shown]
     if isinstance(analysis.motion, Oscillation):
         lines.append(_cut(f"damping: {_law(analysis.motion)}"))
     lines.append(_cut(_findings(analysis)))
@@ -76,24 +77,23 @@ def html_summary(analysis: Analysis) -> str:
         f"<tbody>{''.join(rows)}</tbody></table>",
     ]
     if isinstance(analysis.motion, Oscillation):
-        damping = analysis.motion.damping
         fits = [
             f"<tr><td>{escape(row['name'])}</td><td>{escape(row['status'])}</td>"
             f"<td>{pretty_number(row['fit'].reduced_chi2, 3)}</td><td>{escape(row['bic'])}</td>"
             f"<td>{escape(', '.join(row['coefficients'][1:]))}</td></tr>"
-            for row in laws_of(damping)["rows"]
+            for row in laws_of(analysis.motion)["rows"]
         ]
         heads = "<th>law</th><th>status</th><th>reduced χ²</th><th>ΔBIC</th><th>coefficients</th>"
         parts.append(
             f"<details><summary>Damping: {escape(_law(analysis.motion))}</summary>"
             f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(fits)}</tbody></table></details>"
         )
-    told = "".join(
+    items = "".join(
         f"<li><b>{escape(f.severity)}</b> <code>{escape(f.code)}</code>: {escape(visible(f.message))}</li>"
         for f in analysis.findings
     )
     opened = " open" if any(f.severity != "info" for f in analysis.findings) else ""
-    parts.append(f"<details{opened}><summary>{escape(_findings(analysis))}</summary><ul>{told}</ul></details>")
+    parts.append(f"<details{opened}><summary>{escape(_findings(analysis))}</summary><ul>{items}</ul></details>")
     return f'<div class="springmass-analysis">{"".join(parts)}</div>'
 
 
@@ -108,17 +108,19 @@ def _head(analysis: Analysis) -> str:
 def _law(motion: Oscillation) -> str:
     damping = motion.damping
     others = [name for name in damping.admissible if name != damping.selected]
+    if damping.by_statement:
+        return f"{damping.selected} ({law_status(damping, damping.selected)})"
     state = "rejected, yet the least bad" if damping.best.rejected else "selected"
-    tail = f"; {', '.join(others)} cannot be told from it" if others else ""
+    tail = f"; {', '.join(others)} cannot be distinguished from it" if others else ""
     return f"{damping.selected} ({state} of {len(damping.fits)} laws){tail}"
 
 
 def _findings(analysis: Analysis) -> str:
     counts: Counter[str] = Counter(finding.severity for finding in analysis.findings)
-    told = [f"{counts[name]} {name}{'s' * (counts[name] > 1)}" for name in ("error", "warning") if counts[name]]
-    told += [f"{counts['info']} for information"] if counts["info"] else []
+    parts = [f"{counts[name]} {name}{'s' * (counts[name] > 1)}" for name in ("error", "warning") if counts[name]]
+    parts += [f"{counts['info']} for information"] if counts["info"] else []
     grave = [f.code for f in analysis.findings if f.severity != "info"]
-    return f"findings: {', '.join(told) or 'none'}" + (f": {', '.join(grave)}" if grave else "")
+    return f"findings: {', '.join(parts) or 'none'}" + (f": {', '.join(grave)}" if grave else "")
 
 
 def _cut(line: str) -> str:

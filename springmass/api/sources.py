@@ -15,7 +15,6 @@ from acquisition.errors import NeedsAnswer
 from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis as Found
 from pipeline.analyse import Params
-from pipeline.analyse import analyse as analyse_track
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError, TrackError
@@ -23,18 +22,20 @@ from pipeline.motion.waveform_fit import Params as WaveformParams
 from pipeline.track import F8, Track
 from springmass.api.analysis import Analysis
 from springmass.api.frames import comparison_frame
-from springmass.runs.analysing import Analysed, distinct_names
+from springmass.runs.analysing import Analysed, analyse_loaded, analyse_track, distinct_names, with_law
 from springmass.runs.comparing import Compared, compare_analysed, demand_one_spring
-from springmass.runs.json_results import all_findings
-from springmass.runs.loading import Loaded, cut, load
+from springmass.runs.loading import Loaded, cut
+from springmass.runs.loading import load as read
+from springmass.runs.options import ReadOptions
 from springmass.runs.questions import for_python
 from springmass.runs.scenes import read_scene
+from springmass.values import ANY_LAW
 from storage.run_file.reading import Run
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Comparison", "analyse", "compare"]
+__all__ = ["Comparison", "analyse", "compare", "load"]
 
 
 def analyse(
@@ -43,6 +44,7 @@ def analyse(
     params: Params | None = None,
     *,
     accuracy: str | None = None,
+    law: str | Law | None = None,
     laws: Sequence[str | Law | EllipsisType] | None = None,
     options: Mapping[str, Mapping[str, Any]] | None = None,
     from_s: float | None = None,
@@ -65,6 +67,10 @@ def analyse(
         Options of every stage, in place of a tier's.
     accuracy : {"fast", "standard", "best"}, optional
         Tier, "standard" where it is left out; not together with ``params``.
+    law : str or Law, optional
+        The damping law, if it is known: a name of :data:`springmass.LAWS` or a law of :func:`springmass.make_law`. The
+        results are stated by it alone, and findings say whether the run contradicts it. "any" leaves the choice to the
+        run, whatever the scene states; left out, the scene's counts.
     laws : sequence of str or Law, optional
         The damping laws to try: names of :data:`springmass.LAWS`, laws of :func:`springmass.make_law`, and ``...`` for
         all that ship.
@@ -104,22 +110,57 @@ def analyse(
     chosen = with_options(params or params_for(accuracy or "standard"), options or {})
     if laws is not None:
         chosen = replace(chosen, damping=replace(chosen.damping, laws=_laws(laws), otherwise=()))
+    if law is not None:
+        chosen = with_law(chosen, law if law == ANY_LAW else find_law(law))
     if isinstance(source, Run):
         source = source.path
     if isinstance(source, str | os.PathLike):
-        try:
-            source = load(Path(source), **completions)
-        except NeedsAnswer as asked:
-            raise asked.with_remedy(for_python(asked.question, "springmass.analyse", completions)) from None
+        source = load_file(source, "springmass.analyse", {**completions, "from_s": from_s, "to_s": to_s})
     elif completions:
         raise TrackError(f"{', '.join(completions)} complete recordings named by a path, got a {type(source).__name__}")
+    elif isinstance(source, Loaded):
+        source = replace(source, track=cut(source.track, from_s, to_s, where=source.path))
     if isinstance(source, Loaded):
-        found = analyse_track(cut(source.track, from_s, to_s, where=source.path), _scene(scene, source), chosen)
-        found = replace(found, findings=all_findings(source, found))
+        found, name = analyse_loaded(source, _scene(scene), params=chosen).analysis, source.path.name
     else:
-        found = analyse_track(cut(track_of(source), from_s, to_s, where="the record"), _scene(scene, None), chosen)
-    name = source.path.name if isinstance(source, Loaded) else ""
+        track = cut(track_of(source), from_s, to_s, where="the record")
+        found, name = analyse_track(track, _scene(scene) or Scene(), chosen), ""
     return Analysis(**{each.name: getattr(found, each.name) for each in fields(Found)}, name=name)
+
+
+def load(path: str | os.PathLike[str], **options: Any) -> Loaded:
+    """Read a recording, a run file or a wire log.
+
+    All digests of a run file are checked before a sample is used.
+
+    Parameters
+    ----------
+    path : path
+    **options
+        The fields of :class:`springmass.runs.options.ReadOptions`: what the file leaves open (velocity, channel, run,
+        rate_hz, unit, time, time_unit), and from_s, to_s, clock_ppm, unverified.
+
+    Raises
+    ------
+    acquisition.errors.NeedsAnswer
+        If the file leaves something open that was not given. Its ``question`` lists what is missing and every answer.
+    acquisition.errors.FormatError, storage.errors.StorageError
+        If it cannot be read; one line.
+    ProgramError
+        If no sample lies within the seconds asked for.
+    TypeError
+        If an option is not known.
+    """
+    return load_file(path, "springmass.load", options)
+
+
+def load_file(path: str | os.PathLike[str], function: str, options: Mapping[str, Any]) -> Loaded:
+    """Load a file; what it leaves open is asked as arguments of the function that was called."""
+    given = ReadOptions.of(options)
+    try:
+        return read(Path(path), given)
+    except NeedsAnswer as error:
+        raise error.with_remedy(for_python(error.question, function, given.given())) from None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -134,7 +175,7 @@ class Comparison(Compared):
     runs: Mapping[str, Analysis]
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a row a run and one, "together", for their mean.
+        """Return one row per run and one, "together", for their mean.
 
         Returns
         -------
@@ -179,9 +220,7 @@ def compare(
         raise AnalysisError(f"compare needs two runs at least, got {len(sources)}")
     scenes = list(scene) if isinstance(scene, list | tuple) else [scene] * len(sources)
     if len(scenes) != len(sources):
-        raise AnalysisError(
-            f"one scene for all runs or one for each was demanded, got {len(scenes)} for {len(sources)}"
-        )
+        raise AnalysisError(f"expected one scene for all runs or one for each, got {len(scenes)} for {len(sources)}")
     each = [
         one if isinstance(one, Analysis) else analyse(one, its, **how) for one, its in zip(sources, scenes, strict=True)
     ]
@@ -250,7 +289,7 @@ def track_of(source: Any) -> Track:
     if t is None or y is None:
         raise TrackError(
             "a path, a run, a track, a pair (t, y), or a dataset, frame or mapping with time and distance was "
-            f"demanded, got a {type(source).__name__}"
+            f"expected, got a {type(source).__name__}"
         )
     of_y: Mapping[str, Any] = getattr(y, "attrs", {})
     track = Track.from_arrays(
@@ -288,14 +327,8 @@ def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:
     return tuple(found)
 
 
-def _scene(given: Any, loaded: Loaded | None) -> Scene:
-    """Return the scene given, else the one beside a file, else the one inside it."""
-    if isinstance(given, Scene):
+def _scene(given: Any) -> Scene | None:
+    """Return the scene that was given, in whatever form."""
+    if given is None or isinstance(given, Scene):
         return given
-    if isinstance(given, Mapping):
-        return Scene.from_mapping(given)
-    if given is not None:
-        return read_scene(given)
-    if loaded is None:
-        return Scene()
-    return Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
+    return Scene.from_mapping(given) if isinstance(given, Mapping) else read_scene(given)

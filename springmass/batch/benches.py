@@ -1,4 +1,4 @@
-"""What the runs of a course say together: springs, discs, scatter between and within benches, runs noted wrongly."""
+"""Compare the runs of a course: springs, discs, scatter between and within benches, runs noted wrongly."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ import numpy as np
 
 from pipeline.numerics.estimate import Estimate, format_value
 from pipeline.results.course import Agreement, CourseRun, Suspect, agreement, suspects
-from springmass.batch.search import COURSE
+from springmass.batch.rows import COURSE
 from springmass.errors import UNREADABLE, USAGE, ProgramError
 
-__all__ = ["CourseCompared", "compare_rows", "compared_json", "compared_text"]
+__all__ = ["CourseComparison", "compare_rows", "compared_json", "compared_text"]
 
 BENCHES = ("bench", "group", "section", COURSE)
-"""Columns that tell benches apart, the first that the course has."""
+"""Columns that distinguish benches; the first that the course has is used."""
 
 
 @dataclass(frozen=True, slots=True)
-class CourseCompared:
-    """What many runs say together.
+class CourseComparison:
+    """A comparison of many runs.
 
     Parameters
     ----------
     runs : int
-        That took part.
+        Runs with a period.
     bench : str
-        The column by which benches are told apart.
+        The column that distinguishes benches.
     agreements : tuple of Agreement
         Spring constants by spring, drag coefficients by disc; without the suspects.
     suspects : tuple of Suspect
@@ -45,16 +45,16 @@ class CourseCompared:
     laws: Mapping[str, int]
 
 
-def compare_rows(rows: Sequence[Mapping[str, Any]], *, bench: str | None = None) -> CourseCompared:
+def compare_rows(rows: Sequence[Mapping[str, Any]], *, bench: str | None = None) -> CourseComparison:
     """Compare the runs of a course.
 
     Parameters
     ----------
     rows : sequence of mapping
-        Of the table, by column. Springs and discs are told apart by the columns ``spring`` and ``disc`` where the
-        course has them, else by the spring's mass and the disc's diameter.
+        Of the table, by column. The columns ``spring`` and ``disc`` distinguish springs and discs if the course has
+        them, else the spring's mass and the disc's diameter.
     bench : str, optional
-        The column that tells benches apart; left out, the first of :data:`BENCHES` that is there.
+        The column that distinguishes benches; left out, the first of :data:`BENCHES` that is there.
 
     Raises
     ------
@@ -63,16 +63,16 @@ def compare_rows(rows: Sequence[Mapping[str, Any]], *, bench: str | None = None)
     """
     moving = [row for row in rows if row["status"] == "ok"]
     if len(moving) < 2:
-        raise ProgramError(f"a comparison needs two runs with a period, got {len(moving)}; see --where", UNREADABLE)
+        raise ProgramError(f"compare needs two runs with a period, got {len(moving)}; see --where", UNREADABLE)
     if bench is not None and bench not in moving[0]:
-        raise ProgramError(f"--bench: a column of the course was demanded, there is no {bench!r}", USAGE)
+        raise ProgramError(f"--bench: the course has no column {bench!r}; name another", USAGE)
     by = bench or next(name for name in BENCHES if name in moving[0])
     courses = {row[COURSE] for row in moving}
     runs = [_run(row, by, alone=len(courses) == 1) for row in moving]
-    wrong = suspects(runs)
-    named = {one.name for one in wrong}
+    differing = suspects(runs)
+    named = {suspect.name for suspect in differing}
     good = [run for run in runs if run.name not in named]
-    found = []
+    agreements = []
     for quantity, label in (("spring_constant", "spring"), ("drag", "disc")):
         groups: dict[str, list[CourseRun]] = {}
         for run in good:
@@ -80,13 +80,13 @@ def compare_rows(rows: Sequence[Mapping[str, Any]], *, bench: str | None = None)
                 groups.setdefault(getattr(run, label), []).append(run)
         for name, group in sorted(groups.items()):
             values = [getattr(run, quantity) for run in group]
-            found.append(agreement(_NAMES[quantity], name, values, [run.bench for run in group]))
+            agreements.append(agreement(_NAMES[quantity], name, values, [run.bench for run in group]))
     counts: dict[str, int] = {}
     for row in moving:
         if row["law"]:
             counts[row["law"]] = counts.get(row["law"], 0) + 1
     laws = dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
-    return CourseCompared(len(runs), by, tuple(found), wrong, laws)
+    return CourseComparison(len(runs), by, tuple(agreements), differing, laws)
 
 
 _NAMES = {"spring_constant": "spring_constant", "drag": "drag_coefficient"}
@@ -118,10 +118,10 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
 
 
 def _label(row: Mapping[str, Any], tag: str, scene: str) -> str:
-    told = row.get(tag)
-    if told is None:
-        told = row[scene]
-    return "" if told is None else str(told)
+    label = row.get(tag)
+    if label is None:
+        label = row[scene]
+    return "" if label is None else str(label)
 
 
 def _number(row: Mapping[str, Any], name: str) -> float:
@@ -129,27 +129,29 @@ def _number(row: Mapping[str, Any], name: str) -> float:
     return math.nan if value is None else float(value)
 
 
-def compared_json(found: CourseCompared) -> dict[str, Any]:
-    """Return a comparison as JSON-able mapping."""
+def compared_json(comparison: CourseComparison) -> dict[str, Any]:
+    """Return a comparison as a mapping that JSON can hold."""
     from springmass.runs.json_results import SCHEMA, plain
 
-    told: dict[str, Any] = plain(found)
-    return {"schema": SCHEMA, **told}
+    fields: dict[str, Any] = plain(comparison)
+    return {"schema": SCHEMA, **fields}
 
 
-def compared_text(found: CourseCompared) -> str:
+def compared_text(comparison: CourseComparison) -> str:
     """Return a comparison in lines."""
-    lines = [f"{found.runs} runs; benches told apart by {found.bench}", ""]
-    for one in found.agreements:
-        of = f" of {one.group}" if one.group else ""
-        lines.append(f"{one.quantity}{of}: {format_value(one.mean.value, one.mean.u, one.mean.unit)}")
-        within = "one run a bench" if math.isnan(one.within) else f"{one.within:.2g} within a bench"
-        between = "one bench" if math.isnan(one.between) else f"{one.between:.2g} between {one.benches} benches"
-        lines.append(f"  {one.runs} runs; scatter {within} (stated {one.stated:.2g}), {between}")
-    if any(one.quantity == "drag_coefficient" for one in found.agreements):
+    lines = [f"{comparison.runs} runs; benches distinguished by {comparison.bench}", ""]
+    for group in comparison.agreements:
+        of = f" of {group.group}" if group.group else ""
+        lines.append(f"{group.quantity}{of}: {format_value(group.mean.value, group.mean.u, group.mean.unit)}")
+        within = "one run a bench" if math.isnan(group.within) else f"{group.within:.2g} within a bench"
+        benches = f"{group.between:.2g} between {group.benches} benches"
+        between = "one bench" if math.isnan(group.between) else benches
+        lines.append(f"  {group.runs} runs; scatter {within} (stated {group.stated:.2g}), {between}")
+    if any(group.quantity == "drag_coefficient" for group in comparison.agreements):
         lines.append("a drag coefficient counts all damping as drag of the disc, that of spring and hook too")
-    laws = ", ".join(f"{law} {count}" for law, count in found.laws.items())
+    laws = ", ".join(f"{law} {count}" for law, count in comparison.laws.items())
     lines += ["", f"damping laws selected: {laws}"] if laws else []
-    lines += ["", f"{len(found.suspects)} runs differ from their course"] if found.suspects else []
-    lines += [f"  {one.name}: {one.cause}: {one.message}" for one in found.suspects]
+    differing = comparison.suspects
+    lines += ["", f"runs that differ from their course: {len(differing)}"] if differing else []
+    lines += [f"  {suspect.name}: {suspect.cause}: {suspect.message}" for suspect in differing]
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""``runs.csv``: what is known of each run of a course, a row a file or a row a pattern."""
+"""``runs.csv``: the known values of each run of a course, in rows for files or for patterns."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -16,40 +16,44 @@ from typing import Any
 
 from acquisition.regular_file import open_regular_text
 from pipeline.bench.scene import PLACES
-from springmass.batch.rows import COLUMNS
+from pipeline.registry.laws import LAW_NAMES
+from springmass.batch.rows import RESERVED, TAG
 from springmass.errors import USAGE, ProgramError
-from springmass.runs.inputs import Found
+from springmass.runs.inputs import InputFile
+from springmass.values import ANY_LAW
 
-__all__ = ["Course", "Said", "join", "read_course", "template"]
+__all__ = ["Course", "Entry", "join", "read_course", "template"]
 
 ANSWERS = ("velocity", "channel", "run", "rate_hz", "unit", "time", "time_unit", "from_s", "to_s", "clock_ppm")
 NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
 POSITION = "sensor_position"
-KNOWN = ("path", "scene", POSITION, *ANSWERS, *PLACES, *(f"{name}_u" for name in PLACES))
+LAW = "law"
+KNOWN = ("path", "scene", POSITION, LAW, *ANSWERS, *PLACES, *(f"{name}_u" for name in PLACES))
 TEMPLATE = (
     "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
     "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",
 )  # fmt: skip
 LARGEST = 64 << 20  # bytes
-_TAG = re.compile(r"[a-z][a-z0-9_]*")
 _UNIT = re.compile(r"_(kg|g|m|mm|cm|s|hz|c|pa|n_per_m|per_s)(_u)?$")
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
-    """What one row says of a run, or all rows that name it.
+class Entry:
+    """What one row states about a run, or all rows that match it.
 
     Parameters
     ----------
     scene_file : str
-        Empty where none is named.
+        Empty if none is named.
     scene : mapping
-        Values by attribute of a scene: text of a position, or (value, u).
+        By attribute of a scene, the name of a position or (value, u).
     answers : mapping
         What the recording leaves open, as :func:`springmass.runs.loading.load` takes it.
     tags : mapping of str to str
     line : int
-        In the file; of several rows the first.
+        Number in the file; of several rows the first.
+    law : str
+        Damping law that is stated; empty where none is.
     """
 
     scene_file: str = ""
@@ -57,6 +61,7 @@ class Said:
     answers: Mapping[str, Any] = field(default_factory=dict)
     tags: Mapping[str, str] = field(default_factory=dict)
     line: int = 0
+    law: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,21 +73,21 @@ class Course:
     path : Path
     tags : tuple of str
         Names of its columns that are no part of a scene or a recording.
-    rows : tuple of (str, Said)
-        A path or pattern, and what is said there.
+    rows : tuple of (str, Entry)
+        A path or pattern, and what its row states.
     """
 
     path: Path
     tags: tuple[str, ...]
-    rows: tuple[tuple[str, Said], ...]
+    rows: tuple[tuple[str, Entry], ...]
 
     def files(self) -> list[str]:
-        """Return the files that it names without a pattern, those of its own folder where they are relative."""
+        """Return the files that it names without a pattern; relative paths begin at its folder."""
         named = [os.path.join(self.path.parent, text) for text, _ in self.rows if not self.is_pattern(text)]
         return list(dict.fromkeys(named))
 
     def is_pattern(self, text: str) -> bool:
-        """Return whether a row's path is a pattern: with a mark of one, and not the name of a file, ``run [1].txt``."""
+        """Return whether a row's path is a pattern, and not the name of a file such as ``run [1].txt``."""
         return any(mark in text for mark in "*?[") and not os.path.exists(os.path.join(self.path.parent, text))
 
 
@@ -106,7 +111,7 @@ def read_course(path: str | Path) -> Course:
     path = Path(path)
     table = list(_table(path))
     if not table:
-        raise ProgramError(f"{path}: a table of runs was demanded, got an empty file; see batch --template", USAGE)
+        raise ProgramError(f"{path}: expected a table of runs, got an empty file; see batch --template", USAGE)
     (_, head, comma), *lines = table
     names = [name.strip() for name in head]
     while names and not names[-1]:
@@ -115,14 +120,14 @@ def read_course(path: str | Path) -> Course:
     rows = []
     for number, cells, _ in lines:
         if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
-            demand = f"{len(names)} columns were demanded, got {len(cells)}; put quotes about a text with a separator"
-            raise ProgramError(f"{path}, line {number}: {demand}", USAGE)
-        told = {name: cell.strip() for name, cell in zip(names, cells, strict=False) if cell.strip()}
-        if not told:
+            wrong = f"expected {len(names)} columns, got {len(cells)}; put quotes around a text with a separator"
+            raise ProgramError(f"{path}, line {number}: {wrong}", USAGE)
+        values = {name: cell.strip() for name, cell in zip(names, cells, strict=False) if cell.strip()}
+        if not values:
             continue
-        if "path" not in told:
-            raise ProgramError(f"{path}, line {number}: the path of a run was demanded, got none", USAGE)
-        rows.append((told["path"], _said(path, number, told, tags, decimal_comma=comma)))
+        if "path" not in values:
+            raise ProgramError(f"{path}, line {number}: the path of the run is missing; fill it in", USAGE)
+        rows.append((values["path"], _entry(path, number, values, tags, decimal_comma=comma)))
     return Course(path, tags, tuple(rows))
 
 
@@ -130,13 +135,13 @@ def _table(path: Path) -> Iterator[tuple[int, list[str], bool]]:
     """Yield line number, cells and whether numbers may have a decimal comma."""
     try:
         if path.stat().st_size > LARGEST:
-            raise ProgramError(f"{path}: a table of runs of at most {LARGEST >> 20} MB was demanded", USAGE)
+            raise ProgramError(f"{path}: a table of runs must be at most {LARGEST >> 20} MB", USAGE)
         with open_regular_text(path, "utf-8-sig") as file:
             text = file.read()
     except OSError as error:
-        raise ProgramError(f"{path}: a table of runs was demanded, {error.strerror}; check the name", USAGE) from error
+        raise ProgramError(f"{path}: no table of runs can be read ({error.strerror}); check the name", USAGE) from error
     except UnicodeDecodeError as error:
-        raise ProgramError(f"{path}: a table in UTF-8 was demanded; save the sheet as CSV UTF-8", USAGE) from error
+        raise ProgramError(f"{path}: not in UTF-8; save the sheet as CSV UTF-8", USAGE) from error
     first = text.partition("\n")[0]
     mark = max(",;\t", key=first.count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark)
@@ -145,15 +150,15 @@ def _table(path: Path) -> Iterator[tuple[int, list[str], bool]]:
             if cells and not cells[0].lstrip().startswith("#"):
                 yield reader.line_num, cells, mark != ","
     except csv.Error as error:
-        raise ProgramError(f"{path}, line {reader.line_num}: no row of a table ({error})", USAGE) from error
+        raise ProgramError(f"{path}, line {reader.line_num}: not a row of a table ({error})", USAGE) from error
 
 
 def _checked(path: Path, names: Sequence[str]) -> tuple[str, ...]:
     """Return the tags among the names of columns."""
     if "path" not in names:
-        raise ProgramError(f"{path}: a column path was demanded, got {', '.join(names)}; see batch --template", USAGE)
+        raise ProgramError(f"{path}: no column path, got {', '.join(names)}; see batch --template", USAGE)
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise ProgramError(f"{path}: the column {twice[0]} stands there twice; leave one out", USAGE)
+        raise ProgramError(f"{path}: the column {twice[0]} is there twice; leave one out", USAGE)
     tags = []
     for name in names:
         if name in KNOWN:
@@ -162,101 +167,110 @@ def _checked(path: Path, names: Sequence[str]) -> tuple[str, ...]:
         if near or _UNIT.search(name):
             hint = f"did you mean {near[0]}?" if near else f"allowed with a unit are {', '.join(PLACES)}"
             raise ProgramError(f"{path}: unknown column {name!r}; {hint}", USAGE)
-        if not _TAG.fullmatch(name) or name in COLUMNS:
-            demand = "a tag of lower-case letters, digits and _ that is no column of the results"
-            raise ProgramError(f"{path}: {demand} was demanded, got {name!r}; rename the column", USAGE)
+        if name in RESERVED:
+            raise ProgramError(f"{path}: {name!r} is a column of the results; rename the column", USAGE)
+        if not TAG.fullmatch(name):
+            raise ProgramError(f"{path}: a tag has lower-case letters, digits and _, got {name!r}; rename it", USAGE)
         tags.append(name)
     return tuple(tags)
 
 
-def _said(path: Path, line: int, told: Mapping[str, str], tags: Sequence[str], *, decimal_comma: bool) -> Said:
+def _entry(path: Path, line: int, values: Mapping[str, str], tags: Sequence[str], *, decimal_comma: bool) -> Entry:
     def number(name: str) -> float:
-        text = told[name].replace(",", ".") if decimal_comma else told[name]
+        text = values[name].replace(",", ".") if decimal_comma else values[name]
         try:
             value = float(text)
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise ProgramError(f"{path}, line {line}: {name} must be a finite number, got {told[name]!r}", USAGE)
+            raise ProgramError(f"{path}, line {line}: {name} must be a finite number, got {values[name]!r}", USAGE)
         return value
 
-    scene: dict[str, Any] = {POSITION: told[POSITION]} if POSITION in told else {}
+    scene: dict[str, Any] = {POSITION: values[POSITION]} if POSITION in values else {}
     for name in PLACES:
-        if name in told:
-            scene[name] = (number(name), number(f"{name}_u") if f"{name}_u" in told else 0.0)
-        elif f"{name}_u" in told:
-            raise ProgramError(f"{path}, line {line}: {name}_u does nothing without {name}; fill in both", USAGE)
+        if name in values:
+            scene[name] = (number(name), number(f"{name}_u") if f"{name}_u" in values else 0.0)
+        elif f"{name}_u" in values:
+            raise ProgramError(f"{path}, line {line}: {name}_u is there without {name}; fill in both", USAGE)
     answers: dict[str, Any] = {
-        name: number(name) if name in NUMBERS else told[name] for name in ANSWERS if name in told
+        name: number(name) if name in NUMBERS else values[name] for name in ANSWERS if name in values
     }
     if "velocity" in answers:
         answers["velocity"] = os.path.join(path.parent, answers["velocity"])
-    scene_file = os.path.join(path.parent, told["scene"]) if "scene" in told else ""
-    return Said(scene_file, scene, answers, {name: told[name] for name in tags if name in told}, line)
+    scene_file = os.path.join(path.parent, values["scene"]) if "scene" in values else ""
+    law = values.get(LAW, "")
+    if law not in ("", ANY_LAW, *LAW_NAMES):
+        laws = ", ".join((*LAW_NAMES, ANY_LAW))
+        raise ProgramError(f"{path}, line {line}: {LAW} must be one of {laws}, got {law!r}", USAGE)
+    return Entry(scene_file, scene, answers, {name: values[name] for name in tags if name in values}, line, law)
 
 
-def join(course: Course, found: Sequence[Found]) -> tuple[list[tuple[Found, Said]], list[str], list[str]]:
-    """Return each file with what the table says of it, rows that no file belongs to, and files without a row.
+def join(course: Course, files: Sequence[InputFile]) -> tuple[list[tuple[InputFile, Entry]], list[str], list[str]]:
+    """Return each file with what the table states about it, rows without a file, and files without a row.
 
-    A file has a run for each row that names it by its path with another ``run`` or ``channel``. What a pattern says
-    holds where such a row says nothing.
+    A file has a run for each row that names it by its path with another ``run`` or ``channel``. A row with a path
+    takes precedence over one with a pattern.
 
     Raises
     ------
     ProgramError
-        With exit code 2 if two rows say different things of one run.
+        With exit code 2 if two rows contradict each other about one run.
     """
-    exact: dict[str, list[Said]] = {}
-    patterns: list[tuple[str, Said]] = []
-    for text, said in course.rows:
+    exact: dict[str, list[Entry]] = {}
+    patterns: list[tuple[str, Entry]] = []
+    for text, entry in course.rows:
         if course.is_pattern(text):
-            patterns.append((text, said))
+            patterns.append((text, entry))
         else:
-            exact.setdefault(os.path.abspath(os.path.join(course.path.parent, text)), []).append(said)
+            exact.setdefault(os.path.abspath(os.path.join(course.path.parent, text)), []).append(entry)
     used: set[int] = set()
-    joined: list[tuple[Found, Said]] = []
+    joined: list[tuple[InputFile, Entry]] = []
     without: list[str] = []
     here = os.path.abspath(course.path.parent)
-    for one in found:
-        whole = os.path.abspath(one.path)
-        wide = [said for text, said in patterns if _matches(whole, text, here)]
+    for file in files:
+        whole = os.path.abspath(file.path)
+        wide = [entry for text, entry in patterns if _matches(whole, text, here)]
         narrow = exact.get(whole, [])
-        used |= {said.line for said in (*wide, *narrow)}
-        base = _together(course, one.path, wide)
+        used |= {entry.line for entry in (*wide, *narrow)}
+        base = _together(course, file.path, wide)
         if not wide and not narrow:
-            without.append(one.path)
+            without.append(file.path)
         seen: dict[tuple[Any, Any], int] = {}
-        for said in narrow:
-            which = (said.answers.get("run"), said.answers.get("channel"))
+        for entry in narrow:
+            which = (entry.answers.get("run"), entry.answers.get("channel"))
             if which in seen:
-                demand = f"lines {seen[which]} and {said.line} name {one.path}; leave one out, or tell their runs apart"
-                raise ProgramError(f"{course.path}: {demand}", USAGE)
-            seen[which] = said.line
-        joined += [(one, _over(base, said)) for said in narrow] or [(one, base)]
-    unused = [f"line {said.line}: {text}" for text, said in course.rows if said.line not in used]
+                wrong = f"lines {seen[which]} and {entry.line} both name {file.path}"
+                raise ProgramError(f"{course.path}: {wrong}; leave one out, or give each another run or channel", USAGE)
+            seen[which] = entry.line
+        joined += [(file, _over(base, entry)) for entry in narrow] or [(file, base)]
+    unused = [f"line {entry.line}: {text}" for text, entry in course.rows if entry.line not in used]
     return joined, unused, without
 
 
-def _together(course: Course, path: str, rows: Sequence[Said]) -> Said:
-    """Return what all patterns say that a file matches."""
-    whole = Said()
-    for said in rows:
+def _together(course: Course, path: str, rows: Sequence[Entry]) -> Entry:
+    """Return what all patterns state that a file matches."""
+    whole = Entry()
+    for entry in rows:
         for part in ("scene", "answers", "tags"):
-            before, after = getattr(whole, part), getattr(said, part)
+            before, after = getattr(whole, part), getattr(entry, part)
             if clash := sorted(name for name in after if before.get(name, after[name]) != after[name]):
-                demand = f"lines {whole.line} and {said.line} both match {path} and differ in {clash[0]}"
-                raise ProgramError(f"{course.path}: {demand}; narrow one of the patterns", USAGE)
-        whole = _over(whole, said)
+                wrong = f"lines {whole.line} and {entry.line} both match {path} and differ in {clash[0]}"
+                raise ProgramError(f"{course.path}: {wrong}; narrow one of the patterns", USAGE)
+        if whole.law and entry.law and whole.law != entry.law:
+            wrong = f"lines {whole.line} and {entry.line} both match {path} and differ in {LAW}"
+            raise ProgramError(f"{course.path}: {wrong}; narrow one of the patterns", USAGE)
+        whole = _over(whole, entry)
     return whole
 
 
-def _over(under: Said, said: Said) -> Said:
-    merged = {f.name: {**getattr(under, f.name), **getattr(said, f.name)} for f in fields(Said)[1:4]}
-    return Said(said.scene_file or under.scene_file, **merged, line=under.line or said.line)
+def _over(under: Entry, over: Entry) -> Entry:
+    merged = {name: {**getattr(under, name), **getattr(over, name)} for name in ("scene", "answers", "tags")}
+    line, law = under.line or over.line, over.law or under.law
+    return Entry(over.scene_file or under.scene_file, merged["scene"], merged["answers"], merged["tags"], line, law)
 
 
 def _matches(whole: str, pattern: str, here: str) -> bool:
-    """Tell whether a path matches: by its name alone where the pattern has no slash."""
+    """Return whether a path matches; a pattern without a slash is compared only with its name."""
     if "/" not in pattern:
         return fnmatchcase(os.path.basename(whole), pattern)
     return fnmatchcase(whole, os.path.normpath(os.path.join(here, pattern)))

@@ -1,20 +1,19 @@
-"""The page of a course: every run in a table that sorts, those that need a look first."""
+"""The page of a course: every run in a table that sorts, the runs that need a look first."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from pipeline.numerics.estimate import Estimate
 from springmass.batch.reports import REPORTS, need_of, report_name
 from springmass.batch.rows import FAILED
-from storage.atomic import write_whole
+from springmass.batch.store import PAGE, Store
+from storage.atomic import writing
 
-__all__ = ["PAGE", "line_of", "write_page"]
+__all__ = ["line_of", "write_page"]
 
-PAGE = "index.html"
 SHOWN = (
     ("period", "T", "s"),
     ("spring_constant", "k", "N/m"),
@@ -22,16 +21,15 @@ SHOWN = (
     ("damping_rate", "λ", "1/s"),
     ("drag_coefficient", "C_d", ""),
 )
-"""Estimates with a column of their own."""
+"""Estimates that have a column."""
 
 
-def write_page(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequence[str], reports: set[str]) -> Path:
+def write_page(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[str], reports: set[str]) -> None:
     """Write ``index.html``.
 
     Parameters
     ----------
-    folder : Path
-        Of the course.
+    store : Store
     lines : sequence of mapping
         Of :func:`line_of`, one a run.
     tags : sequence of str
@@ -46,11 +44,12 @@ def write_page(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequence[
         {**line, "cells": [line["cells"][i] for i in there], "link": _link(line["name"], reports)} for line in lines
     ]
     shown.sort(key=lambda line: (*(-x for x in line["need"]), line["name"]))
-    told = {kind: sum(line["look"] == kind for line in shown) for kind in ("failed", "error", "warning", "fine")}
+    counts = {kind: sum(line["look"] == kind for line in shown) for kind in ("failed", "error", "warning", "fine")}
     page = template("course.html.j2").render(
-        title=folder.resolve().name, lines=shown, tags=tags, quantities=[SHOWN[i] for i in there], told=told
+        title=store.folder.resolve().name, lines=shown, tags=tags, quantities=[SHOWN[i] for i in there], counts=counts
     )
-    return write_whole(folder / PAGE, page.encode("utf-8", "backslashreplace"))
+    with store.output(PAGE) as temporary, writing(store.folder / PAGE):
+        temporary.write_bytes(page.encode("utf-8", "backslashreplace"))
 
 
 def _link(name: str, reports: set[str]) -> str:
@@ -58,12 +57,12 @@ def _link(name: str, reports: set[str]) -> str:
     return f"{REPORTS}/{quote(report)}/report.html" if report in reports else ""
 
 
-def line_of(name: str, row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
-    """Return what the page shows of a run, from its name, its row and the course's own columns."""
+def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
+    """Return what the page shows of a run, from its row and the course's own columns."""
     failed = row["status"] in FAILED
     look = "failed" if failed else "error" if row["errors"] else "warning" if row["warnings"] else "fine"
     return {
-        "name": name,
+        "name": row["run"],
         "look": look,
         "need": need_of(row),
         "why": row["error"] if failed else "; ".join(message for _, message in row["messages"][:2]),
@@ -76,7 +75,7 @@ def line_of(name: str, row: Mapping[str, Any], tags: Sequence[str]) -> dict[str,
 
 
 def _cell(row: Mapping[str, Any], quantity: str, unit: str) -> tuple[str, str, str]:
-    """Return an estimate's label, as printed, and as it sorts."""
+    """Return an estimate's label, its text, and the number by which it sorts."""
     value, u = row["estimates"].get(quantity, (None, None))
     label = next(symbol for name, symbol, _ in SHOWN if name == quantity)
     if value is None or u is None:

@@ -1,23 +1,34 @@
-"""What a row of a course holds: columns, their types, and how a row of the store becomes one of the table."""
+"""What a row of a course holds: its schema in the store, and the columns of the table that it becomes."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from typing import Any
+import re
+from collections.abc import Collection, Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct, field
 
 from acquisition.errors import visible
 from pipeline.bench.scene import PLACES
+from storage.schema import Count, ValueRefused, decoded, parsed
 
 __all__ = [
     "COLUMNS",
+    "COURSE",
     "DETAILS",
     "ESTIMATES",
     "FAILED",
-    "FILTERED",
+    "LARGEST",
     "NUMBERS",
+    "RESERVED",
+    "TAG",
     "UNITS",
     "WHOLE",
+    "Digest",
+    "NoDigest",
+    "Tag",
+    "checked_row",
     "columns_of",
     "dumped",
     "flat",
@@ -26,11 +37,13 @@ __all__ = [
 ESTIMATES = (
     "period", "frequency", "angular_frequency", "spring_constant", "amplitude", "displacement_amplitude",
     "angle_amplitude", "offset", "noise", "phase", "damping_rate", "quality_factor", "velocity_rms", "reynolds_number",
+    "reynolds_number_start",
     "keulegan_carpenter_number", "drag_coefficient", "gamma", "beta", "mu", "c", "n", "natural_angular_frequency",
     "own_mass_kg", "first_mode_period", "second_mode_period", "first_mode_amplitude", "second_mode_amplitude",
     "relaxation_rate", "relaxation_rate_slow", "relaxation_rate_fast",
 )  # fmt: skip
 """Each a column with its value and one, ``_u``, with its standard uncertainty, in SI units."""
+POSITIVE = ("period", "frequency", "angular_frequency", "natural_angular_frequency", "own_mass_kg")
 QUALITY = (
     "used", "missing", "false_echo", "clipped", "duplicate_time", "non_monotonic_time", "outside", "malformed_rows",
 )  # fmt: skip
@@ -42,12 +55,6 @@ NUMBERS = (
     "rate_hz", "duration_s", "u_clock", "reduced_chi2",
     *(name for pair in ((x, f"{x}_u") for x in (*ESTIMATES, *PLACES)) for name in pair),
 )  # fmt: skip
-FILTERED = (
-    "run", "status", "law", "period", "period_u", "spring_constant", "spring_constant_u", "amplitude",
-    "damping_rate", "drag_coefficient", "reynolds_number", "keulegan_carpenter_number", "errors", "warnings",
-    "bob_mass_kg", "disc_diameter_m", "duration_s",
-)  # fmt: skip
-"""Columns that are asked for most: a catalog has an index of each."""
 UNITS = {
     **dict.fromkeys(("period", "first_mode_period", "second_mode_period", "duration_s"), "s"),
     **dict.fromkeys(("frequency", "rate_hz"), "Hz"),
@@ -66,10 +73,144 @@ UNITS = {
 }
 """Of the columns that have the same in every run; that of the others is by the column ``unit``."""
 DETAILS = ("findings", "messages", "correlations", "drag_points")
-"""Columns of JSON, which no filter needs at once."""
-COLUMNS = (*_FIRST, *_INPUT, "law", "admissible", *WHOLE, *NUMBERS, *_HASHES, *DETAILS)
+"""Columns of JSON."""
+LAW_COLUMNS = ("law", "admissible", "stated_law", "one_law", "undetermined")
+COLUMNS = (*_FIRST, *_INPUT, *LAW_COLUMNS, *WHOLE, *NUMBERS, *_HASHES, *DETAILS)
+COURSE = "course"
+"""Column of the folder of a course, where several are read together."""
+RESERVED = frozenset((COURSE, *COLUMNS))
+"""Names that no tag may have."""
 FAILED = ("failed", "ended", "no_oscillation")
-"""Values of ``status`` of runs that gave no period; "ended" is a process that was ended from outside."""
+"""Values of ``status`` of runs without a period; "ended" is a run whose worker process died."""
+
+LARGEST = 1e100
+"""Bound of the numbers in a row: its square is a number too. A row states no estimate beyond it."""
+TAG = re.compile(r"[a-z][a-z0-9_]*")
+_DEEPEST = 5  # a row, its job, the scene, the table of one part of the bench, and a value with its u
+
+Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+NoDigest = Annotated[str, Meta(pattern="^([0-9a-f]{64})?$")]
+Tag = Annotated[str, Meta(pattern=f"^{TAG.pattern}$")]
+_Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
+_Size = Annotated[float, Meta(ge=0.0, le=LARGEST)]
+_Estimate = tuple[_Number | None, _Size | None]
+_Path = Annotated[str, Meta(pattern=r"^[^\x00]+$")]
+
+
+class _Answers(Struct, forbid_unknown_fields=True):
+    """What was stated about a recording, as :func:`springmass.runs.loading.load` takes it."""
+
+    velocity: _Path | None = None
+    channel: str | None = None
+    run: str | None = None
+    rate_hz: float | None = None
+    unit: str | None = None
+    time: str | None = None
+    time_unit: str | None = None
+    from_s: float | None = None
+    to_s: float | None = None
+    clock_ppm: float | None = None
+    unverified: bool = False
+
+
+class _Job(Struct, forbid_unknown_fields=True):
+    """See :class:`springmass.batch.plan.Job`."""
+
+    path: _Path
+    answers: _Answers
+    scene: dict[str, Any] | None
+    tags: dict[Tag, str]
+    accuracy: str
+    law: str | None = None
+
+    def __post_init__(self) -> None:
+        for tag in self.tags:
+            if tag in RESERVED:
+                raise ValueRefused("tags", f"expected names that are no columns, got {tag!r}")
+
+
+class _Correlations(Struct, forbid_unknown_fields=True):
+    names: list[str] = field(default_factory=list)
+    matrix: list[list[_Number | None]] = field(default_factory=list)
+
+
+class _Row(Struct, forbid_unknown_fields=True, kw_only=True):
+    """A row as :mod:`springmass.batch.worker` makes it and :mod:`springmass.batch.store` keeps it."""
+
+    run: str = ""
+    path: _Path
+    status: Literal["ok", "no_oscillation", "failed", "ended"]
+    error: str
+    format: str | None = None
+    kind: str | None = None
+    channel: str | None = None
+    unit: str | None = None
+    start_time: str | None = None
+    clock: str | None = None
+    law: str | None = None
+    admissible: str | None = None
+    stated_law: str | None = None
+    one_law: str | None = None
+    undetermined: str | None = None
+    samples: Count | None = None
+    errors: Count = 0
+    warnings: Count = 0
+    rate_hz: _Number | None = None
+    duration_s: _Number | None = None
+    u_clock: _Size | None = None
+    reduced_chi2: _Size | None = None
+    estimates: dict[str, _Estimate]
+    scene: dict[str, _Estimate]
+    quality: dict[str, Count]
+    findings: list[str]
+    messages: list[tuple[Literal["error", "warning"], str]]
+    correlations: _Correlations
+    drag_points: list[tuple[_Size, _Size, _Number, _Size]]
+    # The page shows it as it stands, as the path of a drawing.
+    thumbnail: Annotated[str, Meta(pattern="^(M[-+0-9.eL ]+Z)?$")]
+    # Of every file that the run was read from: path, bytes, time of modification in ns.
+    stamps: list[tuple[_Path, int, int]]
+    hashes: dict[str, Digest]
+    input_sha256: Digest | None
+    scene_sha256: NoDigest
+    parameters_sha256: Digest
+    code_sha256: Digest
+    job: _Job
+
+    def __post_init__(self) -> None:
+        _demand_names(self.estimates, "estimates", ESTIMATES)
+        _demand_names(self.scene, "scene", PLACES)
+        _demand_names(self.quality, "quality", QUALITY)
+        for name in POSITIVE:
+            value, _ = self.estimates.get(name, (None, None))
+            if value is not None and value <= 0.0:
+                raise ValueRefused(f"estimates.{name}", f"expected a positive number, got {value!r}")
+
+
+def _demand_names(table: Mapping[str, Any], key: str, allowed: Collection[str]) -> None:
+    for name in table:
+        if name not in allowed:
+            raise ValueRefused(key, f"expected names of columns, got {ascii(name)[:60]}")
+
+
+def checked_row(text: bytes, key: str) -> dict[str, Any]:
+    """Return a row of the store, its types, ranges and names checked.
+
+    Parameters
+    ----------
+    text : bytes
+        A JSON object.
+    key : str
+        What a message calls the row.
+
+    Raises
+    ------
+    storage.schema.ValueRefused
+        For the first value that a row cannot have.
+    """
+    row: dict[str, Any] = parsed(text, key)
+    decoded(row, _Row, key, _DEEPEST)
+    return row
 
 
 def columns_of(tags: Sequence[str]) -> tuple[str, ...]:
@@ -83,28 +224,27 @@ def dumped(value: object) -> str:
 
 
 def flat(row: Mapping[str, Any], run: str, tags: Sequence[str]) -> dict[str, Any]:
-    """Return a row of the table by column: text, whole numbers, numbers, None where there is nothing.
+    """Return a row of the table by column: text, whole numbers, numbers, None where nothing is known.
 
-    In text from outside control characters and marks of direction, and halves of characters that a file's name may
-    hold, stand as escapes.
+    Control characters, marks of direction and halves of characters, which a file's name may hold, become escapes.
 
     Parameters
     ----------
     row : mapping
-        As the worker made it.
+        Of the store.
     run : str
         The run's name.
     tags : sequence of str
         The columns that are the course's own.
     """
-    found: dict[str, Any] = {"run": run, **{tag: row["job"]["tags"].get(tag) for tag in tags}}
+    cells: dict[str, Any] = {"run": run, **{tag: row["job"]["tags"].get(tag) for tag in tags}}
     for name, (value, u) in {**row["estimates"], **row["scene"]}.items():
-        found[name], found[f"{name}_u"] = value, u
-    found.update(row["quality"])
+        cells[name], cells[f"{name}_u"] = value, u
+    cells.update(row["quality"])
     messages = [[severity, visible(message)] for severity, message in row["messages"]]
     for name, value in {**{name: row[name] for name in DETAILS}, "messages": messages}.items():
-        found[name] = dumped(value) if value else None
-    return {name: _text(found.get(name, row.get(name))) for name in columns_of(tags)}
+        cells[name] = dumped(value) if value else None
+    return {name: _text(cells.get(name, row.get(name))) for name in columns_of(tags)}
 
 
 def _text(value: Any) -> Any:

@@ -1,37 +1,36 @@
-"""One run to one row: what every process does, here or on another machine."""
+"""From a run to its row: what every process does, here or on another machine."""
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
-from acquisition.regular_file import open_regular
-from pipeline.accuracy import params_for
-from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
+from pipeline.analyse import Analysis, Oscillation, Overdamped
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.errors import AnalysisError, PipelineError
-from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.numerics.threads import one_thread
 from pipeline.results.compare import SpringRun
 from pipeline.track import F8
 from springmass.batch.plan import Job, code_sha256
-from springmass.batch.rows import ESTIMATES
-from springmass.errors import ProgramError, hushed, internal_error
+from springmass.batch.rows import ESTIMATES, LARGEST
+from springmass.batch.store import sha256_of
+from springmass.errors import NO_MEMORY, ProgramError, internal_error, quietly
 from springmass.runs.about import about_path
-from springmass.runs.analysing import scene_of
-from springmass.runs.json_results import all_findings
-from springmass.runs.loading import Loaded, load
+from springmass.runs.analysing import AnalysedRun, load_and_analyse
+from springmass.runs.loading import Loaded
+from springmass.runs.options import ReadOptions
 from springmass.runs.questions import for_course
 from storage.errors import StorageError
 
-__all__ = ["analyse_many", "blank_row", "load_job", "stamps_of", "unchanged"]
+__all__ = ["analyse_job", "analyse_many", "blank_row", "stamps_of", "unchanged"]
 
 BINS, FEWEST_BINS = 60, 8  # of a thumbnail
 DRAG_POINTS = 8
@@ -40,8 +39,8 @@ DIGITS = 6  # of a correlation
 
 def analyse_many(jobs: Sequence[Job]) -> list[dict[str, Any]]:
     """Analyse runs one after the other; one that fails is a row as well."""
-    # What a recording has to say stands in its row. Threads are set once, not by each analysis.
-    with hushed(), one_thread:
+    # Messages about a recording go into its row. Threads are limited once, not by each analysis.
+    with quietly(), one_thread:
         return [analyse_one(job) for job in jobs]
 
 
@@ -50,33 +49,32 @@ def analyse_one(job: Job) -> dict[str, Any]:
     row = blank_row(job)
     try:
         row["stamps"] = stamps_of(job)  # first: a file that changes meanwhile is another by the next pass
-        row["hashes"] = {path: _sha256(job.whole(path)) for path, *_ in row["stamps"]}
+        row["hashes"] = {path: sha256_of(job.whole(path)) for path, *_ in row["stamps"]}
         row["input_sha256"] = row["hashes"].get(job.path)
-        loaded, given = load_job(job)
-        analysis = analyse(loaded.track, scene_of(loaded, given), params_for(job.accuracy))
-        _fill(row, loaded, analysis)
-    except NeedsAnswer as asked:
-        row["error"] = _told(job, str(asked.with_remedy(for_course(asked.question))))
+        run = analyse_job(job)
+        _fill(row, run.loaded, run.analysis)
+    except NeedsAnswer as error:
+        row["error"] = _one_line(job, str(error.with_remedy(for_course(error.question))))
     except (ProgramError, AcquisitionError, PipelineError, StorageError, OSError) as error:
-        row["error"] = _told(job, str(error))
+        row["error"] = _one_line(job, str(error))
     except MemoryError:
-        row["error"] = f"{job.path}: more memory was demanded than there is; analyse it with fewer processes"
-    except Exception as error:  # a defect: the other runs of a thousand are not to wait for its repair
-        row["error"] = _told(job, f"{job.path}: {internal_error(error)}")
+        row["error"] = f"{job.path}: {NO_MEMORY}"
+    except Exception as error:  # a defect: the other runs of a thousand do not wait for its repair
+        row["error"] = _one_line(job, f"{job.path}: {internal_error(error)}")
     return row
 
 
-def load_job(job: Job) -> tuple[Loaded, Scene | None]:
-    """Return a run's recording, and the scene that was given for it."""
-    answers = dict(job.answers)
-    if "velocity" in answers:
-        answers["velocity"] = job.whole(answers["velocity"])
-    loaded = load(job.whole(job.path), **answers)
-    return loaded, None if job.scene is None else Scene.from_mapping(job.scene)
+def analyse_job(job: Job) -> AnalysedRun:
+    """Read a run of a course and analyse it as the course states."""
+    options = ReadOptions.of(job.answers)
+    if options.velocity is not None:
+        options = replace(options, velocity=job.whole(str(options.velocity)))
+    scene = None if job.scene is None else Scene.from_mapping(job.scene)
+    return load_and_analyse(job.whole(job.path), options, scene, accuracy=job.accuracy, law=job.law)
 
 
 def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, Any]:
-    """Return the row of a run of which nothing is known but what was asked for."""
+    """Return the row of a run of which only the job is known."""
     return {
         "path": job.path,
         "status": status,
@@ -95,32 +93,31 @@ def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, An
         "scene_sha256": job.scene_sha256,
         "parameters_sha256": job.parameters_sha256,
         "code_sha256": code_sha256(),
-        "job": job.told(),
+        "job": job.to_mapping(),
     }
 
 
 def stamps_of(job: Job) -> list[list[Any]]:
-    """Return path, size and time of modification in ns of every file that a run is read from; absent ones are not."""
-    beside = str(about_path(Path(job.path)))
-    found = []
-    for path in (job.path, job.answers.get("velocity"), beside):
+    """Return path, size and time of modification in ns of every file that a run is read from, if it is there."""
+    stamps = []
+    for path in (job.path, job.answers.get("velocity"), str(about_path(Path(job.path)))):
         if path:
             try:
-                told = os.stat(job.whole(path))
+                status = os.stat(job.whole(path))
             except (OSError, ValueError):
                 continue
-            found.append([path, told.st_size, told.st_mtime_ns])
-    return found
+            stamps.append([path, status.st_size, status.st_mtime_ns])
+    return stamps
 
 
 def unchanged(job: Job, row: Mapping[str, Any], *, rehash: bool) -> list[list[Any]] | None:
-    """Return the stamps of a run's files where a row still holds for it; None where it has to be analysed again.
+    """Return the stamps of a run's files if a row is up to date; None if the run has to be analysed again.
 
     Files of the same path, size and time of modification count as unchanged unless ``rehash`` asks for all to be read;
     others are unchanged where their digests are.
     """
-    told = (row["scene_sha256"], row["parameters_sha256"], row["code_sha256"])
-    if row["status"] == "ended" or told != (job.scene_sha256, job.parameters_sha256, code_sha256()):
+    digests = (row["scene_sha256"], row["parameters_sha256"], row["code_sha256"])
+    if row["status"] == "ended" or digests != (job.scene_sha256, job.parameters_sha256, code_sha256()):
         return None
     stamps = stamps_of(job)
     if stamps == row["stamps"] and not rehash:
@@ -128,14 +125,14 @@ def unchanged(job: Job, row: Mapping[str, Any], *, rehash: bool) -> list[list[An
     if [path for path, *_ in stamps] != [path for path, *_ in row["stamps"]]:
         return None
     try:
-        same = all(_sha256(job.whole(path)) == row["hashes"].get(path) for path, *_ in stamps)
+        same = all(sha256_of(job.whole(path)) == row["hashes"].get(path) for path, *_ in stamps)
     except OSError:
         return None
     return stamps if same else None
 
 
 def _fill(row: dict[str, Any], loaded: Loaded, analysis: Analysis) -> None:
-    track, motion, findings = analysis.track, analysis.motion, all_findings(loaded, analysis)
+    track, motion, findings = analysis.track, analysis.motion, analysis.findings
     moves = isinstance(motion, (Oscillation, Overdamped))
     row.update(
         status="ok" if moves else "no_oscillation",
@@ -161,6 +158,9 @@ def _fill(row: dict[str, Any], loaded: Loaded, analysis: Analysis) -> None:
     if isinstance(motion, Oscillation):
         damping, derived = motion.damping, motion.derived
         row["law"], row["admissible"] = damping.selected, " ".join(damping.admissible)
+        row["stated_law"], row["one_law"] = damping.stated or None, derived.law or None
+        undetermined = [name for name, x in derived.coefficients.items() if isinstance(x, UpperLimit)]
+        row["undetermined"] = " ".join(undetermined) or None
         row["reduced_chi2"] = _number(damping.best.reduced_chi2)
         row["estimates"] |= _numbers({k: x for k, x in derived.coefficients.items() if k not in row["estimates"]})
         row["correlations"] = {
@@ -183,7 +183,7 @@ def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, list[float | None]]
 
 
 def _number(x: Any) -> float | None:
-    return float(x) if math.isfinite(x) else None
+    return float(x) if math.isfinite(x) and abs(x) <= LARGEST else None
 
 
 def _drag_points(analysis: Analysis, motion: Oscillation) -> list[list[float]]:
@@ -203,16 +203,20 @@ def _drag_points(analysis: Analysis, motion: Oscillation) -> list[list[float]]:
     per_velocity = estimates["reynolds_number"].value / estimates["velocity_rms"].value
     reynolds = per_velocity * estimates["angular_frequency"].value * at / np.sqrt(2.0)
     points = np.column_stack([reynolds, 2.0 * np.pi * at / diameter.value, value, u])
-    return [[float(f"{x:.6g}") for x in point] for point in points.tolist() if np.isfinite(point).all()]
+    return [
+        [float(f"{x:.6g}") for x in point]
+        for point in points.tolist()
+        if np.isfinite(point).all() and np.abs(point).max() <= LARGEST
+    ]
 
 
 def _period_s(analysis: Analysis) -> float:
-    """Return the period, or so short a time that it limits nothing."""
+    """Return the period; without one, a time so short that it limits nothing."""
     return analysis.estimates["period"].value if "period" in analysis.estimates else 1e-9
 
 
 def _thumbnail(t: F8, y: F8, period_s: float) -> str:
-    """Return an outline of the record, an SVG path in a box of 120 by 30; empty where nothing was measured."""
+    """Return an outline of the recording, an SVG path in a box of 120 by 30; empty if nothing was measured."""
     there = np.isfinite(t) & np.isfinite(y)
     if not there.all():
         t, y = t[there], y[there]
@@ -226,7 +230,7 @@ def _thumbnail(t: F8, y: F8, period_s: float) -> str:
     ends = np.searchsorted(t, t[0] + span * np.arange(count + 1) / count)
     filled = np.flatnonzero(np.diff(ends))
     low, high = (edge.reduceat(y, ends[filled]) for edge in (np.minimum, np.maximum))
-    beyond = y.size // 200  # a false echo does not flatten the motion
+    beyond = y.size // 200  # without the extreme 0.5 %, false echoes do not flatten the outline of the motion
     bottom, top = np.partition(y, (beyond, -1 - beyond))[[beyond, -1 - beyond]]
     scale = 28.0 / max(top - bottom, 1e-300)
     above, below = (np.clip(29.0 - (edge - bottom) * scale, 0.0, 30.0).round() for edge in (high, low))
@@ -235,12 +239,7 @@ def _thumbnail(t: F8, y: F8, period_s: float) -> str:
     return "M" + "L".join(f"{a:g} {b:g}" for a, b in edge) + "Z"
 
 
-def _told(job: Job, message: str) -> str:
+def _one_line(job: Job, message: str) -> str:
     """Return a message in one line that names the run's path as the inputs do."""
-    told = " ".join(message.replace(job.whole(job.path), job.path).split())
-    return told if job.path in told else f"{job.path}: {told}"
-
-
-def _sha256(path: str) -> str:
-    with open_regular(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    line = " ".join(message.replace(job.whole(job.path), job.path).split())
+    return line if job.path in line else f"{job.path}: {line}"

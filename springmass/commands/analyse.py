@@ -1,27 +1,25 @@
-"""``springmass analyse``: recordings to Table 1, findings and a report.
+"""``springmass analyse``: from recordings to Table 1, findings and a report.
 
 Several inputs are analysed one after the other: twenty records of two minutes take 1.4 s, and a second process would
-take longer to begin (``benchmarks/many.py``). Their reports, a second each and more, are made by a process a core.
+take longer to begin (``benchmarks/many.py``). Reports take a second or more each; one process per core makes them.
 """
 
 from __future__ import annotations
 
-import argparse
 import filecmp
 import json
 import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
 from pipeline.analyse import Oscillation, Overdamped
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
-from springmass.commands import completions, worded_for
 from springmass.errors import (
     INTERNAL,
     NO_MEMORY,
@@ -33,61 +31,92 @@ from springmass.errors import (
     ProgramError,
     complain,
     internal_error,
+    manner,
     suggest,
     tell,
 )
+from springmass.layout import STDIN
+from springmass.options import BENCH, AnalyseOptions, BenchOptions
 from springmass.runs.about import remember_scene
-from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, in_a_name, make_folder, scene_of
-from springmass.runs.inputs import Found, files_of
+from springmass.runs.analysing import (
+    Analysed,
+    analyse_loaded,
+    distinct_names,
+    in_a_name,
+    law_line,
+    make_folder,
+    scene_of,
+)
+from springmass.runs.inputs import InputFile, files_of
 from springmass.runs.json_results import picked, rejected
 from springmass.runs.loading import Loaded, load, sample_data
+from springmass.runs.options import ReadOptions
 from springmass.runs.processes import cores, pool
-from springmass.runs.scenes import amended, read_scenes
-from springmass.terminal.arguments import BENCH
+from springmass.runs.questions import for_command, option_of
+from springmass.runs.scenes import Amendments, amended, read_scenes
+from springmass.terminal.asking import ask_for_bench
 from storage.errors import StorageError, WriteFailed
+
+if TYPE_CHECKING:
+    from springmass.report.tables import TableKey
 
 __all__ = ["run"]
 
-PARAMETERS = ("accuracy", "method", "velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "clock_ppm", "strict")
+READING = ("velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "clock_ppm")
+RESOLVED = ("accuracy", "method", "law", "strict")
 TOGETHER = "together.results"
+STDIN_NAME = "stdin"
 LONGEST_INPUTS = 48  # characters: names that are repeated in what to type next
 
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """One input, and what is to be made of it."""
+    """One input and what to make from it."""
 
-    found: Found
+    file: InputFile
     name: str
     scene: Scene | None
-    options: argparse.Namespace
+    scene_file: str | Path | None
+    options: AnalyseOptions
+    read: ReadOptions
+    bench: Amendments
+    alone: bool
     writes: bool = False  # whether files may be written at all
     report: Path | None = None  # the folder for it
 
 
 @dataclass(frozen=True, slots=True)
 class _Done:
-    """What became of one of several inputs: small enough to come from another process."""
+    """The outcome of one of several inputs, small enough to be sent from another process."""
 
     name: str
     code: int
     complaints: tuple[str, ...] = ()
     result: Mapping[str, Any] = field(default_factory=dict)
-    table: Mapping[str, Estimate] = field(default_factory=dict)
+    table: Mapping[TableKey, Estimate] = field(default_factory=dict)
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
     page: Path | None = None
     remembered: bool = False  # whether its scene was noted beside it
+    law: str = ""  # the line that names the law which its scene states
 
 
-def run(options: argparse.Namespace) -> int:
-    """Analyse every input; one that fails does not keep the others from their results."""
-    if options.velocity is not None and (len(options.input) > 1 or Path(options.input[0]).is_dir()):
-        got = f"{len(options.input)} inputs" if len(options.input) > 1 else "a folder"
+def run(recordings: Sequence[str | Path], options: AnalyseOptions, read: ReadOptions, bench: BenchOptions) -> int:
+    """Analyse every input; if one fails, the others still give results."""
+    inputs = [str(each) for each in recordings]
+    if options.report and options.no_report:
+        raise ProgramError("--report and --no-report exclude each other, got both; leave one out", USAGE)
+    if read.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
+        got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself", USAGE)
-    scenes = read_scenes(options.scene, len(options.input))
-    found, said = files_of(options.input)
-    out = make_folder(options.out or ".") if _writes(options) else None
-    for line in said:
+    if options.ask and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
+        raise ProgramError("--ask is about one recording; analyse the others by themselves", USAGE)
+    if options.ask and inputs == [STDIN]:
+        raise ProgramError("--ask reads answers from standard input, which is the recording; give --mass-kg", USAGE)
+    scenes = read_scenes(options.scene, len(inputs))
+    values = _values(bench)
+    found, folders = files_of(inputs)
+    out = make_folder(options.output or ".") if _writes(options) else None
+    for line in folders:
         tell(line)
     every = len(found) == 1 or options.report
     tasks = [
@@ -95,17 +124,23 @@ def run(options: argparse.Namespace) -> int:
             one,
             name,
             scenes[one.of],
+            options.scene[one.of if len(options.scene) > 1 else 0] if options.scene else None,
             options,
+            read if one.velocity is None else replace(read, velocity=one.velocity),
+            values,
+            inputs == [one.path],
             out is not None,
             out / in_a_name(name, ".results") if out is not None and every else None,
         )
-        for one, name in zip(found, distinct_names([one.path for one in found]), strict=True)
+        for one, name in zip(
+            found, distinct_names([STDIN_NAME if one.path == STDIN else one.path for one in found]), strict=True
+        )
     ]
-    return _one(tasks[0]) if len(tasks) == 1 else _several(tasks, options, out)
+    return _one(tasks[0]) if len(tasks) == 1 else _several(tasks, inputs, options, out)
 
 
-def _writes(options: argparse.Namespace) -> bool:
-    return not options.no_report and (options.report or options.out is not None or not options.json)
+def _writes(options: AnalyseOptions) -> bool:
+    return not options.no_report and (options.report or options.output is not None or not options.json)
 
 
 def _one(task: _Task) -> int:
@@ -117,25 +152,26 @@ def _one(task: _Task) -> int:
     if task.options.json:
         print(json.dumps(analysed.result, allow_nan=False), flush=True)
     else:
-        _print_text(analysed, si=task.options.si)
+        if line := law_line(analysed.analysis, Path(task.file.path), task.scene_file):
+            print(line)
+        _print_text(analysed, task.options)
     if noted is not None:
-        tell(f"{noted}: this scene, used from now on with {task.found.path}")
+        tell(f"bench data saved for this file: {noted}")
     if task.report is not None:
-        page = _write(analysed, task.report, pdf=task.options.pdf)
+        page = _write(analysed, task)
         tell(f"report: {page}")
-        suggest(f"open {page} in a browser")
     code, complaints = _judged(analysed, task)
     for line in complaints:
         complain(line)
     return code
 
 
-def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | None) -> int:
+def _several(tasks: Sequence[_Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:
     """Analyse many inputs: one Table 1, one file of numbers."""
-    from springmass.terminal.counting import counted
+    from springmass.terminal.progress import counted
 
     everything: list[_Done] = []
-    for done in counted(_worked(tasks), len(tasks), "reports" if options.report else "runs", quiet=options.quiet):
+    for done in counted(_worked(tasks), len(tasks), "reports" if options.report else "runs", quiet=manner()[0]):
         everything.append(done)
         if options.json and done.result:
             print(json.dumps(done.result, allow_nan=False), flush=True)
@@ -145,14 +181,14 @@ def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | No
             complain(line)
     analysed = [done for done in everything if done.result]
     if noted := sum(done.remembered for done in everything):
-        tell(f"scenes noted beside {noted} recordings, NAME.about.toml, used from now on with them")
+        tell(f"bench data saved for {noted} recordings, each in NAME.about.toml")
     if analysed and not options.json:
         _print_together(analysed, options)
     if analysed and out is not None:
         tell(f"written: {_write_together(analysed, out / TOGETHER)}")
     if len(analysed) > 1:
-        inputs = shlex.join(options.input)
-        suggest(f"springmass compare {inputs if len(inputs) <= LONGEST_INPUTS else '...'}")
+        named = shlex.join(inputs)
+        suggest(f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     codes = [done.code for done in everything]
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
@@ -160,7 +196,7 @@ def _several(tasks: Sequence[_Task], options: argparse.Namespace, out: Path | No
 
 
 def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
-    """Yield what became of each task, in their order; with reports a process a core works on them."""
+    """Yield the outcome of each task, in order; if there are reports, use one process per core."""
     workers = min(cores(), len(tasks))
     if tasks[0].report is None or workers == 1:
         yield from map(_work, tasks)
@@ -171,8 +207,8 @@ def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
         try:
             yield from processes.map(_work, tasks)
         except BrokenProcessPool as error:
-            demand = "a process that makes reports was ended from outside, for lack of memory perhaps"
-            raise ProgramError(f"{demand}; give fewer inputs at once", SOME_FAILED) from error
+            what = "a process that makes reports was ended from outside, perhaps for lack of memory"
+            raise ProgramError(f"{what}; give fewer inputs", SOME_FAILED) from error
         except BaseException:
             processes.shutdown(wait=False, cancel_futures=True)
             raise
@@ -183,9 +219,9 @@ def _work(task: _Task) -> _Done:
     try:
         return _analyse_and_report(task)
     except MemoryError:
-        return _Done(task.name, UNREADABLE, (f"{task.found.path}: {NO_MEMORY}",))
+        return _Done(task.name, UNREADABLE, (f"{task.file.path}: {NO_MEMORY}",))
     except Exception as error:
-        return _Done(task.name, INTERNAL, (f"{task.found.path}: {internal_error(error)}",))
+        return _Done(task.name, INTERNAL, (f"{task.file.path}: {internal_error(error)}",))
 
 
 def _analyse_and_report(task: _Task) -> _Done:
@@ -199,80 +235,91 @@ def _analyse_and_report(task: _Task) -> _Done:
     page = None
     if task.report is not None:
         try:
-            page = _write(analysed, task.report, pdf=task.options.pdf)
+            page = _write(analysed, task)
         except WriteFailed as error:
             code, complaints = USAGE, (*complaints, str(error))
     analysis = analysed.analysis
     table, numbers = table_estimates(analysis), every_number(analysis)
-    return _Done(task.name, code, complaints, analysed.result, table, numbers, page, noted is not None)
+    law = law_line(analysis, Path(task.file.path), task.scene_file)
+    return _Done(task.name, code, complaints, analysed.result, table, numbers, page, noted is not None, law)
 
 
 def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
-    """Analyse an input; return that, and where its scene was noted from now on."""
-    options = task.options
-    asked = {**completions(options), "velocity": options.velocity or task.found.velocity}
+    """Analyse an input; return the analysis, and where its scene was saved."""
     try:
-        bench = _bench(options)
-        loaded = load(task.found.path, **asked, from_s=options.from_s, to_s=options.to_s, clock_ppm=options.clock_ppm)
-        scene = amended(scene_of(loaded, task.scene), bench, where="the command line") if bench else task.scene
-        analysed = analyse_loaded(
+        options, read = task.options, task.read
+        loaded, bench = load(task.file.path, read), dict(task.bench)
+        if options.ask:
+            known = amended(scene_of(loaded, task.scene), bench, where="the command line") if bench else None
+            bench |= ask_for_bench(known or scene_of(loaded, task.scene), loaded.path.name)
+        run = analyse_loaded(
             loaded,
-            scene,
-            parameters={**picked(options, PARAMETERS), "velocity": asked["velocity"]},
+            task.scene,
+            bench=bench,
             accuracy=options.accuracy,
+            law=options.law,
             with_classic=options.method == "classic",
         )
-        return analysed, _remembered(loaded, scene) if task.writes else None
+        parameters = {
+            **picked(options, ("accuracy", "method", "law")),
+            **picked(read, READING),
+            "strict": options.strict,
+        }
+        scene = run.analysis.scene if task.scene is not None or bench else None
+        return run.described(parameters), _remembered(loaded, scene) if task.writes or options.ask else None
     except ProgramError as error:
         return _Done(task.name, error.exit_code, (str(error),))
     except NeedsAnswer as question:
-        return _Done(task.name, UNREADABLE, (str(worded_for(options, question, _words(task))),))
+        if task.alone:
+            raise  # answered by the command line as it was typed
+        remedy = for_command(question.question, _words(task), replace(task.read, velocity=None).given())
+        return _Done(task.name, UNREADABLE, (str(question.with_remedy(remedy)),))
     except (AcquisitionError, StorageError) as error:
         return _Done(task.name, UNREADABLE, (str(error),))
     except PipelineError as error:
-        return _Done(task.name, UNREADABLE, (f"{task.found.path}: {error}",))
+        return _Done(task.name, UNREADABLE, (f"{task.file.path}: {error}",))
 
 
-def _words(task: _Task) -> list[str] | None:
-    """Return the command line for one of several inputs by itself; None where it is the only one, as it was typed."""
-    if task.options.input == [task.found.path]:
-        return None
-    velocity = () if task.found.velocity is None else ("--velocity", task.found.velocity)
-    path = task.found.path
+def _words(task: _Task) -> list[str]:
+    """Return the command line for one of several inputs by itself."""
+    velocity = () if task.file.velocity is None else ("--velocity", task.file.velocity)
+    path = task.file.path
     return ["springmass", "analyse", f"./{path}" if path.startswith("-") else path, *velocity]
 
 
 def _remembered(loaded: Loaded, scene: Scene | None) -> Path | None:
-    """Note a scene that was given beside its recording; where nothing can be written it is said, and done without."""
-    if scene is None or _bundled(loaded.path):
+    """Save a given scene next to its recording; if that is impossible, print a message and continue."""
+    if scene is None or loaded.path == Path(STDIN) or _bundled(loaded.path):
         return None
     try:
         return remember_scene(loaded.path, loaded.scene, scene)
     except WriteFailed as error:
-        tell(f"{error}; the scene is not noted beside {loaded.path}")
+        tell(f"{error}; the bench data are not saved")
         return None
 
 
 def _bundled(path: Path) -> bool:
-    """Tell the recordings that come with the program, wherever they lie: their folder stays as it is."""
+    """Whether a recording came with the program, wherever it is now: nothing is written into its folder."""
     own = sample_data() / path.name
     return own.is_file() and filecmp.cmp(own, path, shallow=False)
 
 
-def _bench(options: argparse.Namespace) -> dict[tuple[str, str], dict[str, float]]:
-    """Return what the command line says of the bench, by table and key of the scene."""
-    found = {}
-    for place, (option, of_u, _) in BENCH.items():
-        value, u = (getattr(options, name[2:].replace("-", "_")) for name in (option, of_u))
+def _values(bench: BenchOptions) -> dict[tuple[str, str], dict[str, float]]:
+    """Return the values of the bench that were given, by table and key of the scene."""
+    values = {}
+    for place, (of_value, of_u) in BENCH.items():
+        value, u = getattr(bench, of_value), getattr(bench, of_u)
         if value is not None:
-            found[place] = {"value": value, "u": u or 0.0}
+            values[place] = {"value": value, "u": u or 0.0}
         elif u is not None:
-            raise ProgramError(f"{of_u} does nothing without {option}; name both or neither", USAGE)
-    return found
+            raise ProgramError(
+                f"{option_of(of_u)} does nothing without {option_of(of_value)}; name both or neither", USAGE
+            )
+    return values
 
 
 def _judged(analysed: Analysed, task: _Task) -> tuple[int, tuple[str, ...]]:
-    """Return the exit code of an analysis, and what is to be said of it."""
+    """Return the exit code of an analysis, and the message for it."""
     path, motion = analysed.result["input"]["path"], analysed.analysis.motion
     if not isinstance(motion, (Oscillation, Overdamped)):
         return UNREADABLE, (f"{path}: no oscillation: {motion.why}",)
@@ -281,40 +328,45 @@ def _judged(analysed: Analysed, task: _Task) -> tuple[int, tuple[str, ...]]:
     return OK, ()
 
 
-def _print_text(analysed: Analysed, *, si: bool) -> None:
+def _print_text(analysed: Analysed, options: AnalyseOptions) -> None:
+    """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.budgets import budget_text
-    from springmass.report.words import typeset
-    from springmass.terminal.look import look_of
-    from springmass.terminal.printing import classic_text, findings_text, fitted
+    from springmass.report.words import damping_sentence, typeset
+    from springmass.terminal.printing import classic_text, findings_text, fitted, wrapped
+    from springmass.terminal.style import style_of
     from springmass.terminal.table1 import text_table
 
-    look = look_of(sys.stdout, si=si)
-    print(text_table([analysed.name], [analysed.analysis], look))
+    style = style_of(sys.stdout, si=options.si)
+    print(text_table([analysed.name], [analysed.analysis], style))
     if analysed.classic is not None:
-        print(f"\n{classic_text(analysed.classic)}")
-    elif told := budget_text(analysed.analysis):
-        print(fitted(told, look.width) if look.terminal else told)
-    print()
-    print(findings_text(analysed.result["findings"], typeset if look.unicode else str))
+        print(f"{classic_text(analysed.classic)}\n")
+    elif (options.full or options.budget) and (budget := budget_text(analysed.analysis)):
+        print(f"{fitted(budget, style.width) if style.terminal else budget}\n")
+    if sentence := damping_sentence(analysed.analysis):
+        print(f"{wrapped(sentence, '', 80)}\n")
+    print(findings_text(analysed.result["findings"], typeset if style.unicode else str, full=options.full))
 
 
-def _print_together(analysed: Sequence[_Done], options: argparse.Namespace) -> None:
+def _print_together(analysed: Sequence[_Done], options: AnalyseOptions) -> None:
     from springmass.report.words import typeset
-    from springmass.terminal.look import look_of
     from springmass.terminal.printing import shared_findings_text
+    from springmass.terminal.style import style_of
     from springmass.terminal.table1 import text_table
 
+    for line in dict.fromkeys(done.law for done in analysed if done.law):
+        print(line)
     names = [done.name for done in analysed]
-    look = look_of(sys.stdout, si=options.si)
-    print(text_table(names, [done.table for done in analysed], look))
+    style = style_of(sys.stdout, si=options.si)
+    print(text_table(names, [done.table for done in analysed], style))
     findings = {done.name: done.result["findings"] for done in analysed}
-    print(shared_findings_text(findings, typeset if look.unicode else str))
+    print(shared_findings_text(findings, typeset if style.unicode else str))
 
 
-def _write(analysed: Analysed, results: Path, *, pdf: bool) -> Path:
+def _write(analysed: Analysed, task: _Task) -> Path:
     from springmass.report.write import write_report
 
-    return write_report(results, [analysed], pdf=pdf)
+    assert task.report is not None
+    return write_report(task.report, [analysed], pdf=task.options.pdf, template=task.options.template)
 
 
 def _write_together(analysed: Sequence[_Done], folder: Path) -> Path:
@@ -325,7 +377,7 @@ def _write_together(analysed: Sequence[_Done], folder: Path) -> Path:
 
     names = [done.name for done in analysed]
     with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:
-        told = json.dumps([done.result for done in analysed], indent=2, allow_nan=False, ensure_ascii=False)
-        write_whole(part / "results.json", f"{told}\n".encode("utf-8", "backslashreplace"))
+        text = json.dumps([done.result for done in analysed], indent=2, allow_nan=False, ensure_ascii=False)
+        write_whole(part / "results.json", f"{text}\n".encode("utf-8", "backslashreplace"))
         write_whole(part / "results.csv", results_csv(names, [done.numbers for done in analysed]))
     return folder / "results.csv"

@@ -2,46 +2,51 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import shlex
+from collections.abc import Sequence
+from pathlib import Path
 
 from acquisition.errors import visible
-from springmass.batch.results_table import is_course
-from springmass.commands import load_for
+from springmass.batch.store import is_course
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
-from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, make_folder, now_utc, scene_of
+from springmass.options import CompareOptions
+from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, law_line, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
 from springmass.runs.json_results import picked, provenance_of, rejected
+from springmass.runs.loading import load
+from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import read_scenes
 
 __all__ = ["run"]
 
-PARAMETERS = ("accuracy", "mass_correlation", "channel", "run", "rate_hz", "unit", "from_s", "to_s", "strict")
+READING = ("channel", "run", "rate_hz", "unit", "from_s", "to_s")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Analyse every run, compare them, print or write what was found; of courses take the results that are there."""
-    if all(is_course(path) for path in options.input):
-        return _run_courses(options)
+def run(recordings: Sequence[str | Path], options: CompareOptions, read: ReadOptions) -> int:
+    """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
+    inputs = [str(each) for each in recordings]
+    if all(is_course(path) for path in inputs):
+        return _run_courses(inputs, options)
     if options.where or options.bench:
         raise ProgramError("--where and --bench choose among the results of courses; name folders of batch", USAGE)
-    if len(options.input) < 2:
+    if len(inputs) < 2:
         raise ProgramError(
-            f"compare needs two runs at least, got {len(options.input)}; springmass analyse takes a single one", USAGE
+            f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one", USAGE
         )
-    names = distinct_names(options.input)
+    names = distinct_names(inputs)
     # Scenes first: what is wrong with them is known before an hour of records is read.
-    given = read_scenes(options.scene, len(options.input))
-    out = None if options.out is None else make_folder(options.out)
-    cut = {"from_s": options.from_s, "to_s": options.to_s}
-    loaded = [load_for(options, path, **cut) for path in options.input]
+    given = read_scenes(options.scene, len(inputs))
+    out = None if options.output is None else make_folder(options.output)
+    loaded = [load(path, read) for path in inputs]
     scenes = [scene_of(one, scene) for one, scene in zip(loaded, given, strict=True)]
     demand_one_spring(list(zip(names, scenes, strict=True)))
     time_utc = now_utc()
-    parameters = picked(options, PARAMETERS)
+    parameters = {**picked(options, ("accuracy", "law", "mass_correlation", "strict")), **picked(read, READING)}
     runs = [
-        analyse_loaded(one, scene, name=name, parameters=parameters, accuracy=options.accuracy, time_utc=time_utc)
+        analyse_loaded(one, scene, accuracy=options.accuracy, law=options.law).described(
+            parameters, name=name, time_utc=time_utc
+        )
         for name, one, scene in zip(names, loaded, scenes, strict=True)
     ]
     compared = compare_analysed(runs, mass_correlation=options.mass_correlation)
@@ -49,6 +54,11 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(result, allow_nan=False), flush=True)
     else:
+        every: list[str | Path | None] = [*options.scene] or [None]
+        files = every if len(every) == len(loaded) else every * len(loaded)
+        lines = [law_line(run.analysis, one.path, file) for run, one, file in zip(runs, loaded, files, strict=True)]
+        for line in dict.fromkeys(line for line in lines if line):
+            print(line)
         _print_text(compared, runs)
     if out is not None:
         from springmass.report.write import write_report
@@ -57,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         tell(f"report: {page}")
         suggest(f"open {page} in a browser")
     else:
-        suggest("the same command with --out DIR writes the report")
+        suggest("the same command with -o DIR writes the report")
     findings = [*result["findings"], *(f for run in runs for f in run.result["findings"])]
     if options.strict and (wrong := rejected(findings)):
         complain(f"rejected under --strict: {', '.join(wrong)}")
@@ -65,20 +75,20 @@ def run(options: argparse.Namespace) -> int:
     return OK
 
 
-def _run_courses(options: argparse.Namespace) -> int:
+def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     from springmass.batch.benches import compare_rows, compared_json, compared_text
     from springmass.batch.search import search
     from springmass.terminal.printing import visible_lines
 
-    if options.out is not None or options.scene:
-        raise ProgramError("--out and --scene go with single runs; a course has its page and its scenes", USAGE)
-    found = compare_rows(search(options.input, where=options.where).rows, bench=options.bench)
+    if options.output is not None or options.scene:
+        raise ProgramError("-o and --scene go with single runs; a course has its page and its scenes", USAGE)
+    found = compare_rows(search(inputs, where=options.where).rows, bench=options.bench)
     print(json.dumps(compared_json(found), allow_nan=False) if options.json else visible_lines(compared_text(found)))
     if options.strict and found.suspects:
         complain(f"rejected under --strict: {len(found.suspects)} runs differ from their course")
         return REJECTED
     for suspect in found.suspects[:1]:
-        suggest(f"springmass report {shlex.join([*options.input[:1], suspect.name])}")
+        suggest(f"springmass report {shlex.join([*inputs[:1], suspect.name])}")
     return OK
 
 

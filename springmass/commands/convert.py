@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import shlex
 from collections.abc import Sequence
 from pathlib import Path, PurePath
@@ -10,10 +9,11 @@ from typing import Any
 
 from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
-from springmass.commands import load_for
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, suggest, tell
+from springmass.options import ConvertOptions
 from springmass.runs.analysing import made_now
-from springmass.runs.loading import Loaded
+from springmass.runs.loading import Loaded, load
+from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import read_scene
 from storage.atomic import write_whole
 from storage.run_file.writing import write_run
@@ -23,11 +23,15 @@ __all__ = ["run", "write_loaded"]
 RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
 
 
-def run(options: argparse.Namespace) -> int:
+def run(recording: str | Path, output: str | Path | None, options: ConvertOptions, read: ReadOptions) -> int:
     """Convert one input."""
+    if output is not None and options.output is not None:
+        raise ProgramError(f"convert writes one output, got {output} and -o {options.output}; name it once", USAGE)
+    if (output := output or options.output) is None:
+        raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form", USAGE)
     scene = None if options.scene is None else read_scene(options.scene).to_mapping()
-    loaded = load_for(options, options.input)
-    out = Path(options.output)
+    loaded = load(recording, read)
+    out = Path(output)
     if out.suffix.lower() in RUN_SUFFIXES:
         written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=scene, overwrite=options.overwrite)
         tell(f"{written}: {len(loaded.samples)} samples from {loaded.path}")
@@ -41,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _holds(loaded: Loaded, out: Path) -> bool:
-    """Tell whether the original inside a run file is what is asked for: it has the suffix, or no form has it."""
+    """Whether the user asks for the original inside a run file: it has the suffix, or no format has it."""
     if loaded.format != "run":
         return False
     suffixes = {PurePath(each.name).suffix.lower() for each in loaded.originals}
@@ -49,7 +53,7 @@ def _holds(loaded: Loaded, out: Path) -> bool:
 
 
 def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
-    """Write the samples in the form that the suffix names."""
+    """Write the samples in the format of the suffix."""
     writer = WRITERS.get(out.suffix.lower())
     if writer is None:
         raise ProgramError(
@@ -81,7 +85,7 @@ def _beside(out: Path, added: str) -> Path:
 
 
 def _demand_free(targets: Sequence[Path], overwrite: bool) -> None:
-    """Look before the work: of a pair, both are written or none."""
+    """Check before the work, so that of a pair either both files are written or none."""
     for target in () if overwrite else targets:
         if target.exists():
             raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite", USAGE)
@@ -135,7 +139,7 @@ def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
 
 
 def _names_apart(originals: Sequence[Original]) -> list[str]:
-    """Name the originals of a pair; where both had one name, in folders of their own, the second is numbered."""
+    """Name the originals of a pair; if both have the same name, in separate folders, number the second."""
     names: list[str] = []
     for original in originals:
         # Names came from outside: only their last part may choose a place.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -10,13 +9,15 @@ from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.convert import write_loaded
 from springmass.errors import OK, suggest
+from springmass.options import DemoOptions
 from springmass.report.write import write_report
-from springmass.runs.analysing import Analysed, analyse_loaded, make_folder
+from springmass.runs.analysing import Analysed, load_and_analyse, make_folder
 from springmass.runs.comparing import compare_analysed
 from springmass.runs.loading import load, sample_data
+from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import read_scene
-from springmass.terminal.look import look_of
 from springmass.terminal.printing import findings_text
+from springmass.terminal.style import style_of
 from springmass.terminal.table1 import text_table
 
 __all__ = ["run"]
@@ -24,13 +25,13 @@ __all__ = ["run"]
 RUNS = ("undamped", "damped")
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: DemoOptions) -> int:
     """Replay both recordings into run files, analyse and compare them, print Table 1, write the report."""
-    out = make_folder(options.out)
+    out = make_folder(options.output)
     analysed = [_one(name, out) for name in RUNS]
     compared = compare_analysed(analysed)
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")
-    print(text_table(RUNS, [a.analysis for a in analysed], look_of(sys.stdout)))
+    print(text_table(RUNS, [a.analysis for a in analysed], style_of(sys.stdout)))
     for one in analysed:
         print(f"\n{one.name.capitalize()}:")
         print(findings_text(one.result["findings"]))
@@ -41,11 +42,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _one(name: str, out: Path) -> Analysed:
-    """From the old files through a replay into a run file, and from that to the analysis."""
+    """Replay the old files into a run file, and analyse that run file."""
     data = sample_data()
-    old = load(data / f"{name}_simulated_position.txt", velocity=data / f"{name}_simulated_velocity.txt")
+    velocity = data / f"{name}_simulated_velocity.txt"
+    old = load(data / f"{name}_simulated_position.txt", ReadOptions(velocity=velocity))
     scene = read_scene(data / f"{name}.scene.toml")
     path = out / f"{name}.h5"
     with Replay(old.samples_in_blocks(), VirtualClock(), info=old.info, speed=None) as source:
         write_loaded(path, old, source, scene=scene.to_mapping(), overwrite=True)
-    return analyse_loaded(load(path), None, name=name, parameters={"command": "demo"})
+    return load_and_analyse(path).described({"command": "demo"}, name=name)

@@ -1,8 +1,7 @@
-"""``springmass doctor``: is this installation what it should be? Each check has broken such programs before."""
+"""``springmass doctor``: check the installation for problems that have broken such programs before."""
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import importlib.metadata
 import importlib.util
@@ -16,12 +15,24 @@ from pathlib import Path
 
 from springmass.errors import OK, SOME_FAILED, suggest
 from springmass.layout import PACKAGES, PREFIX, part
+from springmass.options import JsonOption
 
 __all__ = ["Check", "examine", "foreign_packages", "run"]
 
 LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2"),
-    *("serial", "nptdms", "python_calamine", "rich", "shtab", "starlette", "uvicorn", "websockets"),
+    *(
+        "serial",
+        "nptdms",
+        "python_calamine",
+        "rich",
+        "cyclopts",
+        "tomli_w",
+        "platformdirs",
+        "starlette",
+        "uvicorn",
+        "websockets",
+    ),
     "segno",
     "msgspec",
 )
@@ -48,7 +59,7 @@ class Check:
     remedy: str = ""
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: JsonOption) -> int:
     """Print every check; exit with 1 where one failed."""
     from acquisition.errors import visible  # a foreign package of this name is one of the things that are checked
 
@@ -92,7 +103,7 @@ def _interpreter() -> Iterator[Check]:
     version = platform.python_version()
     yield Check("python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")
     own = sys.prefix != sys.base_prefix
-    found = sys.prefix if own else "no environment of its own"
+    found = sys.prefix if own else "no virtual environment"
     # Not a failure: an installation without one works until another distribution brings a package of our names.
     yield Check("environment", True, found)
 
@@ -105,7 +116,7 @@ def _packages() -> Iterator[Check]:
             f"package {name}",
             name not in foreign,
             found,
-            "another distribution brings a package of this name: install springmass into an environment of its own",
+            "another distribution brings a package of this name: install springmass into a virtual environment",
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import shlex
 import shutil
@@ -15,26 +14,27 @@ from acquisition.errors import visible
 from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
 from springmass.errors import OK, SENSOR, USAGE, ProgramError, suggest, tell
+from springmass.options import FirmwareOptions
 from springmass.session.identity import outdated, settings_of
 
 __all__ = ["run"]
 
 ANSWER_S = 5.0
-"""So long a board takes to answer at most: opening the port restarts it, and its bootloader waits for two seconds."""
+"""Longest time until a board answers: opening the port restarts it, and its bootloader waits for two seconds."""
 ASK_EVERY_S = 0.5
 FLASH_S = 120.0
 
 
-def run(options: argparse.Namespace) -> int:
-    """Show wiring and how to flash; with a port what the board says, set it, or flash it."""
+def run(options: FirmwareOptions) -> int:
+    """Show the wiring and how to flash; with a port, show the board's settings, change them, or flash it."""
     commands = _commands(options)
-    if options.port is None and (options.flash or commands):
-        raise ProgramError("--port must name the board's port; `springmass ports` lists them", USAGE)
-    if options.flash:
-        _flash(options.port)
-    elif options.port is None:
+    if options.port is None:
+        if options.flash or commands:
+            raise ProgramError("--port must name the board's port; `springmass ports` lists them", USAGE)
         _show()
         return OK
+    if options.flash:
+        _flash(options.port)
     identity = _converse(options.port, commands)
     print(visible(f"{options.port}: {identity}{settings_of(identity)}"))
     if outdated(identity):
@@ -56,22 +56,22 @@ def _show() -> None:
         print(f"  {shlex.join(avrdude_arguments('PORT', baud))}    # {boards}")
 
 
-def _commands(options: argparse.Namespace) -> list[str]:
-    """Return the settings asked for as the device takes them."""
-    asked = []
+def _commands(options: FirmwareOptions) -> list[str]:
+    """Return the requested settings in the form that the device accepts."""
+    commands = []
     if options.rate is not None:
-        asked.append(f"R{options.rate}")
+        commands.append(f"R{options.rate}")
     if options.gate is not None:
-        asked.append("G{},{}".format(*options.gate))
+        commands.append("G{},{}".format(*options.gate))
     if options.spread is not None:
-        asked.append(f"J{options.spread}")
+        commands.append(f"J{options.spread}")
     if options.name is not None:
-        asked.append(f"N{options.name}")
-    return asked
+        commands.append(f"N{options.name}")
+    return commands
 
 
 def _flash(port: str) -> None:
-    """Write the firmware at the speed that the board's bootloader takes."""
+    """Write the firmware at the speed that the bootloader of the board accepts."""
     if shutil.which("avrdude") is None:
         raise ProgramError(
             f"avrdude is needed to write {HEX}, and was not found; install it (Debian: apt install avrdude, macOS: "
@@ -80,33 +80,34 @@ def _flash(port: str) -> None:
         )
     with contextlib.closing(SerialPort(port, FAMILY.baud)):
         pass  # absent, busy or without permission: said in one line of ours
-    said = ""
+    reason = ""
     for baud in BAUDS:
         command = avrdude_arguments(port, baud)
         tell(shlex.join(command))
         try:
             done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=FLASH_S)
         except subprocess.TimeoutExpired:
-            said = f"no end after {FLASH_S:g} s"
+            reason = f"no end after {FLASH_S:g} s"
             continue
         if done.returncode == 0:
             tell("written and verified")
             return
-        said = next((line.strip() for line in done.stderr.splitlines() if "error" in line.lower()), "")
+        reason = next((line.strip() for line in done.stderr.splitlines() if "error" in line.lower()), "")
     raise ProgramError(
-        f"{port}: no bootloader answered at {' or '.join(map(str, BAUDS))} baud ({said or 'avrdude gave no reason'}); "
+        f"{port}: no bootloader answered at {' or '.join(map(str, BAUDS))} baud "
+        f"({reason or 'avrdude gave no reason'}); "
         "is it an Uno or a Nano, and nothing else using the port?",
         SENSOR,
     )
 
 
 def _converse(address: str, commands: list[str]) -> Identity:
-    """Send commands, and return what the device then says of itself.
+    """Send commands, and return the identity that the device then reports.
 
     Raises
     ------
     ProgramError
-        With exit code 4 where nothing answers, or the device does not take a command.
+        With exit code 4 if nothing answers, or if the device does not accept a command.
     """
     clock, decoder = SystemClock(), LineProtocolDecoder()
     with contextlib.closing(SerialPort(address, FAMILY.baud)) as port:
@@ -114,9 +115,9 @@ def _converse(address: str, commands: list[str]) -> Identity:
         _ask(port, decoder, clock, end_ns)
         for command in commands:
             refused = decoder.faults["refused_command"]
-            decoder.told.identity = None
+            decoder.status.identity = None
             port.write(f"{command}\n".encode("ascii", "replace"))
-            while decoder.told.identity is None and decoder.faults["refused_command"] == refused:
+            while decoder.status.identity is None and decoder.faults["refused_command"] == refused:
                 if clock.now_ns() > end_ns:
                     raise ProgramError(f"{address}: no answer to {command!r}; try again", SENSOR)
                 decoder.feed(0, _heard(port, clock, 0.05))
@@ -125,25 +126,25 @@ def _converse(address: str, commands: list[str]) -> Identity:
                     f"{address}: the device does not take {command!r}; docs/reference/line-protocol.md has the ranges",
                     SENSOR,
                 )
-        assert decoder.told.identity is not None
-        return decoder.told.identity
+        assert decoder.status.identity is not None
+        return decoder.status.identity
 
 
 def _ask(port: SerialPort, decoder: LineProtocolDecoder, clock: SystemClock, end_ns: int) -> None:
-    """Ask what it is until it says so."""
+    """Ask the board for its identification until it answers."""
     heard = 0
-    while decoder.told.identity is None:
+    while decoder.status.identity is None:
         if clock.now_ns() > end_ns:
             what = "readings, but not what it is; flash it with --flash" if heard else "nothing; is it the right port?"
             raise ProgramError(f"{port.name}: the device was asked what it is and said {what}", SENSOR)
         port.write(FAMILY.identify)
         until_ns = clock.now_ns() + int(ASK_EVERY_S * 1e9)
-        while decoder.told.identity is None and clock.now_ns() < until_ns:
+        while decoder.status.identity is None and clock.now_ns() < until_ns:
             heard += len(decoder.feed(0, _heard(port, clock, 0.05)))
 
 
 def _heard(port: SerialPort, clock: SystemClock, wait_s: float) -> bytes:
-    """Return what came; after so long where nothing did."""
+    """Return the bytes received; return after the timeout if there are none."""
     data = port.read(wait_s)
     if not data:
         clock.sleep_until_ns(clock.now_ns() + 1_000_000)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import shlex
 from collections.abc import Iterator
@@ -16,10 +15,12 @@ from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.explained import explain
 from acquisition.recordings.identify import formats, inspect
 from acquisition.recordings.inspection import Inspection, Survey
-from springmass.commands import load_for
 from springmass.errors import OK, USAGE, ProgramError, suggest
+from springmass.options import FormatsOptions
 from springmass.runs.json_results import picked, plain
-from springmass.runs.loading import Loaded, kind_of
+from springmass.runs.loading import Loaded, kind_of, load
+from springmass.runs.options import ReadOptions
+from springmass.runs.questions import for_command
 from springmass.runs.shelf import Entry, is_shelf, shelf
 
 __all__ = ["run"]
@@ -33,22 +34,23 @@ _MOST_ABOVE = 30
 _WHY = {"run": "it begins with the signature of HDF5", "wire": "it begins with the mark of a log's record"}
 
 
-def run(options: argparse.Namespace) -> int:
+def run(file: str | Path | None, options: FormatsOptions, read: ReadOptions) -> int:
     """List the formats, or describe a file."""
-    if options.input is None:
-        return _list(options)
+    if file is None:
+        return _list(as_json=options.json)
+    path = Path(file)
     if options.explain:
-        return _explain(Path(options.input), as_json=options.json)
-    if is_shelf(Path(options.input)):
-        return _shelf(Path(options.input), as_json=options.json)
-    facts = _describe(Path(options.input), options)
+        return _explain(path, as_json=options.json)
+    if is_shelf(path):
+        return _shelf(path, as_json=options.json)
+    facts = _describe(path, read, as_json=options.json)
     if options.json:
         print(json.dumps(facts, allow_nan=False))
         return OK
     for line in _lines(facts):
         print(visible(line))
     if "needs" not in facts:
-        suggest(f"springmass analyse {shlex.quote(options.input)}")
+        suggest(f"springmass analyse {shlex.quote(str(file))}")
     return OK
 
 
@@ -70,7 +72,8 @@ def _shelf(path: Path, *, as_json: bool) -> int:
 def _row(each: Entry) -> tuple[str, ...]:
     rate = "" if each.rate_hz is None else f"{each.rate_hz:.4g} Hz"
     span = "" if each.span_s is None else f"{each.span_s:.4g} s"
-    missing = each.error.partition(" (tried ")[0] or ", ".join(f"--{option}" for option in each.missing)
+    why = each.error if each.recognised else "no format recognises it"
+    missing = why or ", ".join(f"--{option}" for option in each.missing)
     return each.file, each.family or "none", ", ".join(each.channels), rate, span, missing
 
 
@@ -79,13 +82,13 @@ def _fitted(cell: str, width: int) -> str:
 
 
 def _explain(path: Path, *, as_json: bool) -> int:
-    """Print how a file is read: what stands above the rows, and what each column is taken for."""
+    """Print how a file is read: the lines above the rows, and the role of each column."""
     if (kind := kind_of(path)) != "recording":
         raise ProgramError(f"{path}: --explain shows columns of old recordings, got a {kind} file; leave it out", USAGE)
     family, why, layouts = explain(path)
     if as_json:
-        told = {"path": str(path), "format": family, "why": why, "tables": [asdict(each) for each in layouts]}
-        print(json.dumps(told, allow_nan=False))
+        explanation = {"path": str(path), "format": family, "why": why, "tables": [asdict(each) for each in layouts]}
+        print(json.dumps(explanation, allow_nan=False))
         return OK
     print(visible(f"{'format':<10} {family}: {why}"))
     for each in layouts:
@@ -102,9 +105,9 @@ def _explain(path: Path, *, as_json: bool) -> int:
     return OK
 
 
-def _list(options: argparse.Namespace) -> int:
+def _list(*, as_json: bool) -> int:
     table = {**{f.name: f.title for f in formats()}, **OURS}
-    if options.json:
+    if as_json:
         print(json.dumps([{"name": name, "title": title} for name, title in table.items()]))
         return OK
     for name, title in table.items():
@@ -112,22 +115,29 @@ def _list(options: argparse.Namespace) -> int:
     return OK
 
 
-def _describe(path: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """Say what a file is; where one channel can be taken as distance, also what its samples are."""
+def _describe(path: Path, read: ReadOptions, *, as_json: bool) -> dict[str, Any]:
+    """Identify a file; if one channel can be used as distance, also describe its samples."""
     kind = kind_of(path)
     if kind != "recording":
-        loaded = load_for(options, path)
+        loaded = load(path, read)
         samples = loaded.samples
         survey = Survey("", loaded.channel, samples.unit, len(samples), loaded.info.rate_hz, loaded.traps)
         return {**_file(path, Inspection(kind, OURS[kind], _WHY[kind], (survey,))), **_facts(loaded)}
     found = inspect(path)
     facts = _file(path, found)
     try:
-        return {**facts, **_facts(load_for(options, path))}
+        return {**facts, **_facts(load(path, read))}
     except NeedsAnswer as error:
         traps = list(dict.fromkeys(trap for survey in found.surveys for trap in survey.traps))
+        words = ["springmass", "formats", str(path), *(["--json"] if as_json else [])]
+        answered = error.with_remedy(for_command(error.question, words, read.given()))
         question = [plain(need) for need in error.question.needs]
-        return {**facts, "needs": str(error).removeprefix(f"{path}: "), "question": question, "traps": plain(traps)}
+        return {
+            **facts,
+            "needs": visible(f"{answered.problem} {answered.remedy}"),
+            "question": question,
+            "traps": plain(traps),
+        }
 
 
 def _file(path: Path, found: Inspection) -> dict[str, Any]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 import io
 import json
 import shlex
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from springmass.batch.search import search
 from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
+from springmass.options import MapOptions
 from springmass.runs.analysing import make_folder
 
 __all__ = ["run"]
@@ -19,14 +21,15 @@ __all__ = ["run"]
 COLUMNS = ("run", "disc", "reynolds_number", "keulegan_carpenter_number", "drag_coefficient", "drag_coefficient_u")
 
 
-def run(options: argparse.Namespace) -> int:
+def run(folders: Sequence[str | Path], options: MapOptions) -> int:
     """Draw the map of every run for which an expression holds; write it as SVG and PDF, its numbers as CSV."""
     from springmass.report.figures.canvas import save
     from springmass.report.figures.drag_map import DragRun, drag_map_figure
     from springmass.report.tables import cell
     from storage.atomic import write_whole
 
-    found = search(options.input, where=options.where).rows
+    courses = [str(folder) for folder in folders]
+    found = search(courses, where=options.where).rows
     out = io.StringIO()
     table = csv.writer(out, lineterminator="\n")
     table.writerow(COLUMNS)
@@ -39,13 +42,13 @@ def run(options: argparse.Namespace) -> int:
         runs.append(DragRun(label, np.array(points)))
         table.writerows([cell(row["run"]), cell(label), *point] for point in points)
     if not any((one.points[:, 2] > 0).any() for one in runs):
-        demand = "a run with a drag coefficient was demanded"
+        demand = "expected a run with a drag coefficient"
         raise ProgramError(
             f"{demand}, got none among {len(found)}: it needs bob, disc and air in the scene, see --where", UNREADABLE
         )
-    folder = make_folder(options.out)
+    folder = make_folder(options.output)
     save(drag_map_figure(runs), folder, "drag-map")
     write_whole(folder / "drag-map.csv", out.getvalue())
     tell(f"{len(runs)} of {len(found)} runs give a drag coefficient; written: {folder / 'drag-map.svg'}")
-    suggest(f"springmass compare {shlex.join(options.input)}")
+    suggest(f"springmass compare {shlex.join(courses)}")
     return OK

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import threading
@@ -11,72 +10,76 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from springmass.commands import load_for
-from springmass.errors import OK, USAGE, ProgramError, tell
-from springmass.page.desk import Desk
+from springmass.errors import OK, USAGE, ProgramError, manner, tell
+from springmass.options import PageOptions
 from springmass.page.feeds import view_of
+from springmass.page.state import PageState
 from springmass.page.web.log_lines import log_to_stderr
 from springmass.page.web.server import Opening, serve
 from springmass.page.web.sharing import address_in_network, code_for_terminal
-from springmass.runs.loading import kind_of
+from springmass.runs.loading import kind_of, load
+from springmass.runs.options import ReadOptions
 
 __all__ = ["run"]
 
 
-def run(options: argparse.Namespace) -> int:
-    """Serve the page until Ctrl-C, or for a recording until its recorder has ended and nobody looks any more."""
-    path = Path(options.input)
-    wanted_u_s = None if options.want_us is None else options.want_us * 1e-6
+def run(recording: str | Path, page: PageOptions, read: ReadOptions, *, recorder: bool = False) -> int:
+    """Serve the page until Ctrl-C; for a recording, until the recorder has ended and no browser shows the page."""
+    path = Path(recording)
+    wanted_u_s = None if page.want_us is None else page.want_us * 1e-6
     over = threading.Event()
-    opening = Opening(options.page_port, network=address_in_network() if options.lan else "")
-    if getattr(options, "recorder", False):
-        desk = Desk(wanted_u_s, _say, name=path.with_suffix(".h5").name)
-        opening = _from_recorder(opening, desk, over)
+    opening = Opening(page.page_port, network=address_in_network() if page.lan else "")
+    if recorder:
+        page_state = PageState(wanted_u_s, _say, name=path.with_suffix(".h5").name, law=page.law)
+        opening = _from_recorder(opening, page_state, over)
     else:
-        desk = Desk(wanted_u_s)
-        _look_at(desk, path, options)
-    opening.opened = _ready(options, opening)
+        page_state = PageState(wanted_u_s, law=page.law)
+        _look_at(page_state, path, read)
+    opening.opened = _ready(page, opening)
     try:
         with log_to_stderr():
-            serve(desk, opening, until=over.is_set)
+            serve(page_state, opening, until=over.is_set)
     except KeyboardInterrupt:
         tell("the page is closed")
     except OSError as error:
         reason = error.strerror or str(error)
         raise ProgramError(f"--page-port {opening.port}: {reason}; name another, or 0 for any", USAGE) from error
     finally:
-        desk.close()
+        page_state.close()
     return OK
 
 
-def _look_at(desk: Desk, path: Path, options: argparse.Namespace) -> None:
+def _look_at(page_state: PageState, path: Path, read: ReadOptions) -> None:
     if kind_of(path) == "wire":
-        desk.follow(path)
+        page_state.follow(path)
     else:
-        loaded = load_for(options, path)
-        desk.show(view_of(loaded), loaded.scene, loaded.path)
+        loaded = load(path, read)
+        page_state.show(view_of(loaded), loaded.scene, loaded.path)
 
 
-def _ready(options: argparse.Namespace, opening: Opening) -> Callable[[int, str | None, str], None]:
+def _ready(options: PageOptions, opening: Opening) -> Callable[[int, str | None, str], None]:
     def ready(port: int, address: str | None, network: str) -> None:
         """Say where the page is; to the recorder, too, so that one that is started again is found at the same place."""
         if opening.secret:
             _say({"type": "open", "port": port})
         if address is None:
             return  # started again: its browsers know the way
-        tell(f"page: {address}")
+        # Of a page that belongs to a recording the recorder prints the lines: its progress would overwrite them here.
+        say = _say_line if opening.secret else tell
+        say(f"page: {address}")
         if network:
-            tell(f"viewers in this network: {network}")
+            say(f"viewers in this network: {network}")
             if sys.stderr.isatty():
-                print(code_for_terminal(network), file=sys.stderr)
+                for line in code_for_terminal(network).splitlines():
+                    say(line)
         if not options.no_browser:
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
     return ready
 
 
-def _from_recorder(opening: Opening, desk: Desk, over: threading.Event) -> Opening:
-    """Take the recorder's words from stdin, the gate's first; the end of stdin is the recorder's end."""
+def _from_recorder(opening: Opening, page_state: PageState, over: threading.Event) -> Opening:
+    """Read the recorder's messages from stdin, that of the gate first; the recorder has ended when stdin ends."""
     first = json.loads(sys.stdin.readline() or "{}").get("gate", {})
     opening.port = first.get("port") or opening.port
     opening.secret, opening.used = str(first.get("secret", "")), bool(first.get("used"))
@@ -84,13 +87,18 @@ def _from_recorder(opening: Opening, desk: Desk, over: threading.Event) -> Openi
 
     def listen() -> None:
         for line in sys.stdin:
-            desk.told(json.loads(line))
+            page_state.put_recorder_state(json.loads(line))
         over.set()
 
     threading.Thread(target=listen, name="springmass-page-recorder", daemon=True).start()
     return opening
 
 
-def _say(asked: Mapping[str, Any]) -> None:
-    """Speak to the recorder, a JSON line each."""
-    print(json.dumps(asked), file=sys.stdout, flush=True)
+def _say_line(text: str) -> None:
+    if not manner()[0]:
+        _say({"type": "line", "text": text})
+
+
+def _say(message: Mapping[str, Any]) -> None:
+    """Send messages to the recorder, one JSON line each."""
+    print(json.dumps(message), file=sys.stdout, flush=True)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import shlex
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from acquisition.clock import SystemClock
@@ -14,15 +14,16 @@ from acquisition.decoders.registry import describe_bytes, probe
 from acquisition.errors import PortError, visible
 from acquisition.live.serial_port import SerialPort, list_ports
 from springmass.errors import OK, SENSOR, ProgramError, suggest, tell
+from springmass.options import PortsOptions
 
-__all__ = ["name_sensors", "run"]
+__all__ = ["Named", "name_sensors", "run"]
 
 PROBE_S = 1.0
 BAUDS = (115200, 9600)
 
 
-def run(options: argparse.Namespace) -> int:
-    """List ports with what speaks on them: listens to each, a second at each of the usual speeds."""
+def run(options: PortsOptions) -> int:
+    """List ports and the sensors on them: listen to each port for a second at each of the usual speeds."""
     rows = [_row(port.device, port.description, not options.no_probe) for port in list_ports()]
     rows += [_row(address, "named on the command line", True) for address in options.port]
     if options.json:
@@ -39,38 +40,46 @@ def run(options: argparse.Namespace) -> int:
     return OK
 
 
-def name_sensors(options: argparse.Namespace) -> None:
-    """Fill in ports and sensors of a recording that the command line left out, by what speaks on the ports.
+@dataclass(frozen=True, slots=True)
+class Named:
+    """Ports of a recording, with the family of the sensor on each, and their speed if it was measured."""
+
+    ports: tuple[str, ...]
+    sensors: tuple[str, ...]
+    baud: int | None
+
+
+def name_sensors(ports: tuple[str, ...], sensors: tuple[str, ...], baud: int | None) -> Named:
+    """Return ports and sensors of a recording; those that were not named are known by what speaks on the ports.
 
     Raises
     ------
     ProgramError
         With exit code 4 where no port, or more than one, has a sensor that is known; the line names them.
     """
-    if options.port and options.sensor:
-        return
-    addresses = options.port or [port.device for port in list_ports()]
-    told, known = [], []
+    if ports and sensors:
+        return Named(ports, sensors, baud)
+    addresses = ports or [port.device for port in list_ports()]
+    descriptions, known = [], []
     for address in addresses:
-        heard, families, baud = _listen(address, BAUDS if options.baud is None else (options.baud,))
-        wanted = [name for name in families if not options.sensor or name in options.sensor]
-        told.append(f"{address}: {heard}")
+        heard, families, speed = _listen(address, BAUDS if baud is None else (baud,))
+        wanted = [name for name in families if not sensors or name in sensors]
+        descriptions.append(f"{address}: {heard}")
         if wanted:
-            known.append((address, wanted[0], baud))
-    if len(known) != max(len(options.port), 1):
+            known.append((address, wanted[0], speed))
+    if len(known) != max(len(ports), 1):
         if known:
             demand = "name one with --port and --sensor; several speak"
         else:
             demand = (
                 "no rangefinder that is known speaks; name it with --port and --sensor, or take --simulate SCENE.toml"
             )
-        listed = "; ".join(told) or "this machine has no serial port"
+        listed = "; ".join(descriptions) or "this machine has no serial port"
         raise ProgramError(f"record looked for a rangefinder: {demand}: {listed}", SENSOR)
-    for address, name, baud in known:
-        tell(f"{address}: a {name} sensor at {baud} baud")
-    options.port = [address for address, _, _ in known]
-    options.sensor = [name for _, name, _ in known]
-    options.baud = options.baud or (known[0][2] if len(known) == 1 else None)
+    for address, name, speed in known:
+        tell(f"{address}: a {name} sensor at {speed} baud")
+    measured = known[0][2] if len(known) == 1 else None
+    return Named(tuple(each[0] for each in known), tuple(each[1] for each in known), baud or measured)
 
 
 def _row(device: str, description: str, listen: bool) -> dict[str, Any]:
@@ -79,7 +88,7 @@ def _row(device: str, description: str, listen: bool) -> dict[str, Any]:
 
 
 def _listen(device: str, bauds: Sequence[int] = BAUDS) -> tuple[str, list[str], int]:
-    """What a port says at the usual speeds, which families know it, and at which speed."""
+    """What a port sends at the usual speeds, which families recognise it, and at which speed."""
     heard = b""
     for baud in bauds:
         try:

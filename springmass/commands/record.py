@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import os
 import queue
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,19 +26,21 @@ from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.commands.ports import name_sensors
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
-from springmass.page.process import PAGE, PageProcess
+from springmass.options import PageOptions, RecordOptions
+from springmass.page.process import PageProcess
 from springmass.runs.analysing import made_now
 from springmass.runs.scenes import ask_about, read_scene
-from springmass.session.console import Console
 from springmass.session.operator import Closed, Operator
+from springmass.session.options import RunLimits, RunListeners
 from springmass.session.output import default_name, demand_new
 from springmass.session.session import BYTES_PER_READ, Ended, GivenUp, Sensor, Session, Trigger
 from springmass.session.simulated_bench import REST_M, Release, bench_position
-from springmass.session.stops import Stops
+from springmass.session.stops import EndReason, Stops
 from springmass.session.trigger import Disarmed
+from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
-from springmass.terminal.look import look_of
-from springmass.terminal.recording import ProgressLine
+from springmass.terminal.recording import END_WORDS, ProgressLine
+from springmass.terminal.style import style_of
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
 from storage.recovery.recover import RecoverReport, recover
@@ -48,10 +49,11 @@ from storage.run_file.reading import open_run
 __all__ = ["run"]
 
 U_RULER_M = 0.5e-3
+SIMULATED_FAMILY = "line-protocol"
 UNLIMITED_S = 3600.0  # how long a run without --seconds is taken to be, for the look at the disk
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: RecordOptions, page_options: PageOptions) -> int:
     """Record, then build the run file from the log."""
     source = options.scene or options.simulate
     what = options.title or (
@@ -60,13 +62,14 @@ def run(options: argparse.Namespace) -> int:
     out = default_name(what, datetime.now()) if options.output is None else Path(options.output)
     if out.suffix.lower() != ".h5":
         raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5", USAGE)
-    _demand_sense(options)
+    _demand_sense(options, page_options)
     _fill_standard_streams()
     if options.simulate is None:
-        name_sensors(options)
+        named = name_sensors(options.port, options.sensor, options.baud)
+        options = replace(options, port=named.ports, sensor=named.sensors, baud=named.baud)
     demand_new(out, len(options.port))
     scene = None if source is None else read_scene(source)
-    if scene is not None:
+    if scene is not None and source is not None:
         ask_about(scene, source)
     log = out.with_suffix(".wire")
     bench = Release(SystemClock())
@@ -82,32 +85,35 @@ def run(options: argparse.Namespace) -> int:
             title=options.title,
             stops=stops,
         )
-        console = Console(clock, lambda error: session.failures.note("stderr", error))
+        console = beside.enter_context(Console(lambda error: session.failures.note("stderr", error)))
         try:
-            page = _page(options, log, session, beside) if options.page else None
-            ended = _record(session, options, log, console, bench, page)
+            page = beside.enter_context(_page(page_options, log, session, console)) if options.page else None
+            ended = _Bench(session, options, log, console, bench, page).record()
             session.stop()
             code, run_file = _built(ended, out, session, console)
-            if page is not None and run_file is not None and ended.by == PAGE:
+            if page is not None and run_file is not None and ended.by is EndReason.PAGE:
                 page.tell("built", run=str(run_file))
                 page.attend()
             return code
         except Closed:
-            console.line("nothing was recorded: the page was closed before")
+            console.line("nothing was recorded: the page was closed first")
             return OK
         except KeyboardInterrupt:
             if not os.path.lexists(log):
                 raise
             # The log is whole as far as the disk has taken it; nothing of it is removed.
             lost = "" if session.given_up is None else f"; {_given_up(session.given_up)}"
-            console.line(f"springmass: ended at once, by {stops.by or 'Ctrl-C'}{lost}; {_what_to_do(log)}")
+            console.line(
+                f"springmass: stopped immediately by {END_WORDS[stops.by or EndReason.CTRL_C]}{lost}; "
+                f"{_what_to_do(log)}"
+            )
             return INTERRUPTED
         finally:
             session.stop()
 
 
 def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple[int, Path | None]:
-    """Build the run file, say what became of the recording, and return the exit code and the first run's file."""
+    """Build the run file, report the outcome of the recording, and return exit code and file of the first run."""
     log, status = ended.log.path, ended.status
     if status.astray:
         console.line(f"springmass: {log}: {status.astray}; the run file is built from what was recorded")
@@ -139,19 +145,21 @@ def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: C
         named = ", ".join(map(str, useless))
         console.line(f"springmass: {named}: no usable distance was recorded; check aim, distance and wiring")
         return SENSOR
-    if ended.by == "the disk":
-        console.line("springmass: the disk took nothing more and ended the recording; the run holds what came before")
+    if ended.by is EndReason.DISK:
+        console.line(
+            "springmass: the disk is full or broken and ended the recording; the run holds everything before that"
+        )
         return SENSOR
     if any(run.gone for run in report.runs):
         return SENSOR
-    if ended.by in ("seconds", PAGE):
+    if ended.by in (EndReason.SECONDS, EndReason.PAGE):
         return OK
-    console.line(f"stopped by {ended.by}; the run is complete up to there")
+    console.line(f"stopped by {END_WORDS[ended.by]}; everything up to then is saved")
     return INTERRUPTED
 
 
 def _usable(path: Path, channel: int, session: Session) -> bool:
-    """Tell whether a run holds a distance: one that was shown, else any in the file."""
+    """Whether a run contains a distance: one that was displayed, or any in the file."""
     shown = session.shown
     if shown is not None and channel in shown.useful and shown.useful[channel].usable:
         return True
@@ -178,141 +186,149 @@ def _fill_standard_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
 
 
-def _demand_sense(options: argparse.Namespace) -> None:
+def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
     """Refuse options that would do nothing without another."""
-    for name, needed in (("ruler", "still"), ("pre", "trigger"), ("ready", "page"), ("lan", "page")):
-        if getattr(options, name) not in (None, [], False) and getattr(options, needed) in (None, False):
-            raise ProgramError(f"--{name} does nothing without --{needed}; name both or neither", USAGE)
+    for name, given, needed, there in (
+        ("--ruler", bool(options.ruler), "--still", options.still is not None),
+        ("--pre", options.pre is not None, "--trigger", options.trigger is not None),
+        ("--ready", options.ready, "--page", options.page),
+        ("--lan", page.lan, "--page", options.page),
+        ("--law", page.law is not None, "--page", options.page),
+    ):
+        if given and not there:
+            raise ProgramError(f"{name} does nothing without {needed}; name both or neither", USAGE)
 
 
-def _record(
-    session: Session,
-    options: argparse.Namespace,
-    log: Path,
-    console: Console,
-    bench: Release,
-    page: PageProcess | None,
-) -> Ended:
-    """Run the session, with a page from before its beginning to its end."""
-    session.listen(console.line)
-    for line in session.meet():
-        console.line(line)
-    operator = None if page is None else Operator(session, page, log)
-    try:
-        if operator is not None:
-            operator.begin()
-        rest = None if options.still is None else _rest(session, options.still, options.ruler, console)
-        trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
-        if not options.ready:
-            bench.after(0.0 if trigger is None else trigger.keep_s + 0.5)
-        look = look_of(sys.stderr)
-        with marks_by_keys(watched=look.terminal) as typed:
-            marks = page.marks if page is not None and typed is None else typed
-            if page is not None and typed is not None:
-                page.marks = typed
-            show = ProgressLine(console, look, trace=not options.no_trace, keys=typed is not None)
-            record = partial(
-                session.record,
-                log,
-                seconds=options.seconds,
-                progress=show,
-                marks=marks,
-            )
-            try:
-                ended = _operated(record, operator, rest, trigger, console, bench, ready=options.ready)
-            finally:
-                show.end()
-    finally:
-        if operator is not None:
-            operator.end()
-    if page is not None:
-        page.tell("ended", by=ended.by)
-        if ended.by != PAGE:
-            page.ended()
-    return ended
-
-
-def _operated(
-    record: Callable[..., Ended],
-    operator: Operator | None,
-    rest: StillPoint | None,
-    trigger: Trigger | None,
-    console: Console,
-    bench: Release,
-    *,
-    ready: bool,
-) -> Ended:
-    """Record at once, or as is asked for on the page."""
-    if operator is None:
-        return record(trigger=trigger, rest=rest)
-    operator.rest = rest
-    if ready:
-        console.line("ready: the recording begins on the page")
-    while True:
-        if ready:
-            trigger = operator.prepare()
-            bench.after(0.0 if trigger is None else trigger.keep_s + 0.5)
-        changed = (lambda: False) if trigger is None else operator.armed(trigger)
-        try:
-            return record(trigger=trigger, rest=operator.rest, begun=operator.recording, changed=changed)
-        except Disarmed:
-            ready = True  # a trigger of the command line, too, is given up on the page
-
-
-def _page(options: argparse.Namespace, log: Path, session: Session, beside: contextlib.ExitStack) -> PageProcess:
-    """Start the page beside the recording."""
-    marks: queue.SimpleQueue[str] = queue.SimpleQueue()
-    return beside.enter_context(PageProcess(_page_options(options), log, marks, session.stops, session.failures))
-
-
-def _page_options(options: argparse.Namespace) -> list[str]:
+def _page(options: PageOptions, log: Path, session: Session, console: Console) -> PageProcess:
+    """Return the page that runs during the recording."""
     given = ["--page-port", str(options.page_port)]
     given += [] if options.want_us is None else ["--want-us", str(options.want_us)]
     given += ["--lan"] if options.lan else []
-    return [*given, "--no-browser"] if options.no_browser else given
+    given += [] if options.law is None else ["--law", options.law]
+    given += ["--no-browser"] if options.no_browser else []
+    return PageProcess(given, log, queue.SimpleQueue(), session.stops, session.failures, console.line)
 
 
-def _rest(session: Session, seconds: float, ruler: list[float], console: Console) -> StillPoint:
-    """Measure the rest position, at the distances by the ruler first, which set offset and scale."""
-    if not ruler:
-        return _still(session, seconds, "let the bob hang still", console)
-    if len(ruler) == 1:
-        return session.calibrate([_still(session, seconds, "let the bob hang still", console)], ruler, U_RULER_M)
-    points = []
-    for known in ruler:
-        _ask(f"bring the target to {known:g} m by the ruler, then press Enter", console)
-        points.append(_still(session, seconds, "keep it still", console))
-    session.calibrate(points, ruler, U_RULER_M)
-    found = session.sensors[0].calibration
-    scale = format_value(found.scale, found.u_scale)
-    console.line(f"scale {scale}, offset {format_value(found.offset_m, found.u_offset_m, 'm')}")
-    _ask("hang the bob over the sensor, then press Enter", console)
-    return _still(session, seconds, "let it hang still", console)
+@dataclass(frozen=True, slots=True)
+class _Bench:
+    """A bench that is ready: the session, the user's options, and the receivers of messages."""
 
+    session: Session
+    options: RecordOptions
+    log: Path
+    console: Console
+    release: Release
+    page: PageProcess | None
 
-def _still(session: Session, seconds: float, demand: str, console: Console) -> StillPoint:
-    console.line(f"{demand} for {seconds:g} s ...")
-    rest = session.still(seconds)
-    console.line(f"rest {rest.rest_m * 1e3:.2f} mm, noise {rest.noise_m * 1e3:.3f} mm")
-    return rest
+    def record(self) -> Ended:
+        """Run the session, with a page from before its beginning to its end."""
+        self.session.listen(self.console.line)
+        for line in self.session.meet():
+            self.console.line(line)
+        operator = None if self.page is None else Operator(self.session, self.page, self.log)
+        try:
+            if operator is not None:
+                operator.begin()
+            ended = self._recorded(self._limits(), operator)
+        finally:
+            if operator is not None:
+                operator.end()
+        if self.page is not None:
+            self.page.tell("ended", by=ended.by)
+            if ended.by is not EndReason.PAGE:
+                self.page.ended()
+        return ended
 
+    def _limits(self) -> RunLimits:
+        """Measure the rest position if requested, and return when the run begins and ends."""
+        options = self.options
+        rest = None if options.still is None else self._rest(options.still)
+        trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
+        if not options.ready:
+            self._release(trigger)
+        return RunLimits(options.seconds, trigger, rest)
 
-def _ask(demand: str, console: Console) -> None:
-    """Wait for Enter."""
-    console.line(demand)
-    if sys.stdin is None or not sys.stdin.readline():
-        raise ProgramError(
-            "several --ruler distances are measured one after the other, each begun with Enter, and the standard input "
-            "is closed; name one --ruler, or run this at a terminal",
-            USAGE,
-        )
+    def _release(self, trigger: Trigger | None) -> None:
+        self.release.after(0.0 if trigger is None else trigger.keep_s + 0.5)
+
+    def _recorded(self, limits: RunLimits, operator: Operator | None) -> Ended:
+        style = style_of(sys.stderr)
+        with marks_by_keys(watched=style.terminal) as typed:
+            marks = typed
+            if self.page is not None:
+                if typed is None:
+                    marks = self.page.marks
+                else:
+                    self.page.marks = typed
+            show = ProgressLine(self.console, style, trace=not self.options.no_trace, keys=typed is not None)
+            listeners = RunListeners(progress=show, marks=marks)
+            try:
+                if operator is None:
+                    return self.session.record(self.log, limits, listeners)
+                return self._operated(limits, listeners, operator)
+            finally:
+                show.end()
+
+    def _operated(self, limits: RunLimits, listeners: RunListeners, operator: Operator) -> Ended:
+        """Record immediately, or when the page asks for it."""
+        operator.rest = limits.rest
+        ready = self.options.ready
+        if ready:
+            self.console.line("ready: the recording begins on the page")
+        while True:
+            if ready:
+                limits = replace(limits, trigger=operator.prepare())
+                self._release(limits.trigger)
+            changed = listeners.changed if limits.trigger is None else operator.armed(limits.trigger)
+            try:
+                return self.session.record(
+                    self.log,
+                    replace(limits, rest=operator.rest),
+                    replace(listeners, begun=operator.recording, changed=changed),
+                )
+            except Disarmed:
+                ready = True  # a trigger of the command line, too, is given up on the page
+
+    def _rest(self, seconds: float) -> StillPoint:
+        """Measure the rest position, at the distances by the ruler first, which set offset and scale."""
+        ruler = self.options.ruler
+        if not ruler:
+            return self._still(seconds, "let the bob hang still")
+        if len(ruler) == 1:
+            return self.session.calibrate([self._still(seconds, "let the bob hang still")], ruler, U_RULER_M)
+        points = []
+        for known in ruler:
+            self._ask(f"bring the target to {known:g} m by the ruler, then press Enter")
+            points.append(self._still(seconds, "keep it still"))
+        self.session.calibrate(points, ruler, U_RULER_M)
+        found = self.session.sensors[0].calibration
+        scale = format_value(found.scale, found.u_scale)
+        self.console.line(f"scale {scale}, offset {format_value(found.offset_m, found.u_offset_m, 'm')}")
+        self._ask("hang the bob over the sensor, then press Enter")
+        return self._still(seconds, "let it hang still")
+
+    def _still(self, seconds: float, demand: str) -> StillPoint:
+        self.console.line(f"{demand} for {seconds:g} s ...")
+        rest = self.session.still(seconds)
+        self.console.line(f"rest {rest.rest_m * 1e3:.2f} mm, noise {rest.noise_m * 1e3:.3f} mm")
+        return rest
+
+    def _ask(self, demand: str) -> None:
+        """Wait for Enter."""
+        self.console.line(demand)
+        if sys.stdin is None or not sys.stdin.readline():
+            raise ProgramError(
+                "several --ruler distances are measured one after the other, each begun with Enter, and the standard "
+                "input is closed; name one --ruler, or run this at a terminal",
+                USAGE,
+            )
 
 
 @contextlib.contextmanager
-def _sensors(options: argparse.Namespace, scene: Scene | None, bench: Release) -> Iterator[tuple[list[Sensor], str]]:
-    """Open what is to be recorded: the ports named, or a simulated bench behind a port of its own."""
-    family_options = dict(_option(text) for text in options.option)
-    for name in options.sensor:
+def _sensors(options: RecordOptions, scene: Scene | None, bench: Release) -> Iterator[tuple[list[Sensor], str]]:
+    """Open the source of the recording: the named ports, or a simulated bench on a simulated port."""
+    family_options = dict(options.option)
+    for name in options.sensor or ((SIMULATED_FAMILY,) if options.simulate is not None else ()):
         get_family(name).demand_options(family_options)
     calibration = _calibration(options, scene)
     if options.simulate is not None:
@@ -337,20 +353,21 @@ def _sensors(options: argparse.Namespace, scene: Scene | None, bench: Release) -
 
 @contextlib.contextmanager
 def _simulated(
-    options: argparse.Namespace, family_options: dict[str, Any], calibration: Calibration, bench: Release
+    options: RecordOptions, family_options: dict[str, Any], calibration: Calibration, bench: Release
 ) -> Iterator[Sensor]:
     if os.name == "nt":
         raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port", USAGE)
     from acquisition.simulated.pseudo_terminal import VirtualPort
     from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 
-    family = get_family(options.sensor[0] if options.sensor else "line-protocol")
+    family = get_family(options.sensor[0] if options.sensor else SIMULATED_FAMILY)
     if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):
         got = ", ".join(f"{each:g}" for each in options.ruler)
         raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that", USAGE)
     waits = options.still is not None or options.ready
     position = bench_position(
-        read_scene(options.simulate),
+        read_scene(str(options.simulate)),
+        options.seconds or UNLIMITED_S,
         where=str(options.simulate),
         release=bench if waits else None,
     )
@@ -376,7 +393,7 @@ def _simulated(
             port.close()
 
 
-def _calibration(options: argparse.Namespace, scene: Scene | None) -> Calibration:
+def _calibration(options: RecordOptions, scene: Scene | None) -> Calibration:
     """Speed of sound by option, else from the scene's air, else the usual 344 m/s."""
     if options.speed_of_sound is not None:
         speed = options.speed_of_sound
@@ -388,10 +405,3 @@ def _calibration(options: argparse.Namespace, scene: Scene | None) -> Calibratio
         return Calibration(speed_of_sound_m_per_s=speed)
     except CalibrationError as error:
         raise ProgramError(str(error), USAGE) from error
-
-
-def _option(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise ProgramError(f"--option takes NAME=VALUE, got {text!r}", USAGE)
-    return name, int(value) if value.isdecimal() else value

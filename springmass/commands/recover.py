@@ -1,24 +1,24 @@
-"""``springmass recover``: a run file from any wire log, however torn."""
+"""``springmass recover``: build a run file from any wire log, however damaged."""
 
 from __future__ import annotations
 
-import argparse
 import shlex
 from pathlib import Path
 
 from acquisition.errors import CalibrationError
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.options import RecoverOptions
 from springmass.runs.analysing import made_now
 from storage.recovery.recover import recover
 
 __all__ = ["run"]
 
 
-def run(options: argparse.Namespace) -> int:
+def run(log: str | Path, options: RecoverOptions) -> int:
     """Rebuild the run; the log stays."""
     try:
         report = recover(
-            options.input,
+            log,
             None if options.output is None else Path(options.output),
             overwrite=options.overwrite,
             speed_of_sound_m_per_s=options.speed_of_sound,

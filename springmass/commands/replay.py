@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 import shlex
 import sys
@@ -13,22 +12,24 @@ import numpy as np
 
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.replay import Replay
-from springmass.commands import load_for
 from springmass.commands.convert import write_loaded
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.options import PageOptions, ReplayOptions
+from springmass.runs.loading import load
+from springmass.runs.options import ReadOptions
 
 __all__ = ["run"]
 
 
-def run(options: argparse.Namespace) -> int:
-    """Play the input to stdout, a line per sample, or into a run file."""
+def run(recording: str | Path, options: ReplayOptions, page: PageOptions, read: ReadOptions) -> int:
+    """Play the input to stdout, one line per sample, or into a run file."""
     if options.loop and options.output is not None:
         raise ProgramError("--loop never ends and a run file is written whole at the end; leave one of them out", USAGE)
     if options.page:
-        from springmass.commands import page
+        from springmass.commands.page import run as show
 
-        return page.run(options)
-    loaded = load_for(options, options.input)
+        return show(recording, page, read)
+    loaded = load(recording, read)
     fast = math.isinf(options.speed)
     clock: Clock = VirtualClock() if fast else SystemClock()
     source = Replay(

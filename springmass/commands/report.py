@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
-import argparse
+import os
 from pathlib import Path
 
 from springmass.batch.page import line_of, write_page
-from springmass.batch.plan import names_of
-from springmass.batch.reports import REPORTS, find_run, jobs_of, linked, report_name, write_one
-from springmass.batch.store import demand_course
+from springmass.batch.plan import Job
+from springmass.batch.reports import REPORTS, find_run, linked, report_name, write_one
+from springmass.batch.store import open_course
 from springmass.errors import OK, suggest, tell
 from springmass.runs.analysing import make_folder
 
 __all__ = ["run"]
 
 
-def run(options: argparse.Namespace) -> int:
+def run(course: str | Path, run_name: str) -> int:
     """Analyse the run as the course did, write its report, and link it on the course's page."""
-    folder = Path(options.input)
-    store = demand_course(folder)
-    jobs = jobs_of(store)
-    names = names_of(jobs)
-    name, job = find_run(store, dict(zip(names, jobs, strict=True)), options.name)
+    folder = Path(course)
+    store = open_course(folder)
+    here = os.getcwd()
+    jobs, lines = {}, []
+    for row in store.all():
+        jobs[row["run"]] = Job.from_mapping(row["job"], here)
+        lines.append(line_of(row, store.tags))
+    name, job = find_run(folder, jobs, run_name)
     make_folder(folder / REPORTS)
-    page = write_one(name, job, folder / REPORTS / report_name(name))
-    tags = list(dict.fromkeys(tag for each in jobs for tag in each.tags))
-    lines = [line_of(name, row, tags) for name, row in zip(names, store.all(), strict=True)]
-    write_page(folder, lines, tags, linked(folder))
+    with store.held():
+        page = write_one(name, job, folder / REPORTS / report_name(name))
+        write_page(store, lines, store.tags, linked(folder))
     tell(f"report: {page}")
     suggest(f"open {page} in a browser")
     return OK

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import shlex
 from pathlib import Path
 
 from acquisition.errors import visible
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.options import SceneOptions
 
 __all__ = ["run"]
 
@@ -46,31 +46,31 @@ position = "below"                          # or "above" the bob
 """
 
 
-def run(options: argparse.Namespace) -> int:
+def run(recording: str | Path | None, options: SceneOptions) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from springmass.runs.about import about_of, write_about
     from springmass.runs.scenes import ask_about, read_scene, stated_keys
 
     noted = options.scene is not None or options.note or options.mark
     if options.check is not None:
-        if options.input is not None or noted:
+        if recording is not None or noted:
             raise ProgramError("--check looks at a scene file alone; leave the rest out", USAGE)
         scene = read_scene(options.check)
         ask_about(scene, options.check)
         print(visible(f"{options.check}: a scene that states {stated_keys(scene)}"))
-        suggest(f"springmass analyse RECORDING --scene {shlex.quote(options.check)}")
+        suggest(f"springmass analyse RECORDING --scene {shlex.quote(str(options.check))}")
         return OK
-    if options.input is None:
+    if recording is None:
         if noted:
             raise ProgramError("--scene, --note and --mark belong to a recording; name it", USAGE)
         print(TEMPLATE, end="")
         suggest("springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
-        raise ProgramError(f"{options.input}: nothing to note; give --scene, --note or --mark S=TEXT", USAGE)
-    path = Path(options.input)
+        raise ProgramError(f"{recording}: nothing to save; give --scene, --note or --mark S=TEXT", USAGE)
+    path = Path(recording)
     if not path.is_file():
-        raise ProgramError(f"{path}: a recording to note something of was demanded, got none; check the name", USAGE)
+        raise ProgramError(f"{path}: expected a recording, got none; check the name", USAGE)
     given = None if options.scene is None else read_scene(options.scene)
     written = write_about(about_of(path).with_more(given, options.note, options.mark))
     tell(f"{written}: used from now on with {path.name}")

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 
 from acquisition.decoders.registry import families
 from springmass.errors import OK, suggest
+from springmass.options import JsonOption
 from springmass.terminal.printing import wrapped
 
 __all__ = ["run"]
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: JsonOption) -> int:
     """Print every family with rate, resolution, range and limits."""
     if options.json:
         print(json.dumps([family.describe() for family in families()]))

@@ -1,8 +1,7 @@
-"""``springmass simulate``: the motion that a scene predicts, how sure it is, and what it costs."""
+"""``springmass simulate``: the motion that a scene predicts, its uncertainty, and the cost of computing it."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import shlex
@@ -17,8 +16,10 @@ from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect
 from pipeline.results.simulated_effects import simulated_effects
-from springmass.commands import load_for
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.options import SimulateOptions
+from springmass.runs.analysing import load_and_analyse
+from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.prepared import Prepared, prepare
 from springmass.runs.simulating.simulation import (
@@ -28,7 +29,7 @@ from springmass.runs.simulating.simulation import (
     demand_stable,
     simulate,
 )
-from springmass.runs.simulating.told import summary
+from springmass.runs.simulating.summaries import summary
 from springmass.terminal.printing import wrapped
 
 __all__ = ["run"]
@@ -37,32 +38,31 @@ FAR_BELOW = 0.01  # of the band: a tolerance below it buys nothing
 OF_OUTPUT = ("sensor", "noise_m", "echoes")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Say what the scene implies, how sure it is and what it costs, solve it, and write what was asked for."""
+def run(options: SimulateOptions, read: ReadOptions) -> int:
+    """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
     _demand(options)
     count = count_of(options.seconds, options.dt)
     scene, analysis = read_scene(options.scene), None
     ask_about(scene, options.scene)
-    seconds = options.seconds
+    seconds, where = options.seconds, str(options.scene)
     if options.against is not None:
-        from pipeline.analyse import analyse
         from springmass.runs.simulating.against import duration_s
 
-        analysis = analyse(load_for(options, options.against).track, scene)
+        analysis = load_and_analyse(options.against, read, scene).analysis
         seconds = max(seconds, duration_s(analysis))
-    ready = prepare(scene, seconds, analysis=analysis, without=options.without, where=options.scene)
+    ready = prepare(scene, seconds, analysis=analysis, without=options.without, where=where)
     if ready.from_run:
         tell(f"from {options.against}: {', '.join(ready.from_run)}")
     if options.trade:
         from springmass.commands.trade import trade_of_scene
 
-        return trade_of_scene(ready, options.scene, options.dt, count, options.tolerance, options.out, options.json)
+        return trade_of_scene(ready, where, options.dt, count, options.tolerance, options.folder, options.json)
     say = sys.stderr if options.json else sys.stdout
     band, of_band = _band(ready, seconds)
     tolerance, words = _tolerance(options, band)
     if not options.force:
         named_step = options.dt if options.tolerance is None else None
-        demand_stable(ready.problem, options.method, named_step, where=options.scene)
+        demand_stable(ready.problem, options.method, named_step, where=where)
     terms = required(ready.problem, options.dt * count, tolerance)[1] if options.method == "auto" and tolerance else ()
     effects = simulated_effects(ready.stated, ready.problem, terms, options.dt * count, ready.drag, options.without)
     try:
@@ -87,22 +87,22 @@ def run(options: argparse.Namespace) -> int:
         against = lay_over(analysis, ready.problem, options.method, options.dt, tolerance, band, ready.values())
         left = f"rms {against.rms_m * 1e3:.3g} mm, noise of a sample {against.noise_m * 1e3:.3g} mm"
         print("\n".join([f"against the run  {left}", *deviation_text(against)]), file=say)
-    told = summary(simulation, against, band, effects, tolerance)
+    results = summary(simulation, against, band, effects, tolerance)
     if options.output is not None:
-        _write_readings(ready, options, told)
-    if options.out is not None or not (options.json or options.output is not None):
+        _write_readings(ready, options, results)
+    if options.folder is not None or not (options.json or options.output is not None):
         from springmass.runs.simulating.written import write_folder
 
-        folder = write_folder(simulation, against, band, ready.solved, options.scene, options.out or ".", told)
+        folder = write_folder(simulation, against, band, ready.solved, where, options.folder or ".", results)
         print(f"written          {visible(str(folder))}", file=say)
-        suggest(f"springmass analyse {shlex.quote(str(folder / 'run.h5'))} --scene {shlex.quote(options.scene)}")
+        suggest(f"springmass analyse {shlex.quote(str(folder / 'run.h5'))} --scene {shlex.quote(str(options.scene))}")
     if options.json:
-        print(json.dumps(told))
+        print(json.dumps(results))
     return OK
 
 
-def _demand(options: argparse.Namespace) -> None:
-    """Refuse what cannot be meant."""
+def _demand(options: SimulateOptions) -> None:
+    """Refuse combinations of options that make no sense."""
     if options.dt <= 0:
         raise ProgramError(f"--dt must be more than 0 s, got {options.dt:g}", USAGE)
     given = [f"--{name.replace('_', '-')}" for name in OF_OUTPUT if getattr(options, name) is not None]
@@ -113,7 +113,7 @@ def _demand(options: argparse.Namespace) -> None:
 
 
 def _band(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
-    """The band of what is uncertain and how it was made; where there is none, why."""
+    """The band from the uncertain inputs and how it was computed, or the reason why there is none."""
     if not ready.values():
         return None, "none: the scene states no uncertainties"
     try:
@@ -123,8 +123,8 @@ def _band(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
     return band, band.words
 
 
-def _tolerance(options: argparse.Namespace, band: Band | None) -> tuple[float | None, str]:
-    """The tolerance, and in words where it comes from or that it is far below the band."""
+def _tolerance(options: SimulateOptions, band: Band | None) -> tuple[float | None, str]:
+    """The tolerance, with words on its origin or a hint that it is far below the band."""
     if options.tolerance is None:
         if options.method != "auto":
             return None, ""
@@ -144,7 +144,7 @@ def _tolerance(options: argparse.Namespace, band: Band | None) -> tuple[float | 
 
 
 def _before(tolerance: str, effects: Sequence[Effect]) -> str:
-    """What acts, and the tolerance."""
+    """The effects that act, and the tolerance."""
     lines = ["effects          change of the motion, of the amplitude"]
     for effect in effects:
         size = "" if effect.predicted is None else f"{effect.predicted:.2g}"
@@ -180,10 +180,11 @@ def _errors(position: float, velocity: float) -> str:
     return f"{position:.2g} of the amplitude, {velocity:.2g} of the greatest velocity"
 
 
-def _write_readings(ready: Prepared, options: argparse.Namespace, told: dict[str, object]) -> None:
-    """Write what a rangefinder would have read, as a run of kind simulated."""
+def _write_readings(ready: Prepared, options: SimulateOptions, results: dict[str, object]) -> None:
+    """Write the readings of a simulated rangefinder as a run of kind simulated."""
     from springmass.runs.simulating.written import write_readings
 
+    assert options.output is not None
     path = Path(options.output)
     if path.exists() and not options.overwrite:
         raise ProgramError(f"{visible(str(path))}: exists; take another name, or --overwrite", USAGE)
@@ -197,9 +198,9 @@ def _write_readings(ready: Prepared, options: argparse.Namespace, told: dict[str
         noise_m=options.noise_m,
         echoes_hz=options.echoes,
         seed=options.seed,
-        where=options.scene,
-        told=told,
+        where=str(options.scene),
+        results=results,
     )
     say = sys.stderr if options.json else sys.stdout
     print(f"written          {visible(str(path))}", file=say)
-    suggest(f"springmass analyse {shlex.quote(str(path))} --scene {shlex.quote(options.scene)}")
+    suggest(f"springmass analyse {shlex.quote(str(path))} --scene {shlex.quote(str(options.scene))}")

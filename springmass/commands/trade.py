@@ -1,21 +1,22 @@
-"""``springmass trade``: what accuracy costs on this machine, measured, in a table and drawn."""
+"""``springmass trade``: measure the cost of accuracy on this machine; print a table and draw it."""
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.errors import DynamicsError
 from springmass import __version__
-from springmass.commands import load_for
-from springmass.errors import OK, USAGE, ProgramError
+from springmass.errors import OK, USAGE, ProgramError, manner
+from springmass.options import TradeOptions
 from springmass.runs.analysing import make_folder
+from springmass.runs.loading import load
+from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import read_scene
+from springmass.terminal.progress import TaskProgress, counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,91 +25,90 @@ if TYPE_CHECKING:
 
 __all__ = ["run", "trade_of_scene"]
 
-SIMULATED = ("seeds", "noise_m", "seconds", "damping", "echoes", "out")
+SIMULATED = ("seeds", "noise_m", "seconds", "damping", "echoes", "output")
 SPACING_S, LONG_S = 0.01, 120.0  # of the samples of a scene's motion, and how long it is unless it is said
-LABELS = {
-    "frequency": "frequency: error / bound",
-    "amplitude": "amplitude: error / bound",
-    "damping_rate": "damping: error / bound",
-}
 
 
-def run(options: argparse.Namespace) -> int:
-    """Measure estimators on simulated records, or put one record before all of them."""
+def run(recording: str | Path | None, options: TradeOptions, read: ReadOptions) -> int:
+    """Measure estimators on simulated recordings, or apply all of them to one recording."""
     if options.integrators:
-        return _integrators(options)
+        return _integrators(recording, options)
     if given := _given(options, ("scene", "tolerance")):
         raise ProgramError(f"{', '.join(given)}: of --integrators, which was not asked for; add it", USAGE)
     if options.hostile:
-        return _hostile(options)
-    if options.input is None:
+        return _hostile(recording, options)
+    if recording is None:
         return _simulated(options)
     if given := _given(options, SIMULATED):
         flags = ", ".join(f"--{name}" for name in given)
-        raise ProgramError(
-            f"{flags}: describes simulated records, got the record {options.input}; give one of both", USAGE
-        )
-    return _own(options)
+        raise ProgramError(f"{flags}: describes simulated records, got the record {recording}; give one of both", USAGE)
+    return _own(recording, options, read)
 
 
-def _simulated(options: argparse.Namespace) -> int:
+def _simulated(options: TradeOptions) -> int:
     from springmass.trade.measure import measure
-    from springmass.trade.methods import methods
-    from springmass.trade.summary import trade_json, trade_text
+    from springmass.trade.methods import references, tiers
+    from springmass.trade.tables import trade_json, trade_text
     from springmass.trade.truth import Truth
 
-    asked = {
+    given = {
         "noise_m": options.noise_m,
         "seconds": options.seconds,
         "damping_per_s": options.damping,
         "echoes": options.echoes,
     }
-    truth = Truth(**{name: value for name, value in asked.items() if value is not None})
+    truth = Truth(**{name: value for name, value in given.items() if value is not None})
     if truth.seconds * truth.frequency_hz < 2.0:
         raise ProgramError(
             f"--seconds: two periods of {1 / truth.frequency_hz:.3g} s are needed, got {truth.seconds:g} s", USAGE
         )
     seeds = 100 if options.seeds is None else options.seeds
-    out = None if options.out is None else make_folder(options.out)
-    found, absent = methods()
-    trade = measure(truth, found, seeds, timer=time.perf_counter, progress=_progress(seeds))
-    content = trade_json(trade, absent, __version__)
+    out = None if options.output is None else make_folder(options.output)
+    with TaskProgress("records", seeds, quiet=manner()[0]) as progress:
+        trade = measure(
+            truth, [*tiers(linear=True), *references()], seeds, timer=time.perf_counter, progress=progress.update
+        )
+    content = trade_json(trade, __version__)
     if out is not None:
         from springmass.trade.drawing import trade_figure
 
-        _write(out, "trade", trade_figure({q: trade.points(q) for q in trade.bound}, labels=LABELS), content)
-    print(json.dumps(content) if options.json else trade_text(trade, absent))
+        _write(out, "trade", trade_figure(trade), content)
+    print(json.dumps(content) if options.json else trade_text(trade))
     return OK
 
 
-def _given(options: argparse.Namespace, names: Sequence[str]) -> list[str]:
+def _given(options: TradeOptions, names: Sequence[str]) -> list[str]:
     """Return which of some options were given, as they are spelt."""
     return [name.replace("_", "-") for name in names if getattr(options, name) is not None]
 
 
-def _hostile(options: argparse.Namespace) -> int:
-    if given := _given(options, ("input", *SIMULATED[1:])):
+def _named(recording: str | Path | None) -> list[str]:
+    return [] if recording is None else [f"the record {recording}"]
+
+
+def _hostile(recording: str | Path | None, options: TradeOptions) -> int:
+    if given := [*_named(recording), *_given(options, SIMULATED[1:])]:
         raise ProgramError(
-            f"--hostile measures records of its own and takes only --seeds and --json; got {', '.join(given)}", USAGE
+            f"--hostile simulates its recordings and takes only --seeds and --json; got {', '.join(given)}", USAGE
         )
     from springmass.trade.measure import measure
-    from springmass.trade.methods import presets
-    from springmass.trade.summary import hostile_json, hostile_text
+    from springmass.trade.methods import tiers
+    from springmass.trade.tables import hostile_json, hostile_text
     from springmass.trade.truth import HOSTILE
 
     seeds = 20 if options.seeds is None else options.seeds
-    trades = {}
-    for name, truth in HOSTILE.items():
-        trades[name] = measure(truth, presets(), seeds, timer=time.perf_counter, progress=_progress(seeds, name))
+    kinds = counted(HOSTILE.items(), len(HOSTILE), "kinds of records", quiet=manner()[0])
+    trades = {name: measure(truth, tiers(), seeds, timer=time.perf_counter) for name, truth in kinds}
     print(json.dumps(hostile_json(trades, __version__)) if options.json else hostile_text(trades))
     return OK
 
 
-def _integrators(options: argparse.Namespace) -> int:
+def _integrators(recording: str | Path | None, options: TradeOptions) -> int:
     if options.scene is not None:
-        if given := _given(options, ("input", *(name for name in SIMULATED if name not in ("seconds", "out")))):
+        others = [name for name in SIMULATED if name not in ("seconds", "output")]
+        if given := [*_named(recording), *_given(options, others)]:
             raise ProgramError(
-                f"--integrators --scene takes only --seconds, --tolerance, --out and --json; got {', '.join(given)}",
+                f"--integrators --scene takes only --seconds, --tolerance, -o and --json; got {', '.join(given)}",
                 USAGE,
             )
         from springmass.runs.simulating.prepared import prepare
@@ -116,15 +116,19 @@ def _integrators(options: argparse.Namespace) -> int:
 
         seconds = LONG_S if options.seconds is None else options.seconds
         count = count_of(seconds, SPACING_S)
-        ready = prepare(read_scene(options.scene), seconds, where=options.scene)
-        return trade_of_scene(ready, options.scene, SPACING_S, count, options.tolerance, options.out, options.json)
-    if given := _given(options, ("input", *SIMULATED[:-1], "tolerance")):
+        ready = prepare(read_scene(options.scene), seconds, where=str(options.scene))
+        return trade_of_scene(
+            ready, str(options.scene), SPACING_S, count, options.tolerance, options.output, options.json
+        )
+    if given := [*_named(recording), *_given(options, (*SIMULATED[:-1], "tolerance"))]:
         names = ", ".join(given)
-        raise ProgramError(f"--integrators measures trajectories and takes only --out and --json; got {names}", USAGE)
-    from springmass.trade.integrators import integrators_figure, integrators_json, integrators_text, measure_integrators
+        raise ProgramError(f"--integrators measures trajectories and takes only -o and --json; got {names}", USAGE)
+    from springmass.trade.drawing import integrators_figure
+    from springmass.trade.integrators import SCENES, integrators_json, integrators_text, measure_integrators
 
-    out = None if options.out is None else make_folder(options.out)
-    rows = measure_integrators(time.perf_counter, progress=lambda scene: print(f"trade: {scene}", file=sys.stderr))
+    out = None if options.output is None else make_folder(options.output)
+    with TaskProgress("scenes", len(SCENES), quiet=manner()[0]) as progress:
+        rows = measure_integrators(time.perf_counter, progress=progress.update)
     content = integrators_json(rows, __version__)
     if out is not None:
         _write(out, "integrators", integrators_figure(rows), content)
@@ -133,17 +137,18 @@ def _integrators(options: argparse.Namespace) -> int:
 
 
 def trade_of_scene(
-    ready: Prepared, where: str, spacing_s: float, count: int, tolerance: float | None, out: str | None, as_json: bool
+    ready: Prepared,
+    where: str,
+    spacing_s: float,
+    count: int,
+    tolerance: float | None,
+    out: str | Path | None,
+    as_json: bool,
 ) -> int:
     """Measure error against time of every method on one scene, and recommend one."""
     from springmass.runs.simulating.recommend import wanted_error
-    from springmass.trade.integrators import (
-        integrators_figure,
-        integrators_json,
-        integrators_text,
-        measure_scene,
-        recommended,
-    )
+    from springmass.trade.drawing import integrators_figure
+    from springmass.trade.integrators import integrators_json, integrators_text, measure_scene, recommended
 
     folder = None if out is None else make_folder(out)
     name = Path(where).name.removesuffix(".toml")
@@ -188,30 +193,16 @@ def _write(out: Path, name: str, figure: Figure, content: Mapping[str, Any]) -> 
         write_whole(folder / last, json.dumps(content, indent=2) + "\n")
 
 
-def _own(options: argparse.Namespace) -> int:
+def _own(recording: str | Path, options: TradeOptions, read: ReadOptions) -> int:
     from springmass.trade.measure import own_record
-    from springmass.trade.methods import methods
-    from springmass.trade.summary import own_json, own_text
+    from springmass.trade.methods import references, tiers
+    from springmass.trade.tables import own_json, own_text
 
-    loaded = load_for(options, options.input)
+    loaded = load(recording, read)
     loaded.track.demand_length("a comparison of estimators")
-    found, absent = methods()
-    results = own_record(loaded.track, found, timer=time.perf_counter)
+    results = own_record(loaded.track, [*tiers(linear=True), *references()], timer=time.perf_counter)
     if options.json:
-        print(json.dumps(own_json(options.input, results, absent, __version__)))
+        print(json.dumps(own_json(str(recording), results, __version__)))
     else:
-        print(own_text(options.input, results))
-        for each in absent:
-            print(f"Not measured: {each.name}, {each.needs} is not installed.")
+        print(own_text(str(recording), results))
     return OK
-
-
-def _progress(total: int, what: str = "trade") -> Callable[[int], None]:
-    """Return a counter on a terminal's stderr, silent where stderr is a file."""
-
-    def tell(done: int) -> None:
-        if sys.stderr.isatty():
-            end = "\r" if done < total else "\n"
-            print(f"{what}: record {done} of {total}", end=end, file=sys.stderr, flush=True)
-
-    return tell

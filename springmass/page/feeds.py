@@ -1,9 +1,9 @@
-"""Where the page's samples come from: a log that grows, or a run that is all there."""
+"""Sources of the page's samples: a log that grows, or a complete run."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from acquisition.live.calibration import Calibration
 from springmass.page.view import View
 from springmass.runs.loading import Loaded
 from storage.errors import StorageError
+from storage.schema import plain
 from storage.wire_log.following import LogFollower
 from storage.wire_log.log_header import event_content
 from storage.wire_log.records import Kind, Record
@@ -20,8 +21,8 @@ from storage.wire_log.wire_samples import LogDecoder, chains_of
 __all__ = ["LogFeed", "view_of"]
 
 MOST_NOTES = 1000
-UNTOLD = frozenset({"calibration", "ended"})
-"""Events that are no trouble."""
+NOT_LISTED = frozenset({"calibration", "ended"})
+"""Events that a person at the bench need not read."""
 
 
 class LogFeed:
@@ -50,24 +51,32 @@ class LogFeed:
             [f"{sensor.channel}: {sensor.family}" for sensor in header.sensors],
             simulated=header.kind == "simulated",
             calibration=_calibration(header.sensors[0].calibration),
+            info=chains[0].info(header.sensors[0].port, header.kind),
+            provenance={"sensor": plain(header.sensors[0]), "events": []},
         )
         self.scene = header.scene
-        self._late: list[Record] = []
+        self._timed: list[Record] = []
 
     def poll(self) -> None:
-        """Take what has come since the last call; what keeps it from reading on stands in the view."""
+        """Read what was added since the last call; an error that prevents this is shown in the view."""
         if self.view.error or self.view.ended:
             return
         try:
-            for number, block in self._decoder.blocks(self._log.records(), growing=True):
-                self.view.series[number].push(block)
+            self._take(self._decoder.blocks(self._log.records(), growing=True))
+            if self._log.ended:
+                self._take(self._decoder.blocks((), growing=False))
+                self.view.provenance["decoding"] = self._decoder.chains[0].report()
         except (StorageError, OSError) as error:
             self.view.error = str(error)
-        # A mark may come before the first sample that its time is told by.
-        for record in self._late:
-            self._mark(record)
-        self._late.clear()
+        self._place_marks()
         self.view.ended = self._log.ended
+
+    def _take(self, blocks: Iterator[tuple[int, Block]]) -> None:
+        chain, port = self._decoder.chains[0], self._decoder.sensors[0].port
+        for number, block in blocks:
+            self.view.series[number].push(block)
+            # The kind of clock is known after the first reading.
+            self.view.info = chain.info(port, "simulated" if self.view.simulated else "live")
 
     def close(self) -> None:
         """Close the log."""
@@ -75,23 +84,60 @@ class LogFeed:
 
     def _note(self, record: Record) -> None:
         if record.kind is Kind.MARK:
-            self._late.append(record)
+            self._timed.append(record)
         elif record.kind is Kind.EVENT and len(self.view.notes) < MOST_NOTES:
             content = event_content(record.payload)
-            if content["kind"] not in UNTOLD:
-                facts = ", ".join(
-                    f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
-                    for name, value in content["facts"].items()
-                )
-                self.view.notes.append(f"{content['kind']}: {facts}" if facts else str(content["kind"]))
+            if content["kind"] == "trigger":
+                self._timed.append(record)
+            if content["kind"] == "still":
+                self.view.zero = _zero_of(content)
+            if content["kind"] not in NOT_LISTED:
+                self.view.notes.append(_in_words(content["kind"], content["facts"]))
 
-    def _mark(self, record: Record) -> None:
-        t = self.view.series[0].time_of(record.mono_ns)
-        self.view.marks.append((0.0 if math.isnan(t) else t, record.text()))
+    def _place_marks(self) -> None:
+        """Give marks and triggers the times that the run file will give them.
+
+        t = 0 is known once a sample came, and better with each of the first thousand, so earlier times are replaced.
+        """
+        marks, events = [], []
+        for record in self._timed:
+            t_s = self.view.series[0].time_of(record.mono_ns)
+            if math.isnan(t_s):
+                continue
+            if record.kind is Kind.EVENT:
+                events.append({"t_s": t_s, **event_content(record.payload)})
+            else:
+                marks.append((t_s, record.text()))
+        self.view.marks = marks
+        self.view.provenance = {**self.view.provenance, "events": events}
+
+
+def _in_words(kind: str, facts: Mapping[str, Any]) -> str:
+    """Return an event in words; if its kind has none here, its facts by their names."""
+    try:
+        if kind == "still":
+            return f"Zero {1e3 * facts['rest_m']:.1f} mm, noise {1e3 * facts['noise_m']:.2f} mm"
+        if kind == "trigger":
+            return f"Trigger at {1e3 * facts['threshold_m']:.0f} mm, {facts['keep_s']:g} s kept"
+        if kind == "note":
+            return f"Note: {facts['text']}"
+    except (KeyError, TypeError, ValueError):  # a log by another program may state other facts
+        pass
+    named = ", ".join(
+        f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}" for name, value in facts.items()
+    )
+    return f"{kind}: {named}" if named else kind
+
+
+def _zero_of(event: Mapping[str, Any]) -> dict[str, float]:
+    """Return rest position and noise by an event of kind still, m; empty where it states none."""
+    facts = event["facts"]
+    numbers = {name: facts.get(name) for name in ("rest_m", "noise_m")}
+    return numbers if all(isinstance(value, float) for value in numbers.values()) else {}
 
 
 def _calibration(numbers: Mapping[str, Any] | None) -> str:
-    """Return in words how the first sensor's distances are calibrated."""
+    """Return how the first sensor's distances are calibrated, in words."""
     found = Calibration.from_mapping(numbers or {})
     if not (found.u_scale or found.u_offset_m):
         return "not calibrated"
@@ -112,9 +158,14 @@ def view_of(loaded: Loaded) -> View:
         block.unit,
         loaded.info.clock,
         simulated=loaded.info.kind == "simulated",
+        recorded=loaded.track,
+        traps=loaded.traps,
     )
     view.series[0].push(block)
     view.marks += [(float(mark["t_s"]), str(mark["text"])) for mark in loaded.provenance.get("marks", ())]
     view.notes += [trap.message for trap in loaded.traps]
+    for event in loaded.provenance.get("events", ()):
+        if event.get("kind") == "still":
+            view.zero = _zero_of(event)
     view.ended = True
     return view

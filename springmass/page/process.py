@@ -1,7 +1,7 @@
-"""The page beside a recording: a process of its own, between which and the recorder a line goes now and then.
+"""The page during a recording: a separate process, to which the recorder writes a line now and then.
 
-What the recorder says of itself goes to the page through a thread that alone may wait for it; what is asked on the page
-comes through another. Neither can delay a reading, and a page that dies is started again, under the same address.
+One thread writes the recorder's state to the page, and only that thread may wait for it; another one reads what is
+asked for on the page. Neither can delay a reading. A page that dies is started again under the same address.
 """
 
 from __future__ import annotations
@@ -13,28 +13,26 @@ import secrets
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from springmass.session.failures import Failures
-from springmass.session.stops import Stops
+from springmass.session.stops import EndReason, Stops
 
-__all__ = ["PAGE", "PageProcess"]
+__all__ = ["PageProcess"]
 
-PAGE = "the page"
-"""What ended a recording, where its page did."""
 ENDS_WITHIN_S = 5.0
 STARTS = 5
-"""So often a page that died is started again; one that dies more often has a defect that starting does not mend."""
+"""A page that died is started so often at most; one that dies more often has a defect."""
 MOST_UNREAD = 100
-"""So many words of the recorder wait for a page that reads none; the last ones count."""
+"""Lines that wait for a page that reads none; later ones are dropped."""
 
 
 class PageProcess:
     """Starts the page; used in a ``with``.
 
-    Whatever becomes of the page, the recording goes on: it reads the log from the disk, and its end is noted.
+    The recording goes on whatever happens to the page; the end of the page is noted.
 
     Parameters
     ----------
@@ -43,26 +41,34 @@ class PageProcess:
     log : Path
         The log that will be recorded to; the page names the run by it.
     marks : queue of str
-        Takes the marks that are made on the page.
+        Receives the marks that are made on the page.
     stops : Stops
-        Is told where the page asks for the end of the recording.
+        Is asked when the page asks for the end of the recording.
     failures : Failures
+    say : callable
+        Takes a line of the page's for the terminal, such as its address.
 
     Attributes
     ----------
     marks : queue of str
         May be changed before the recording begins.
     asked : queue of dict
-        What else was asked for on the page.
+        Other requests of the page.
     """
 
     def __init__(
-        self, arguments: list[str], log: Path, marks: queue.SimpleQueue[str], stops: Stops, failures: Failures
+        self,
+        arguments: list[str],
+        log: Path,
+        marks: queue.SimpleQueue[str],
+        stops: Stops,
+        failures: Failures,
+        say: Callable[[str], None],
     ) -> None:
-        self._arguments, self._log = arguments, str(log)
+        self._arguments, self._log, self._say = arguments, str(log), say
         self.marks, self._stops, self._failures = marks, stops, failures
-        self.asked: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
-        self._words: queue.SimpleQueue[Mapping[str, Any] | None] = queue.SimpleQueue()
+        self.requests: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        self._states: queue.SimpleQueue[Mapping[str, Any] | None] = queue.SimpleQueue()
         self._last: Mapping[str, Any] = {"phase": "waiting"}
         self._gate: dict[str, Any] = {"secret": secrets.token_urlsafe(24), "port": None}
         self._over = False
@@ -72,28 +78,28 @@ class PageProcess:
 
     def __enter__(self) -> PageProcess:
         self._kept.start()
-        threading.Thread(target=self._speak, name="springmass-page-words", daemon=True).start()
+        threading.Thread(target=self._write_states, name="springmass-page-states", daemon=True).start()
         return self
 
     def tell(self, phase: str, **facts: Any) -> None:
-        """Say where the recording stands; never waits."""
-        if self._words.qsize() < MOST_UNREAD:
-            self._words.put({"phase": phase, **facts})
+        """Send the phase of the recording to the page; never waits."""
+        if self._states.qsize() < MOST_UNREAD:
+            self._states.put({"phase": phase, **facts})
 
     def ended(self) -> None:
-        """Tell the page that no more will be said; it shows that and ends."""
+        """End the input of the page; it shows that and ends."""
         with self._lock:
             self._over = True
-        self._words.put(None)
+        self._states.put(None)
 
     def attend(self) -> None:
-        """Return when the page has ended of its own: somebody closed it, or nobody looks any more."""
+        """Return when the page has ended because somebody closed it or nobody looked at it any more."""
         with self._lock:
             self._over = True
         self._kept.join()
 
     def __exit__(self, *_: object) -> None:
-        """Return when the page has ended, or is ended."""
+        """Return when the page has ended; kill it if it does not end in time."""
         self.ended()
         self._kept.join(ENDS_WITHIN_S)
         if self._process is not None and self._process.poll() is None:
@@ -101,10 +107,10 @@ class PageProcess:
             self._process.wait()
 
     def _keep(self) -> None:
-        """Run the page, and run it again where it died before its time."""
+        """Run the page, and run it again if it died early."""
         for _ in range(STARTS):
             try:
-                # A session of its own: Ctrl-C is for the recording, which tells the page when it has ended.
+                # In a separate session, because Ctrl-C is meant for the recording, which ends the page later.
                 command = [sys.executable, "-m", "springmass", "page", "--recorder", *self._arguments, "--", self._log]
                 process = subprocess.Popen(
                     command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
@@ -113,8 +119,8 @@ class PageProcess:
                 self._failures.note("page", error)
                 return
             self._process = process
-            self._words.put({"gate": dict(self._gate)})
-            self._words.put(self._last)
+            self._states.put({"gate": dict(self._gate)})
+            self._states.put(self._last)
             self._listen(process)
             code = process.wait()
             with self._lock:
@@ -122,17 +128,17 @@ class PageProcess:
                     return
             self._failures.note("page", RuntimeError(f"the page's process ended with {code}; it is started again"))
 
-    def _speak(self) -> None:
-        while (word := self._words.get()) is not None:
-            if "phase" in word:
-                self._last = word
-            self._write(json.dumps(word))
+    def _write_states(self) -> None:
+        while (state := self._states.get()) is not None:
+            if "phase" in state:
+                self._last = state
+            self._write(json.dumps(state))
         if self._process is not None and self._process.stdin is not None:
             with contextlib.suppress(OSError):
                 self._process.stdin.close()
 
     def _write(self, line: str) -> None:
-        """Write to the page that runs now; one that is gone misses nothing, for the next is told anew."""
+        """Write to the page that runs now; a later one gets the last state when it starts."""
         process = self._process
         if process is None or process.stdin is None:
             return
@@ -144,24 +150,26 @@ class PageProcess:
         assert process.stdout is not None
         for line in process.stdout:
             try:
-                said = json.loads(line)
-                kind = said["type"]
+                message = json.loads(line)
+                kind = message["type"]
                 if kind == "open":
-                    self._gate["port"] = int(said["port"])
+                    self._gate["port"] = int(message["port"])
                 elif kind == "used":
                     self._gate["used"] = True
+                elif kind == "line":
+                    self._say(str(message["text"]))
                 elif kind == "mark":
-                    self.marks.put(str(said["text"]) or "mark")
+                    self.marks.put(str(message["text"]) or "mark")
                 elif kind == "note":
-                    self._note(str(said["text"]))
+                    self._note(str(message["text"]))
                 elif kind == "stop":
-                    self._stops.ask(PAGE)
+                    self._stops.ask(EndReason.PAGE)
                 else:
-                    self.asked.put(said)
+                    self.requests.put(message)
             except (ValueError, KeyError, TypeError) as error:
                 self._failures.note("page", error)
 
     def _note(self, text: str) -> None:
-        """Put a note into the log, as an event; before and after the recording there is no log to put it into."""
+        """Write a note into the log as an event; there is a log only during the recording."""
         if text and (tell := self._failures.tell) is not None:
             tell("note", {"text": text})

@@ -1,7 +1,7 @@
-"""When to stop: intervals that hold whenever somebody stops, and how much longer a wanted uncertainty takes.
+"""When to stop: intervals that cover whenever somebody stops, and how long until a wanted uncertainty is reached.
 
-Somebody who watches an interval shrink and stops when he likes it has looked many times; an interval of two standard
-uncertainties then misses far more often than one time in twenty. A confidence sequence covers at all times at once.
+Somebody who watches an interval shrink and stops when it looks good has looked many times. An interval of two standard
+uncertainties then misses far more often than one time in twenty; a confidence sequence covers at all times together.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ALPHA = 0.05
 TIGHTEST = 0.12
 """Ratio of the mixture's information to the record's at which the sequence is tightest, for 95 %."""
 FARTHEST = 50.0
-"""No need is foretold beyond so many times what has been recorded."""
+"""The longest forecast, in multiples of the time recorded so far."""
 
 
 def widening(u: float, wanted_u: float) -> float:
@@ -30,7 +30,7 @@ def widening(u: float, wanted_u: float) -> float:
     u : float
         Standard uncertainty of the estimate now.
     wanted_u : float
-        The one that is aimed at, in the same unit and named before the recording: there the interval is tightest.
+        The one to record for, in the same unit and chosen before the recording: there the interval is tightest.
 
     Returns
     -------
@@ -40,8 +40,9 @@ def widening(u: float, wanted_u: float) -> float:
     Notes
     -----
     The normal mixture of Robbins: with the information :math:`V = u^{-2}` and :math:`\\rho` fixed beforehand,
-    :math:`|\\hat\\theta - \\theta| < u\\sqrt{(1 + \\rho/V)\\ln((1 + V/\\rho)/\\alpha^2)}` at all V at once, but for
-    a chance of :math:`\\alpha`, for estimates whose increments in V are independent, as those of a phase's slope are.
+    :math:`|\\hat\\theta - \\theta| < u\\sqrt{(1 + \\rho/V)\\ln((1 + V/\\rho)/\\alpha^2)}` for all V together, with a
+    probability of at least :math:`1 - \\alpha`. The increments of the estimate in V must be independent, as those of a
+    phase's slope are.
     Howard, Ramdas, McAuliffe, Sekhon, Annals of Statistics 49 (2021) 1055, eq. 14.
 
     Examples

@@ -1,4 +1,4 @@
-"""What the page shows: samples, marks and notes as far as the log has taken them, kept once for all who look."""
+"""What the page shows: the samples, marks and notes of the log, held once for all viewers."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from typing import Any, Literal
 import numpy as np
 
 from acquisition.block import Block
-from acquisition.source import ClockKind
-from pipeline.track import F8, U8
+from acquisition.recordings.recording import Trap
+from acquisition.source import ClockKind, SourceInfo
+from pipeline.track import F8, U8, Track
+from springmass.runs.tracks import to_track
 
 __all__ = ["VERSION", "Series", "View", "json_of"]
 
@@ -21,6 +23,8 @@ VERSION = 1
 """Of the messages."""
 MOST_PER_MESSAGE = 50_000
 _HEAD, _F8 = struct.Struct("<4I"), np.dtype("<f8")
+FIRST_SAMPLES = 1000
+"""Samples whose stamps determine t = 0; later ones would add the difference of the clocks' rates."""
 SAMPLES = 1
 """First number of a binary message: what follows are samples."""
 
@@ -30,6 +34,7 @@ class Series:
 
     def __init__(self) -> None:
         self._t, self._y, self._flags = np.empty(1024), np.empty(1024), np.empty(1024, np.uint8)
+        self._host_ns = np.empty(1024, np.int64)
         self._count = 0
         self._missing = self._looked_at = 0
         self._moment_ns: float | None = None
@@ -44,14 +49,19 @@ class Series:
             room = max(stop, 2 * self._t.size) - self._count
             self._t, self._y = (np.concatenate([c[: self._count], np.empty(room)]) for c in (self._t, self._y))
             self._flags = np.concatenate([self._flags[: self._count], np.empty(room, np.uint8)])
+            self._host_ns = np.concatenate([self._host_ns[: self._count], np.empty(room, np.int64)])
         new = slice(self._count, stop)
         self._t[new], self._y[new], self._flags[new] = block.t, block.distance, block.flags
+        self._host_ns[new] = -1 if block.host_ns is None else block.host_ns
+        early = min(len(block), FIRST_SAMPLES - self._count)
+        if block.host_ns is not None and early > 0:
+            # A stamp may come late, never early.
+            moment_ns = float((block.host_ns[:early] - 1e9 * block.t[:early]).min())
+            self._moment_ns = moment_ns if self._moment_ns is None else min(self._moment_ns, moment_ns)
         self._count = stop
-        if self._moment_ns is None and block.host_ns is not None and len(block):
-            self._moment_ns = float(block.host_ns[0]) - 1e9 * float(block.t[0])
 
     def missing(self) -> int:
-        """Return how many samples measured nothing."""
+        """Return the number of missing samples."""
         self._missing += int(np.count_nonzero(np.isnan(self._y[self._looked_at : self._count])))
         self._looked_at = self._count
         return self._missing
@@ -59,6 +69,11 @@ class Series:
     def columns(self) -> tuple[F8, F8, U8]:
         """Return times in s, distances in m and flags, (n,) each, as they are now."""
         return self._t[: self._count], self._y[: self._count], self._flags[: self._count]
+
+    def block(self) -> Block:
+        """Return all samples as they are now."""
+        t, y, flags = self.columns()
+        return Block(0, t, y, flags, self._host_ns[: self._count])
 
     def time_of(self, host_ns: int) -> float:
         """Return the record's time of a moment by the host's clock, s; NaN before the first sample."""
@@ -89,7 +104,7 @@ class View:
     quantity, unit : str
         Of the values.
     clock : {"nominal", "device", "host"}
-        Where the times come from.
+        Source of the times.
     simulated : bool
         Simulated data never pass for measured ones.
     calibration : str
@@ -97,14 +112,24 @@ class View:
     series : list of Series
         One a sensor.
     session : str
-        Another number for every start: a page that comes back to another run begins anew.
+        Differs between starts, so that a page that reconnects to another run begins anew.
     marks : list of (float, str)
         Time in s and text.
     notes : list of str
-        What befell the recording.
+        Events of the recording, in words.
     ended : bool
     error : str
-        Why nothing more is shown; empty while all is well.
+        Why nothing more is shown; empty without an error.
+    recorded : Track or None
+        Of a run that was recorded before: its first sensor's samples as an analysis takes them.
+    info : SourceInfo or None
+        Of a run that is being recorded: properties of its first sensor.
+    provenance : mapping
+        What the log states so far, as a run file states it: sensor, events, and once it has ended how it was decoded.
+    traps : tuple of Trap
+        What the reader noticed.
+    zero : mapping
+        ``rest_m`` and ``noise_m``, as they were measured before the run; empty where they were not.
     """
 
     source: Literal["LIVE", "REPLAY"]
@@ -123,19 +148,31 @@ class View:
     notes: list[str] = field(default_factory=list)
     ended: bool = False
     error: str = ""
+    recorded: Track | None = None
+    info: SourceInfo | None = None
+    provenance: dict[str, Any] = field(default_factory=dict)
+    traps: tuple[Trap, ...] = ()
+    zero: dict[str, float] = field(default_factory=dict)
+
+    def track(self) -> Track:
+        """Return the first sensor's samples so far as an analysis takes them."""
+        if self.recorded is not None:
+            return self.recorded
+        info = self.info or SourceInfo("live", self.name, self.rate_hz, clock=self.clock)
+        return to_track(self.series[0].block(), info, recorded_format="wire", provenance=self.provenance)
 
     def __post_init__(self) -> None:
         self.series = self.series or [Series() for _ in self.sensors]
 
     def hello(self, *, controls: bool) -> dict[str, Any]:
-        """Return the first message to whoever looks."""
+        """Return the first message to a viewer."""
         names = ("session", "source", "name", "title", "rate_hz", "sensors", "quantity", "unit", "simulated", "clock")
-        told = {name: getattr(self, name) for name in names}
+        fields = {name: getattr(self, name) for name in names}
         more = {"calibration": self.calibration, "controls": controls}
-        return {"type": "hello", "version": VERSION, **told, **more}
+        return {"type": "hello", "version": VERSION, **fields, **more}
 
     def state(self) -> dict[str, Any]:
-        """Return where the run stands, as the log has it."""
+        """Return the state of the run by its log."""
         return {
             "type": "state",
             "samples": [len(series) for series in self.series],
@@ -148,7 +185,7 @@ class View:
 
 
 def json_of(content: Any) -> str:
-    """Return JSON that browsers read: what is no number is null."""
+    """Return JSON that browsers read: a number that is not finite is null."""
     try:
         return json.dumps(content, allow_nan=False)
     except ValueError:  # rarely: to look at every number before takes as long again

@@ -55,12 +55,14 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
         return ()
     budgets = analysis.motion.derived.budgets
     rows = []
-    for name in table_estimates(analysis):
+    for name in dict.fromkeys(key.name for key in table_estimates(analysis)):
         if name in budgets and name not in SAME and budgets[name].contributions:
             every = budgets[name].contributions
-            told = tuple(c for c in every if c.share >= LEAST_SHARE)
+            listed = tuple(c for c in every if c.share >= LEAST_SHARE)
             rows.append(
-                BudgetRow(name, QUANTITIES[name].label, budgets[name], told, sum(c.share for c in every[len(told) :]))
+                BudgetRow(
+                    name, QUANTITIES[name].label, budgets[name], listed, sum(c.share for c in every[len(listed) :])
+                )
             )
     return tuple(rows)
 
@@ -98,14 +100,14 @@ def budget_text(analysis: Analysis) -> str:
     ----------
     analysis : Analysis
     """
-    told = {row: [c for c in row.contributions if c.share >= 0.01] for row in budgets_of(analysis)}
-    rows = [row for row, inputs in told.items() if len(inputs) > 1]
+    shown = {row: [c for c in row.contributions if c.share >= 0.01] for row in budgets_of(analysis)}
+    rows = [row for row, inputs in shown.items() if len(inputs) > 1]
     if not rows:
         return ""
     left = max(len(row.quantity) for row in rows) + 2
     lines = ["Where the uncertainty comes from (share of the variance; A: the record's scatter, B: anything else):"]
     for row in rows:
-        greatest = [f"{INPUTS[c.name].label} ({c.kind}) {100 * c.share:.0f} %" for c in told[row][:2]]
+        greatest = [f"{INPUTS[c.name].label} ({c.kind}) {100 * c.share:.0f} %" for c in shown[row][:2]]
         lines.append(f"  {row.quantity:<{left}}{', '.join(greatest)}")
     return "\n".join(lines)
 

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import base64
 import functools
 import itertools
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
+from pipeline.numerics.estimate import Estimate
 from pipeline.registry.effects import EFFECTS
 from pipeline.registry.quantities import INPUTS
 from pipeline.track import Track
-from springmass.report.advice import ADVICE, sorted_out
+from springmass.report.advice import notices_of
 from springmass.report.budgets import budgets_of, correlations_of
-from springmass.report.figures.inline import inline_svg
+from springmass.report.charts import chart_data
 from springmass.report.laws import laws_across, laws_of
-from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
-from springmass.report.tables import page_unit, pretty, pretty_number, table_rows
+from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of, without_date
+from springmass.report.tables import page_unit, prefixed, pretty, pretty_number, table_rows
 from springmass.report.words import caption, typeset, verdict
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
@@ -39,14 +43,14 @@ _QUALITY = {
     "outside": "outside the part that was analysed",
     "malformed_rows": "malformed rows",
 }
-# What is wrong with each number of the report's own method; pipeline.results.classic derives it.
+# What is wrong with each number of the lab report's method; pipeline.results.classic derives it.
 _BIASES = {
     "period": "two sampled maxima decide where a thousand samples could",
     "frequency": "as the period",
     "angular_frequency": "as the period",
     "spring_constant": "as the period, twice over; the spring's mass and the air carried along are left out",
     "amplitude": "extremes of noisy samples lie outside the motion, false echoes enter, clipping shortens",
-    "damping_rate": "takes a lone exponential, tied to one point; overlapping windows count as independent",
+    "damping_rate": "an exponential tied to one point; overlapping windows count as independent",
     "velocity_rms": "differences of neighbouring distances carry noise, which adds to the mean square",
     "reynolds_number": "as the velocity; air taken at 20 °C without uncertainty",
 }
@@ -55,15 +59,18 @@ _BIASES = {
 BESIDE = 3  # columns of runs that a sheet of A4 holds
 MOST_NOTES = 50  # of a recording that the page lists
 _SECTIONS = (
-    ("position", "Position"),
-    ("amplitude", "Amplitude and damping law"),
-    ("drag", "Drag coefficient"),
-    ("energy", "Energy"),
-    ("motion", "Velocity and acceleration"),
-    ("phase", "Phase plot"),
-    ("classic", "The lab report's own method"),
+    ("position", "Position and residuals", ("position",)),
+    ("amplitude", "Amplitude and damping laws", ("amplitude", "logarithmic")),
+    ("frequency", "Frequency and spectrum", ("frequency", "spectrum")),
+    ("drag", "Effective drag coefficient", ("drag",)),
+    ("energy", "Energy", ("energy",)),
+    ("motion", "Velocity and acceleration", ("motion",)),
+    ("phase", "Phase plot", ("phase",)),
+    ("classic", "The lab report's method", ("classic",)),
 )
-"""Figures in the order of their sections, with the sections' titles."""
+"""Sections of a run: name, title and figures, in their order."""
+CHARTS = frozenset({"position", "amplitude", "frequency"})
+"""Figures that are charts on a screen."""
 
 
 def render_html(
@@ -72,6 +79,8 @@ def render_html(
     *,
     compared: Compared | None = None,
     overview: bytes = b"",
+    overlay: bytes = b"",
+    stems: Sequence[str] = (),
     provenance: Mapping[str, Any],
 ) -> str:
     """Return the report as one self-contained page.
@@ -84,28 +93,63 @@ def render_html(
     compared : Compared, optional
     overview : bytes
         :func:`springmass.report.figures.comparison_figure` as SVG, where runs were compared.
+    overlay : bytes
+        :func:`springmass.report.figures.overlay_figure` as SVG, of several runs of one unit.
+    stems : sequence of str
+        How the names of each run's figure files begin; left out, with nothing.
     provenance : mapping
         Shown as it is, nested mappings flattened.
 
     Notes
     -----
-    First what holds, Table 1, the main figure and what changes a number, then everything else; each fact once.
-    Every text is escaped by the template engine; only the pictures, made here, go in as they are.
+    First Table 1, the summary and the main figure, then the warnings, then all details, folded; each fact once. Every
+    text is escaped by the template engine; only the pictures and the script, made here, go in as they are. The numbers
+    of the charts go in as JSON, in which no text can end the element that holds it.
     """
-    # One run alone shows its law at the top; where several are compared it is their constants.
-    numbers = itertools.count(2 if compared is not None else 1)
+    from markupsafe import Markup
+
+    from springmass.glossary import TERMS
+    from springmass.report.script import report_script, report_style
+
+    numbers = itertools.count(1)
+    over = {"address": _address(overlay), "number": next(numbers)} if overlay else None
+    comparison = None if compared is None else _compared(compared, overview) | {"number": next(numbers)}
     parts = [
-        _part(i, run, drawn, numbers, alone=len(runs) == 1)
-        for i, (run, drawn) in enumerate(zip(runs, pictures, strict=True))
+        _part(i, run, drawn, numbers, stem, alone=len(runs) == 1)
+        for i, (run, drawn, stem) in enumerate(zip(runs, pictures, stems or [""] * len(runs), strict=True))
     ]
     return template("report.html.j2").render(
         title=", ".join(run.name for run in runs),
         parts=parts,
         tables=list(_tables(runs)),
-        compared=None if compared is None else _compared(compared, overview),
-        contents=list(_contents(parts, compared)),
+        overlay=over,
+        compared=comparison,
         provenance=list(_flattened(provenance)),
+        glossary=TERMS,
+        charts=CHARTS,
+        data=_data(runs),
+        script=Markup(report_script()),
+        chart_style=Markup(report_style()),
     )
+
+
+def _data(runs: Sequence[Analysed]) -> dict[str, Any]:
+    """Return what the script shows: the numbers of every run's charts, and Table 1 to copy."""
+    from springmass.report.copies import table_cells, table_text
+    from springmass.report.latex import table_tex
+
+    charts = [chart_data(run.analysis) for run in runs]
+    names, analyses = [run.name for run in runs], [run.analysis for run in runs]
+    return {
+        "runs": [
+            {"name": visible(name), "t": data.pop("t"), "data": data} for name, data in zip(names, charts, strict=True)
+        ],
+        "table": {
+            "text": table_text(names, analyses),
+            "latex": table_tex(names, analyses),
+            "cells": table_cells(names, analyses),
+        },
+    }
 
 
 @functools.cache
@@ -130,6 +174,7 @@ def template(name: str) -> Template:
         "unit": page_unit,
         "typeset": typeset,
         "breakable": _breakable,
+        "aligned": _aligned,
     }
     return environment.get_template(name)
 
@@ -143,41 +188,47 @@ def _tables(runs: Sequence[Analysed]) -> Iterator[dict[str, Any]]:
     """Yield Table 1 in blocks of as many runs as stand beside each other on paper."""
     for first in range(0, len(runs), BESIDE):
         some = runs[first : first + BESIDE]
-        yield {"names": [run.name for run in some], "rows": table_rows([run.analysis for run in some])}
+        rows = [
+            replace(row, estimates=tuple(None if x is None else prefixed(x) for x in row.estimates))
+            for row in table_rows([run.analysis for run in some], missing=True)
+        ]
+        widths = [max((len(_split(row.estimates[i])[0]) for row in rows), default=1) for i in range(len(some))]
+        yield {"names": [run.name for run in some], "rows": rows, "widths": widths}
 
 
-def _contents(parts: Sequence[Mapping[str, Any]], compared: Compared | None) -> Iterator[tuple[str, str]]:
-    """Yield (id, title) of every section that the table of contents names."""
-    yield "holds", "What holds"
-    yield "table-1", "Table 1"
-    if compared is not None or parts[0]["main"]:
-        yield "main-figure", "Main figure"
-    yield "heed", "What changes a number"
-    if compared is not None:
-        yield "comparison", "Comparison"
-    if len(parts) == 1:
-        yield from parts[0]["sections"]
-    else:
-        yield from ((f"run{part['index']}", part["name"]) for part in parts)
-    yield "provenance", "Provenance"
+def _split(estimate: Estimate | None) -> tuple[str, str]:
+    """Return an estimate before its decimal point, and the rest."""
+    written = pretty(estimate)
+    found = re.match(r"\(?−?\d+", written)
+    end = found.end() if found else 0
+    return written[:end], written[end:]
+
+
+def _aligned(estimate: Estimate | None, width: int) -> Markup:
+    """Set an estimate so that decimal points stand above each other."""
+    from markupsafe import Markup
+
+    before, after = _split(estimate)
+    return Markup('<span class="whole" style="min-width: {}ch">{}</span>{}').format(width, before, after)
 
 
 def _part(
-    index: int, run: Analysed, pictures: Mapping[str, bytes], numbers: Iterator[int], *, alone: bool
+    index: int, run: Analysed, pictures: Mapping[str, bytes], numbers: Iterator[int], stem: str, *, alone: bool
 ) -> dict[str, Any]:
     """Everything that the template says of one run."""
     analysis, quality, given = run.analysis, run.result["quality"], run.result["input"]
-    motion = analysis.motion
+    motion, title = analysis.motion, str(run.recorded.get("title") or given.get("title") or "")
     ordered = [*(name for name in _QUALITY if name in quality), *(name for name in quality if name not in _QUALITY)]
     main = next((name for name in ("amplitude", "position") if alone and name in pictures), "")
-    drawn = [name for name in (main, *(name for name, _ in _SECTIONS if name != main)) if name in pictures]
-    findings = [picked(x, ("code", "severity", "message")) for x in analysis.findings]
+    inside = {name: [x for x in figures if x in pictures and x != main] for name, _, figures in _SECTIONS}
+    drawn = [name for name in (main, *itertools.chain(*inside.values())) if name in pictures]
+    findings = [picked(x, ("code", "severity", "message", "advice", "details")) for x in analysis.findings]
     part = {
         "name": run.name,
         "index": index,
         "head": [
-            _subtitle(given, analysis.track),
-            f"{date_words(run.recorded)[:1].upper()}{date_words(run.recorded)[1:]}.",
+            _subtitle(title, given, analysis.track, left_out=len(analysis.track) - quality["used"]),
+            f"{date_words(run.recorded, title)}.",
             f"Bench: {bench_words(analysis.scene)}.",
             *(f"Noted: {visible(str(note))}" for note in run.recorded.get("notes", ())),
         ],
@@ -186,15 +237,17 @@ def _part(
         "main": main,
         "figures": {
             name: {
-                "svg": inline_svg(pictures[name], f"{name}{index}-"),
+                "address": _address(pictures[name]),
                 "caption": caption(name, analysis),
                 "number": next(numbers),
                 "id": f"figure-{name}-{index}",
+                "file": f"{stem}{name}",
             }
             for name in drawn
         },
-        "told": sorted_out(run.result.get("findings", findings), drawn),
-        "laws": laws_of(motion.damping) if isinstance(motion, Oscillation) else None,
+        "notices": notices_of(run.result.get("findings", findings), drawn),
+        "drawn": inside,
+        "laws": laws_of(motion) if isinstance(motion, Oscillation) else None,
         "budgets": budgets_of(analysis),
         "correlations": _correlations(analysis),
         "effects": analysis.effects,
@@ -221,14 +274,9 @@ def _correlations(analysis: Analysis) -> list[tuple[str, list[str]]]:
 
 def _sections(part: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield (id, title) of the sections of a run that have anything to show."""
-    there = {
-        "amplitude": part["laws"] is not None,
-        "motion": part["laws"] is not None,
-        "classic": part["classic"] is not None,
-        "position": True,
-    }
-    for name, title in _SECTIONS:
-        if there.get(name, name in part["figures"]):
+    filled = {"amplitude": part["laws"], "motion": part["laws"], "classic": part["classic"]}
+    for name, title, _ in _SECTIONS:
+        if part["drawn"][name] or filled.get(name) is not None:
             yield f"{name}-{part['index']}", title
     for name, title in (("budgets", "Uncertainty"), ("effects", "Effects")):
         if part[name]:
@@ -236,14 +284,14 @@ def _sections(part: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield f"samples-{part['index']}", "Samples and recording"
 
 
-def _subtitle(given: Mapping[str, Any], track: Track) -> str:
+def _subtitle(title: str, given: Mapping[str, Any], track: Track, *, left_out: int) -> str:
     duration_s = float(track.t[-1] - track.t[0])
     parts = [
-        given.get("title"),
-        f"{len(track)} samples at {track.rate_hz:g} Hz, {duration_s:.1f} s",
+        without_date(title),
+        f"{len(track)} samples ({left_out} left out) at {track.rate_hz:g} Hz, {duration_s:.1f} s",
         f"format {given['format']}" if given.get("format") else None,
     ]
-    return " · ".join(str(part) for part in parts if part)
+    return " · ".join(str(part) for part in parts if part) + "."
 
 
 def _classic_rows(run: Analysed) -> list[dict[str, Any]] | None:
@@ -267,11 +315,16 @@ def _compared(compared: Compared, overview: bytes) -> dict[str, Any]:
     return {
         "found": found,
         "message": typeset(found.message),
-        "told": [picked(x, ("code", "severity")) | {"advice": ADVICE[x.code]} for x in compared.findings],
+        "findings": [picked(x, ("code", "severity", "advice")) for x in compared.findings],
         "rows": list(zip(found.names, found.each, found.pulls, strict=True)),
-        "figure": inline_svg(overview, "comparison-"),
+        "figure": _address(overview),
         "joint": [laws_across(joint) for joint in compared.joint],
     }
+
+
+def _address(svg: bytes) -> str:
+    """Return a picture as an address that holds it, so that the page is one file."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 
 def _flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:

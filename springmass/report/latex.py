@@ -1,19 +1,21 @@
-"""Tables for LaTeX: Table 1 and the uncertainty budget, with siunitx quantities."""
+"""LaTeX: Table 1 and the uncertainty budget with siunitx quantities, and a lab report to fill in."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
-from pipeline.numerics.estimate import Estimate, format_value
+from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value
 from pipeline.registry.quantities import INPUTS
+from springmass.report.advice import by_harm, lab_report_line
 from springmass.report.budgets import budgets_of
 from springmass.report.tables import table_rows
+from springmass.runs.analysing import Analysed
 
-__all__ = ["budget_tex", "table_tex"]
+__all__ = ["budget_tex", "lab_report_tex", "table_tex"]
 
 _SIUNITX = {
     "s": r"\second",
@@ -63,9 +65,7 @@ def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
         + r" \\"
         for row in table_rows(analyses)
     ]
-    caption = (
-        "Results of the oscillation experiment; in parentheses the standard uncertainty ($k = 1$) of the last digits."
-    )
+    caption = "Results of the oscillation experiment; in parentheses the standard uncertainty of the last digits."
     return _framed(caption, ["Quantity", "Symbol", *map(_tex_text, names)], body, [r"  \label{tab:springmass}"])
 
 
@@ -81,7 +81,7 @@ def budget_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
 
 
 def _budget_table(name: str, analysis: Analysis) -> str:
-    """A block a quantity, its result above its inputs: beside them it would not fit a page of A4."""
+    """Return the table, one block per quantity; a result is above its inputs, because A4 is too narrow for both."""
     lines = []
     for row in budgets_of(analysis):
         result = f"{row.quantity[:1].upper()}{row.quantity[1:]} {_tex_quantity(row.budget.estimate)}"
@@ -128,6 +128,141 @@ def _tex_power(text: str) -> str:
     return re.sub(r"e([+-])0*(\d+)", lambda found: rf" \times 10^{{{found[1].replace('+', '')}{found[2]}}}", text)
 
 
+def lab_report_tex(
+    run: Analysed, figures: Mapping[str, str], captions: Mapping[str, str], sentences: Sequence[str]
+) -> str:
+    """Return a lab report to fill in: Table 1, figures, captions and uncertainty are there, the rest are questions.
+
+    It is compiled in the folder of the report, where its figures are: ``pdflatex lab-report.tex``.
+
+    Parameters
+    ----------
+    run : Analysed
+    figures : mapping of str to str
+        Path of each figure's file, without its ending, by its name.
+    captions : mapping of str to str
+    sentences : sequence of str
+        What was measured and how the motion is damped.
+    """
+    warnings = [line for finding in by_harm(run.result.get("findings", ())) if (line := lab_report_line(finding))]
+    budget = {row.name: row for row in budgets_of(run.analysis)}
+    stated = [
+        f"The {row.quantity} is {_tex_quantity(row.budget.estimate)}; its expanded uncertainty is "
+        rf"$U = {_tex_power(f'{row.budget.expanded:.2g}')}$ in the same unit "
+        f"($k = {row.budget.coverage_factor:.2f}$, coverage "
+        rf"\qty{{95.45}}{{\percent}}). Its largest contribution is the {_tex_text(INPUTS[greatest.name].label)} "
+        rf"(type {greatest.kind}, \qty{{{100 * greatest.share:.0f}}}{{\percent}} of the variance)."
+        for name in ("period", "spring_constant")
+        if (row := budget.get(name)) is not None
+        for greatest in row.contributions[:1]
+    ]
+    pictures = [
+        "\n".join(
+            [
+                r"\begin{figure}[htbp]",
+                r"  \centering",
+                rf"  \includegraphics[width=\linewidth,height=0.8\textheight,keepaspectratio]{{{path}}}",
+                rf"  \caption{{{_tex_words(captions[name])}}}",
+                rf"  \label{{fig:{name}}}",
+                r"\end{figure}",
+                "",
+            ]
+        )
+        for name, path in figures.items()
+    ]
+    method = [
+        "What did you measure, and how does the sensor measure it?",
+        "How was the spring hung, and what moved with it?",
+        "How did you measure the masses, and how uncertain are they?",
+        "How did you release the bob?",
+    ]
+    discussion = [
+        "Does the spring constant agree with that from a static measurement, within the uncertainties?",
+        "Which damping law fits, and is that what you expect for this bob and disc?",
+        "Do the residuals show structure? What could cause it?",
+        "Which contribution would you reduce first, and how?",
+    ]
+    return "\n".join(
+        [
+            r"\documentclass[11pt,a4paper]{article}",
+            r"\usepackage[utf8]{inputenc}",
+            r"\usepackage[T1]{fontenc}",
+            r"\usepackage[margin=25mm]{geometry}",
+            r"\usepackage{amsmath,textcomp,booktabs,longtable,graphicx,siunitx}",
+            r"\title{Oscillation of a mass on a spring}",
+            r"\author{Your name}",
+            r"\begin{document}",
+            r"\maketitle",
+            "",
+            r"\section{Method}",
+            *(f"% {question}" for question in method),
+            "",
+            r"\section{Results}",
+            " ".join(_tex_words(sentence) for sentence in sentences),
+            r"Table~\ref{tab:springmass} lists the results.",
+            "",
+            table_tex([run.name], [run.analysis]),
+            *pictures,
+            r"\section{Uncertainty}",
+            r"Uncertainties are standard uncertainties (coverage factor 1) unless stated otherwise.",
+            *stated,
+            *(_tex_words(warning) for warning in warnings),
+            "",
+            r"\section{Discussion}",
+            *(f"% {question}" for question in discussion),
+            "",
+            r"\end{document}",
+            "",
+        ]
+    )
+
+
+_TEX_MATH = {
+    "χ²": r"\chi^2",
+    "α": r"\alpha",
+    "β": r"\beta",
+    "γ": r"\gamma",
+    "δ": r"\delta",
+    "ζ": r"\zeta",
+    "η": r"\eta",
+    "θ": r"\theta",
+    "κ": r"\kappa",
+    "λ": r"\lambda",
+    "μ": r"\mu",
+    "ν": r"\nu",
+    "π": r"\pi",
+    "ρ": r"\rho",
+    "σ": r"\sigma",
+    "τ": r"\tau",
+    "φ": r"\varphi",
+    "ψ": r"\psi",
+    "ω": r"\omega",
+    "Δ": r"\Delta",
+    "Ω": r"\Omega",
+    "±": r"\pm",
+    "−": "-",
+    "×": r"\times",
+    "·": r"\cdot",
+    **{lowered: f"_{digit}" for digit, lowered in enumerate("₀₁₂₃₄₅₆₇₈₉")},
+    "≤": r"\leq",
+    "≥": r"\geq",
+    "≈": r"\approx",
+    "∞": r"\infty",
+}
+_SUPERSCRIPTS = {raised: plain for plain, raised in zip("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True)}
+
+
+def _tex_words(text: str) -> str:
+    """Return a sentence of the page for LaTeX: its symbols and powers set as mathematics."""
+    text = _tex_text(text).replace("\u00a0", "~").replace("\u202f", r"\,").replace("“", "``").replace("”", "''")
+    text = re.sub(
+        f"[{''.join(_SUPERSCRIPTS)}]+", lambda run: f"$^{{{''.join(_SUPERSCRIPTS[each] for each in run[0])}}}$", text
+    )
+    for symbol, tex in _TEX_MATH.items():
+        text = text.replace(symbol, f"${tex}$")
+    return text.replace("°C", r"\textcelsius{}").replace("µ", r"\textmu{}").replace("–", "--")
+
+
 def _framed(caption: str, heads: Sequence[str], body: Sequence[str], label: Sequence[str] = ()) -> str:
     """Set the lines of a table under its heads, all columns to the left."""
     return "\n".join(
@@ -154,6 +289,8 @@ def _tex_quantity(estimate: Estimate | None) -> str:
     """Write value(u)unit for siunitx, from the one place that decides on digits."""
     if estimate is None:
         return "--"
+    if isinstance(estimate, UpperLimit):
+        return f"$<$ {_tex_number(format_limit(estimate.limit), estimate.unit)} (\\qty{{95}}{{\\percent}})"
     written = format_value(estimate.value, estimate.u)
     found = _WRITTEN.fullmatch(written)
     if found is None:
@@ -162,12 +299,15 @@ def _tex_quantity(estimate: Estimate | None) -> str:
         # 0.7529 +- 0.0014 is 0.7529(14), 13.9 +- 1.2 is 13.9(12), 1100 +- 150 is 1100(150).
         number = f"{found['value']}({int(found['u'].replace('.', ''))})"
         number += f"e{int(found['power'])}" if found["power"] else ""
-    if not number:
-        return "--"
-    if not estimate.unit:
+    return _tex_number(number, estimate.unit) if number else "--"
+
+
+def _tex_number(number: str, unit: str) -> str:
+    """Write a number, with its uncertainty perhaps, and its unit for siunitx."""
+    if not unit:
         return rf"\num{{{number}}}"
-    unit = _SIUNITX.get(estimate.unit, rf"\text{{{_tex_text(estimate.unit)}}}")
-    return rf"\qty{{{number}}}{{{unit}}}"
+    macro = _SIUNITX.get(unit, rf"\text{{{_tex_text(unit)}}}")
+    return rf"\qty{{{number}}}{{{macro}}}"
 
 
 def _tex_text(text: str) -> str:

@@ -6,25 +6,27 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from pipeline.analyse import Oscillation
 from pipeline.damping.joint import JointDamping
 from pipeline.damping.select import Damping
-from pipeline.numerics.estimate import Joint
-from springmass.report.tables import law_status, pretty, pretty_number
-from springmass.report.words import LETTERS, typeset
+from pipeline.numerics.estimate import Estimate
+from springmass.report.tables import law_status, pretty_number
+from springmass.report.words import equation, typeset
 
 __all__ = ["laws_across", "laws_of"]
 
 
-def laws_of(damping: Damping) -> dict[str, Any]:
+def laws_of(motion: Oscillation) -> dict[str, Any]:
     """Return the rows of every law tried on one run, and what kept others from being tried."""
-    fitted = {law: fit.joint for law, fit in damping.fits.items()}
+    damping = motion.damping
+    fitted = {law: motion.derived.parameters_of(fit) for law, fit in damping.fits.items()}
     laws = _laws(damping, fitted, lambda law: law_status(damping, law))
     return {**laws, "unfitted": [(law, typeset(why)) for law, why in damping.unfitted.items()]}
 
 
 def laws_across(joint: JointDamping) -> dict[str, Any]:
     """Return the same for one law with shared coefficients on several runs, with what came of it in words."""
-    fitted = {law: fit.coefficients for law, fit in joint.fits.items()}
+    fitted = {law: fit.coefficients.estimates() for law, fit in joint.fits.items()}
     return {
         "message": typeset(joint.message),
         "unfitted": [],
@@ -32,18 +34,20 @@ def laws_across(joint: JointDamping) -> dict[str, Any]:
     }
 
 
-def _laws(found: Damping | JointDamping, fitted: Mapping[str, Joint], status: Callable[[str], str]) -> dict[str, Any]:
+def _laws(
+    found: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]], status: Callable[[str], str]
+) -> dict[str, Any]:
     """Lay out every law tried: how well it fits, what became of it, and what was fitted."""
     chi2 = found.best.reduced_chi2 * found.best.dof
     rows = [
         {
             "name": law,
             "status": status(law),
-            "look": "selected" if status(law) == "selected" else "rejected" if fit.rejected else "",
+            "look": "selected" if status(law) in ("selected", "stated") else "rejected" if fit.rejected else "",
             "fit": fit,
             "chi2": _difference(fit.reduced_chi2 * fit.dof - chi2),
             "bic": _difference(fit.bic - found.best.bic),
-            "coefficients": [f"{LETTERS.get(name, name)} = {pretty(x)}" for name, x in fitted[law].estimates().items()],
+            "coefficients": [equation(name, x) for name, x in fitted[law].items()],
         }
         for law, fit in found.fits.items()
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -12,7 +13,7 @@ from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from springmass.report.tables import pretty
 
-__all__ = ["Note", "bench_words", "calibration_of", "date_words", "notes_of"]
+__all__ = ["Note", "bench_words", "calibration_of", "date_words", "notes_of", "without_date"]
 
 _ON_THE_BENCH = (
     ("bob", "bob_mass_kg"),
@@ -64,12 +65,12 @@ def notes_of(recorded: Mapping[str, Any]) -> tuple[Note, ...]:
 
 
 def _facts(facts: Mapping[str, Any]) -> str:
-    told = (
+    parts = (
         f"{name.replace('_', ' ')} {value:g}" if isinstance(value, float) else f"{name} {value}".replace("_", " ")
         for name, value in facts.items()
         if value is not None
     )
-    return visible(", ".join(told))
+    return visible(", ".join(parts))
 
 
 def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -83,31 +84,60 @@ def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     return tuple(rows)
 
 
-def date_words(recorded: Mapping[str, Any]) -> str:
-    """Return when a run was recorded, in UTC where the recording says so; as it stands where it is no such time.
+def date_words(recorded: Mapping[str, Any], title: str = "") -> str:
+    """Return when a run was recorded: in UTC where the recording says so, else the date in its title.
+
+    Parameters
+    ----------
+    recorded : mapping
+        What a run file says of its origin.
+    title : str
+        The recording's title line.
 
     Examples
     --------
     >>> date_words({"start_time": "2026-11-22T22:30:35.97+00:00"})
-    'recorded 2026-11-22 22:30:35 UTC'
+    'Recorded 2026-11-22 22:30:35 UTC'
+    >>> date_words({}, "Motion Sensor Data File Sep 20, 2018 1:40 PM")
+    'Recorded Sep 20, 2018 1:40 PM'
     >>> date_words({})
-    'date of the recording not known'
+    'Date of the recording not known'
     """
-    told = recorded.get("start_time")
-    if not told:
-        return "date of the recording not known"
+    start = recorded.get("start_time")
+    if not start:
+        found = _DATE.search(title)
+        return f"Recorded {visible(found[0])}" if found else "Date of the recording not known"
     try:
-        moment = datetime.fromisoformat(str(told))
+        moment = datetime.fromisoformat(str(start))
     except ValueError:
-        return f"recorded {visible(str(told))}"
+        return f"Recorded {visible(str(start))}"
     if moment.tzinfo is None:
-        return f"recorded {moment:%Y-%m-%d %H:%M:%S}"
-    return f"recorded {moment.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
+        return f"Recorded {moment:%Y-%m-%d %H:%M:%S}"
+    return f"Recorded {moment.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+_TIME = r"(?:,?\s+\d{1,2}:\d{2}(?::\d{2})?(?:\s*[AP]M)?)?"
+_MONTH = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*\.?"
+_DATE = re.compile(
+    rf"(?:{_MONTH}\s+\d{{1,2}},?\s+\d{{4}}|\d{{1,2}}\.?\s+{_MONTH}\s+\d{{4}}|\d{{4}}-\d{{2}}-\d{{2}}){_TIME}",
+    re.IGNORECASE,
+)
+
+
+def without_date(title: str) -> str:
+    """Return a title without the date in it.
+
+    Examples
+    --------
+    >>> without_date("Motion Sensor Data File Sep 20, 2018 1:40 PM")
+    'Motion Sensor Data File'
+    """
+    return " ".join(_DATE.sub("", title).split())
 
 
 def bench_words(scene: Scene) -> str:
     """Return the bench in a line: what hung there, in which air."""
-    told = [f"{words} {pretty(x)}" for words, name in _ON_THE_BENCH if (x := getattr(scene, name)) is not None]
+    stated = [f"{words} {pretty(x)}" for words, name in _ON_THE_BENCH if (x := getattr(scene, name)) is not None]
     if scene.sensor_position is not None:
-        told.append(f"sensor {scene.sensor_position}")
-    return ", ".join(told) if told else "no scene was given: nothing is known of the masses and the air"
+        stated.append(f"sensor {scene.sensor_position}")
+    return ", ".join(stated) if stated else "not stated; for the spring constant add --mass-kg KG"

@@ -6,21 +6,25 @@ import csv
 import io
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.damping.laws import FunctionLaw
+from pipeline.damping.laws import LAWS
 from pipeline.damping.select import Damping
-from pipeline.numerics.estimate import Estimate, format_value
+from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value
 from pipeline.registry.quantities import QUANTITIES
+from pipeline.results.derive import Derived
 
 __all__ = [
+    "TableKey",
     "TableRow",
     "cell",
     "every_number",
     "law_status",
     "page_unit",
+    "prefixed",
     "pretty",
     "pretty_number",
     "raised",
@@ -35,6 +39,36 @@ _POWER = re.compile(r"\^\(?([\dn-]+)\)?")
 NOTHING = "-"
 
 
+class TableKey(NamedTuple):
+    """What a line of Table 1 states.
+
+    Parameters
+    ----------
+    name : str
+        As in ``Analysis.estimates``, or of a coefficient.
+    law : str or None
+        The law by which it is stated, "" for an average over laws; None where the table does not say.
+    certain : bool
+        Whether all results are stated by this law, because the user states it or the recording supports no other.
+        Otherwise the line holds if the law does.
+    """
+
+    name: str
+    law: str | None = None
+    certain: bool = False
+    row: str = ""
+    """The law whose numbers have a separate row: of coefficients, and of the law that is clearly ahead."""
+
+    @property
+    def words(self) -> str:
+        """The damping law that the value assumes, in words; empty if the table names none."""
+        if self.law is None:
+            return ""
+        if not self.law:
+            return "any law"
+        return f"law {self.law}" if self.certain else f"if {self.law}"
+
+
 @dataclass(frozen=True, slots=True)
 class TableRow:
     """One line of Table 1.
@@ -42,14 +76,16 @@ class TableRow:
     Parameters
     ----------
     name : str
-        As in ``Analysis.estimates``; "gamma" and "beta" are those of both drags together, with "mu", "c" and "n"
-        the selected law's, where these do not describe the record.
+        As in ``Analysis.estimates``, or of a coefficient; ``LAW.NAME`` in a line that adds what holds if the law that
+        is clearly ahead does.
     quantity : str
-        In words.
+        In words, with the law by which it is stated where the law decides on it.
     symbol, page_symbol, tex_symbol : str
         In ASCII, in Unicode (an index stands after a space) and as the inside of ``$...$``.
     estimates : tuple of Estimate or None
         One a run; None where the run does not give it.
+    note : str
+        Why no run gives it, and what to do; empty for a row with values.
     """
 
     name: str
@@ -58,41 +94,110 @@ class TableRow:
     page_symbol: str
     tex_symbol: str
     estimates: tuple[Estimate | None, ...]
+    note: str = ""
 
     @property
     def cells(self) -> tuple[str, ...]:
         """The estimates as printed, two digits of u."""
-        return tuple(NOTHING if x is None else format_value(x.value, x.u, x.unit) for x in self.estimates)
+        return tuple(NOTHING if x is None else str(x) for x in self.estimates)
 
 
-def table_estimates(analysis: Analysis) -> dict[str, Estimate]:
-    """Return what Table 1 says of a run: its estimates, and the selected law's coefficients, by name."""
-    found = {name: _estimate(analysis, name) for name, quantity in QUANTITIES.items() if quantity.in_table}
-    return {name: estimate for name, estimate in found.items() if estimate is not None}
+def table_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
+    """Return what Table 1 says of a run: its estimates, and the coefficients of a law, each with its law."""
+    found = _shown_estimates(analysis)
+    if any(finding.code in _WITHOUT_OFFSET for finding in analysis.findings):
+        found.pop(TableKey("offset"), None)
+    return found
 
 
-def table_rows(runs: Sequence[Analysis | Mapping[str, Estimate]]) -> tuple[TableRow, ...]:
+_WITHOUT_OFFSET = frozenset({"offset_unknown", "offset_unknown_after_gap"})
+"""Findings that say that the rest position is not that of the bob."""
+
+
+def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
+    motion = analysis.motion
+    if not isinstance(motion, Oscillation):
+        return {TableKey(name): analysis.estimates[name] for name in _IN_TABLE if name in analysis.estimates}
+    derived = motion.derived
+    found = _stated(derived, certain=bool(derived.law))
+    if derived.leading is None:
+        return found
+    leading = _stated(derived.leading, certain=False, row=derived.leading.law)
+    # A coefficient of the same law has one value, wherever it stands.
+    return found | {key: x for key, x in leading.items() if key.law is not None and key not in found}
+
+
+def _stated(derived: Derived, *, certain: bool, row: str = "") -> dict[TableKey, Estimate]:
+    law = derived.laws[0].fit.law
+    # A coefficient of a law of the user's own is not ours, even where it has the same name.
+    coefficients = derived.coefficients if law.name in LAWS else {}
+    found = {}
+    for name in _IN_TABLE:
+        if name in derived.estimates:
+            key = TableKey(name, derived.law, certain, row) if QUANTITIES[name].by_law else TableKey(name)
+            found[key] = derived.estimates[name]
+        elif name in coefficients:
+            found[TableKey(name, law.name, certain, law.name)] = coefficients[name]
+    return found
+
+
+_IN_TABLE = tuple(name for name, quantity in QUANTITIES.items() if quantity.in_table)
+
+
+def table_rows(
+    runs: Sequence[Analysis | Mapping[TableKey, Estimate]], *, missing: bool = False
+) -> tuple[TableRow, ...]:
     """Return Table 1: every quantity that at least one run gives, one column a run.
 
     Parameters
     ----------
     runs : sequence of Analysis, or of what :func:`table_estimates` kept of one
+    missing : bool
+        Whether to add a row that says what the spring constant needs, if no run gives it.
     """
-    told = [table_estimates(run) if isinstance(run, Analysis) else run for run in runs]
+    columns = [table_estimates(run) if isinstance(run, Analysis) else run for run in runs]
     rows = []
     for name, q in QUANTITIES.items():
-        estimates = tuple(run.get(name) for run in told)
-        if any(estimate is not None for estimate in estimates):
-            rows.append(TableRow(name, q.label, q.symbol, q.page_symbol, q.tex_symbol, estimates))
+        keys = [{key.row: key for key in run if key.name == name} for run in columns]
+        for i, law in enumerate(dict.fromkeys(row for of_run in keys for row in of_run)):
+            words = {of_run[law].words for of_run in keys if law in of_run}
+            label = words.pop() if len(words) == 1 else f"if {law}" if law else "by each run's law"
+            estimates = tuple(
+                run[of_run[law]] if law in of_run else None for run, of_run in zip(columns, keys, strict=True)
+            )
+            rows.append(
+                TableRow(
+                    f"{law}.{name}" if i else name,
+                    f"{q.label}, {label}" if label else q.label,
+                    q.symbol,
+                    q.page_symbol,
+                    q.tex_symbol,
+                    estimates,
+                )
+            )
+        if missing and name == "spring_constant" and not any(keys) and any(map(_needs_mass, runs, columns)):
+            rows.append(TableRow(name, q.label, q.symbol, q.page_symbol, q.tex_symbol, (None,) * len(runs), NEEDS_MASS))
     return tuple(rows)
+
+
+NEEDS_MASS = "needs the mass: --mass-kg KG"
+
+
+def _needs_mass(run: Analysis | Mapping[TableKey, Estimate], column: Mapping[TableKey, Estimate]) -> bool:
+    """Tell whether a distance oscillates and only the mass is missing."""
+    if isinstance(run, Analysis) and run.scene.bob_mass_kg is not None:
+        return False
+    amplitude = column.get(TableKey("amplitude"))
+    return TableKey("period") in column and amplitude is not None and amplitude.unit == "m"
 
 
 def every_number(analysis: Analysis) -> dict[str, Estimate]:
     """Return every estimate of a run and every law's parameters, these named ``LAW.PARAMETER``."""
     everything = dict(analysis.estimates)
     if isinstance(analysis.motion, Oscillation):
+        derived = analysis.motion.derived
         for law, fit in analysis.motion.damping.fits.items():
-            everything |= {f"{law}.{name}": x for name, x in fit.joint.estimates().items()}
+            everything |= {f"{law}.{name}": x for name, x in derived.parameters_of(fit).items()}
     return everything
 
 
@@ -148,6 +253,8 @@ def pretty(estimate: Estimate | None) -> str:
     """
     if estimate is None:
         return "–"
+    if isinstance(estimate, UpperLimit):
+        return f"< {_typeset(format_limit(estimate.limit))} {page_unit(estimate.unit)}".rstrip() + " (95 %)"
     number = format_value(estimate.value, estimate.u)
     return f"{_typeset(number)} {page_unit(estimate.unit)}".rstrip()
 
@@ -163,6 +270,30 @@ def pretty_number(value: float | None, digits: int = 2) -> str:
     if value is None or value != value:
         return "–"
     return _typeset(f"{value:#.{digits}g}".rstrip("."))
+
+
+# Unit to (below this size, factor, unit with its prefix), the smallest first. Periods stay in seconds down to 0.1 s.
+_PREFIXES = {
+    "m": ((1e-3, 1e6, "µm"), (1.0, 1e3, "mm")),
+    "kg": ((1e-3, 1e6, "mg"), (1.0, 1e3, "g")),
+    "s": ((1e-3, 1e6, "µs"), (0.1, 1e3, "ms")),
+    "m/s": ((1e-4, 1e6, "µm/s"), (0.1, 1e3, "mm/s")),
+}
+
+
+def prefixed(estimate: Estimate) -> Estimate:
+    """Return an estimate in the unit with the prefix that leaves 1 to 1000 in front of it; most units have none.
+
+    Examples
+    --------
+    >>> prefixed(Estimate(0.05145, 2e-5, "m"))
+    51.450(20) mm
+    """
+    for below, factor, unit in _PREFIXES.get(estimate.unit, ()):
+        if 0.0 < abs(estimate.value) < below:
+            value, u = (float(f"{x * factor:.15g}") for x in (estimate.value, estimate.u))
+            return replace(estimate, value=value, u=u, unit=unit, variable=None)
+    return estimate
 
 
 def page_unit(unit: str) -> str:
@@ -187,18 +318,12 @@ def law_status(damping: Damping, name: str) -> str:
     name : str
     """
     if name == damping.selected:
+        if damping.by_statement:
+            return "stated, and rejected" if damping.fits[name].rejected else "stated"
         return "rejected, yet the least bad" if damping.fits[name].rejected else "selected"
     if damping.fits[name].rejected:
         return "rejected"
     return "admissible" if name in damping.admissible else "unlikely"
-
-
-def _estimate(analysis: Analysis, name: str) -> Estimate | None:
-    if name in analysis.estimates or not isinstance(analysis.motion, Oscillation):
-        return analysis.estimates.get(name)
-    derived = analysis.motion.derived
-    # A coefficient of a law of the user's own is not ours, even where it has the same name.
-    return None if isinstance(derived.laws[0].fit.law, FunctionLaw) else derived.coefficients.get(name)
 
 
 def _typeset(number: str) -> str:

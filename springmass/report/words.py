@@ -1,28 +1,46 @@
-"""What the page says in words of a run: the verdict on its damping, and its figures' captions."""
+"""The result of a run in words: what was measured, how the motion is damped, and the captions of figures."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 
 from pipeline.analyse import Analysis, Oscillation, Overdamped, Still
-from pipeline.damping.select import Damping
-from pipeline.numerics.estimate import Estimate
+from pipeline.damping.laws import words_of
+from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.numerics.quantity import SHOWN, noun
+from pipeline.registry.quantities import INPUTS
+from springmass.report.budgets import budgets_of
 from springmass.report.figures.phase_plot import turn_step
 from springmass.report.figures.position import ZOOM_PERIODS, has_error_bars, is_long
 from springmass.report.figures.rest_position import rest_moves
 from springmass.report.motion_table import row_step
 from springmass.report.tables import page_unit, pretty, raised
 
-__all__ = ["LETTERS", "caption", "kept", "typeset", "verdict"]
+__all__ = ["LETTERS", "caption", "damping_sentence", "equation", "kept", "typeset", "verdict"]
 
 LETTERS = {"A0": "A₀", "gamma": "γ", "beta": "β", "mu": "μ"}
 
 
 def kept(estimate: Estimate) -> str:
     """Write an estimate so that no line breaks inside it."""
-    return pretty(estimate).replace(" ", "\u00a0")
+    return _unbroken(pretty(estimate))
+
+
+def _unbroken(text: str) -> str:
+    return text.replace(" ", "\u00a0")
+
+
+def equation(name: str, estimate: Estimate) -> str:
+    """Write a parameter with its value, or with the limit that it lies below.
+
+    Examples
+    --------
+    >>> equation("beta", Estimate(0.235, 0.012, "1/(m s)")), equation("mu", UpperLimit(1e-5, 2e-5, "m/s"))
+    ('β = 0.235 ± 0.012 m⁻¹ s⁻¹', 'μ < 4.7 × 10⁻⁵ m/s (95 %)')
+    """
+    sign = "" if isinstance(estimate, UpperLimit) else "= "
+    return f"{LETTERS.get(name, name)} {sign}{pretty(estimate)}"
 
 
 _SUBSTITUTES = (
@@ -51,49 +69,101 @@ def typeset(message: str) -> str:
 
 
 def verdict(analysis: Analysis) -> tuple[str, ...]:
-    """Return what holds of a run, in two sentences at most: what was measured, and how the motion is damped."""
-    if isinstance(analysis.motion, Overdamped):
-        why = typeset(analysis.motion.why)
+    """Return the result of a run in at most three sentences: the numbers, the damping, and where u comes from."""
+    motion = analysis.motion
+    if isinstance(motion, Overdamped) or (isinstance(motion, Still) and "first_mode_period" in analysis.estimates):
+        why = typeset(motion.why)
         return (f"{why[0].upper()}{why[1:]}.",)
-    if "first_mode_period" in analysis.estimates and isinstance(analysis.motion, Still):
-        why = typeset(analysis.motion.why)
-        return (f"{why[0].upper()}{why[1:]}.",)
-    if isinstance(analysis.motion, Still):
-        return ("Nothing oscillates in this record; rest position and noise are all that it gives.",)
+    if isinstance(motion, Still):
+        return ("Nothing oscillates in this recording; it gives rest position and noise only.",)
     found = analysis.estimates
     unit = analysis.track.unit
     moves = "bob swings" if unit == "m" else f"{noun(unit)} oscillates"
     measured = f"The {moves} with the period T\u00a0=\u00a0{kept(found['period'])}"
     if "spring_constant" in found:
         measured += f", which makes the spring constant k\u00a0=\u00a0{kept(found['spring_constant'])}"
-    return (f"{measured}.", _damped(analysis.motion.damping, analysis.motion.derived.coefficients))
+    sentences = (f"{measured}.", damping_sentence(analysis, coefficients=True))
+    cause = _largest_cause(analysis)
+    return (*sentences, cause) if cause else sentences
 
 
-def _damped(damping: Damping, stated: Mapping[str, Estimate]) -> str:
-    """Return what became of the damping laws, in a sentence, with the numbers of Table 1."""
-    chosen = damping.best.law.words
+def _largest_cause(analysis: Analysis) -> str:
+    """Return what the uncertainty of the result comes from: of the spring constant, else of the period."""
+    rows = {row.name: row for row in budgets_of(analysis)}
+    row = rows.get("spring_constant") or rows.get("period")
+    if row is None or not row.contributions:
+        return ""
+    greatest = row.contributions[0]
+    symbol = "k" if row.name == "spring_constant" else "T"
+    return f"The largest part of u({symbol})², {greatest.share:.0%}, comes from the {INPUTS[greatest.name].label}."
+
+
+NAMED_LAWS = 2  # of those that cannot be ruled out
+
+
+def damping_sentence(analysis: Analysis, *, coefficients: bool = False) -> str:
+    """Return in one sentence which damping law fits and what became of the others; empty where nothing oscillates.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    coefficients : bool
+        Whether to state the coefficients of the selected law and the damping rate, with the numbers of Table 1.
+    """
+    if not isinstance(analysis.motion, Oscillation):
+        return ""
+    damping, derived = analysis.motion.damping, analysis.motion.derived
+    chosen = words_of(damping.best.law)
+    span = f"{float(analysis.track.t[-1] - analysis.track.t[0]):.0f} s"
+    if damping.best.rejected and damping.by_statement:
+        return (
+            f"The recording contradicts the stated law, {chosen}; state no law, or quote the amplitude against time "
+            "instead of its coefficients."
+        )
     if damping.best.rejected:
         return (
-            f"No damping law describes how the amplitude falls; {chosen} comes nearest, and its parameters must not be "
-            "used: quote the amplitude against time."
+            f"No damping law describes how the amplitude falls; {chosen} is nearest, but quote the amplitude against "
+            "time instead of its coefficients."
         )
-    if damping.selected == "none":
-        text = "The amplitude does not fall by more than this record can tell"
-    else:
-        text = f"Its amplitude falls by {chosen}"
-    parameters = [
-        f"{LETTERS.get(name, name)}\u00a0=\u00a0{kept(stated[name])}"
-        for name in damping.best.joint.names
-        if name in stated
-    ]
-    text += f", {', '.join(parameters)}" if parameters else ""
-    others = [damping.fits[name].law.words for name in damping.admissible if name != damping.selected]
-    if others:
-        return f"{text}; as far as this record can tell, as good: {'; '.join(others)}."
-    tried, rejected = len(damping.fits) - 1, sum(fit.rejected for fit in damping.fits.values())
-    if rejected == tried:
-        return f"{text}; the record rejects every other law tried."
-    return f"{text}; of the {tried} other laws tried the record rejects {rejected}, the rest are unlikely."
+    text = f"The amplitude falls by {chosen}"
+    if len(damping.best.law.parameters) == 1:
+        text = f"The amplitude does not fall measurably in {span}"
+    if damping.by_statement:
+        text += ", as you stated"
+    if coefficients:
+        stated = derived.coefficients_of(damping.selected)
+        text += "".join(f", {_unbroken(equation(name, x))}" for name, x in stated.items())
+    if damping.by_statement:
+        return f"{text}."
+    if coefficients:
+        text += f"; the damping rate at the start is λ\u00a0=\u00a0{_damping_rates(analysis.motion)}"
+    possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
+    if possible:
+        more = len(possible) - NAMED_LAWS
+        if more > 1:
+            return f"{text}; {', '.join(possible[:NAMED_LAWS])} and {more} more laws cannot be ruled out in {span}."
+        return f"{text}; {_listed(possible)} cannot be ruled out in {span}."
+    others, rejected = len(damping.fits) - 1, sum(fit.rejected for fit in damping.fits.values())
+    if not others:
+        return f"{text}; no other law was tried."
+    if rejected == others:
+        return f"{text}; the recording rejects all {others} other laws."
+    return f"{text}; of {others} other laws {rejected} are rejected and {others - rejected} unlikely."
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join(words) if len(words) < 3 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _damping_rates(motion: Oscillation) -> str:
+    """Return the damping rate at the start, and what it is if the law that is clearly ahead holds."""
+    derived = motion.derived
+    rate = kept(derived.estimates["damping_rate"])
+    if derived.law:
+        return f"{rate} by that law"
+    if derived.leading is None:
+        return f"{rate} for any law"
+    return f"{rate} for any law, {kept(derived.leading.estimates['damping_rate'])} if that law holds"
 
 
 def caption(name: str, analysis: Analysis) -> str:
@@ -108,7 +178,7 @@ def caption(name: str, analysis: Analysis) -> str:
     if isinstance(analysis.motion, Overdamped):
         return f"{_subject(analysis)} with the fitted relaxation. Samples scatter by {_sigma(analysis)}."
     if isinstance(analysis.motion, Still):
-        what = "two modes at once" if "first_mode_period" in analysis.estimates else "nothing oscillates"
+        what = "two modes together" if "first_mode_period" in analysis.estimates else "nothing oscillates"
         return f"{_subject(analysis)}; {what}. Samples scatter by {_sigma(analysis)}."
     return _CAPTIONS[name](analysis, analysis.motion)
 
@@ -127,20 +197,19 @@ def _subject(analysis: Analysis) -> str:
 
 def _position(analysis: Analysis, _: Oscillation) -> str:
     bars = "shown as error bars" if has_error_bars(analysis) else "too small for error bars to show"
-    detail = f" Above the whole record, below its first {ZOOM_PERIODS} periods (shaded above)."
-    rest = " At the bottom the rest position of single windows less its mean, with u, and the curve that it follows."
+    detail = f" The upper pair shows the whole recording, the lower pair its first {ZOOM_PERIODS} periods."
+    rest = " The bottom panel shows the rest position of each window minus its mean, with u, and the fitted curve."
     return (
-        f"{_subject(analysis)} with the fitted motion; beneath, what the fit leaves, over the noise of "
-        f"one sample, σ\u00a0=\u00a0{_sigma(analysis)}, {bars}.{detail if is_long(analysis) else ''}"
+        f"{_subject(analysis)} and fit; below, the residuals divided by the noise of one sample, "
+        f"σ\u00a0=\u00a0{_sigma(analysis)}, {bars}.{detail if is_long(analysis) else ''}"
         f" Flagged samples were left out of the fit and of the residuals.{rest if rest_moves(analysis) else ''}"
     )
 
 
 def _amplitude(_: Analysis, motion: Oscillation) -> str:
     return (
-        "Amplitude in windows of one period or a few, with one standard uncertainty u, and every law, named where it "
-        "matters; "
-        f"beneath, the residuals of the selected law, {motion.damping.selected}, over u."
+        "Amplitude of each window (one period or a few) with one standard uncertainty u, and the damping laws; "
+        f"below, the residuals of the selected law, {motion.damping.selected}, divided by u."
     )
 
 
@@ -149,19 +218,18 @@ def _phase(analysis: Analysis, motion: Oscillation) -> str:
     every = f" One turn in {step} is drawn." if step > 1 else ""
     value = noun(analysis.track.unit)
     what = "Velocity against displacement" if value == "distance" else f"Derivative of the {value} against the {value}"
-    return f"{what} from rest; colour tells the time.{every}"
+    return f"{what} from rest; the colour shows the time.{every}"
 
 
 def _energy(analysis: Analysis, motion: Oscillation) -> str:
     mass = motion.derived.effective_mass_kg
     of = f"the mass that oscillates, {kept(mass)}" if mass is not None else "one kilogram, as no mass was given"
-    parts = ", and the parts as they change into each other" if analysis.track.unit == "m" else ""
+    parts = "; at the bottom, kinetic and potential energy in the first periods" if analysis.track.unit == "m" else ""
     return (
-        f"Energy of the oscillation, m ω² A²/2{_of_displacement(analysis)}, for {of}, with its kinetic and potential "
-        "parts, one half each in the mean of a period; beneath, what single amplitudes "
-        f"deviate from the law{parts}. "
-        "Points bear their own scatter. The band is one standard uncertainty of the law, with all that points share: "
-        "mass, frequency, the distances' scale and the choice among admissible laws."
+        f"Energy of the oscillation, m ω² A²/2{_of_displacement(analysis)}, for {of}. The means of kinetic and "
+        "potential energy over a period are one half of it each, and their markers alternate. Below, the deviation of "
+        f"single amplitudes from the law{parts}. Error bars: scatter of each point. Band: standard uncertainty of the "
+        "law, with errors common to all points."
     )
 
 
@@ -173,12 +241,11 @@ def _of_displacement(analysis: Analysis) -> str:
 def _drag(analysis: Analysis, motion: Oscillation) -> str:
     friction = "; friction is left out" if motion.damping.best.drag_term("mu") is not None else ""
     return (
-        "Drag coefficient against amplitude: what purely quadratic drag on the disc would need to take the energy that "
-        f"the record loses, −dA/dt · 3π m/(2 ω ρ S A²){_of_displacement(analysis)}, the spring's own losses "
-        f"included{friction}. Points are slopes of the amplitude's logarithm through stretches of the record and bear "
-        "their own scatter; the band is one "
-        "standard uncertainty of the law with masses, disc, air and scale. A coefficient that falls with the "
-        "amplitude is one that a constant C does not describe."
+        "Effective drag coefficient against amplitude, −dA/dt · 3π m/(2 ω ρ S A²)"
+        f"{_of_displacement(analysis)}: that of purely quadratic drag on the disc with the same energy loss, losses "
+        f"of the spring included{friction}. Points: slopes of the logarithm of the amplitude in stretches of the run, "
+        "with their scatter. Band: standard uncertainty of the law with masses, disc, air and scale. If the "
+        "coefficient depends on the amplitude, a constant does not describe the drag."
     )
 
 
@@ -191,29 +258,54 @@ def _motion(analysis: Analysis, _: Oscillation) -> str:
     if analysis.track.unit != "m":
         first, rate = f"First and second derivative of the {noun(analysis.track.unit)}", "first derivative"
         rows = rows.replace("position, velocity and acceleration", "the value and its derivatives")
-    above = f"The {rate} over the whole record; beneath, " if is_long(analysis) else ""
+    above = f"The {rate} over the whole recording; below it, " if is_long(analysis) else ""
     first = f"{first[:1].lower()}{first[1:]}" if above else first
     return (
-        f"{above}{first} over {periods}, from an oscillator smoother: every sample speaks on every "
-        f"other, nothing is differenced. Beneath{whole}, what the {rate} differs from the fitted law's, in its band "
-        "of one standard uncertainty u, and u of both: larger at the edges, where one side is missing. Clock and "
-        f"scale, which move all alike, are not in u. motion.csv holds {rows}."
+        f"{above}{first} over {periods}, estimated by an oscillator smoother from all samples, not by differences of "
+        f"neighbours. The panel below{whole}: smoothed {rate} minus fitted law, with a band of ±u. Bottom: the "
+        "standard uncertainties, which are larger at the ends. Errors of clock and scale are not included. "
+        f"motion.csv holds {rows}."
     )
 
 
 def _classic(_: Analysis, motion: Oscillation) -> str:
     return (
-        "What the lab report's own method takes, over this analysis. Above, the two sampled maxima whose distance in "
-        "time is seven periods, each to a sample's width, and the extremes of the whole record, half of whose distance "
-        "is its amplitude: noise and false echoes are among them. Beneath, half of what lies between the extremes in "
-        "1.5 s, at every sample, with the exponential that it "
-        f"fits through the first of these; points and black curve, {motion.damping.selected}, are this analysis's."
+        "The lab report's method compared with this analysis. Above: the two sampled maxima that are seven periods "
+        "apart, and the extremes of the whole recording, whose half distance it takes as amplitude, noise and false "
+        "echoes included. Below: half the distance between the extremes within 1.5 s of every sample, and the "
+        "exponential through the first of these. Points and black curve "
+        f"({motion.damping.selected}) are of this analysis."
+    )
+
+
+def _logarithmic(_: Analysis, motion: Oscillation) -> str:
+    return (
+        "Amplitude on a logarithmic axis, on which an exponential (linear drag) is a straight line. The solid line is "
+        f"the selected law, {motion.damping.selected}."
+    )
+
+
+def _frequency(_: Analysis, motion: Oscillation) -> str:
+    model = "changes with the amplitude" if motion.phase.backbone is not None else "is constant"
+    return (
+        "Frequency of stretches of the run against their mean amplitude, with one standard uncertainty u. The line is "
+        f"the model of the phase, in which the frequency {model}."
+    )
+
+
+def _spectrum(_: Analysis, __: Oscillation) -> str:
+    return (
+        "Amplitude spectrum of the recording and of the residuals of the fit (Hann window). The highest peaks are "
+        "labelled. A peak of the residuals is a motion that the fit does not describe."
     )
 
 
 _CAPTIONS: dict[str, Callable[[Analysis, Oscillation], str]] = {
     "position": _position,
     "amplitude": _amplitude,
+    "logarithmic": _logarithmic,
+    "frequency": _frequency,
+    "spectrum": _spectrum,
     "drag": _drag,
     "energy": _energy,
     "motion": _motion,

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 from springmass.errors import detail
 from springmass.report.budgets import budget_csv
-from springmass.report.figures import KINDS, NAMES, comparison_figure, draw, render
+from springmass.report.figures import KINDS, NAMES, comparison_figure, draw, overlay_figure, render
 from springmass.report.html import render_html
-from springmass.report.latex import budget_tex, table_tex
+from springmass.report.latex import budget_tex, lab_report_tex, table_tex
 from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.recorded import notes_of
 from springmass.report.tables import results_csv
+from springmass.report.words import caption, verdict
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
 from springmass.runs.json_results import plain
@@ -34,6 +33,7 @@ def write_report(
     compared: Compared | None = None,
     summary: Mapping[str, Any] | None = None,
     pdf: bool = False,
+    template: Literal["latex"] | None = None,
 ) -> Path:
     """Write the report of one run or of several side by side.
 
@@ -49,7 +49,9 @@ def write_report(
         What ``results.json`` holds in place of the runs' results. Its ``provenance``, else the first run's, goes into
         the page: version, parameters, time, whatever says how to make this report again.
     pdf : bool
-        Whether figures are written as PDF too: that takes as long as all the rest, the fonts in them above all.
+        Whether figures are written as PDF too, which takes as long as everything else.
+    template : {"latex"}, optional
+        Whether to write ``lab-report.tex`` too, a document to fill in; its figures are written as PDF.
 
     Returns
     -------
@@ -69,39 +71,30 @@ def write_report(
     number is null), ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, ``motion.csv`` of each run that
     oscillates, and ``figures/`` with every figure as SVG, and as PDF where asked for. Names of figures and motions
     begin with their run's where there are several.
-    The same arguments give the same bytes.
     """
     if not runs:
         raise ValueError("a report needs one run at least, got none")
     directory, names = Path(directory), [run.name for run in runs]
     stems = _stems(names)
-    with whole_folder(directory, _names(stems), PAGE) as folder, _collected_once_a_run():
-        _write(folder, runs, stems, compared, summary, KINDS if pdf else KINDS[:1])
+    with whole_folder(directory, _names(stems), PAGE) as folder:
+        kinds = KINDS if pdf or template is not None else KINDS[:1]
+        drawn = _write(folder, runs, stems, compared, summary, kinds)
+        if template is not None:
+            _write_lab_report(folder, runs[0], drawn)
     detail(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
     return directory / PAGE
 
 
-@contextmanager
-def _collected_once_a_run() -> Iterator[None]:
-    """Look for dead objects in cycles once a run: figures are many living ones, and a tenth of the time went so."""
-    before = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if before:
-            gc.enable()
-
-
 PAGE = "report.html"
+LAB_REPORT = "lab-report.tex"
 _TABLES = ("results.json", "results.csv", "table.tex", "budget.csv", "budget.tex")
 
 
 def _names(stems: Sequence[str]) -> set[str]:
     """Return the name of every file that a report of these runs may hold."""
     pictures = [f"{stem}{name}" for stem in stems for name in NAMES]
-    figures = {f"figures/{name}.{kind}" for name in (*pictures, "comparison") for kind in KINDS}
-    return {PAGE, *_TABLES, *figures, *(f"{stem}motion.csv" for stem in stems)}
+    figures = {f"figures/{name}.{kind}" for name in (*pictures, "comparison", "overlay") for kind in KINDS}
+    return {PAGE, LAB_REPORT, *_TABLES, *figures, *(f"{stem}motion.csv" for stem in stems)}
 
 
 def _write(
@@ -111,7 +104,8 @@ def _write(
     compared: Compared | None,
     summary: Mapping[str, Any] | None,
     kinds: Sequence[Literal["svg", "pdf"]],
-) -> None:
+) -> Sequence[str]:
+    """Write everything; return the names of the first run's figures."""
     (folder / "figures").mkdir()
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
     pictures = []
@@ -125,12 +119,10 @@ def _write(
         if not isinstance(smoothed, str):
             write_whole(folder / f"{stem}motion.csv", motion_csv(run.analysis, smoothed))
         pictures.append({name: files["svg"] for name, files in drawn.items()})
-        del figures
-        gc.collect(0)  # the youngest alone: what was made for this run
     results = [run.result for run in runs]
     content = plain(summary if summary is not None else results[0] if len(results) == 1 else results)
     text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    # Half a character, which a file's name may hold, is written as JSON's own escape of it.
+    # Lone surrogates, which a file's name may hold, are written as JSON escapes.
     tables: tuple[bytes | str, ...] = (
         text.encode("utf-8", "backslashreplace"),
         results_csv(names, analyses),
@@ -145,9 +137,29 @@ def _write(
         overview = {kind: render(comparison_figure(compared.comparison), kind) for kind in kinds}
         for kind, data in overview.items():
             write_whole(folder / "figures" / f"comparison.{kind}", data)
-    provenance = (summary or results[0])["provenance"]
-    page = render_html(runs, pictures, compared=compared, overview=overview.get("svg", b""), provenance=provenance)
+    overlay = overlay_figure(names, analyses) if len(runs) > 1 else None
+    over = {} if overlay is None else {kind: render(overlay, kind) for kind in kinds}
+    for kind, data in over.items():
+        write_whole(folder / "figures" / f"overlay.{kind}", data)
+    page = render_html(
+        runs,
+        pictures,
+        compared=compared,
+        overview=overview.get("svg", b""),
+        overlay=over.get("svg", b""),
+        stems=stems,
+        provenance=(summary or results[0])["provenance"],
+    )
     write_whole(folder / PAGE, page)
+    return list(pictures[0])
+
+
+def _write_lab_report(folder: Path, run: Analysed, drawn: Sequence[str]) -> None:
+    """Write the document to fill in, with the figures that a lab report shows."""
+    shown = [name for name in ("position", "amplitude", "frequency") if name in drawn]
+    captions = {name: caption(name, run.analysis) for name in shown}
+    figures = {name: f"figures/{name}" for name in shown}
+    write_whole(folder / LAB_REPORT, lab_report_tex(run, figures, captions, verdict(run.analysis)))
 
 
 def _stems(names: Sequence[str]) -> list[str]:

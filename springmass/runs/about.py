@@ -5,12 +5,13 @@ Recordings and run files are never changed; this file is. Every command that rea
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import tomli_w
 
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
@@ -69,13 +70,13 @@ def about_of(recording: Path) -> About:
     path = about_path(recording)
     if not os.path.exists(path):  # Path.exists would raise for a name that is too long
         return About(path)
-    told = read_tables(path)
-    if unknown := sorted(set(told) - {"scene", "notes", "marks"}):
+    tables = read_tables(path)
+    if unknown := sorted(set(tables) - {"scene", "notes", "marks"}):
         raise ProgramError(f"{path}: unknown key {unknown[0]!r}; allowed are scene, notes, marks", USAGE)
     try:
-        scene = Scene.from_mapping(told["scene"], where=f"{path} [scene]") if "scene" in told else None
-        marks = tuple((float(mark["t_s"]), str(mark["text"])) for mark in told.get("marks", ()))
-        notes = tuple(str(note) for note in told.get("notes", ()))
+        scene = Scene.from_mapping(tables["scene"], where=f"{path} [scene]") if "scene" in tables else None
+        marks = tuple((float(mark["t_s"]), str(mark["text"])) for mark in tables.get("marks", ()))
+        notes = tuple(str(note) for note in tables.get("notes", ()))
     except SceneError as error:
         raise ProgramError(str(error), USAGE) from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -111,20 +112,9 @@ def remember_scene(recording: Path, own: Mapping[str, Any] | None, used: Scene) 
 
 def write_about(about: About) -> Path:
     """Write the notes whole, in place of those that stood there; return their path."""
-    lines = [f"notes = [{', '.join(map(_text, about.notes))}]"] if about.notes else []
-    for table, keys in (about.scene.to_mapping() if about.scene is not None else {}).items():
-        lines += ["", f"[scene.{table}]", *(f"{key} = {_value(value)}" for key, value in keys.items())]
-    for t_s, text in about.marks:
-        lines += ["", "[[marks]]", f"t_s = {t_s!r}", f"text = {_text(text)}"]
-    return write_whole(about.path, "\n".join([*lines, ""]), overwrite=True)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{key} = {_value(inner)}' for key, inner in value.items())} }}"
-    return _text(value) if isinstance(value, str) else repr(float(value))
-
-
-def _text(text: str) -> str:
-    """Write a text as TOML's basic string, which JSON's is but for one control character."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    tables: dict[str, Any] = {"notes": list(about.notes)} if about.notes else {}
+    if about.scene is not None and (scene := about.scene.to_mapping()):
+        tables["scene"] = scene
+    if about.marks:
+        tables["marks"] = [{"t_s": t_s, "text": text} for t_s, text in about.marks]
+    return write_whole(about.path, tomli_w.dumps(tables), overwrite=True)

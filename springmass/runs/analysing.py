@@ -5,31 +5,44 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from acquisition.recordings.recording import Trap
 from pipeline.accuracy import params_for
-from pipeline.analyse import Analysis, analyse
+from pipeline.analyse import Analysis, Params, analyse
 from pipeline.bench.scene import Scene
+from pipeline.damping.laws.law import Law
 from pipeline.results.classic import Classic, classic
+from pipeline.track import Track
 from springmass import __version__
 from springmass.errors import USAGE, ProgramError, detail
-from springmass.runs.json_results import result_of
-from springmass.runs.loading import Loaded
-from springmass.runs.scenes import stated_keys
+from springmass.runs.about import about_of
+from springmass.runs.json_results import result_of, with_traps
+from springmass.runs.loading import Loaded, load
+from springmass.runs.options import READ, ReadOptions
+from springmass.runs.scenes import Amendments, amended, stated_keys
+from springmass.values import ANY_LAW
 
 __all__ = [
     "Analysed",
+    "AnalysedRun",
     "analyse_loaded",
+    "analyse_track",
     "distinct_names",
     "in_a_name",
+    "law_line",
+    "load_and_analyse",
     "made_now",
     "make_folder",
     "now_utc",
     "scene_of",
+    "with_law",
 ]
+
+NOTHING: Amendments = {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,12 +54,11 @@ class Analysed:
     name : str
     analysis : Analysis
     result : mapping
-        As printed under ``--json``. A report shows its ``input`` as it is, and with it ``title``, the recording's own
-        first line, if it has one.
+        As printed under ``--json``. A report shows its ``input`` as it is.
     classic : Classic, optional
-        The lab report's own method on the same input, to be set beside.
+        The lab report's own method on the same input, for comparison.
     recorded : mapping
-        What the recording says of its origin: start time, marks, events, calibration.
+        What the recording states about its origin: start time, title, marks, events, calibration.
     """
 
     name: str
@@ -56,51 +68,161 @@ class Analysed:
     recorded: Mapping[str, Any] = field(default_factory=dict)
 
 
-def analyse_loaded(
-    loaded: Loaded,
-    scene: Scene | None,
-    *,
-    parameters: Mapping[str, Any],
-    name: str = "",
-    accuracy: str = "standard",
-    with_classic: bool = False,
-    time_utc: str | None = None,
-) -> Analysed:
-    """Analyse one input.
+@dataclass(frozen=True, slots=True, eq=False)
+class AnalysedRun:
+    """One recording, loaded and analysed: the numbers that every command, page, report and script shows.
 
     Parameters
     ----------
     loaded : Loaded
+    analysis : Analysis
+        Its findings include those of the reader.
+    accuracy : str
+    classic : Classic or None
+        The lab report's own method on the same input.
+    """
+
+    loaded: Loaded
+    analysis: Analysis
+    accuracy: str
+    classic: Classic | None = None
+
+    def described(self, parameters: Mapping[str, Any], *, name: str = "", time_utc: str | None = None) -> Analysed:
+        """Return it with its JSON, ready for a report.
+
+        Parameters
+        ----------
+        parameters : mapping
+            Options as resolved, stored with the result.
+        name : str
+            Empty: the file's.
+        time_utc : str, optional
+            ISO 8601; None: now.
+        """
+        result = result_of(
+            self.loaded,
+            self.analysis,
+            time_utc=time_utc or now_utc(),
+            accuracy="classic" if self.classic is not None else self.accuracy,
+            parameters={**parameters, "scene": self.analysis.scene.to_mapping()},
+            classic=self.classic,
+        )
+        recorded = {**self.loaded.provenance, "title": self.loaded.title}
+        return Analysed(name or self.loaded.path.name, self.analysis, result, self.classic, recorded)
+
+
+def load_and_analyse(
+    path: str | Path,
+    options: ReadOptions = READ,
+    scene: Scene | None = None,
+    *,
+    bench: Amendments = NOTHING,
+    accuracy: str = "standard",
+    law: str | None = None,
+    params: Params | None = None,
+    with_classic: bool = False,
+) -> AnalysedRun:
+    """Read a recording, a run file or a wire log, and analyse it.
+
+    Parameters
+    ----------
+    path : path
+    options : ReadOptions
     scene : Scene or None
-        None: the scene that a run file carries, if any.
-    parameters : mapping
-        Options as resolved, stored with the result.
-    name : str
-        Left out, the file's.
+        None: the scene noted next to the file, else the one inside a run file.
+    bench : mapping
+        Values that replace those of the scene, as :func:`springmass.runs.scenes.amended` takes them.
     accuracy : {"fast", "standard", "best"}
         Tier.
+    law : str or None
+        Damping law that is stated, as :func:`with_law` takes it.
+    params : pipeline.analyse.Params, optional
+        Options of every stage, in place of those of the tier.
     with_classic : bool
-        Whether the report's method is wanted; its estimates then stand in the result.
-    time_utc : str, optional
-        ISO 8601; left out, now.
+        Whether to apply the lab report's own method as well.
 
     Raises
     ------
+    acquisition.errors.NeedsAnswer
+        If the file leaves something open that was not given.
+    acquisition.errors.FormatError, storage.errors.StorageError, springmass.errors.ProgramError
+        If it cannot be read, or a value of the bench is impossible.
     pipeline.errors.AnalysisError, pipeline.errors.SceneError
+        If it cannot be analysed.
     """
-    scene = scene_of(loaded, scene)
-    analysis = analyse(loaded.track, scene, params_for(accuracy))
-    detail(f"analysed: {loaded.path} at {accuracy}, with a scene that states {stated_keys(scene)}")
-    by_classic = classic(loaded.track, scene) if with_classic else None
-    result = result_of(
-        loaded,
-        analysis,
-        time_utc=time_utc or now_utc(),
-        accuracy="classic" if with_classic else accuracy,
-        parameters={**parameters, "scene": scene.to_mapping()},
-        classic=by_classic,
+    loaded = load(path, options)
+    return analyse_loaded(
+        loaded, scene, bench=bench, accuracy=accuracy, law=law, params=params, with_classic=with_classic
     )
-    return Analysed(name or loaded.path.name, analysis, result, by_classic, loaded.provenance)
+
+
+def analyse_loaded(
+    loaded: Loaded,
+    scene: Scene | None = None,
+    *,
+    bench: Amendments = NOTHING,
+    accuracy: str = "standard",
+    law: str | None = None,
+    params: Params | None = None,
+    with_classic: bool = False,
+) -> AnalysedRun:
+    """Analyse an input that was loaded before; see :func:`load_and_analyse`."""
+    scene = scene_of(loaded, scene)
+    if bench:
+        scene = amended(scene, bench, where="the command line")
+    analysis = analyse_track(loaded.track, scene, with_law(params or params_for(accuracy), law), loaded.traps)
+    detail(f"analysed: {loaded.path} at {accuracy}, with a scene that states {stated_keys(scene)}")
+    return AnalysedRun(loaded, analysis, accuracy, classic(loaded.track, scene) if with_classic else None)
+
+
+def with_law(params: Params, law: str | Law | None) -> Params:
+    """Return options by which results are stated by one damping law.
+
+    Parameters
+    ----------
+    params : pipeline.analyse.Params
+    law : str or None
+        Name of a law; "any" leaves the choice to the recording, whatever the scene states; None leaves the options as
+        they are.
+    """
+    if law is None:
+        return params
+    stated = {"from_scene": False} if law == ANY_LAW else {"stated": law}
+    return replace(params, damping=replace(params.damping, **stated))
+
+
+def law_line(analysis: Analysis, recording: Path, scene_file: str | Path | None) -> str:
+    """Return a line that names the damping law which a scene states; empty where none does, or an option did.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    recording : Path
+    scene_file : path or None
+        That was given for it; None: its scene is noted next to the recording or stands inside it.
+    """
+    law = analysis.scene.damping_law
+    if law is None or not analysis.params.damping.from_scene or analysis.params.damping.stated != law:
+        return ""
+    if scene_file is None:
+        noted = about_of(recording)
+        scene_file = recording if noted.scene is None else noted.path
+    return f"damping law {law}: stated in {scene_file}"
+
+
+def analyse_track(track: Track, scene: Scene, params: Params, traps: Sequence[Trap] = ()) -> Analysis:
+    """Analyse samples; the findings include what their reader has seen.
+
+    Parameters
+    ----------
+    track : Track
+    scene : Scene
+    params : pipeline.analyse.Params
+    traps : sequence of Trap
+        Of the reader.
+    """
+    found = analyse(track, scene, params)
+    return replace(found, findings=with_traps(found.findings, traps))
 
 
 def scene_of(loaded: Loaded, given: Scene | None) -> Scene:
@@ -165,7 +287,7 @@ def make_folder(path: str | Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ProgramError(
-            f"{folder}: a folder for results was demanded, {error.strerror}; name another with --out", USAGE
+            f"{folder}: cannot make the folder for results ({error.strerror}); name another with -o", USAGE
         ) from error
     return folder
 

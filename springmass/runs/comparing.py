@@ -10,12 +10,13 @@ from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.damping.joint import JointDamping, JointFit, fit_joint
 from pipeline.errors import AnalysisError
+from pipeline.findings.finding import Finding
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.checks.finding import Finding
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
+from pipeline.results.derive import limited
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.analysing import Analysed
-from springmass.runs.json_results import SCHEMA, picked, plain
+from springmass.runs.json_results import SCHEMA, parameters_json, picked, plain
 
 __all__ = ["Compared", "compare_analysed", "comparison_json", "demand_one_spring"]
 
@@ -172,5 +173,6 @@ def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Fin
 
 
 def _law(fit: JointFit) -> dict[str, Any]:
-    told = ("reduced_chi2", "dof", "bic", "excess_chi2", "excess_dof", "rejection")
-    return {"parameters": fit.coefficients.estimates(), **picked(fit, told)}
+    keys = ("reduced_chi2", "dof", "bic", "excess_chi2", "excess_dof", "rejection")
+    coefficients = {name: limited(fit.law, name, x) for name, x in fit.coefficients.estimates().items()}
+    return {"parameters": parameters_json(coefficients), **picked(fit, keys)}

@@ -13,14 +13,14 @@ from acquisition.recordings.identify import sniff
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.runs.loading import kind_of
 
-__all__ = ["Found", "files_of"]
+__all__ = ["InputFile", "files_of"]
 
 NAMED = 5  # files that a message names
 _LATER_LOG = re.compile(r"\.\d{3,}\.wire$")
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class InputFile:
     """One file to analyse.
 
     Parameters
@@ -39,7 +39,7 @@ class Found:
 
 def files_of(
     inputs: Sequence[str], *, deep: bool = False, known: Collection[str] = (), but: Collection[str] = ()
-) -> tuple[list[Found], list[str]]:
+) -> tuple[list[InputFile], list[str]]:
     """Return the files that inputs name, and what to say of folders: what in them is no recording.
 
     Parameters
@@ -62,26 +62,24 @@ def files_of(
     -----
     In a folder ``X_velocity.txt`` belongs to ``X_position.txt``, and logs to the run file or the log of their name.
     """
-    found: list[Found] = []
-    said: list[str] = []
+    found: list[InputFile] = []
+    messages: list[str] = []
     for number, text in enumerate(inputs):
         if not Path(text).is_dir():
-            found.append(Found(text, None, number))
+            found.append(InputFile(text, None, number))
             continue
-        taken: list[Found] = []
+        taken: list[InputFile] = []
         others: list[str] = []
         for folder in _folders(Path(text), but) if deep else (Path(text),):
             in_it, not_in_it = _in_folder(folder, number, known, but)
             taken += in_it
             others += [str((folder / name).relative_to(text)) for name in not_in_it]
         if not taken:
-            raise ProgramError(
-                f"{text}: a folder with recordings was demanded, got none in it{_named(others)}", UNREADABLE
-            )
+            raise ProgramError(f"{text}: expected a folder with recordings, got none{_named(others)}", UNREADABLE)
         files = "file" if len(others) == 1 else "files"
-        said.append(f"{text}: {len(taken)} recordings; {len(others)} other {files}{_named(others)}")
+        messages.append(f"{text}: {len(taken)} recordings; {len(others)} other {files}{_named(others)}")
         found += taken
-    return found, said
+    return found, messages
 
 
 def _named(others: Sequence[str]) -> str:
@@ -106,7 +104,7 @@ def _folders(top: Path, but: Collection[str]) -> Iterator[Path]:
 
 def _in_folder(
     folder: Path, number: int, known: Collection[str], but: Collection[str]
-) -> tuple[list[Found], list[str]]:
+) -> tuple[list[InputFile], list[str]]:
     try:
         files = sorted(
             path
@@ -114,16 +112,17 @@ def _in_folder(
             if path.is_file() and not path.name.startswith(".") and not (but and os.path.abspath(path) in but)
         )
     except OSError as error:
-        raise ProgramError(
-            f"{folder}: a folder to read was demanded, {error.strerror}; name another", UNREADABLE
-        ) from error
+        raise ProgramError(f"{folder}: cannot read the folder ({error.strerror}); name another", UNREADABLE) from error
     names = {path.name for path in files}
     pairs = {path.name: name for path in files if (name := _velocity_of(path)) in names}
     parts = set(_parts(files)) | set(pairs.values())
     taken = [path for path in files if path.name not in parts and (str(path) in known or _is_recording(path))]
     kept = {path.name for path in taken} | parts
     return (
-        [Found(str(path), str(folder / pairs[path.name]) if path.name in pairs else None, number) for path in taken],
+        [
+            InputFile(str(path), str(folder / pairs[path.name]) if path.name in pairs else None, number)
+            for path in taken
+        ],
         [path.name for path in files if path.name not in kept],
     )
 

@@ -12,25 +12,28 @@ from typing import Any
 
 from acquisition.recordings.recording import Trap
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.registry.findings import FINDINGS, UNKNOWN_CODE
+from pipeline.findings.finding import Finding, by_severity
+from pipeline.findings.registry import FINDINGS, UNKNOWN_CODE
+from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.budget import Contribution
-from pipeline.results.checks.finding import Finding, by_severity
 from pipeline.results.classic import Classic
+from pipeline.results.derive import Derived
 from springmass import __version__
 from springmass.runs.loading import Loaded
 
 __all__ = [
     "SCHEMA",
-    "all_findings",
     "input_of",
+    "parameters_json",
     "picked",
     "plain",
     "provenance_of",
     "rejected",
     "result_of",
+    "with_traps",
 ]
 
-SCHEMA = 1
+SCHEMA = 2
 _REJECTED_WARNINGS = frozenset({"sensor_lost"})
 
 
@@ -75,7 +78,7 @@ def result_of(
         "correlations": _correlations(analysis, wanted=classic is None),
         "damping": _damping(analysis, wanted=classic is None),
         "effects": analysis.effects,
-        "findings": all_findings(loaded, analysis),
+        "findings": analysis.findings,
         "provenance": provenance_of(accuracy, parameters, time_utc),
     }
     return {key: plain(value) for key, value in content.items()}
@@ -103,31 +106,35 @@ def input_of(loaded: Loaded) -> dict[str, Any]:
 
 def _recorded(loaded: Loaded) -> dict[str, Any]:
     """Return what was noted while a run was recorded, and afterwards: marks, trigger and other events, calibration."""
-    told = loaded.provenance
+    provenance = loaded.provenance
     return {
-        "start_time": told.get("start_time"),
-        "calibration": (told.get("sensor") or {}).get("calibration") or {},
-        "events": list(told.get("events", ())),
-        "marks": list(told.get("marks", ())),
-        "notes": list(told.get("notes", ())),
+        "start_time": provenance.get("start_time"),
+        "calibration": (provenance.get("sensor") or {}).get("calibration") or {},
+        "events": list(provenance.get("events", ())),
+        "marks": list(provenance.get("marks", ())),
+        "notes": list(provenance.get("notes", ())),
     }
 
 
-def all_findings(loaded: Loaded, analysis: Analysis) -> tuple[Finding, ...]:
-    """Return the analysis's findings and those that reading the file gave, the gravest first."""
-    findings = list(analysis.findings)
-    known = {f.code for f in findings}
-    for trap in loaded.traps:
-        if trap.code not in known:
-            findings.append(_of_reader(trap))
-    return by_severity(findings)
+def with_traps(findings: Sequence[Finding], traps: Sequence[Trap]) -> tuple[Finding, ...]:
+    """Return the findings of an analysis and those of the reader, the gravest first."""
+    known = {finding.code for finding in findings}
+    return by_severity([*findings, *(_of_reader(trap) for trap in traps if trap.code not in known)])
 
 
 def _of_reader(trap: Trap) -> Finding:
     if trap.code in FINDINGS:
-        return Finding(trap.code, FINDINGS[trap.code][0], trap.message)
+        return Finding(trap.code, FINDINGS[trap.code].severities[0], _sentence(trap.message))
     # A run file may come from a version that knows more codes than this one.
-    return Finding(UNKNOWN_CODE, FINDINGS[UNKNOWN_CODE][0], f"{trap.code}: {trap.message}")
+    return Finding(UNKNOWN_CODE, FINDINGS[UNKNOWN_CODE].severities[0], f"{trap.code}: {trap.message}")
+
+
+def _sentence(clause: str) -> str:
+    """Return a clause, as a reader of files words it, in the form of every other finding."""
+    end = "" if clause.endswith((".", '"')) else "."
+    first = clause.split(" ", 1)[0]
+    # A name, of a file for example, keeps its letters.
+    return (clause[0].upper() + clause[1:] if first.isalpha() else clause) + end
 
 
 def _quality(loaded: Loaded, analysis: Analysis) -> dict[str, int]:
@@ -164,11 +171,59 @@ def _correlations(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
 
 def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
     if not wanted or not isinstance(analysis.motion, Oscillation):
-        return {"selected": None, "admissible": [], "laws": {}}
-    damping = analysis.motion.damping
-    told = ("reduced_chi2", "dof", "bic", "rejected")
-    laws = {name: {"parameters": fit.joint.estimates(), **picked(fit, told)} for name, fit in damping.fits.items()}
-    return {**picked(damping, ("selected", "admissible")), "laws": laws}
+        return {
+            "selected": None,
+            "admissible": [],
+            "stated": None,
+            "law": None,
+            "weights": {},
+            "of_law": [],
+            "coefficients": {},
+            "leading": None,
+            "laws": {},
+        }
+    damping, derived = analysis.motion.damping, analysis.motion.derived
+    keys = ("reduced_chi2", "dof", "bic", "rejected")
+    laws = {
+        name: {"parameters": parameters_json(derived.parameters_of(fit)), **picked(fit, keys)}
+        for name, fit in damping.fits.items()
+    }
+    return {
+        **picked(damping, ("selected", "admissible")),
+        "stated": damping.stated or None,
+        "law": derived.law or None,
+        "weights": {one.fit.name: one.weight for one in derived.laws},
+        "of_law": sorted(derived.of_law),
+        "coefficients": _coefficients(derived),
+        "leading": None if derived.leading is None else _by_leading_law(derived.leading),
+        "laws": laws,
+    }
+
+
+def _by_leading_law(derived: Derived) -> dict[str, Any]:
+    """Return the numbers that depend on the law, as they are if the law that is clearly ahead holds."""
+    return {
+        "law": derived.law,
+        "estimates": {name: x for name, x in derived.estimates.items() if name in derived.of_law},
+        "coefficients": _coefficients(derived),
+    }
+
+
+def _coefficients(derived: Derived) -> dict[str, Any]:
+    law = derived.laws[0].fit.name
+    return {name: {**x, "law": law} for name, x in parameters_json(derived.coefficients).items()}
+
+
+def parameters_json(estimates: Mapping[str, Estimate]) -> dict[str, dict[str, Any]]:
+    """Return parameters of a law, with whether each is determined and, where it is not, below what it lies."""
+    return {
+        name: {
+            **plain(x),
+            "determined": not isinstance(x, UpperLimit),
+            "upper_limit": x.limit if isinstance(x, UpperLimit) else None,
+        }
+        for name, x in estimates.items()
+    }
 
 
 def picked(thing: object, names: Sequence[str]) -> dict[str, Any]:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
+import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,15 +19,15 @@ import numpy as np
 from acquisition.block import Block
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.identify import open_recording
-from acquisition.recordings.questions import Missing, Need, Question
+from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
 from acquisition.source import SourceInfo
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, detail, tell
-from springmass.layout import part
+from springmass.layout import STDIN, part
 from springmass.runs.about import about_of
-from springmass.runs.questions import for_python
+from springmass.runs.options import READ, ReadOptions
 from springmass.runs.tracks import to_track
 from storage.errors import RunDamaged
 from storage.recovery.recover import recover
@@ -32,10 +35,11 @@ from storage.run_file.layout import MAGIC
 from storage.run_file.reading import CHECKED, open_run
 from storage.wire_log.records import MAGIC as WIRE_MAGIC
 
-__all__ = ["Loaded", "cut", "kind_of", "load", "sample_data"]
+__all__ = ["Loaded", "between", "cut", "kind_of", "load", "sample_data"]
 
 UNVERIFIED = "unverified"
 NAMED = 5  # differences that a message names
+_OF_FILES = frozenset({"velocity", "channel", "rate_hz", "unit", "run", "time", "time_unit"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +95,7 @@ class Loaded:
         Raises
         ------
         storage.errors.StorageError
-            If one inside a run file is not what was written, or the run file is another by now.
+            If one inside a run file has a checksum mismatch, or the run file has changed since.
         """
         return self.take_originals()
 
@@ -112,40 +116,16 @@ class Loaded:
             yield self.samples[start : start + size]
 
 
-def load(
-    path: str | Path,
-    *,
-    velocity: str | Path | None = None,
-    channel: str | None = None,
-    rate_hz: float | None = None,
-    unit: str | None = None,
-    run: str | None = None,
-    time: str | None = None,
-    time_unit: str | None = None,
-    from_s: float | None = None,
-    to_s: float | None = None,
-    unverified: bool = False,
-    clock_ppm: float | None = None,
-) -> Loaded:
+def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
     """Read a recording, a run file or a wire log.
 
-    A run file is held against its digests, all of it, before anybody sees a sample.
+    All digests of a run file are checked before a sample is used.
 
     Parameters
     ----------
     path : path
-    velocity : path, optional
-        The velocity file that belongs to a position file; joined by time.
-    channel, rate_hz, unit, run, time, time_unit : optional
-        What the file leaves out or leaves open. Of a wire log of several sensors ``channel`` names one, by its number
-        or its port.
-    from_s, to_s : float, optional
-        Use samples of these seconds only; the rest stays in the file.
-    unverified : bool
-        Whether a run file that is not what was written is read all the same. What differs is said on stderr, and in a
-        trap of the code "unverified" that goes into whatever is made of it.
-    clock_ppm : float, optional
-        What the sensor's clock may be off at most, ppm; left out, what the run file or the sensor's family says.
+        :data:`springmass.layout.STDIN` for standard input.
+    options : ReadOptions
 
     Raises
     ------
@@ -156,47 +136,59 @@ def load(
     ProgramError
         If no sample lies within the seconds asked for.
     """
+    if str(path) == STDIN:
+        return _load_stdin(options)
     where = Path(path)
     kind = kind_of(where)
-    answers = {"velocity": velocity, "rate_hz": rate_hz, "unit": unit, "run": run, "time": time, "time_unit": time_unit}
-    try:
-        if kind == "run":
-            _refuse(where, "a run file", {**answers, "channel": channel})
-            loaded = _load_run(where, unverified=unverified)
-        elif kind == "wire":
-            _refuse(where, "a wire log", answers)
-            loaded = _load_wire(where, channel)
-        else:
-            recording = open_recording(
+    if kind == "run":
+        _refuse(where, "a run file", options, ())
+        loaded = _load_run(where, unverified=options.unverified)
+    elif kind == "wire":
+        _refuse(where, "a wire log", options, ("channel",))
+        loaded = _load_wire(where, options.channel)
+    else:
+        loaded = _from_recording(
+            where,
+            open_recording(
                 where,
-                channel=channel,
-                rate_hz=rate_hz,
-                unit=unit,
-                run=run,
-                time=time,
-                time_unit=time_unit,
-                velocity_path=velocity,
-            )
-            loaded = _from_recording(where, recording)
-    except NeedsAnswer as asked:
-        given = {**answers, "channel": channel, "from_s": from_s, "to_s": to_s, "clock_ppm": clock_ppm}
-        raise asked.with_remedy(for_python(asked.question, "springmass.load", given)) from None
+                channel=options.channel,
+                rate_hz=options.rate_hz,
+                unit=options.unit,
+                run=options.run,
+                time=options.time,
+                time_unit=options.time_unit,
+                velocity_path=options.velocity,
+            ),
+        )
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             complain(f"{where}: {trap.message}")
-    if told := (about := about_of(where)).described():
-        tell(f"{about.path}: {told} noted beside the recording")
+    if described := (about := about_of(where)).described():
+        tell(f"{about.path}: {described} read from the notes next to the file")
         scene = loaded.scene if about.scene is None else about.scene.to_mapping()
         marks = [*loaded.provenance.get("marks", ()), *({"t_s": t_s, "text": text} for t_s, text in about.marks)]
         noted = {"marks": marks} if marks else {}
         if about.notes:
             noted["notes"] = list(about.notes)
         loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
-    told = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
-    detail(f"read: {where}: {told} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
-    if clock_ppm is not None:
-        loaded = replace(loaded, track=replace(loaded.track, clock_limit=clock_ppm * 1e-6))
-    return replace(loaded, track=cut(loaded.track, from_s, to_s, where=where))
+    summary = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
+    detail(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
+    if options.clock_ppm is not None:
+        loaded = replace(loaded, track=replace(loaded.track, clock_limit=options.clock_ppm * 1e-6))
+    return replace(loaded, track=cut(loaded.track, options.from_s, options.to_s, where=where))
+
+
+def _load_stdin(options: ReadOptions) -> Loaded:
+    """Read what stands on standard input; the formats need a file to go back and forth in."""
+    with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
+        spooled = Path(folder) / "stdin"
+        if sys.stdin is None:
+            raise ProgramError("standard input is closed; name a file", UNREADABLE)
+        with open(spooled, "wb") as file:
+            shutil.copyfileobj(sys.stdin.buffer, file)
+        loaded = load(spooled, options)
+        originals, sha256 = loaded.originals, loaded.sha256  # while the file is there
+    return replace(loaded, path=Path(STDIN), take_originals=lambda: originals, take_sha256=lambda: sha256)
 
 
 def sample_data() -> Path:
@@ -219,9 +211,9 @@ def kind_of(path: Path) -> Literal["run", "wire", "recording"]:
     return "wire" if head.startswith(WIRE_MAGIC) else "recording"
 
 
-def _refuse(path: Path, what: str, answers: Mapping[str, object]) -> None:
-    """Demand that nothing was said of a file that says it all."""
-    given = [name for name, value in answers.items() if value is not None]
+def _refuse(path: Path, what: str, options: ReadOptions, allowed: Sequence[str]) -> None:
+    """Demand that nothing was stated about a file that holds it all."""
+    given = [name for name in options.given() if name in _OF_FILES and name not in allowed]
     if given:
         raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out", USAGE)
 
@@ -247,8 +239,8 @@ def _from_recording(path: Path, recording: Recording) -> Loaded:
 
 def _origin(recording: Recording) -> dict[str, Any]:
     """Return what an old recording says of where and when it comes from."""
-    told = {"start_time": recording.start_time, "recorded_run": recording.run}
-    return {name: value for name, value in told.items() if value}
+    origin = {"start_time": recording.start_time, "recorded_run": recording.run}
+    return {name: value for name, value in origin.items() if value}
 
 
 def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
@@ -264,7 +256,7 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
             if unverified:
                 raise
             remedy = f"{error.remedy}, or look at it as it is with --unverified"
-            raise RunDamaged(path, error.demand, remedy) from error
+            raise RunDamaged(path, error.problem, remedy) from error
         return Loaded(
             path,
             "run",
@@ -284,10 +276,10 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
 
 
 def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[Trap, ...]:
-    """Say what of a run file is not what was written."""
+    """Say which parts of a run file have a checksum mismatch."""
     if not differing:
         return ()
-    named = "; ".join(error.demand for error in differing[:NAMED])
+    named = "; ".join(error.problem for error in differing[:NAMED])
     more = f"; and {len(differing) - NAMED} more" if len(differing) > NAMED else ""
     message = f"{path.name} did not verify and was read all the same: {named}{more}."
     return (Trap(UNVERIFIED, message, len(differing)),)
@@ -304,7 +296,7 @@ def _stamp(path: Path) -> tuple[int, int, int] | None:
 
 def _demand_same(path: Path, stamp: tuple[int, int, int] | None) -> None:
     if _stamp(path) != stamp:
-        raise ProgramError(f"{path}: the file that was loaded was demanded, got another; load it again", UNREADABLE)
+        raise ProgramError(f"{path}: the file has changed since it was loaded; load it again", UNREADABLE)
 
 
 def _originals_of(path: Path, stamp: tuple[int, int, int] | None, unverified: bool) -> tuple[Original, ...]:
@@ -333,7 +325,7 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
         if len(wanted) != 1:
             sensors = ", ".join(f"{number} at {each.sensor.port}" for number, each in names.items())
             refused = "" if channel is None else f'channel "{channel}" is not in the log, '
-            need = Need(Missing.CHANNEL, tuple(names), next(iter(names)))
+            need = MissingItem(Missing.CHANNEL, tuple(names), next(iter(names)))
             raise NeedsAnswer(Question(str(path), (need,), reason=f"{refused}the log holds the sensors {sensors}"))
         loaded = _load_run(wanted[0].path)
         originals = loaded.originals  # while the run file is there
@@ -363,15 +355,20 @@ def cut(track: Track, from_s: float | None, to_s: float | None, *, where: object
     ProgramError
         If no sample lies there.
     """
-    if from_s is None and to_s is None:
-        return track
-    t = track.t
     low = -np.inf if from_s is None else from_s
     high = np.inf if to_s is None else to_s
-    keep = (t >= low) & (t <= high)
-    if not keep.any():
-        told = t[np.isfinite(t)]
-        span = f"spans {told.min():g} to {told.max():g} s" if told.size else "holds no sample"
+    part = between(track, low, high)
+    if not len(part) and (from_s, to_s) != (None, None):
+        times = track.t[np.isfinite(track.t)]
+        span = f"spans {times.min():g} to {times.max():g} s" if times.size else "holds no sample"
         raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s; the record {span}", USAGE)
+    return part
+
+
+def between(track: Track, low_s: float, high_s: float) -> Track:
+    """Return the samples between two times, both included; all where neither time is finite."""
+    if math.isinf(low_s) and math.isinf(high_s):
+        return track
+    keep = (track.t >= low_s) & (track.t <= high_s)
     velocity = None if track.velocity is None else track.velocity[keep]
-    return replace(track, t=t[keep], y=track.y[keep], flags=track.flags[keep], velocity=velocity)
+    return replace(track, t=track.t[keep], y=track.y[keep], flags=track.flags[keep], velocity=velocity)

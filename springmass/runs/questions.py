@@ -73,8 +73,8 @@ def for_command(question: Question, words: Sequence[str], given: Mapping[str, ob
 
     Examples
     --------
-    >>> from acquisition.recordings.questions import Need
-    >>> question = Question("run.csv", (Need(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
+    >>> from acquisition.recordings.questions import MissingItem
+    >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
     >>> for_command(question, ["springmass", "convert", "run.csv", "run.h5"], {"channel": "theta"})
     'springmass convert run.csv run.h5 --channel theta --unit rad'
     """
@@ -83,13 +83,13 @@ def for_command(question: Question, words: Sequence[str], given: Mapping[str, ob
         # Options follow, so a file's name that begins with a minus is written as one that does not.
         at = list(words).index("--")
         words = [*words[:at], *(f"./{word}" if word.startswith("-") else word for word in words[at + 1 :])]
-    return " ".join(each for each in (*map(quoted, words), kept, _asked_as_options(question)) if each)
+    return " ".join(each for each in (*map(quoted, words), kept, _examples_as_options(question)) if each)
 
 
 def for_course(question: Question) -> str:
     """Return how the question of one recording of a course is answered: in the table of runs, or for all of them."""
     columns = ", ".join(question.missing)
-    return f"fill in {columns} in the table of runs, or give batch {_asked_as_options(question)} for all recordings"
+    return f"fill in {columns} in the table of runs, or give batch {_examples_as_options(question)} for all recordings"
 
 
 def for_python(question: Question, function: str, given: Mapping[str, object]) -> str:
@@ -105,20 +105,20 @@ def for_python(question: Question, function: str, given: Mapping[str, object]) -
 
     Examples
     --------
-    >>> from acquisition.recordings.questions import Need
-    >>> question = Question("run.csv", (Need(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
+    >>> from acquisition.recordings.questions import MissingItem
+    >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
     >>> for_python(question, "springmass.load", {"channel": "theta"})
     'springmass.load("run.csv", channel="theta", unit="rad")'
     """
     kept = as_arguments(_without(given, question))
-    asked = ", ".join(
+    examples = ", ".join(
         f"{name}=R" if name == Missing.RATE_HZ else as_arguments({name: value})
         for name, value in question.examples.items()
     )
-    return f"{function}({', '.join(each for each in (_literal(question.path), kept, asked) if each)})"
+    return f"{function}({', '.join(each for each in (_literal(question.path), kept, examples) if each)})"
 
 
-def _asked_as_options(question: Question) -> str:
+def _examples_as_options(question: Question) -> str:
     # An example of a rate would be copied as if it were the file's.
     return " ".join(
         f"{option_of(name)} R" if name == Missing.RATE_HZ else as_options({name: value})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,12 +13,14 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import USAGE, ProgramError, complain
 
-__all__ = ["amended", "ask_about", "read_scene", "read_scenes", "read_tables", "stated_keys"]
+__all__ = ["Amendments", "amended", "ask_about", "read_scene", "read_scenes", "read_tables", "stated_keys"]
 
+Amendments = Mapping[tuple[str, str], Mapping[str, float]]
+"""Table and key of a scene to the value and its standard uncertainty."""
 LONGEST_SCENE = 1 << 14  # bytes; of longer ones some take seconds to parse
 
 
-def read_scenes(paths: Sequence[str], count: int) -> list[Scene | None]:
+def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
     """Read one scene a run: one file for all of them, or one for each in their order; None without a file.
 
     Raises
@@ -59,15 +62,15 @@ def read_tables(path: str | Path) -> dict[str, Any]:
             content = file.read(LONGEST_SCENE + 1) or b""
         if len(content) > LONGEST_SCENE:
             raise ProgramError(
-                f"{path}: a scene file of at most {LONGEST_SCENE} bytes was demanded, got a longer one; "
+                f"{path}: expected a scene file of at most {LONGEST_SCENE} bytes, got a longer one; "
                 "name the scene, not the recording",
                 USAGE,
             )
-        return tomllib.loads(content.decode())
+        # On Windows, PowerShell 5 writes `springmass scene > bench.toml` in UTF-16, and editors add a byte order mark.
+        utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        return tomllib.loads(content.decode("utf-16" if utf16 else "utf-8-sig"))
     except OSError as error:
-        raise ProgramError(
-            f"{path}: a scene file was demanded, got none ({error.strerror}); check the name", USAGE
-        ) from error
+        raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name", USAGE) from error
     # A number of thousands of digits is a plain ValueError, brackets nested by the thousand end Python's own reader.
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
@@ -82,7 +85,7 @@ def _scene_of(tables: Any, where: str) -> Scene:
         raise ProgramError(str(error), USAGE) from error
 
 
-def amended(scene: Scene, values: Mapping[tuple[str, str], Mapping[str, float]], *, where: str) -> Scene:
+def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
     """Return a scene with some values replaced.
 
     Parameters

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from acquisition.errors import AcquisitionError, FormatError, NeedsAnswer
+from acquisition.errors import AcquisitionError, FormatError, NeedsAnswer, UnknownFormat
 from acquisition.recordings.base import read_bytes
 from acquisition.recordings.identify import inspect, sniff
 from acquisition.recordings.parts import members
@@ -38,6 +38,8 @@ class Entry:
         Options that it asks for.
     error : str
         Why it cannot be read; empty where it can.
+    recognised : bool
+        Whether a family of recordings recognises its content.
     """
 
     file: str
@@ -47,6 +49,7 @@ class Entry:
     span_s: float | None = None
     missing: tuple[str, ...] = ()
     error: str = ""
+    recognised: bool = True
 
 
 def is_shelf(path: Path) -> bool:
@@ -85,20 +88,21 @@ def _entry(path: Path, name: str) -> Entry:
     try:
         try:
             loaded = load(path)
-        except NeedsAnswer as asked:
-            return _asked(path, name, asked)
+        except NeedsAnswer as unanswered:
+            return _unanswered_entry(path, name, unanswered)
     except (AcquisitionError, StorageError, ProgramError) as error:
-        return Entry(name, "", error=str(error).removeprefix(str(path)).lstrip(":, "))
+        text = str(error).removeprefix(str(path)).lstrip(":, ")
+        return Entry(name, "", error=text, recognised=not isinstance(error, UnknownFormat))
     t = loaded.samples.t[np.isfinite(loaded.samples.t)]
     span = float(t.max() - t.min()) if t.size else None
     return Entry(name, loaded.format, (loaded.channel,), loaded.info.rate_hz, span)
 
 
-def _asked(path: Path, name: str, asked: NeedsAnswer) -> Entry:
+def _unanswered_entry(path: Path, name: str, unanswered: NeedsAnswer) -> Entry:
     found = inspect(path)
-    missing = tuple(each.value.replace("_", "-") for each in asked.question.missing)
-    told = [each for each in found.surveys if each.samples]
-    channels = tuple(dict.fromkeys(each.channel for each in told))
-    timed = bool(told) and not {Missing.RATE_HZ, Missing.TIME_UNIT} & {*asked.question.missing}
-    rate_hz, span_s = (told[0].rate_hz, told[0].span_s) if timed else (None, None)
+    missing = tuple(each.value.replace("_", "-") for each in unanswered.question.missing)
+    surveys = [each for each in found.surveys if each.samples]
+    channels = tuple(dict.fromkeys(each.channel for each in surveys))
+    timed = bool(surveys) and not {Missing.RATE_HZ, Missing.TIME_UNIT} & {*unanswered.question.missing}
+    rate_hz, span_s = (surveys[0].rate_hz, surveys[0].span_s) if timed else (None, None)
     return Entry(name, found.format, channels, rate_hz, span_s, missing)

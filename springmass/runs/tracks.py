@@ -69,16 +69,16 @@ def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str,
         return {}
     noted = provenance.get("decoding", {}).get("clock", {})
     # By the pings, whose times no sample has; a file of an earlier version leaves the comparison to its reader.
-    told = noted if noted.keys() >= COMPARED else _compared_anew(samples)
+    comparison = noted if noted.keys() >= COMPARED else _compared_anew(samples)
     clock = {
         "clock_limit": 1e-6 * noted.get("limit_ppm", RESONATOR_PPM),
-        "held_samples": told["held_readings"],
-        "longest_stall_s": told["longest_stall_s"],
+        "held_samples": comparison["held_readings"],
+        "longest_stall_s": comparison["longest_stall_s"],
     }
-    if told["rate_error_ppm"] is None or told["u_rate_error_ppm"] is None:
+    if comparison["rate_error_ppm"] is None or comparison["u_rate_error_ppm"] is None:
         return clock
-    rate, u_rate = told["rate_error_ppm"] * 1e-6, told["u_rate_error_ppm"] * 1e-6
-    return {**clock, "rate_error": rate, "u_rate_error": u_rate, "compared_s": told["span_s"]}
+    rate, u_rate = comparison["rate_error_ppm"] * 1e-6, comparison["u_rate_error_ppm"] * 1e-6
+    return {**clock, "rate_error": rate, "u_rate_error": u_rate, "compared_s": comparison["span_s"]}
 
 
 def _compared_anew(samples: Block) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
         return {}
     calibration = Calibration.from_mapping(sensor.get("calibration", {}))
     known = {"u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
-    # Families that state a distance have applied a speed of their own that nobody knows.
+    # Families that state a distance have applied an unknown speed of sound.
     if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
         known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
     return known

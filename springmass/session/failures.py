@@ -1,4 +1,4 @@
-"""What failed beside the recording: counted, written into the run once, and said at its end."""
+"""What failed during the recording without ending it: counted, written into the run once, and reported at its end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from storage.errors import one_line
 __all__ = ["Failures", "raised_at"]
 
 KINDS = 20
-"""So many different failures are told apart; the texts of those beyond are not kept, their number is."""
+"""So many different failures are counted by kind; of those beyond only the number is kept."""
 OTHERS = "others"
 
 
@@ -53,7 +53,7 @@ class Failures:
     def describe(self) -> Iterator[str]:
         """Yield a line for people on each kind."""
         for name, count in self.counts.items():
-            yield f"beside the recording, which went on, {count} time{'s' * (count > 1)}: {name}"
+            yield f"during the recording, which went on, {count} time{'s' * (count > 1)}: {name}"
 
 
 def raised_at(error: BaseException) -> str:

@@ -34,11 +34,13 @@ def outdated(identity: Identity) -> bool:
 
 def settings_of(identity: Identity) -> str:
     """Return what it is set to, for people; empty where it does not say."""
-    if not (said := identity.settings):
+    if not (settings := identity.settings):
         return ""
-    spread = f", pings spread over {said['spread_us']} us" if said["spread_us"] else ""
-    thermometer = "with a thermometer" if said["thermometer"] else "no thermometer"
-    return f": {said['rate_hz']} Hz, echoes of {said['near_us']} to {said['far_us']} us{spread}, {thermometer}"
+    spread = f", pings spread over {settings['spread_us']} us" if settings["spread_us"] else ""
+    thermometer = "with a thermometer" if settings["thermometer"] else "no thermometer"
+    return (
+        f": {settings['rate_hz']} Hz, echoes of {settings['near_us']} to {settings['far_us']} us{spread}, {thermometer}"
+    )
 
 
 def _numbers(version: str) -> tuple[int, ...]:

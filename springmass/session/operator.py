@@ -36,7 +36,7 @@ LONGEST_KEEP_S = 60.0
 class Page(Protocol):
     """The page, as far as the operator speaks with it."""
 
-    asked: queue.SimpleQueue[dict[str, Any]]
+    requests: queue.SimpleQueue[dict[str, Any]]
 
     def tell(self, phase: str, **facts: Any) -> None:
         """Say where the recording stands."""
@@ -104,26 +104,26 @@ class Operator:
                 self.begin()
                 self._tell("ready")
                 since_ns = self.session.now_ns()
-            if self.page.asked.empty():
+            if self.page.requests.empty():
                 continue
-            asked = self.page.asked.get()
-            kind = asked.get("type")
+            request = self.page.requests.get()
+            kind = request.get("type")
             if kind == "record":
                 return None
             if kind == "arm":
-                return Trigger(float(asked["threshold_m"]), min(float(asked["keep_s"]), LONGEST_KEEP_S))
+                return Trigger(float(request["threshold_m"]), min(float(request["keep_s"]), LONGEST_KEEP_S))
             if kind == "close":
                 raise Closed
             if kind in ("zero", "ruler"):
-                self._measure(asked)
+                self._measure(request)
 
     def armed(self, trigger: Trigger) -> Callable[[], bool]:
         """Say that the trigger is armed; return what tells whether it shall wait no longer."""
         self._tell("armed", threshold_m=trigger.threshold_m, keep_s=trigger.keep_s)
 
         def changed() -> bool:
-            while not self.page.asked.empty():
-                kind = self.page.asked.get().get("type")
+            while not self.page.requests.empty():
+                kind = self.page.requests.get().get("type")
                 if kind == "close":
                     raise Closed
                 if kind in ("disarm", "arm", "record"):
@@ -137,12 +137,12 @@ class Operator:
         self._tell("recording", log=str(log))
         self.end()
 
-    def _measure(self, asked: Mapping[str, Any]) -> None:
+    def _measure(self, request: Mapping[str, Any]) -> None:
         self._tell("still", seconds=STILL_S)
         try:
             point = self.session.still(STILL_S)
-            if asked["type"] == "ruler":
-                point = self._against(point, float(asked["known_m"]))
+            if request["type"] == "ruler":
+                point = self._against(point, float(request["known_m"]))
                 self.begin()  # what is looked at begins anew, as it is now stated
             self.rest = point
         except CalibrationError as error:
@@ -158,7 +158,7 @@ class Operator:
         kept = [(p, k) for p, k in zip(self._points, self._known_m, strict=True) if abs(k - known_m) >= SAME_M]
         if same := [k for p, k in kept if abs(p.rest_m - measured.rest_m) < SAME_M]:
             raise CalibrationError(
-                f"{known_m:g} m by the ruler was demanded of a target that stands where {same[0]:g} m was said before; "
+                f"the target at {known_m:g} m by the ruler is where {same[0]:g} m was given before; "
                 "move the target, or give one distance"
             )
         points, known = (tuple(each) for each in zip(*kept, (measured, known_m), strict=True))
@@ -169,12 +169,12 @@ class Operator:
 
     def _tell(self, phase: str, **facts: Any) -> None:
         log = "" if self._preview is None else str(self._preview.path)
-        told: dict[str, Any] = {"log": log, "run": str(self.log.with_suffix(".h5"))}
+        fields: dict[str, Any] = {"log": log, "run": str(self.log.with_suffix(".h5"))}
         if self.rest is not None:
-            told |= {"rest_m": self.rest.rest_m, "noise_m": self.rest.noise_m}
+            fields |= {"rest_m": self.rest.rest_m, "noise_m": self.rest.noise_m}
         if self._known_m:
-            told |= {"ruler_m": self._known_m}
-        self.page.tell(phase, **(told | facts))
+            fields |= {"ruler_m": self._known_m}
+        self.page.tell(phase, **(fields | facts))
 
     @staticmethod
     def _drop(recorder: Recorder | None) -> None:

@@ -40,7 +40,7 @@ def demand_new(path: Path, sensors: int) -> None:
     for there in dict.fromkeys((path, path.with_suffix(".wire"), *run_paths(path, range(sensors)))):
         if (size := len(os.fsencode(there.name))) > longest:
             raise ProgramError(
-                f"{there}: a name of at most {longest} bytes was demanded, got {size}; choose a shorter one", USAGE
+                f"{there}: expected a name of at most {longest} bytes, got {size}; choose a shorter one", USAGE
             )
         if there.is_symlink() and not there.exists():
             raise ProgramError(f"{there}: a link to nothing stands there; remove it or choose another name", USAGE)

@@ -85,7 +85,7 @@ class Tee:
     def _proof(self, channel: int) -> Proof | None:
         """Return what has to be proven on a port that came back, by what spoke there last."""
         sensor, now = self._sensors[channel], self._channels[channel]
-        identity = self._chains[now].told.identity or (sensor.identity if now == channel else None)
+        identity = self._chains[now].status.identity or (sensor.identity if now == channel else None)
         return replace(sensor, identity=identity).proof(self._last[now])
 
     def reads(self, reads: Sequence[Read]) -> None:
@@ -166,7 +166,7 @@ class Tee:
             return bytes(self._heard[channel])
 
     def keep(self) -> None:
-        """Keep reads from here on, for a run that may begin before the moment that starts it."""
+        """Retain the data read from now on: a run may include data from before its trigger."""
         with self._lock:
             self._kept = deque()
 

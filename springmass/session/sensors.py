@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from acquisition.decoders.family import Decoder, Family, Identity, Told
+from acquisition.decoders.family import Decoder, DeviceStatus, Family, Identity
 from acquisition.decoders.registry import describe_bytes
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM
@@ -49,10 +49,10 @@ PROOF_BYTES = 4096
 
 
 class Proof:
-    """Whether what speaks on a port that came back is the sensor that was lost, or may be.
+    """Whether the device on a port that came back is, or may be, the sensor that was lost.
 
-    A name that is known and differs is another bench: it is refused, as is another wire form. Where no name is known,
-    the device's counter tells: see :class:`Counters`.
+    A device with another known name belongs to another bench: it is refused, as is another wire form. If no name is
+    known, the device's counter decides: see :class:`Counters`.
 
     Parameters
     ----------
@@ -89,9 +89,9 @@ class Proof:
         """Which sensor it is, once that is proven."""
         if self._named:
             return {"sensor": Back.IDENTIFIED}
-        judged, said = self._judged(self._last), Told.by(self._decoder).identity
+        judged, identity = self._judged(self._last), DeviceStatus.of(self._decoder).identity
         # The serial number of its adapter outweighs what it says; without a name all of a family say the same.
-        if judged is not Back.IDENTIFIED and self._identity is None and said is not None and said.name:
+        if judged is not Back.IDENTIFIED and self._identity is None and identity is not None and identity.name:
             return {"sensor": Back.ANOTHER, "why": "it says its name, and the one before had none"}
         return {"sensor": judged}
 
@@ -108,10 +108,10 @@ class Proof:
         self._bytes += len(data)
         self._since_first += len(data) if self._readings else 0
         garbage = self._decoder.faults.get("garbage_bytes", 0) - self._garbage_before
-        said = Told.by(self._decoder).identity
-        if self._identity is not None and said is not None:
-            self._named = bool(said.name)
-            if (said.model, said.name) != (self._identity.model, self._identity.name):
+        identity = DeviceStatus.of(self._decoder).identity
+        if self._identity is not None and identity is not None:
+            self._named = bool(identity.name)
+            if (identity.model, identity.name) != (self._identity.model, self._identity.name):
                 return False
             # A name is one bench's; all that nobody named say the same.
             return True if self._named or self._last is not None else None

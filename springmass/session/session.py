@@ -1,7 +1,7 @@
 """A recording session: ports opened, sensors heard, and bytes kept until somebody ends it.
 
 The reading thread brings bytes; they go to the recorder as they are, and then through the decoders. The session's own
-thread waits for the end and puts marks into the run. What is shown is worked out on a thread of its own, which takes
+thread waits for the end and puts marks into the run. What is shown is calculated on a separate thread, which takes
 samples once a second (``display``): nothing that it does or raises delays or ends the other two.
 """
 
@@ -25,20 +25,21 @@ from acquisition.live.calibration import Calibration, StillPoint, against_ruler,
 from acquisition.live.reader import PortReader
 from springmass import __version__
 from springmass.errors import SENSOR, USAGE, ProgramError
-from springmass.session.display.progress import SECOND_NS, Progress, Shown, progress_of
-from springmass.session.display.turns import Display, Samples
+from springmass.session.display.progress import SECOND_NS, LiveState, Progress, progress_of
+from springmass.session.display.thread import Display, Samples
 from springmass.session.failures import Failures
 from springmass.session.identity import meeting
+from springmass.session.options import RunLimits, RunListeners
 from springmass.session.reads import Tee
 from springmass.session.sensors import ANSWERED, Sensor
-from springmass.session.stops import Stops
+from springmass.session.stops import EndReason, Stops
 from springmass.session.trigger import Disarmed, Trigger, Watch
 from storage.errors import StorageError, WriteFailed
 from storage.recorder import Recorder, RecorderStatus
 from storage.wire_log.records import LogHeader
 from storage.wire_log.scanning import LogContents
 
-__all__ = ["Ended", "Progress", "Sensor", "Session", "Trigger"]
+__all__ = ["EndReason", "Ended", "Progress", "Sensor", "Session", "Trigger"]
 
 SAY_NS = 1_500_000_000  # silence so long before a run is said
 HEAR_S = 3.0  # silence longer than this before a run is no sensor
@@ -54,14 +55,13 @@ class Ended:
 
     Parameters
     ----------
-    by : str
-        "seconds", "Ctrl-C", "SIGTERM", "a closed terminal" or "the disk".
+    by : EndReason
     status : RecorderStatus
     log : LogContents
         What was recorded, also where the log's name does not lead to it any more.
     """
 
-    by: str
+    by: EndReason
     status: RecorderStatus
     log: LogContents
 
@@ -99,10 +99,10 @@ class Session:
     Attributes
     ----------
     failures : Failures
-        What failed beside the recording.
+        What failed during the recording without ending it.
     given_up : GivenUp or None
         What the recording gave up, where the user did not wait for the disk.
-    shown : Shown or None
+    shown : LiveState or None
         What the samples so far amount to, as far as they were shown.
     """
 
@@ -127,8 +127,8 @@ class Session:
         self._reader: PortReader | None = None
         self._reader_failure: BaseException | None = None
         self.stops = stops or Stops()
-        self._marks: list[tuple[float, str]] = []
-        self.shown: Shown | None = None
+        self._marks: list[tuple[int, str]] = []
+        self.shown: LiveState | None = None
         self.given_up: GivenUp | None = None
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
@@ -150,15 +150,15 @@ class Session:
                 line.transport.write(line.greeting)
         self._reader = PortReader(lines, self._tee, self._clock)
         self._reader.start()
-        # A slow sensor takes several of its own periods to be distinguished from silence.
+        # A slow sensor takes several of its periods to be distinguished from silence.
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
-        said_ns: int | None = self._clock.now_ns() + SAY_NS
+        due_ns: int | None = self._clock.now_ns() + SAY_NS
         while self._waits_for_word():
             mute = next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)
-            if mute is not None and said_ns is not None and self._clock.now_ns() > said_ns:
+            if mute is not None and due_ns is not None and self._clock.now_ns() > due_ns:
                 say(f"{self.sensors[mute].transport.name}: nothing readable so far; check power, wiring and --baud")
-                said_ns = None
+                due_ns = None
             if self._clock.now_ns() > deadline:
                 if mute is None:
                     return
@@ -169,21 +169,21 @@ class Session:
     def _waits_for_word(self) -> bool:
         """Whether a sensor was not heard yet, or may still answer what it is."""
         return any(
-            count < HEARD or (count < ANSWERED and sensor.family.identify and chain.told.identity is None)
+            count < HEARD or (count < ANSWERED and sensor.family.identify and chain.status.identity is None)
             for count, sensor, chain in zip(self._tee.readings, self.sensors, self._chains, strict=True)
         )
 
     def meet(self) -> list[str]:
         """Keep what the sensors said that they are, take the rate that one is set to, and return lines on it."""
-        said: list[str] = []
+        messages: list[str] = []
         for channel, sensor in enumerate(self.sensors):
-            identity = self._chains[channel].told.identity
+            identity = self._chains[channel].status.identity
             if identity is None or sensor.identity is not None:
                 continue
-            said += meeting(sensor, identity)
+            messages += meeting(sensor, identity)
             rate_hz = sensor.rate_hz or identity.settings.get("rate_hz")
             self.sensors[channel] = replace(sensor, identity=identity, rate_hz=rate_hz)
-        return said
+        return messages
 
     def still(self, seconds: float = 3.0) -> StillPoint:
         """Return rest position and noise of the first sensor's next seconds, the bob hanging still."""
@@ -228,43 +228,20 @@ class Session:
         self._tee.start(recorder, chains, self._clock.now_ns(), preview=True)
         return recorder
 
-    def record(
-        self,
-        log: Path,
-        *,
-        seconds: float | None,
-        trigger: Trigger | None = None,
-        rest: StillPoint | None = None,
-        progress: Callable[[Progress], None] = lambda _: None,
-        marks: queue.SimpleQueue[str] | None = None,
-        begun: Callable[[Path], None] = lambda _: None,
-        changed: Callable[[], bool] = lambda: False,
-    ) -> Ended:
+    def record(self, log: Path, limits: RunLimits, listeners: RunListeners) -> Ended:
         """Record until the seconds are over, the user ends it or the disk takes nothing more.
 
         Parameters
         ----------
         log : Path
             The wire log to make.
-        seconds : float or None
-            How long; None: until the user ends it.
-        trigger : Trigger, optional
-            Left out, it starts at once.
-        rest : StillPoint, optional
-            What the trigger measures from; left out, the distance when it began to wait.
-        progress : callable
-            Called about once a second, on a thread of its own.
-        marks : queue of str, optional
-            Marks to put into the run.
-        begun : callable
-            Called with the log's path once reads go there.
-        changed : callable
-            Whether it shall wait for the trigger no longer; asked while it does.
+        limits : RunLimits
+        listeners : RunListeners
 
         Raises
         ------
         Disarmed
-            If ``changed`` said so.
+            If ``listeners.changed`` said so.
         storage.errors.WriteFailed
             If the log cannot be begun.
         storage.wire_log.window.NotALog
@@ -272,31 +249,32 @@ class Session:
         KeyboardInterrupt
             If the user would not wait for the disk to take what is queued; the log stays, without its end.
         """
+        trigger, rest = limits.trigger, limits.rest
         if trigger is not None and any(sensor.options.get("temperature_every") for sensor in self.sensors):
             raise ProgramError(
-                "--trigger keeps replies from before, which cannot be told from temperatures; "
+                "--trigger keeps replies from before, which cannot be distinguished from temperatures; "
                 "leave --option temperature_every out",
                 USAGE,
             )
-        moment_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, progress, changed)
+        moment_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, listeners)
         since_ns = moment_ns if trigger is None else moment_ns - int(trigger.keep_s * 1e9)
         # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
         self._chains = [sensor.chain() for sensor in self.sensors]
         recorder = Recorder(log, self._header(), self._clock)
         with self.stops.counted():
-            display = self._display(progress)
+            display = self._display(listeners.progress)
             start_ns = self._clock.now_ns()
             self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
             try:
                 self._tee.start(recorder, self._chains, since_ns)
-                begun(recorder.path)
+                listeners.begun(recorder.path)
                 if rest is not None:
                     recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
                 if trigger is not None:
                     facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
                     # The sample's own moment: an analysis leaves out what was still before it.
                     recorder.event(0, moment_ns, "trigger", facts)
-                by = self._loop(recorder, display, start_ns, seconds, marks)
+                by = self._loop(recorder, display, start_ns, limits.seconds, listeners.marks)
             finally:
                 self._tee.stop()
                 end_ns = self._clock.now_ns()
@@ -312,7 +290,7 @@ class Session:
             self.given_up = GivenUp(recorder.give_up(), recorder.status)
             raise
         status = recorder.status
-        return Ended("the disk" if status.error else by, status, recorder.contents())
+        return Ended(EndReason.DISK if status.error else by, status, recorder.contents())
 
     def poll(self, wait_s: float) -> list[tuple[int, Block]]:
         """Wait so long, then return the blocks that came since the last call."""
@@ -336,8 +314,8 @@ class Session:
         start_ns: int,
         seconds: float | None,
         marks: queue.SimpleQueue[str] | None,
-    ) -> str:
-        """Wait for the end; return what ended the recording."""
+    ) -> EndReason:
+        """Wait for the end of the recording, and return its reason."""
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
         # Without marks a turn a second will do: the samples are shown once a second, and an error of the disk stands.
         wait_ns, tick_ns = int((1.0 if marks is None else LOOK_FOR_MARKS_S) * 1e9), start_ns + SECOND_NS
@@ -347,12 +325,12 @@ class Session:
             try:
                 self._wait_until(turn_ns)
             except KeyboardInterrupt:
-                return self.stops.by or "Ctrl-C"
+                return self.stops.by or EndReason.CTRL_C
             if recorder.status.error:
-                return "the disk"
+                return EndReason.DISK
             while marks is not None and not marks.empty():
-                recorder.mark(text := marks.get())
-                self._marks.append(((self._clock.now_ns() - start_ns) * 1e-9, text))
+                recorder.mark(text := marks.get(), host_ns=(now_ns := self._clock.now_ns()))
+                self._marks.append((now_ns, text))
                 self._ring(display, self._tee.blocks, start_ns, recorder, tick=False)
             if turn_ns == end_ns:
                 break
@@ -362,20 +340,14 @@ class Session:
                 tick_ns += SECOND_NS
         self._tee.stop()  # what comes while the last line is shown is no part of the run
         self._ring(display, self._tee.blocks, start_ns, recorder)
-        return "seconds"
+        return EndReason.SECONDS
 
-    def _wait_for(
-        self,
-        trigger: Trigger,
-        rest: StillPoint | None,
-        progress: Callable[[Progress], None],
-        changed: Callable[[], bool],
-    ) -> int:
+    def _wait_for(self, trigger: Trigger, rest: StillPoint | None, listeners: RunListeners) -> int:
         """Wait until the bob moves; return the host's time of the first sample that shows it."""
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
         keep_ns, start_ns = int(trigger.keep_s * 1e9), self._clock.now_ns()
         self._tee.keep()
-        display, tick_ns = self._display(progress), start_ns + SECOND_NS
+        display, tick_ns = self._display(listeners.progress), start_ns + SECOND_NS
         seen: deque[tuple[int, Block]] = deque(maxlen=HELD_BLOCKS)
         try:
             while True:
@@ -384,7 +356,7 @@ class Session:
                     moment_ns = watch.moment_ns(block) if channel == 0 else None
                     if moment_ns is not None:
                         return moment_ns
-                if changed():
+                if listeners.changed():
                     self._tee.let_go()
                     raise Disarmed
                 # A second more than asked for: samples may lie a moment before they are looked at.
@@ -405,7 +377,7 @@ class Session:
             self.failures.note("reader", failure)
 
     def _display(self, progress: Callable[[Progress], None]) -> Display:
-        self.shown = Shown(self._chains[0].timebase.rate_hz)
+        self.shown = LiveState(self._chains[0].timebase.rate_hz)
         return Display(self.shown, progress, self.failures)
 
     def _ring(

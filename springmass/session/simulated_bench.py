@@ -43,13 +43,18 @@ class Release:
         self.at_s = (self._clock.now_ns() - self._begun_ns) * 1e-9 + seconds
 
 
-def bench_position(scene: Scene, *, where: str = "scene", release: Release | None = None) -> Callable[[float], float]:
+def bench_position(
+    scene: Scene, seconds: float = 10.0, *, where: str = "scene", release: Release | None = None
+) -> Callable[[float], float]:
     """Return the bob's distance from the sensor, m, as a function of time, s.
 
     Parameters
     ----------
     scene : Scene
-        Bob mass, spring constant and starting displacement are needed; what else is left out is zero.
+        Bob mass, spring constant and starting displacement are needed. Where it names a disc or the air and no damping,
+        the drag is derived from them, as ``springmass simulate`` does; what else is left out is zero.
+    seconds : float
+        How long it is recorded, s: a derived drag is that of the amplitudes within it.
     where : str
         Named in errors.
     release : Release, optional
@@ -72,7 +77,9 @@ def bench_position(scene: Scene, *, where: str = "scene", release: Release | Non
     >>> f"{bench_position(scene)(0.1 * np.pi):.6f}"
     '0.200000'
     """
-    problem = Problem.from_scene(scene, where=where)
+    from springmass.runs.simulating.prepared import prepare
+
+    problem = prepare(scene, seconds, where=where).problem
     step_s = 1.0 / (STEPS_A_RADIAN * problem.equation.angular_frequency_per_s)
     solved: list[Trajectory] = []
 

@@ -1,16 +1,35 @@
-"""The user's word that a recording shall end: Ctrl-C, SIGTERM, a closed terminal."""
+"""Requests that a recording shall end: Ctrl-C, SIGTERM, a closed terminal, the page."""
 
 from __future__ import annotations
 
 import _thread
 import contextlib
+import enum
 import signal
 import threading
 from collections.abc import Iterator
 
-__all__ = ["Stops"]
+__all__ = ["EndReason", "Stops"]
 
-NAMES = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "a closed terminal"}
+
+class EndReason(enum.StrEnum):
+    """What ended a recording.
+
+    The values stand in wire logs (event ``ended``) and never change.
+    """
+
+    SECONDS = "seconds"
+    """The time that was asked for is over."""
+    CTRL_C = "Ctrl-C"
+    SIGTERM = "SIGTERM"
+    HANGUP = "a closed terminal"
+    PAGE = "the page"
+    """The button or key of its page."""
+    DISK = "the disk"
+    """The disk took nothing more."""
+
+
+SIGNALS = {"SIGINT": EndReason.CTRL_C, "SIGTERM": EndReason.SIGTERM, "SIGHUP": EndReason.HANGUP}
 
 
 class Stops:
@@ -23,18 +42,18 @@ class Stops:
 
     Attributes
     ----------
-    by : str
-        What asked for the end, for people; empty where nothing did.
+    by : EndReason or None
+        What asked first for the end; None where nothing did.
     """
 
     def __init__(self) -> None:
-        self.by = ""
+        self.by: EndReason | None = None
         self._raises = True
         self._before: dict[signal.Signals, object] = {}
 
     def __enter__(self) -> Stops:
         if threading.current_thread() is threading.main_thread():  # signals are the main thread's
-            for number in (getattr(signal, name) for name in NAMES if hasattr(signal, name)):
+            for number in (getattr(signal, name) for name in SIGNALS if hasattr(signal, name)):
                 if signal.getsignal(number) is not signal.SIG_IGN:
                     self._before[number] = signal.signal(number, self._heard)
         return self
@@ -64,7 +83,7 @@ class Stops:
         finally:
             self._raises = before
 
-    def ask(self, by: str) -> None:
+    def ask(self, by: EndReason) -> None:
         """End the recording from another thread, as the first signal would."""
         self.by = self.by or by
         main = threading.main_thread().ident
@@ -74,6 +93,6 @@ class Stops:
             _thread.interrupt_main()
 
     def _heard(self, number: int, *_: object) -> None:
-        self.by = self.by or NAMES[signal.Signals(number).name]
+        self.by = self.by or SIGNALS[signal.Signals(number).name]
         if self._raises:
             raise KeyboardInterrupt

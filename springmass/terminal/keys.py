@@ -1,4 +1,4 @@
-"""Keys that put marks into a recording: space at once, a word with Enter."""
+"""Keys that put marks into a recording: the space bar alone, or a word with Enter."""
 
 from __future__ import annotations
 

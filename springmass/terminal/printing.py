@@ -23,39 +23,63 @@ __all__ = [
 ]
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
-STANDING = ("nominal_clock", "stated_error_is_not_noise", "jittered_time", "offset_unknown", "velocity_missing")
-"""Notes that a format makes on every file of its own: they drown what this record says."""
 NAMED = 5  # runs that a line names
-FIRST = 3  # that change a number stand by themselves
+FIRST = 3  # warnings that are shown without --full
+NARROW = 80  # columns that warnings are wrapped to at most
+WARNING_LINES = 3
 
 
-def findings_text(findings: Sequence[Mapping[str, Any]], written: Callable[[str], str] = str) -> str:
-    """Return findings as wrapped lines, each with its severity and code.
+def findings_text(
+    findings: Sequence[Mapping[str, Any]], written: Callable[[str], str] = str, *, full: bool = False
+) -> str:
+    """Return findings as wrapped lines, the most harmful first, each with its severity, its code and what to do.
 
     Parameters
     ----------
     findings : sequence of mapping
-        As in the result's JSON: code, severity, message.
+        As in the result's JSON: code, severity, message, advice.
     written : callable
         How a message is written on this terminal.
+    full : bool
+        Whether to show every warning and every note; else all errors and the first three warnings.
     """
-    if not findings:
-        return "No findings."
-    standing = [f["code"] for f in findings if f["code"] in STANDING and f["severity"] == "info"]
-    own = [f for f in findings if f["code"] not in standing]
-    told = [f"{_MARKS[f['severity']]} {f['code']}: {written(f['message'])}" for f in own]
-    grave = sum(f["severity"] != "info" for f in own)
-    lines = [wrapped(one, " " * 8) for one in told]
-    if grave > FIRST:
-        lines.insert(FIRST, f"and {grave - FIRST} more that may change a number:")
+    from springmass.report.advice import STANDING, by_harm
+
+    ordered = by_harm(findings)
+    errors = [f for f in ordered if f["severity"] == "error"]
+    warnings = [f for f in ordered if f["severity"] == "warning"]
+    notes = [f for f in ordered if f["severity"] == "info"]
+    lines = [_finding_line(f, written) for f in (*errors, *(warnings if full else warnings[:FIRST]))]
+    if not full:
+        more = len(warnings) - FIRST
+        if more > 0:
+            lines.append(f"and {more} more {'warning' if more == 1 else 'warnings'}: --full")
+        return "\n".join(lines or ["No warnings."])
+    standing = [f["code"] for f in notes if f["code"] in STANDING]
+    lines += [_finding_line(f, written) for f in notes if f["code"] not in STANDING]
     if standing:
-        words = f"{_MARKS['info']} of the format, as of every file of its kind: {', '.join(standing)} (findings.md)"
-        lines.append(wrapped(words, " " * 8))
-    return "\n".join(lines)
+        words = f"{_MARKS['info']} of every file of this format: {', '.join(standing)}"
+        lines.append(wrapped(words, " " * 8, NARROW))
+    if lines:
+        lines.append("springmass explain CODE prints meaning, cause, advice and an example of each.")
+    return "\n".join(lines or ["No warnings."])
+
+
+def _finding_line(finding: Mapping[str, Any], written: Callable[[str], str]) -> str:
+    """Return severity, code, message and advice in at most three lines; an error's lines are never cut."""
+    severity, advice = finding["severity"], finding.get("advice", "")
+    message = written(finding["message"])
+    if advice and severity != "info":
+        message += f"{'' if message[-1:] in '.!?' else '.'} {advice}"
+    lines = wrapped(f"{_MARKS[severity]} {finding['code']}: {message}", " " * 8, NARROW).splitlines()
+    if severity == "error" or len(lines) <= WARNING_LINES:
+        return "\n".join(lines)
+    last = lines[WARNING_LINES - 1]
+    return "\n".join([*lines[: WARNING_LINES - 1], f"{last[: NARROW - 4].rstrip(' .,;')} ..."])
 
 
 def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], written: Callable[[str], str] = str) -> str:
-    """Return the findings of several runs that change a number, a paragraph a code, and how many notes there are.
+    """Return the warnings of several runs, one paragraph per code, and the number of notes.
 
     Parameters
     ----------
@@ -74,17 +98,17 @@ def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], writte
     lines = []
     for code, by_run in sorted(grave.items(), key=lambda item: min(f["severity"] for f in item[1].values())):
         names = [visible(name) for name in by_run]
-        told = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+        listed = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
         first = next(iter(by_run.values()))
-        head = f"{_MARKS[first['severity']]} {code}, {len(names)} of {len(runs)} runs ({told}): "
+        head = f"{_MARKS[first['severity']]} {code}, {len(names)} of {len(runs)} runs ({listed}): "
         lines.append(wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{written(first['message'])}", " " * 8))
-    lines.append(f"{notes} notes, which change no number: --json has them.")
+    lines.append(f"{notes} notes do not affect the results; --json lists them.")
     return "\n".join(lines)
 
 
 def classic_text(classic: Classic) -> str:
     """Return the report's own numbers, marked as what they are."""
-    lines = ["By the report's own method (biased, for comparison only; --help names the page on it):"]
+    lines = ["By the report's own method (biased, for comparison only):"]
     lines += [f"  {name.replace('_', ' '):<22} {estimate}" for name, estimate in classic.estimates.items()]
     return "\n".join([*lines, f"  {'chi-square of its fit':<22} {classic.chi2:.4g}"])
 
@@ -112,9 +136,9 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str
     return "\n".join([*lines, "", wrapped(comparison.message)])
 
 
-def wrapped(text: str, indent: str = "") -> str:
-    """Return text wrapped to the terminal, at most a hundred columns, lines after the first indented."""
-    width = min(shutil.get_terminal_size((100, 24)).columns, 100)
+def wrapped(text: str, indent: str = "", columns: int = 100) -> str:
+    """Return text wrapped to the terminal, at most so many columns, lines after the first indented."""
+    width = min(shutil.get_terminal_size((columns, 24)).columns, columns)
     shown = visible(" ".join(text.splitlines()))
     return textwrap.fill(shown, width, subsequent_indent=indent, break_on_hyphens=False)
 

@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 from pipeline.streaming import LiveMotion, NotYet
-from springmass.session.console import Console
-from springmass.session.display.progress import Progress
-from springmass.terminal.look import PLAIN, Look
+from springmass.session.display.progress import Progress, Trouble, TroubleKind
+from springmass.session.stops import EndReason
+from springmass.terminal.console import Console
 from springmass.terminal.quantities import concise
+from springmass.terminal.style import PLAIN, TerminalStyle
 from springmass.terminal.trace import trace_of
 
-__all__ = ["ProgressLine", "line_of", "trust_in"]
+__all__ = ["END_WORDS", "ProgressLine", "line_of", "trust_in"]
 
 # Off a terminal one line of so many is printed: working out the motion for each is a tenth of what recording costs.
 UNWATCHED_LINES = 30
-PATIENCE_S = 0.2  # a progress line that nobody reads is left out
+PATIENCE_S = 0.5  # what is shown and not taken within it has no reader, and the run says so
 SILENT_S = 1.5  # of a sensor, said in the progress line
 FIRST_MOTION_S = 1.5
 SHOWN_PERIODS, SHOWN_S = 4.0, 4.0
 KEYS = "space marks, Ctrl-C stops"
+END_WORDS = {
+    EndReason.SECONDS: "its time",
+    EndReason.CTRL_C: "Ctrl-C",
+    EndReason.SIGTERM: "SIGTERM",
+    EndReason.HANGUP: "a closed terminal",
+    EndReason.PAGE: "its page",
+    EndReason.DISK: "the disk",
+}
+"""What ended a recording, for people: "stopped by ..."."""
 
 
 class ProgressLine:
@@ -26,7 +36,7 @@ class ProgressLine:
     Parameters
     ----------
     console : Console
-    look : Look
+    style : TerminalStyle
         Of stderr; its width is asked for anew at every turn.
     trace : bool
         Whether the latest periods are drawn, where the terminal has braille.
@@ -34,46 +44,40 @@ class ProgressLine:
         Whether somebody can type marks.
     """
 
-    def __init__(self, console: Console, look: Look = PLAIN, *, trace: bool = False, keys: bool = False) -> None:
+    def __init__(
+        self, console: Console, style: TerminalStyle = PLAIN, *, trace: bool = False, keys: bool = False
+    ) -> None:
         self._console = console
-        self._look = look
-        self._trace = trace and look.unicode
+        self._style = style
+        self._trace = trace and style.unicode
         self._keys = keys
         self._shown = 0
-        self._drawn = 0
-        self._trouble = ""
+        self._trouble: TroubleKind | None = None
 
     def __call__(self, progress: Progress) -> None:
         """Show where the recording stands."""
         if progress.tick:
             self._shown += 1
-        if self._look.terminal:
-            self._draw(self._lines(progress))
+        if self._style.terminal:
+            self._console.draw(self._lines(progress))
+            self._console.wait(PATIENCE_S)
             return
-        trouble = progress.trouble.partition(":")[0]
+        trouble = progress.trouble
         if progress.tick and (self._shown == 1 or self._shown % UNWATCHED_LINES == 10):
-            self._console.write(f"{line_of(progress)}\n", PATIENCE_S)
-        elif trouble and trouble != self._trouble:
-            self._console.write(f"{progress.trouble}\n", PATIENCE_S)
-        self._trouble = trouble
+            self._console.line(line_of(progress))
+            self._console.wait(PATIENCE_S)
+        elif trouble is not None and trouble.kind is not self._trouble:
+            self._console.line(_worded(trouble))
+        self._trouble = None if trouble is None else trouble.kind
 
     def end(self) -> None:
-        """Leave the lines standing."""
-        if self._drawn:
-            self._console.write("\n", PATIENCE_S)
-
-    def _draw(self, lines: list[str]) -> None:
-        """Write lines over those of the turn before; none is as wide as the terminal, so that nothing scrolls."""
-        width = self._console.columns
-        up = f"\x1b[{self._drawn - 1}A" if self._drawn > 1 else ""
-        told = "\r\n".join(f"{line[: width - 1]}\x1b[K" for line in lines)
-        self._console.write(f"\r{up}{told}\x1b[J", PATIENCE_S)
-        self._drawn = len(lines)
+        """Leave the lines where they are."""
+        self._console.settle()
 
     def _lines(self, progress: Progress) -> list[str]:
         # The first analysis loads what it needs: troubles and keys do not wait for that.
         found = progress.motion() if progress.seconds >= FIRST_MOTION_S else NotYet("listening")
-        lines = [_head(progress, found, self._look, self._console.columns - 1)]
+        lines = [_head(progress, found, self._style, self._console.columns - 1)]
         if troubles := _troubles(progress):
             lines.append("; ".join(troubles))
         if self._trace:
@@ -108,11 +112,11 @@ def trust_in(found: LiveMotion, missing_share: float) -> str:
     return "fair" if off <= 10.0 and missing_share <= 1 / 3 else "poor"
 
 
-def _head(progress: Progress, found: LiveMotion | NotYet, look: Look, width: int) -> str:
+def _head(progress: Progress, found: LiveMotion | NotYet, style: TerminalStyle, width: int) -> str:
     """As much as fits of: time, motion and trust in it, rate, what is missing, what is safe on the disk."""
     parts = ["waiting for the bob" if progress.waiting else f"{progress.seconds:.0f} s"]
     if isinstance(found, LiveMotion):
-        parts += [f"T {concise(found.period, look)}", f"A {concise(found.amplitude, look)}"]
+        parts += [f"T {concise(found.period, style)}", f"A {concise(found.amplitude, style)}"]
         parts.append(f"trust {trust_in(found, progress.missing_share)}")
     else:
         parts.append(found.why)
@@ -132,13 +136,17 @@ def _troubles(progress: Progress) -> list[str]:
     parts = list(progress.gone)
     if not progress.gone and progress.silent_s > SILENT_S:
         parts.append(f"no reading for {progress.silent_s:.0f} s: check power, wiring and baud rate")
-    elif progress.trouble:
-        parts.append(progress.trouble)
+    elif progress.trouble is not None:
+        parts.append(_worded(progress.trouble))
     if progress.unshown:
         parts.append(f"{progress.unshown} samples recorded and not shown")
     if progress.status is not None:
-        parts += [told for told in (progress.status.astray, progress.status.error) if told]
+        parts += [text for text in (progress.status.astray, progress.status.error) if text]
     return parts
+
+
+def _worded(trouble: Trouble) -> str:
+    return trouble.text if trouble.channel is None else f"sensor {trouble.channel}: {trouble.text}"
 
 
 def line_of(progress: Progress) -> str:

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Mapping, Sequence
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate
-from springmass.report.tables import TableRow, table_rows
-from springmass.terminal.look import PLAIN, Look
+from springmass.report.tables import TableKey, TableRow, table_rows
 from springmass.terminal.quantities import concise, shown
+from springmass.terminal.style import PLAIN, TerminalStyle
 
 __all__ = ["text_table"]
 
+NARROWEST = 24  # columns for the names of quantities, which wrap
 
-def text_table(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Estimate]], look: Look = PLAIN) -> str:
+
+def text_table(
+    names: Sequence[str], runs: Sequence[Analysis | Mapping[TableKey, Estimate]], style: TerminalStyle = PLAIN
+) -> str:
     """Return Table 1, aligned; runs that do not fit side by side follow in a further block.
 
     Parameters
@@ -23,8 +28,8 @@ def text_table(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Esti
     names : sequence of str
         Of the runs; shortened where they are wider than their column.
     runs : sequence of Analysis, or of what :func:`springmass.report.tables.table_estimates` kept of one
-    look : Look
-        Of the stream. For a pipe it is ASCII in SI units; on a terminal it has rules, ± and prefixes. Runs that do not
+    style : TerminalStyle
+        Of the stream. For a pipe it is ASCII; on a terminal it has rules and ±. Runs that do not
         fit side by side have the digits of u in parentheses.
 
     Examples
@@ -37,22 +42,33 @@ def text_table(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Esti
     >>> text_table(["bob"], [analyse(Track.from_arrays(t, y))]).splitlines()[2].split()[::4]
     ['period', '0.000022']
     """
-    rows = table_rows(runs)
+    rows = table_rows(runs, missing=True)
     left = max([len("quantity"), *(len(row.quantity) for row in rows)]) + 2
     middle = max([len("symbol"), *(len(row.symbol) for row in rows)]) + 2
     for form in (shown, concise):
-        cells = [tuple(form(x, look) for x in row.estimates) for row in rows]
+        cells = [tuple(form(x, style) for x in row.estimates) for row in rows]
         widest = max([8, *(len(cell) for row in cells for cell in row)])
-        together = max(1, (look.width - left - middle + 3) // (widest + 3))
+        room = style.width - left - middle
+        if len(names) == 1 and all(len(row.note) <= room for row in rows):
+            widest = max([widest, *(len(row.note) for row in rows)])
+        cells = [
+            (_noted(row, widest),) * len(line) if row.note else line for row, line in zip(rows, cells, strict=True)
+        ]
+        together = max(1, (style.width - left - middle + 3) // (widest + 3))
         if together >= len(names):
             break
+    else:
+        # Long names of quantities wrap, if that lets all runs stand side by side.
+        wrapped = style.width - middle + 3 - len(names) * (widest + 3)
+        if wrapped >= NARROWEST:
+            left, together = wrapped, len(names)
     blocks = []
     for first in range(0, len(names), together):
         chosen = slice(first, first + together)
-        heads = [_shortened(_readable(name, look), widest) for name in names[chosen]]
+        heads = [_shortened(_readable(name, style), widest) for name in names[chosen]]
         part = [row[chosen] for row in cells]
         blocks.append(
-            _drawn(rows, heads, part, look) if look.terminal else _plain(rows, heads, part, left, middle, widest)
+            _drawn(rows, heads, part, style) if style.terminal else _plain(rows, heads, part, left, middle, widest)
         )
     return "\n\n".join(blocks) + "\n"
 
@@ -62,11 +78,13 @@ def _plain(
 ) -> str:
     lines = [_line("quantity", "symbol", heads, left, middle, widest)]
     lines.append("-" * max(len(lines[0]), left + middle + len(heads) * (widest + 3) - 3))
-    lines += [_line(row.quantity, row.symbol, cells[i], left, middle, widest) for i, row in enumerate(rows)]
+    for row, values in zip(rows, cells, strict=True):
+        first, *others = textwrap.wrap(row.quantity, left - 2)
+        lines += [_line(first, row.symbol, values, left, middle, widest), *(f"  {line}" for line in others)]
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _drawn(rows: Sequence[TableRow], heads: Sequence[str], cells: Sequence[Sequence[str]], look: Look) -> str:
+def _drawn(rows: Sequence[TableRow], heads: Sequence[str], cells: Sequence[Sequence[str]], style: TerminalStyle) -> str:
     """Draw it by rich, in colour unless NO_COLOR says otherwise."""
     from rich import box
     from rich.console import Console
@@ -74,16 +92,16 @@ def _drawn(rows: Sequence[TableRow], heads: Sequence[str], cells: Sequence[Seque
     from rich.text import Text
 
     table = Table(
-        box=box.SIMPLE_HEAD if look.unicode else box.ASCII2, pad_edge=False, show_edge=False, header_style="bold"
+        box=box.SIMPLE_HEAD if style.unicode else box.ASCII2, pad_edge=False, show_edge=False, header_style="bold"
     )
-    table.add_column("quantity", no_wrap=True)
+    table.add_column("quantity")  # on a narrow terminal the law by which it is stated wraps
     table.add_column("", style="dim", no_wrap=True)
     for head in heads:
         table.add_column(Text(head), no_wrap=True)
     for row, values in zip(rows, cells, strict=True):
-        symbol = row.page_symbol.replace(" ", "") if look.unicode else row.symbol
+        symbol = row.page_symbol.replace(" ", "") if style.unicode else row.symbol
         table.add_row(row.quantity, symbol, *(Text(value) for value in values))
-    console = Console(file=io.StringIO(), force_terminal=True, width=look.width, highlight=False)
+    console = Console(file=io.StringIO(), force_terminal=True, width=style.width, highlight=False)
     console.print(table)
     assert isinstance(console.file, io.StringIO)
     return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines())
@@ -93,10 +111,15 @@ def _line(quantity: str, symbol: str, cells: Sequence[str], left: int, middle: i
     return quantity.ljust(left) + symbol.ljust(middle) + "   ".join(cell.ljust(widest) for cell in cells)
 
 
+def _noted(row: TableRow, width: int) -> str:
+    """Return why a row has no values, as far as its column is wide."""
+    return row.note if len(row.note) <= width else "no mass"
+
+
 def _shortened(name: str, width: int) -> str:
     # Names of one experiment differ at their ends as often as at their beginnings: keep both.
     return name if len(name) <= width else f"{name[: width // 2 - 1]}..{name[len(name) - (width - width // 2 - 1) :]}"
 
 
-def _readable(text: str, look: Look) -> str:
-    return visible(text) if look.unicode else visible(text).encode("ascii", "replace").decode()
+def _readable(text: str, style: TerminalStyle) -> str:
+    return visible(text) if style.unicode else visible(text).encode("ascii", "replace").decode()

@@ -1,6 +1,5 @@
-"""What accuracy costs: estimators against each other on simulated records, or on one of the user's own.
+"""What accuracy costs: ways to evaluate a record, and to solve a motion, by their error and their time.
 
-In: a truth to simulate (or a track), and methods. Out: errors over the bound and times, as a table, JSON and a
-figure. Free to change: kinds of hostile records (`truth.HOSTILE`) and reference methods (`methods.methods`), one
-entry each; the generator shares no code with any estimator.
+In: a truth to simulate, or a track, and methods. Out: errors and times as tables, JSON and figures. Free to change:
+kinds of hostile records (``truth.HOSTILE``) and reference methods (``methods.methods``), one entry each.
 """

@@ -84,14 +84,12 @@ HOSTILE = {
 def record(truth: Truth, rng: np.random.Generator) -> F8:
     """Return one record at ``truth.times``, (n,) float64, m; its phase is drawn too."""
     t = truth.times
-    phase = rng.uniform(-math.pi, math.pi)
     decay = np.exp(-truth.damping_per_s * t)
-    if truth.quadratic_per_m_s:
-        growing = t if truth.damping_per_s == 0 else (1.0 - decay) / truth.damping_per_s
-        decay = decay / (1.0 + truth.quadratic_per_m_s * truth.amplitude_m * growing)
+    integral_s = t if truth.damping_per_s == 0 else (1.0 - decay) / truth.damping_per_s
+    decay = decay / (1.0 + truth.quadratic_per_m_s * truth.amplitude_m * integral_s)
     angle = 2 * math.pi * truth.frequency_hz * t
-    swing = truth.amplitude_m * decay * np.cos(angle + phase) + truth.noise_m * rng.standard_normal(t.size)
-    y = truth.offset_m + swing
+    y = truth.offset_m + truth.amplitude_m * decay * np.cos(angle + rng.uniform(-math.pi, math.pi))
+    y = y + truth.noise_m * rng.standard_normal(t.size)
     if truth.sideways_m:
         y = y + truth.sideways_m * np.cos(0.6 * angle + rng.uniform(-math.pi, math.pi))
     y = np.minimum(y, truth.offset_m + truth.clip_m)
@@ -104,11 +102,7 @@ def record(truth: Truth, rng: np.random.Generator) -> F8:
 
 
 def bounds(truth: Truth) -> dict[str, float]:
-    """Return the least standard deviations of any unbiased estimate, by name, in SI units.
-
-    Parameters
-    ----------
-    truth : Truth
+    """Return the least standard deviations of any unbiased estimate (Cramér-Rao), by name, in SI units.
 
     Returns
     -------
@@ -118,20 +112,18 @@ def bounds(truth: Truth) -> dict[str, float]:
 
     Notes
     -----
-    The inverse Fisher information of (o, A, phase, f, gamma) in white noise, averaged over the phase. False echoes
-    are counted out: samples that are one tell nothing.
+    The inverse Fisher information of (A, f, phase, o, gamma) in white noise, averaged over the phase. A false echo
+    gives no information.
     """
-    t = truth.times
+    t, size = truth.times, truth.amplitude_m
     decay = np.exp(-truth.damping_per_s * t)
     variances = []
     for phase in np.linspace(-math.pi, math.pi, 9)[:-1]:
         angle = 2 * math.pi * truth.frequency_hz * t + phase
         cosine, sine = decay * np.cos(angle), decay * np.sin(angle)
-        columns = [cosine, -2 * math.pi * truth.amplitude_m * t * sine, -truth.amplitude_m * sine, np.ones(t.size)]
-        columns.append(-truth.amplitude_m * t * cosine)
+        columns = [cosine, -2 * math.pi * size * t * sine, -size * sine, np.ones(t.size), -size * t * cosine]
         design = np.stack(columns, axis=1)
-        norms = np.linalg.norm(design, axis=0)
-        inverse = np.linalg.inv((design / norms).T @ (design / norms))
-        variances.append(np.diag(inverse) / norms**2)
+        norms = np.linalg.norm(design, axis=0)  # makes columns of different units comparable
+        variances.append(np.diag(np.linalg.inv((design / norms).T @ (design / norms))) / norms**2)
     u = truth.noise_m / math.sqrt(1.0 - truth.echoes) * np.sqrt(np.mean(variances, axis=0))
     return {"frequency": float(u[1]), "amplitude": float(u[0]), "damping_rate": float(u[4])}

@@ -1,5 +1,5 @@
-"""Recovery: from a wire log, however torn, to run files, and what the recording did not get.
+"""Recovery: build run files from a wire log, even a damaged one, and count what the recording lost.
 
-In: a log on the disk. Out: run files verified against it, the losses counted. A newcomer may change how the samples are
-built up; that every byte of the log travels inside the run file may not change.
+In: a log on the disk. Out: run files that were verified against it, and the losses. You may change how the samples are
+built, but every byte of the log must stay inside the run file.
 """

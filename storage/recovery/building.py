@@ -1,4 +1,4 @@
-"""One sensor's run file on its way: samples and the log go in as they come, what is said of them at the end."""
+"""Build one sensor's run file: samples and the log as they come, the header at the end."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from storage.wire_log.scanning import Damage, LogContents
 __all__ = ["SensorRun"]
 
 FIRST_SAMPLES = 1000
-"""Of so many the earliest stamp says when t = 0 was; later ones would bring in the difference of the clocks' rates."""
+"""Number of first samples that determine the host time of t = 0; later ones would add the sensor's clock error."""
 
 
 class SensorRun:
-    """Puts one sensor's run file together.
+    """Builds one sensor's run file.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class SensorRun:
         The log.
     sensor : SensorEntry
     chain : SensorChain
-        Makes the samples.
+        Decodes the samples.
     """
 
     def __init__(self, writer: RunWriter, contents: LogContents, sensor: SensorEntry, chain: SensorChain) -> None:
@@ -46,15 +46,15 @@ class SensorRun:
         writer.keep([(part.path.name, part.size) for part in contents.parts])
 
     def take(self, part: int, data: bytes) -> None:
-        """Take the log's next bytes."""
+        """Store the log's next bytes."""
         self._digest.update(data)
         self._writer.take(part, data)
 
     def append(self, block: Block) -> None:
-        """Take the next samples."""
+        """Append the next samples."""
         assert block.host_ns is not None
-        if (left := FIRST_SAMPLES - self._samples) > 0:
-            pairs = zip(block.t[:left].tolist(), block.host_ns[:left].tolist(), strict=True)
+        if (missing := FIRST_SAMPLES - self._samples) > 0:
+            pairs = zip(block.t[:missing].tolist(), block.host_ns[:missing].tolist(), strict=True)
             self._first_ns += [host_ns - round(t * 1e9) for t, host_ns in pairs]
         self._samples += len(block)
         self._losses.push(block)
@@ -63,7 +63,7 @@ class SensorRun:
     def finish(
         self, header: LogHeader, notes: Notes, reads: int, last_ns: int, extra: Mapping[str, Any]
     ) -> RecoveredRun:
-        """Write what is known at the end.
+        """Write the header and finish the file.
 
         Parameters
         ----------
@@ -71,17 +71,17 @@ class SensorRun:
         notes : Notes
             Marks and events of the log.
         reads : int
-            Of the sensor's port.
+            Number of reads of the sensor's port.
         last_ns : int
-            Host's stamp of the log's last record.
+            Host time of the log's last record, ns.
         extra : mapping
-            Goes into the provenance besides.
+            Further entries of the provenance.
         """
         decoding = self._chain.report()
         faults, damage = decoding["faults"], self._contents.damage
         end_ns = end_of(notes.events(), [last_ns], header.mono_ns)
         losses = self._losses.losses(notes.events(self._sensor.channel), header.mono_ns, end_ns)
-        # A stamp may come late, never early.
+        # A host time may be late but never early, so the earliest is the best.
         origin = min(self._first_ns, default=header.mono_ns)
         self._writer.finish(
             self._chain.info(self._sensor.port, header.kind),
@@ -114,15 +114,15 @@ def _counter_traps(decoding: Mapping[str, Any]) -> Iterator[Trap]:
     if joins := decoding["joins"]:
         yield Trap(
             "counter_changed",
-            "The sensor's counter did not go on when its port came back; the host's clock times the gap.",
+            "The sensor's counter started anew when its port came back; the gap is timed by the host's clock.",
             joins,
         )
 
 
 def _traps(damage: Damage) -> tuple[Trap, ...]:
-    found = []
+    traps = []
     if not damage.intact:
-        found.append(Trap("damaged_log", f"The wire log is damaged: {damage.describe()}.", max(1, damage.lost)))
+        traps.append(Trap("damaged_log", f"The wire log is damaged: {damage.describe()}.", max(1, damage.lost)))
     if not damage.ended:
-        found.append(Trap("cut_short", "The recording did not end by itself; what the log holds is here."))
-    return tuple(found)
+        traps.append(Trap("cut_short", "The recording was cut short; everything in its log is here."))
+    return tuple(traps)

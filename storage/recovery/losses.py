@@ -1,7 +1,7 @@
-"""What a recording did not get: a sensor that went, a target that was lost, readings that no queue took.
+"""What a recording lost: a disconnected sensor, a target out of sight, readings that did not fit in the queue.
 
-Found from the samples and the events of the log, so that the end of a recording, ``recover`` and an analysis say the
-same.
+All of it follows from the samples and the events of the log, so the end of a recording, ``recover`` and an analysis
+report the same losses.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from acquisition.recordings.recording import Trap
 __all__ = ["LossCount", "Losses", "end_of"]
 
 SILENCE_S, SILENT_PERIODS = 1.5, 5.0
-"""A sensor from which no reading comes for so long, or for so many of its periods, up to the end, is gone."""
+"""A sensor is gone if it sent no reading for longer than this, and than this many sample periods, before the end."""
 NO_TARGET_S = 1.0
-"""A target that is lost for less, now and then, is what missing samples tell anyway."""
+"""Shorter losses of the target are reported as missing samples only."""
 UNCONFIRMED = ("restarted", "assumed")
-"""Of what the event "reopened" says of the sensor, what leaves open whether it is the same."""
+"""Values of ``sensor`` in a "reopened" event which leave open whether it is the same sensor."""
 
 Event = tuple[int, Mapping[str, Any]]
-"""Host's monotonic clock, ns, and ``{"kind", "facts"}`` as the log notes it."""
+"""Host's monotonic clock, ns, and ``{"kind", "facts"}`` as in the log."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,25 +35,25 @@ class Losses:
     Parameters
     ----------
     seconds : float
-        How long was recorded, s.
+        Duration of the recording, s.
     gone_s : float or None
-        How long before the end the sensor's last reading came, s; None where it was there to the end.
+        Time from the sensor's last reading to the end, s; None if readings came until the end.
     why : str
-        Why the port was lost; empty where it was there and silent.
+        Why the port was lost; empty if the port was there but silent.
     away : tuple of float
-        How long the port was lost each time it came back, s.
+        Duration of each interruption after which the port came back, s.
     refused : int
         How often another device came in its place and was not recorded.
     unconfirmed : int
-        How often a sensor came back that nothing distinguishes from another of its kind.
+        How often a sensor came back that cannot be distinguished from another of its kind.
     continued_in : int or None
-        Channel in which the recording goes on, because another sensor came back on the port.
+        Channel that continues this one, because another sensor came back on the port.
     continues : int or None
-        Channel of the sensor that was there before, where this one came back in its place.
+        Channel that this one continues, because this sensor came back in place of another.
     no_target_s, longest_no_target_s : float
-        How long the sensor answered without a distance, s: in all, and at a stretch.
+        How long the sensor answered without a distance, s: in total, and the longest stretch.
     dropped_reads, dropped_bytes : int
-        What came while the recorder's queue was full.
+        Reads that were dropped because the recorder's queue was full.
     """
 
     seconds: float
@@ -70,59 +70,59 @@ class Losses:
     continues: int | None = None
 
     def traps(self) -> Iterator[Trap]:
-        """Yield what an analysis has to say of it."""
+        """Yield a trap for each kind of loss."""
         if self.gone_s is not None:
             why = f" ({self.why})" if self.why else ", though its port was there"
             yield Trap(
                 "sensor_lost",
-                f"The sensor was gone at the end: no reading came in the last {self.gone_s:.3g} s of the "
-                f"{self.seconds:.4g} s recorded{why}.",
+                f"The sensor sent no reading in the last {self.gone_s:.3g} s of the {self.seconds:.4g} s "
+                f"recorded{why}.",
             )
         if self.away:
             often = "once" if len(self.away) == 1 else f"{len(self.away)} times"
             yield Trap(
                 "sensor_away",
-                f"The sensor's port was lost {often} and came back, after {max(self.away):.3g} s at the most; "
-                f"{sum(self.away):.3g} s in all were not recorded.",
+                f"The sensor's port was lost {often} and came back, after at most {max(self.away):.3g} s; "
+                f"{sum(self.away):.3g} s in total were not recorded.",
                 len(self.away),
             )
         if self.unconfirmed:
             yield Trap(
                 "sensor_unconfirmed",
-                "The sensor that came back cannot be distinguished from another of its kind: no name, serial number "
-                "or counter identifies it.",
+                "The sensor that came back may be another one of its kind: no name, serial number or counter "
+                "identifies it.",
                 self.unconfirmed,
             )
         if self.continued_in is not None:
             yield Trap(
                 "sensor_replaced",
-                "Another sensor, or one whose counter leapt, came back on the port; the recording goes on in channel "
-                f"{self.continued_in}.",
+                "Another sensor, or one whose counter jumped, came back on the port; the recording continues in "
+                f"channel {self.continued_in}.",
             )
         if self.continues is not None:
             yield Trap(
                 "sensor_replaced",
-                "This run begins where another sensor, or this one before its counter leapt, was lost: channel "
-                f"{self.continues} holds what came before.",
+                "This run begins where another sensor, or this one before its counter jumped, was lost; channel "
+                f"{self.continues} holds the earlier part.",
             )
         if self.refused:
             yield Trap(
                 "other_device",
-                "In place of the sensor that was lost another device came, which did not speak as the sensor does; "
-                "it was not recorded.",
+                "Another device was connected in place of the lost sensor and did not answer like it; it was not "
+                "recorded.",
                 self.refused,
             )
         if self.longest_no_target_s >= NO_TARGET_S:
             yield Trap(
                 "no_target",
-                f"The sensor heard no target for {self.no_target_s:.3g} s in all, at a stretch for up to "
-                f"{self.longest_no_target_s:.3g} s.",
+                f"The sensor heard no target for {self.no_target_s:.3g} s in total, at most "
+                f"{self.longest_no_target_s:.3g} s at a time.",
             )
         if self.dropped_reads:
             yield Trap(
                 "readings_dropped",
-                f"{self.dropped_reads} reads of the port ({self.dropped_bytes} bytes) came while the recorder's queue "
-                "was full, because the disk did not take them; they are gaps in the record.",
+                f"{self.dropped_reads} reads of the port ({self.dropped_bytes} bytes) were dropped because the disk "
+                "was too slow and the queue was full; the samples have gaps there.",
                 self.dropped_reads,
             )
 
@@ -133,7 +133,7 @@ class LossCount:
     Parameters
     ----------
     rate_hz : float
-        Nominal.
+        Nominal sampling rate, Hz.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -150,7 +150,7 @@ class LossCount:
         return self._last_ns
 
     def push(self, samples: Block) -> None:
-        """Take the next samples."""
+        """Count the next samples."""
         if not len(samples):
             return
         if samples.host_ns is not None:
@@ -160,7 +160,7 @@ class LossCount:
         start = float(samples.t[0]) if self._known_t is None else self._known_t
         self._last_t = float(samples.t[-1])
         if known.size:
-            # From one distance to the next, where readings without one lie between.
+            # The time between consecutive distances if readings without a distance lie between them.
             t = np.concatenate(([start], samples.t[known]))
             between = np.diff(known, prepend=-1) > 1
             between[0] |= self._missing_since
@@ -171,29 +171,29 @@ class LossCount:
             self._known_t, self._missing_since = start, True
 
     def losses(self, events: Iterable[Event], start_ns: int, end_ns: int) -> Losses:
-        """Return what is missing between two moments of the host's clock, by the samples and by the events."""
+        """Return the losses between two times of the host's clock, from the samples and the events."""
         if self._missing_since and self._known_t is not None:
             self._add(np.array([self._last_t - self._known_t]))
             self._missing_since = False
-        told = [(content.get("kind"), content.get("facts", {})) for _, content in events]
+        notes = [(content.get("kind"), content.get("facts", {})) for _, content in events]
         gone_s = (end_ns - (start_ns if self._last_ns is None else self._last_ns)) * 1e-9
-        ports = [(kind, facts) for kind, facts in told if kind in ("lost", "reopened")]
+        ports = [(kind, facts) for kind, facts in notes if kind in ("lost", "reopened")]
         lost = bool(ports) and ports[-1][0] == "lost"
         silent = gone_s > max(SILENCE_S, SILENT_PERIODS / self._rate_hz)
-        overflows = [facts for kind, facts in told if kind == "overflow"]
+        overflows = [facts for kind, facts in notes if kind == "overflow"]
         return Losses(
             (end_ns - start_ns) * 1e-9,
             max(gone_s, 0.0) if lost or silent else None,
             str(ports[-1][1].get("why", "")) if lost else "",
             tuple(_number(facts, "gap_s") for kind, facts in ports if kind == "reopened"),
-            sum(kind == "refused" for kind, _ in told),
+            sum(kind == "refused" for kind, _ in notes),
             self._total,
             self._longest,
             sum(int(_number(facts, "records")) for facts in overflows),
             sum(int(_number(facts, "bytes")) for facts in overflows),
-            sum(kind == "reopened" and facts.get("sensor") in UNCONFIRMED for kind, facts in told),
-            next((int(_number(facts, "channel")) for kind, facts in told if kind == "replaced"), None),
-            next((int(_number(facts, "of")) for kind, facts in told if kind == "continues"), None),
+            sum(kind == "reopened" and facts.get("sensor") in UNCONFIRMED for kind, facts in notes),
+            next((int(_number(facts, "channel")) for kind, facts in notes if kind == "replaced"), None),
+            next((int(_number(facts, "of")) for kind, facts in notes if kind == "continues"), None),
         )
 
     def _add(self, stretches: np.ndarray[Any, Any]) -> None:
@@ -203,13 +203,13 @@ class LossCount:
 
 
 def _number(facts: Mapping[str, Any], name: str) -> float:
-    """A number of an event; one that a damaged or foreign log does not hold as such is none."""
+    """Return a number of an event; 0 if a damaged or foreign log has no number there."""
     value = facts.get(name)
     return float(value) if isinstance(value, int | float) else 0.0
 
 
 def end_of(events: Sequence[Event], last_ns: Iterable[int | None], start_ns: int) -> int:
-    """Return the host's clock at the end of a recording: as the log notes it, else of the last that came."""
+    """Return the host's clock at the end of a recording: from the "ended" event, else from the last record."""
     for mono_ns, content in events:
         if content.get("kind") == "ended":
             return mono_ns

@@ -1,8 +1,8 @@
-"""From a wire log, however torn, to a run file: at the end of every recording, and after a crash.
+"""Build a run file from a wire log, even a damaged one: at the end of every recording, and after a crash.
 
-The bytes go through the very chain that showed them live, so both give the same samples. The log itself travels
-inside the run file, bit for bit: nothing that decoding leaves out is lost. Log and samples pass through memory a
-stretch at a time, so that a run may be of any length.
+The bytes go through the same chain as in the live view, so both give the same samples. The run file includes the whole
+log, bit for bit, so nothing is lost that decoding leaves out. Log and samples are processed in pieces, so a run may
+have any length.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from storage.wire_log.wire_samples import LogDecoder, chains_of
 
 __all__ = ["LogGrowing", "RecoverReport", "RecoveredRun", "recover", "run_paths", "verify_against_log"]
 
-AT_ONCE = 4
-"""So many sensors' run files are written in one pass over the log: each holds some megabytes of samples back."""
+SENSORS_PER_PASS = 4
+"""Run files written in one pass over the log; each needs some megabytes of memory."""
 FOREIGN = "springmass writes no such log; ask where it comes from"
 
 
 class LogGrowing(StorageError):
-    """A log that a recording still writes: its run file would lack what comes and stand in the recording's way."""
+    """A log that a recording still writes: its run file would be incomplete and block that of the recording."""
 
 
 def recover(
@@ -53,47 +53,47 @@ def recover(
     provenance: Mapping[str, Any] | None = None,
     growing: bool = False,
 ) -> RecoverReport:
-    """Build the run file of a log, or one for each sensor where several were recorded.
+    """Build the run file of a log, or one for each sensor if there are several.
 
     Parameters
     ----------
     log : str, PathLike or LogContents
         The log; finished, torn or damaged.
     out_path : str or PathLike, optional
-        The run file; left out, the log's name with ``.h5``. With several sensors their channels come before the
-        suffix: ``run.0.h5``, ``run.1.h5``. So they do of a sensor that came back as another on the port of the only
-        one: ``run.h5``, ``run.1.h5``.
+        The run file; by default the log's name with the suffix ``.h5``. With several sensors the channel comes before
+        the suffix: ``run.0.h5``, ``run.1.h5``. If another sensor came back on the port of a single one, the files are
+        ``run.h5`` and ``run.1.h5``.
     overwrite : bool
-        Whether run files that stand there may be replaced.
+        Whether existing run files may be replaced.
     remove_log : bool
-        Whether the log goes once every run file holds it and verifies. Else it stays.
+        Whether to remove the log after every run file that holds it is verified.
     header : LogHeader, optional
-        Stands in where every copy in the log is lost.
+        Used if every copy of the header in the log is lost.
     speed_of_sound_m_per_s : float, optional
-        Applied to echo times in place of the one that the log notes, m/s.
+        Used for echo times instead of the value in the log, m/s.
     provenance : mapping, optional
-        Goes into the run file besides what the log says: software, version, ...
+        Further entries of the run file's provenance: software, version, ...
     growing : bool
-        Whether to take what there is of a log that a recording still writes.
+        Whether to accept a log that a recording still writes, as far as it goes.
 
     Raises
     ------
     acquisition.errors.CalibrationError
-        If sound is never so slow or fast.
+        If the speed of sound is out of range.
     LogGrowing
         If a recording still writes the log.
     NotALog
         If there is no log, or nothing in it can be read.
     RunExists, WriteFailed
-        If a run file stands there already or cannot be written. What stood there stands, and so does the log.
+        If a run file exists or cannot be written. The existing file and the log are then unchanged.
     RunDamaged
-        If a run file just written does not read back as it should. The log stands.
+        If a run file that was just written fails its verification. The log is kept.
     """
     if speed_of_sound_m_per_s is not None:
         Calibration(speed_of_sound_m_per_s=speed_of_sound_m_per_s)
     contents = log if isinstance(log, LogContents) else read_log(log)
     if not growing:
-        _demand_finished(contents)
+        _check_finished(contents)
     known = _header(contents, header)
     notes = _notes(contents)
     leftovers = remove_leftovers(contents.path.absolute().parent)
@@ -101,23 +101,25 @@ def recover(
     out = contents.path if out_path is None else Path(out_path)
     paths = _paths(out, known.sensors, sensors)
     runs: dict[Path, RecoveredRun] = {}
-    taken: list[Path] = []
+    occupied: list[Path] = []
     for sensor, path in zip(sensors, paths, strict=True):
         if not overwrite and os.path.lexists(path):
-            stood = _standing(path, sensor, contents) if speed_of_sound_m_per_s is None else None
-            if stood is None:
-                taken.append(path)
+            existing = _existing_run(path, sensor, contents) if speed_of_sound_m_per_s is None else None
+            if existing is None:
+                occupied.append(path)
             else:
-                runs[path] = stood
-    if paths[0] in taken:
-        raise _exists(paths[0])
-    missing = [(sensor, path) for sensor, path in zip(sensors, paths, strict=True) if path not in (*runs, *taken)]
-    for start in range(0, len(missing), AT_ONCE):
-        for run in _build(contents, known, notes, missing[start : start + AT_ONCE], provenance or {}, overwrite):
-            _demand_held(run.path, contents)
+                runs[path] = existing
+    if paths[0] in occupied:
+        raise _already_exists(paths[0])
+    missing = [(sensor, path) for sensor, path in zip(sensors, paths, strict=True) if path not in (*runs, *occupied)]
+    for start in range(0, len(missing), SENSORS_PER_PASS):
+        for run in _build(
+            contents, known, notes, missing[start : start + SENSORS_PER_PASS], provenance or {}, overwrite
+        ):
+            _check_log_inside(run.path, contents)
             runs[run.path] = run
-    if taken:  # the others are there by then
-        raise _exists(taken[0])
+    if occupied:  # the other run files exist by now
+        raise _already_exists(occupied[0])
     return RecoverReport(
         contents.path,
         tuple(runs[path] for path in paths),
@@ -132,7 +134,7 @@ def recover(
 
 
 def _notes(contents: LogContents) -> Notes:
-    """Read the log once for what it says besides bytes: a calibration at its end counts for its first sample."""
+    """Read marks and events of the log first, because a calibration at its end applies from the first sample on."""
     notes = Notes()
     try:
         for record in contents:
@@ -144,7 +146,7 @@ def _notes(contents: LogContents) -> Notes:
 
 
 def _sensors(header: Sequence[SensorEntry], notes: Notes, speed_of_sound_m_per_s: float | None) -> list[SensorEntry]:
-    """Return the sensors of the header, then those that came back as others on their ports, as they are calibrated."""
+    """Return the calibrated sensors: those of the header, then those that came back in their place."""
     known: dict[int, SensorEntry] = {}
 
     def add(sensor: SensorEntry) -> None:
@@ -169,57 +171,56 @@ def _paths(out: Path, header: Sequence[SensorEntry], sensors: Sequence[SensorEnt
     return run_paths(out, [sensor.channel for sensor in header]) + parts
 
 
-def _exists(path: Path) -> RunExists:
-    demand = "a new run file was to be written, but a file stands there"
-    return RunExists(path, demand, "choose another name or allow overwriting")
+def _already_exists(path: Path) -> RunExists:
+    return RunExists(path, "already exists", "choose another name or allow overwriting")
 
 
-def _demand_finished(contents: LogContents) -> None:
+def _check_finished(contents: LogContents) -> None:
     for part in contents.parts:
-        with contextlib.suppress(OSError), part.open() as file:  # that it is gone is for the reading to say
+        with contextlib.suppress(OSError), part.open() as file:  # a missing file is reported when it is read
             if is_being_written(file):
-                demand = f"a recording still writes the log, got it at {contents.size} bytes"
-                raise LogGrowing(contents.path, demand, "recover it when the recording has ended")
+                problem = f"a recording still writes this log ({contents.size} bytes so far)"
+                raise LogGrowing(contents.path, problem, "recover it after the recording has ended")
 
 
 def verify_against_log(path: str | os.PathLike[str], log_path: str | os.PathLike[str]) -> None:
-    """Read a run file back, all of it, and hold it against the log that it was made from.
+    """Read a whole run file and compare it with the log from which it was made.
 
-    After this, and not before, the log may be deleted.
+    The log may be deleted only after this.
 
     Parameters
     ----------
     path : str or PathLike
         The run file.
     log_path : str or PathLike
-        The log, with all the files that it lies in.
+        The first file of the log.
 
     Raises
     ------
     NotALog
         If the log cannot be read.
     NotARun, RunDamaged
-        If the run file does not verify, or the log inside is not, bit for bit, the one on the disk.
+        If the run file does not verify, or the log inside it differs from the one on the disk.
     """
-    _demand_held(Path(path), read_log(log_path))
+    _check_log_inside(Path(path), read_log(log_path))
 
 
-def _demand_held(path: Path, contents: LogContents) -> None:
+def _check_log_inside(path: Path, contents: LogContents) -> None:
     with open_run(path) as run:
         run.verify()
-        held = [(entry.name, entry.size, entry.sha256) for entry in run.header.originals]
-    if held != [(part.path.name, part.size, part.sha256()) for part in contents.parts]:
-        raise RunDamaged(path, f"the log inside is not {contents.path}", "keep the log and recover it again")
+        inside = [(entry.name, entry.size, entry.sha256) for entry in run.header.originals]
+    if inside != [(part.path.name, part.size, part.sha256()) for part in contents.parts]:
+        raise RunDamaged(path, f"the log inside differs from {contents.path}", "keep the log and recover it again")
 
 
-def _standing(path: Path, sensor: SensorEntry, contents: LogContents) -> RecoveredRun | None:
-    """Return the run file that stands there if it holds all of this log, as a killed recovery leaves it; else None."""
+def _existing_run(path: Path, sensor: SensorEntry, contents: LogContents) -> RecoveredRun | None:
+    """Return an existing run file if it holds all of this log, as after a killed recovery; else None."""
     try:
-        _demand_held(path, contents)
+        _check_log_inside(path, contents)
         with open_run(path) as run:
             decoding, lost = run.provenance["decoding"], run.provenance["losses"]
             losses = Losses(**{**lost, "away": tuple(lost["away"])})
-            return RecoveredRun(sensor, path, len(run), decoding["faults"], decoding, losses, stood=True)
+            return RecoveredRun(sensor, path, len(run), decoding["faults"], decoding, losses, existed=True)
     except (StorageError, KeyError, TypeError):
         return None
 
@@ -230,13 +231,13 @@ def _header(contents: LogContents, stand_in: LogHeader | None) -> LogHeader:
         return header
     path = contents.path
     if not contents.damage.records:
-        raise NotALog(path, f"a wire log was demanded, got {contents.size} bytes without one record", "name another")
-    demand = f"the log's header is lost in all its copies ({contents.damage.describe()})"
-    raise NotALog(path, demand, "say which sensors were recorded")
+        raise NotALog(path, f"expected a wire log, got {contents.size} bytes without a record", "name another file")
+    problem = f"all copies of the log's header are lost ({contents.damage.describe()})"
+    raise NotALog(path, problem, "state which sensors were recorded")
 
 
 def run_paths(path: Path, channels: Sequence[int]) -> list[Path]:
-    """Return the run files that a log of these channels becomes, named after ``path``."""
+    """Return the paths of the run files of these channels, named after ``path``."""
     path = path if path.suffix == ".h5" else path.with_suffix(".h5")
     if len(channels) <= 1:
         return [path]
@@ -277,10 +278,10 @@ def _build(
 
 
 def _remove(contents: LogContents) -> bool:
-    """Remove a log whose every byte is in run files that verify; one that grew meanwhile stays."""
+    """Remove a log whose bytes are all in verified run files; a log that has grown since then stays."""
     with contextlib.suppress(OSError):
         if all(part.in_place() for part in contents.parts):
-            for part in contents.parts:  # the first file first: without it, the others are not taken for all of a run
+            for part in contents.parts:  # the first file first, so that the others do not look like a whole log
                 part.path.unlink()
             return True
     return False

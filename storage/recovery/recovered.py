@@ -1,4 +1,4 @@
-"""What became of a log: the run files that it was made into, and what is said of them."""
+"""The result of a recovery: the run files made from a log, and their description."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class RecoveredRun:
         The file, verified against the log.
     samples : int
     faults : mapping of str to int
-        What the decoder counted.
+        The decoder's counts.
     decoding : mapping
-        What the chain reports besides: gaps, restarts, the clock's rate error.
+        The chain's report: gaps, restarts, the clock's rate error.
     losses : Losses
         What the run lacks.
-    stood : bool
-        Whether it stood there already and holds the whole of the log.
+    existed : bool
+        Whether the file existed already, with the whole log in it.
     """
 
     sensor: SensorEntry
@@ -40,36 +40,38 @@ class RecoveredRun:
     faults: Mapping[str, int]
     decoding: Mapping[str, Any]
     losses: Losses
-    stood: bool = False
+    existed: bool = False
 
     @property
     def gone(self) -> bool:
-        """Whether the sensor was gone at the end."""
+        """Whether the sensor was disconnected or silent at the end."""
         return self.losses.gone_s is not None
 
     def describe(self, log: Path) -> Iterator[str]:
-        """Yield lines for people."""
+        """Yield lines for the user."""
         faults = "".join(f", {count} {name.replace('_', ' ')}" for name, count in self.faults.items() if count)
-        stood = "; it stood there already and holds all of the log" if self.stood else ""
-        yield f"{self.path}: {self.samples} samples from {log}{faults}{stood}"
-        gaps, left = self.decoding.get("gaps", []), self.decoding.get("gaps_left_out", {})
+        existed = "; it existed already and holds the whole log" if self.existed else ""
+        yield f"{self.path}: {self.samples} samples from {log}{faults}{existed}"
+        gaps, left_out = self.decoding.get("gaps", []), self.decoding.get("gaps_left_out", {})
         if gaps:
-            longest = max(left.get("longest_s", 0.0), *(gap["length_s"] for gap in gaps), 0.0)
-            lost = sum(gap["lost"] for gap in gaps) + left.get("lost", 0)
-            count = len(gaps) + left.get("count", 0)
-            yield f"{self.path}: {count} gaps, {lost} readings lost in them, the longest {longest:.3g} s"
+            longest = max(left_out.get("longest_s", 0.0), *(gap["length_s"] for gap in gaps), 0.0)
+            lost = sum(gap["lost"] for gap in gaps) + left_out.get("lost", 0)
+            count = len(gaps) + left_out.get("count", 0)
+            gaps_are = "1 gap" if count == 1 else f"{count} gaps"
+            readings_are = "1 lost reading" if lost == 1 else f"{lost} lost readings"
+            yield f"{self.path}: {gaps_are} with {readings_are}, the longest {longest:.3g} s"
         for trap in self.losses.traps():
             yield f"{self.path}: {trap.code}: {trap.message}"
         clock = self.decoding.get("clock", {})
         if clock.get("kind") == "device" and clock.get("rate_error_ppm") is not None:
             rate = f"{clock['rate_error_ppm']:+.1f} +- {clock['u_rate_error_ppm']:.1f} ppm"
             jitter = f"{clock['host_jitter_s'] * 1e3:.2g} ms"
-            yield f"{self.path}: sensor clock {rate} against this host's, jitter {jitter}"
+            yield f"{self.path}: sensor clock {rate} against this computer's, jitter {jitter}"
 
 
 @dataclass(frozen=True, slots=True)
 class RecoverReport:
-    """What became of a log.
+    """The result of the recovery of one log.
 
     Parameters
     ----------
@@ -77,16 +79,16 @@ class RecoverReport:
     runs : tuple of RecoveredRun
         One for each sensor.
     damage : Damage
-        Of the log.
+        Damage of the log.
     marks, events : int
-        Kept in the provenance of every run file.
+        Numbers of marks and events in the log.
     log_removed : bool
     parts : int
-        Files that the log lay in.
+        Number of files of the log.
     parts_of : mapping of int to int
-        By channel of a sensor that came back as another, the channel of the one before.
+        For each channel of a sensor that replaced another, the channel of the sensor before.
     leftovers : tuple of Path
-        Files of builds that were killed, found in the folder and removed.
+        Temporary files of killed builds, which were removed from the folder.
     """
 
     log: Path
@@ -101,7 +103,7 @@ class RecoverReport:
 
     @property
     def main(self) -> RecoveredRun:
-        """The run that is to be analysed: the first sensor's, the longest part where others came back in its place."""
+        """The run to analyse: that of the first sensor, or the longest part if other sensors replaced it."""
         root = self.runs[0].sensor.channel
         return max((run for run in self.runs if self._root(run.sensor.channel) == root), key=lambda run: run.samples)
 
@@ -111,12 +113,12 @@ class RecoverReport:
         return channel
 
     def describe(self) -> Iterator[str]:
-        """Yield lines for people: of each run file, and one about the log."""
+        """Yield lines for the user: some about each run file, and one about the log."""
         for path in self.leftovers:
-            yield f"{path}: left by a build that was killed, removed"
+            yield f"{path}: removed, left by a killed build"
         for run in self.runs:
             yield from run.describe(self.log)
         if self.parts_of:
-            yield f"{self.log}: another sensor came back on the port; the longest part is {self.main.path}"
+            yield f"{self.log}: another sensor came back on the port; the longest part is in {self.main.path}"
         files = f" in {self.parts} files" if self.parts > 1 else ""
         yield f"{self.log}: {self.damage.describe()}{files}"

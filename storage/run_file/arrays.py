@@ -1,4 +1,4 @@
-"""The arrays of a run file while it is written: samples a chunk at a time, original files as their bytes come."""
+"""The arrays of a run file during writing: samples chunk by chunk, original files as their bytes come."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["Columns", "Originals"]
 
 
 class Columns:
-    """The growing arrays of a run file, written a whole chunk at a time."""
+    """The growing arrays of a run file, written in whole chunks."""
 
     def __init__(self, path: Path, file: Any, sigma_m: float | None) -> None:
         self.path, self.file, self.sigma_m = path, file, sigma_m
@@ -33,7 +33,7 @@ class Columns:
         self._written = 0
 
     def append(self, block: Block) -> None:
-        """Take a block; write what fills whole chunks."""
+        """Append a block, and write the chunks that are complete."""
         if self.first is None:
             self.first, self.quantity = block.first, block.quantity
         self._demand_fit(block)
@@ -46,7 +46,7 @@ class Columns:
             self._pending = [whole[full:]]
 
     def finish(self) -> None:
-        """Write the rest, tie every array to its dimension, and give the samples' arrays a name at the root too."""
+        """Write the remaining samples, attach arrays to their dimensions, and link the signal's arrays at the root."""
         rest = concatenate(self._pending)
         if not self._written or len(rest):
             self._write(rest, growing=bool(self._written))
@@ -58,20 +58,23 @@ class Columns:
                     if name != scale:
                         arrays[name].dims[0].attach_scale(arrays[scale])
             for name, array in self.file[layout.SIGNAL].items():
-                self.file[name] = array  # a second name of the same array: it takes no room
+                self.file[name] = array  # a hard link to the same array, which takes no space
 
     def _demand_fit(self, block: Block) -> None:
         expected = (self.first or 0) + self.rows
-        if block.first != expected or block.first < 0 or expected + len(block) > 2**32:
-            demand = f"a block that begins with sample {expected} was demanded, got first = {block.first}"
-            raise WriteFailed(self.path, demand, "number blocks without gaps, and flag what is missing")
+        if block.first != expected or block.first < 0:
+            problem = f"expected a block that begins with sample {max(expected, 0)}, got {block.first}"
+            raise WriteFailed(self.path, problem, "number blocks without gaps, and flag missing samples")
+        if expected + len(block) > 2**32:
+            problem = f"expected at most {2**32} samples, got {expected + len(block)}"
+            raise WriteFailed(self.path, problem, "write several run files")
         if block.quantity != self.quantity:
-            demand = f"samples of {self.quantity} were demanded, got {block.quantity} from sample {block.first} on"
-            raise WriteFailed(self.path, demand, "write a run file for each quantity")
+            problem = f"expected samples of {self.quantity}, got {block.quantity} from sample {block.first} on"
+            raise WriteFailed(self.path, problem, "write a run file for each quantity")
         for name, values in layout.arrays(block, None).items():
             if values is not None and values.shape != block.t.shape:
-                demand = f"{len(block)} values of {name} from sample {block.first} were demanded"
-                raise WriteFailed(self.path, f"{demand}, got shape {values.shape}", "make them equally long")
+                problem = f"expected {len(block)} values of {name} from sample {block.first}, got shape {values.shape}"
+                raise WriteFailed(self.path, problem, "give every column the same length")
 
     def _write(self, block: Block, *, growing: bool) -> None:
         with writing_h5(self.path):
@@ -91,7 +94,7 @@ class Columns:
         if column.name not in self.digests:
             self.digests[column.name] = hashlib.sha256()
             _create(self.file, column.path, column.dtype, None if growing else len(values))
-            for start in range(0, self._written, CHUNK):  # a column that comes late
+            for start in range(0, self._written, CHUNK):  # fill a column that earlier blocks lacked
                 self._extend(column, start, np.full(CHUNK, column.fill, column.dtype))
         self._extend(column, self._written, values)
 
@@ -104,7 +107,7 @@ class Columns:
 
 
 def _create(file: Any, path: str, dtype: str, length: int | None) -> Any:
-    """Make an array of a known length, or a growing one; zero length only a growing one can have."""
+    """Make an array of known length, or a growing one; HDF5 allows zero length only for a growing array."""
     if length:
         return file.create_dataset(path, (length,), dtype, chunks=(min(length, CHUNK),), **layout.filters(path))
     chunk = CHUNK if length is None else 1
@@ -129,7 +132,7 @@ class Originals:
         _dimension(wire, "record", [wire[name] for name in records])
 
     def take(self, number: int, data: bytes) -> None:
-        """Take the next bytes of a file."""
+        """Append the next bytes of a file."""
         start = self._starts[number] + self._taken[number]
         self._taken[number] += len(data)
         self._digests[number].update(data)
@@ -137,22 +140,22 @@ class Originals:
             self._bytes[start : start + len(data)] = np.frombuffer(data, np.uint8)
 
     def entries(self) -> tuple[FileEntry, ...]:
-        """Return what the header says of them.
+        """Return the entries of the files in the header.
 
         Raises
         ------
         ValueError
-            If one is not whole.
+            If a file is incomplete.
         """
         for name, size, taken in zip(self._names, self._sizes, self._taken, strict=True):
             if taken != size:
-                raise ValueError(f"{size} bytes of {name} were to be kept, got {taken}: it changed meanwhile")
+                raise ValueError(f"expected {size} bytes of {name}, got {taken}: it has changed meanwhile")
         digests = (digest.hexdigest() for digest in self._digests)
         return tuple(FileEntry(*entry) for entry in zip(self._names, self._sizes, digests, strict=True))
 
 
 def _dimension(group: Any, name: str, arrays: Sequence[Any]) -> None:
-    """Tie arrays to a dimension without coordinates, in netCDF's own way: a scale of this very title."""
+    """Attach arrays to a dimension without coordinates as netCDF does: by a scale with this exact title."""
     length = arrays[0].shape[0]
     growing: dict[str, Any] = {} if length else {"maxshape": (None,), "chunks": (1,)}
     scale = group.create_dataset(name, (length,), ">f4", **growing)

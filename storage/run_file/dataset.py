@@ -1,4 +1,4 @@
-"""A run's samples as an ``xarray.Dataset``: read piece by piece from the file, or checked and in memory."""
+"""A run's samples as an ``xarray.Dataset``: read from the file on demand, or checked and in memory."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def lazy_dataset(contents: Contents) -> xr.Dataset:
     import xarray as xr
 
     for name in contents.header.columns:
-        contents.column(name)  # type and length, which a lazy reading would take as it finds them
+        contents.column(name)  # checks type and length, which lazy reading does not
     contents.demand_own_signal()
     with reading(contents.path, layout.SIGNAL):
-        # Through the run's own handle: the path may by now name another file.
+        # Through the run's open handle, because the path may lead to another file by now.
         file = h5netcdf.File(contents.file(), "r")
         store = xr.backends.H5NetCDFStore(file, group=layout.SIGNAL)
         dataset = xr.open_dataset(store, decode_times=False)  # elapsed seconds are no dates
@@ -48,7 +48,7 @@ def checked_dataset(contents: Contents, samples: Block) -> xr.Dataset:
     for column in layout.COLUMNS:
         if column.path.startswith(layout.SIGNAL) and column.name in header.columns:
             attributes = layout.column_attributes(column, header)
-            attributes.pop("_FillValue", None)  # xarray keeps it with the encoding
+            attributes.pop("_FillValue", None)  # xarray stores it in the encoding
             variables[column.name] = ("time", values[column.name], attributes)
     return xr.Dataset(variables, attrs=_attributes(header))
 

@@ -1,4 +1,4 @@
-"""The header of a run file: everything about a run that is not an array, as one canonical JSON text."""
+"""The header of a run file: everything but the arrays, as one canonical JSON text."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ __all__ = ["LONGEST_HEADER", "MOST_UNWRITTEN", "SCHEMA", "FileEntry", "Header", 
 
 SCHEMA = 1
 LONGEST_HEADER = 1 << 26
-"""Bytes of the header's text: a day of events is a thousandth of it."""
+"""Largest size of the header's text, bytes; a day of events needs a thousandth of it."""
 MOST_UNWRITTEN = 10_000_000
-"""Samples, or bytes of original files, that a file may hold packed without as many bytes of its own: a day at 100 Hz.
+"""Number of samples, or of bytes of original files, that is always accepted: a day at 100 Hz.
 
-Beyond it, a file that states more than it has bytes is a bomb: it would fill the memory with what was never measured.
+A larger number must not exceed the size of the file. Otherwise a small file could fill the memory (a decompression
+bomb).
 """
 DEEPEST = 33
-"""Tables and lists in each other, the header itself among them."""
+"""Largest depth of nested tables and lists, including the header itself."""
 
 _Text = Annotated[str, Meta(max_length=1 << 20)]
 _Word = Annotated[str, Meta(max_length=200)]
@@ -41,7 +42,7 @@ class Info(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     sigma_m: _Length | None = None
     quantum_m: _Length | None = None
     clock: ClockKind = "nominal"
-    stated_error_m: Annotated[float, Meta(ge=-1e30, le=1e30)] | None = None  # as an old recording prints it
+    stated_error_m: Annotated[float, Meta(ge=-1e30, le=1e30)] | None = None  # as printed in a recording
 
 
 class FileEntry(Struct, frozen=True, forbid_unknown_fields=True):
@@ -53,7 +54,7 @@ class FileEntry(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TrapEntry(Struct, frozen=True, forbid_unknown_fields=True):
-    """What was seen on reading, as :class:`acquisition.recordings.recording.Trap` describes it."""
+    """A remark of the reader, as described by :class:`acquisition.recordings.recording.Trap`."""
 
     code: _Word
     message: _Text
@@ -91,7 +92,7 @@ class _DecodingNote(Struct, frozen=True):
 
 
 class _Provenance(Struct, frozen=True):
-    """What other rooms read of the provenance; it may hold anything else besides."""
+    """The entries of the provenance that other code reads; there may be further ones."""
 
     sensor: _SensorNote = _SensorNote()
     start_time: _Word | None = None
@@ -106,9 +107,9 @@ class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     info : Info
         The source.
     first, samples : int
-        Index of the first sample, and how many there are.
+        Index of the first sample, and the number of samples.
     columns : mapping of str to str
-        SHA-256 of every column that the file holds, by name.
+        SHA-256 of every column in the file, by name.
     originals : tuple of FileEntry
         The original files.
     title, channel, format : str
@@ -116,12 +117,12 @@ class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     scene, provenance : mapping or None, mapping
         JSON-able, with string keys.
     traps : tuple of TrapEntry
-        What was seen on reading.
+        Remarks of the reader.
     malformed_rows : int
         Rows that were not samples.
     quantity, unit : str
-        What the samples are of, as in :class:`acquisition.block.Block`; empty in files from before it was written,
-        which hold a length in metres.
+        Quantity and unit of the samples, as in :class:`acquisition.block.Block`. Empty in older files, which hold
+        lengths in metres.
     """
 
     info: Info
@@ -145,8 +146,8 @@ class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Raises
         ------
         TypeError, ValueError
-            If the scene or the provenance holds what JSON cannot: an object, NaN, an infinity; or a value is one that
-            :meth:`decode` would refuse.
+            If JSON cannot store a value of the scene or the provenance (an object, NaN, an infinity), or
+            :meth:`decode` would refuse it.
         """
         text = json_text({"schema": SCHEMA, **plain(self)}).encode("ascii")
         self.decode(text)
@@ -154,20 +155,20 @@ class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @classmethod
     def decode(cls, text: bytes) -> Header:
-        """Read what :meth:`encode` wrote.
+        """Read the text that :meth:`encode` wrote.
 
         Raises
         ------
         storage.schema.ValueRefused
-            If a key holds what it may not.
+            If a value is not allowed for its key.
         ValueError
             If the text is of another schema.
         """
         content = parsed(text, "header")
         schema = content.pop("schema", None) if isinstance(content, dict) else None
         if schema != SCHEMA:
-            raise ValueError(f"schema {SCHEMA} demanded, got {shown(schema)}")
-        content.pop("implied", None)  # formulas of columns, which some files hold besides the columns
+            raise ValueError(f"expected schema {SCHEMA}, got {shown(schema)}")
+        content.pop("implied", None)  # formulas of columns, which some older files have
         header = decoded(content, cls, "header", DEEPEST)
         converted(header.columns, _Columns, "header.columns")
         read = {name: header.provenance[name] for name in _Provenance.__struct_fields__ if name in header.provenance}

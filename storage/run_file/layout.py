@@ -2,30 +2,29 @@
 
 ::
 
-    /                     @Conventions @NX_class=NXroot @default=entry @kind; second names of the signal's arrays, for
-                          tools that look at the root alone (files from before there were any have none)
+    /                     @Conventions @NX_class=NXroot @default=entry @kind; hard links to the signal's arrays, for
+                          tools that read only the root (older files have none)
     /entry                NXentry @default=signal; title, start_time where known
     /entry/signal         NXdata @signal=distance @axes=[time] @kind; on the dimension ``time``:
-        time              f8 s, elapsed; @epoch says when t = 0 was, @clock where the times come from, @moment of what
+        time              f8 s, elapsed; @epoch time of t = 0, @clock source of the times, @moment event they refer to
         distance          f8 m @ancillary_variables @quantity
-        distance_errors   f4 m, standard deviation; only where the source knows it, NaN where unmeasured
+        distance_errors   f4 m, standard deviation; only if the source knows it, NaN if unmeasured
         quality           u1 @flag_masks @flag_meanings
-        velocity          f8 m/s; only where the recording states one
-                          (of another quantity than a length: in that unit, and in that unit per second)
+        velocity          f8 m/s; only if the recording states one
+                          (for another quantity than a length: that unit, and that unit per second)
     /entry/instrument     name, kind, clock, rate_hz, quantum_m, sigma_m, stated_error_m
     /entry/scene          @json: the scene's tables
     /entry/provenance     @software @version @configuration @traps ...; header, see below
-    /raw                  sequence u4 (sample index); host_mono_ns i8 where a host was there
-    /wire                 bytes u1; record_offset, record_len, record_mono_ns; one record an original file
+    /raw                  sequence u4 (sample index); host_mono_ns i8 if a host recorded the samples
+    /wire                 bytes u1; record_offset, record_len, record_mono_ns; one record per original file
 
-Texts have a fixed length, as netCDF's own library writes them: xarray, netCDF4 and NeXus tools give them as
-text, h5py as ``bytes``.
+Texts have a fixed length, as in files of the netCDF library: xarray, netCDF4 and NeXus tools return them as
+text, h5py returns ``bytes``.
 
-The file says everything twice. ``/entry/provenance/header`` is one canonical JSON text (sorted keys, ASCII)
-of all that is not an array, with the SHA-256 of every array's decoded little-endian values; its own SHA-256
-stands beside it. That text alone is what :class:`storage.run_file.reading.Run` believes. The attributes and fields
-above
-are drawn from it for people and for other tools, and :meth:`storage.run_file.reading.Run.verify` holds them against it.
+The file states everything twice. ``/entry/provenance/header`` is one canonical JSON text (sorted keys, ASCII)
+of everything but the arrays, with the SHA-256 of every array's decoded little-endian values; the SHA-256 of the text
+is its attribute. :class:`storage.run_file.reading.Run` reads only that text. The attributes and fields above are made
+from it for people and other tools, and :meth:`storage.run_file.reading.Run.verify` compares them with it.
 """
 
 from __future__ import annotations
@@ -69,11 +68,11 @@ SIGNAL = "/entry/signal"
 INSTRUMENT = "/entry/instrument"
 WIRE = "/wire"
 GROUPS = frozenset({"entry", "raw", "wire"})
-"""What stands at the root besides second names of columns."""
+"""Groups at the root; everything else there is a link to a column."""
 DIMENSION_ATTRIBUTES = frozenset({"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"})
-"""What HDF5 itself puts on arrays that are tied to a dimension."""
+"""Attributes that HDF5 itself adds to arrays with a dimension."""
 NO_HOST_NS = -1
-"""Stands in ``host_mono_ns`` and ``record_mono_ns`` where no host saw the sample or record."""
+"""Value of ``host_mono_ns`` and ``record_mono_ns`` if no host recorded the sample or record."""
 
 FILTERS: Mapping[str, Any] = {
     "shuffle": True,
@@ -81,35 +80,35 @@ FILTERS: Mapping[str, Any] = {
     "compression_opts": 1,
     "fletcher32": True,
 }
-"""What every reader can undo without a plugin. The checksum makes a flipped bit an error, not a value."""
+"""Filters that every reader can undo without a plugin. The checksum turns a flipped bit into a read error."""
 
 UNPACKED: Mapping[str, Any] = {"fletcher32": True}
-"""For columns whose last digits are noise: packing saves a quarter of their room and triples the time to read them."""
+"""Filters of noisy columns: compression saves a quarter of their size and triples the time to read them."""
 
 NOISY = frozenset({"distance", "velocity"})
-"""The columns that are kept so."""
+"""Columns whose last digits are noise; they are not compressed."""
 
 LIBVER = ("v110", "v110")
-"""HDF5 1.10's file format (2016): the oldest in which all of the file's own bookkeeping carries checksums."""
+"""The file format of HDF5 1.10 (2016), the oldest with checksums in all of the file's metadata."""
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One array of the file with a value a sample.
+    """One array of the file with a value for each sample.
 
     Parameters
     ----------
     path : str
-        Where it stands.
+        Path in the file.
     dtype : str
         Its type, little-endian.
     attributes : mapping
-        Units and description. What depends on the run is added by :func:`attributes`.
+        Units and description; :func:`attributes` adds those that depend on the run.
     fill : float or int
-        Value of samples from before an optional column's first value.
+        Value of the samples before the first value of an optional column.
     least, greatest : float or int
-        Its range, both ends allowed; NaN is, too. The ends lie far beyond any bench: squares and sums of what lies
-        between are finite.
+        Smallest and largest value; NaN is allowed too. The limits are far beyond any bench, but squares and sums of
+        values between them are finite.
     """
 
     path: str
@@ -120,14 +119,14 @@ class Column:
     greatest: float | int = 1e12
 
     def demand_within(self, values: NDArray[Any], start: int) -> None:
-        """Hold values of samples from ``start`` on against the range.
+        """Check values of samples from ``start`` on against the range.
 
         Raises
         ------
         ValueRefused
-            Naming the first that lies outside.
+            For the first value outside the range.
         """
-        # Of all-NaN the extremes are NaN, which is inside; a warning is given for none of it.
+        # fmin and fmax skip NaN without a warning; an array of NaN alone passes.
         low, high = np.fmin.reduce(values, initial=self.greatest), np.fmax.reduce(values, initial=self.least)
         if low < self.least or high > self.greatest:
             at = int(np.flatnonzero((values < self.least) | (values > self.greatest))[0])
@@ -184,12 +183,12 @@ COLUMNS: tuple[Column, ...] = (
 
 
 def filters(path: str) -> Mapping[str, Any]:
-    """Return what an array's chunks go through on their way to the disk."""
+    """Return the HDF5 filters of an array."""
     return UNPACKED if path.rpartition("/")[2] in NOISY else FILTERS
 
 
 def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None]:
-    """Return a block's values by column name; None for a column that it lacks.
+    """Return a block's values by column name; None for a missing column.
 
     Parameters
     ----------
@@ -218,7 +217,7 @@ def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None
 
 
 def records(sizes: NDArray[np.uint64]) -> dict[str, NDArray[Any]]:
-    """Return what stands beside the bytes of original files of these sizes, by name: one record a file."""
+    """Return the arrays that locate original files of these sizes, by name: one record per file."""
     return {
         "record_offset": np.cumsum(sizes, dtype="<u8") - sizes,
         "record_len": sizes,
@@ -227,7 +226,7 @@ def records(sizes: NDArray[np.uint64]) -> dict[str, NDArray[Any]]:
 
 
 def attributes(header: Header) -> dict[str, dict[str, Any]]:
-    """Return the attributes that other tools see, by the path of the group or array that carries them."""
+    """Return the attributes for other tools, by the path of their group or array."""
     info = header.info
     tree: dict[str, dict[str, Any]] = {
         "/": {"Conventions": "CF-1.11", "NX_class": "NXroot", "default": "entry", "kind": info.kind},
@@ -249,35 +248,35 @@ def attributes(header: Header) -> dict[str, dict[str, Any]]:
 
 
 def signal_attributes(header: Header) -> dict[str, Any]:
-    """Return what travels with the samples wherever they go."""
+    """Return the attributes of the signal, which a dataset of the samples has too."""
     texts = {name: getattr(header, name) for name in ("title", "channel", "format")}
     return {"kind": header.info.kind} | {name: text for name, text in texts.items() if text}
 
 
 def column_attributes(column: Column, header: Header) -> dict[str, Any]:
     """Return a column's attributes in this run."""
-    found = dict(column.attributes)
+    attributes = dict(column.attributes)
     if column.name == "time":
-        found["clock"] = header.info.clock
-        found["epoch"] = _text(header, "start_time") or "unknown"
+        attributes["clock"] = header.info.clock
+        attributes["epoch"] = _text(header, "start_time") or "unknown"
         moment = header.provenance.get("decoding", {}).get("clock", {}).get("moment")
-        found |= {"moment": moment} if moment else {}
+        attributes |= {"moment": moment} if moment else {}
     if header.quantity not in ("", "length") and column.attributes.get("units") in ("m", "m/s"):
-        found["units"] = header.unit + column.attributes["units"].removeprefix("m")
-        found["long_name"] = column.attributes["long_name"].replace("distance from the sensor", header.quantity)
+        attributes["units"] = header.unit + column.attributes["units"].removeprefix("m")
+        attributes["long_name"] = column.attributes["long_name"].replace("distance from the sensor", header.quantity)
     if column.name == "distance":
         if header.quantity:
-            found["quantity"] = header.quantity
+            attributes["quantity"] = header.quantity
         beside = ("distance_errors", "quality")
-        found["ancillary_variables"] = " ".join(name for name in beside if name in header.columns)
-    return found
+        attributes["ancillary_variables"] = " ".join(name for name in beside if name in header.columns)
+    return attributes
 
 
 def fields(header: Header) -> dict[str, Any]:
-    """Return the scalar fields by path: NeXus keeps in fields what it gives a unit."""
-    found = {"/entry/title": header.title, "/entry/start_time": _text(header, "start_time")}
-    found |= {f"{INSTRUMENT}/{name}": value for name, value in plain(header.info).items()}
-    stated = {path: value for path, value in found.items() if value not in (None, "")}
+    """Return the scalar fields by path: NeXus uses fields for quantities with a unit."""
+    values = {"/entry/title": header.title, "/entry/start_time": _text(header, "start_time")}
+    values |= {f"{INSTRUMENT}/{name}": value for name, value in plain(header.info).items()}
+    stated = {path: value for path, value in values.items() if value not in (None, "")}
     return {path: value if isinstance(value, str) else float(value) for path, value in stated.items()}
 
 
@@ -291,38 +290,38 @@ def _units_of(path: str) -> dict[str, str]:
 
 
 def _plot(header: Header) -> dict[str, Any]:
-    """What a NeXus tool plots unasked."""
-    found: dict[str, Any] = {"NX_class": "NXdata", "signal": "distance", "axes": ("time",)}
+    """Return the attributes that select the default plot of NeXus tools."""
+    attributes: dict[str, Any] = {"NX_class": "NXdata", "signal": "distance", "axes": ("time",)}
     if "velocity" in header.columns:
-        found["auxiliary_signals"] = ("velocity",)
-    return found
+        attributes["auxiliary_signals"] = ("velocity",)
+    return attributes
 
 
 def _provenance(header: Header) -> dict[str, Any]:
-    found: dict[str, Any] = {"malformed_rows": header.malformed_rows}
+    attributes: dict[str, Any] = {"malformed_rows": header.malformed_rows}
     texts = {name: _text(header, name) for name in ("software", "version", "created_utc")}
-    found |= {name: text for name, text in texts.items() if text}
+    attributes |= {name: text for name, text in texts.items() if text}
     if "configuration" in header.provenance:
-        found["configuration"] = json_text(header.provenance["configuration"])
+        attributes["configuration"] = json_text(header.provenance["configuration"])
     if header.traps:
-        found["traps"] = json_text(header.traps)
+        attributes["traps"] = json_text(header.traps)
     if header.originals:
-        found["original_sha256"] = tuple(entry.sha256 for entry in header.originals)
-    return found
+        attributes["original_sha256"] = tuple(entry.sha256 for entry in header.originals)
+    return attributes
 
 
 def _text(header: Header, key: str) -> str:
-    """Return a text of the provenance, or an empty one."""
+    """Return a text of the provenance; empty if there is none."""
     value = header.provenance.get(key)
     return value if isinstance(value, str) else ""
 
 
 def stored(value: Any) -> tuple[Any, Any]:
-    """Return a value as HDF5 is given it, with its type.
+    """Return a value and its type as HDF5 stores them.
 
-    Texts get a fixed length, as netCDF's own library writes them. Texts of free length would lie in HDF5's
-    global heap, the one part of the file without a checksum: a flipped bit there changes them unseen, or
-    sends the HDF5 library into an endless loop.
+    Texts get a fixed length, as in files of the netCDF library. HDF5 stores texts of variable length in its global
+    heap, the only part of the file without a checksum: a flipped bit there changes them unnoticed, or sends the HDF5
+    library into an endless loop.
     """
     import h5py
 
@@ -334,5 +333,5 @@ def stored(value: Any) -> tuple[Any, Any]:
 
 
 def _shown(text: str) -> str:
-    """Return a text as HDF5 can hold it, without NUL and lone surrogates; the header holds the exact one."""
+    """Return a text as HDF5 can store it, without NUL and lone surrogates; the header has the exact text."""
     return text.replace("\0", "\ufffd").encode("utf-16", "surrogatepass").decode("utf-16", "replace")

@@ -1,4 +1,4 @@
-"""Run files, read: :func:`open_run` opens one lazily and checks what it reads.
+"""Read run files: :func:`open_run` opens one lazily and checks what it reads.
 
 Examples
 --------
@@ -46,9 +46,9 @@ __all__ = ["CHECKED", "Run", "is_run", "open_run"]
 
 
 def is_run(head: bytes) -> bool:
-    """Tell from a file's first eight bytes whether it may be a run file: whether it is HDF5.
+    """Return whether a file may be a run file, from its first eight bytes: whether it is HDF5.
 
-    Whether it is one of ours, :func:`open_run` says.
+    :func:`open_run` checks whether it is a run file.
     """
     return head.startswith(layout.MAGIC)
 
@@ -60,41 +60,41 @@ def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
     ----------
     path : str or PathLike
     unverified : bool
-        Whether to give what does not fit its digest, to look at it; what differs, :meth:`Run.differences` says.
+        Whether to return data even if their digest differs; :meth:`Run.differences` lists what differs.
 
     Returns
     -------
     Run
-        To be used in a ``with``, or closed.
+        Use it in a ``with``, or close it.
 
     Raises
     ------
     NotARun
-        If nothing is there, or something else.
+        If there is no file, or it is not a run file.
     RunDamaged
-        If the file cannot be read, its header is not what was written, or holds what no header may.
+        If the file cannot be read, or its header is damaged or has a value that is not allowed.
     """
     path = Path(path)
-    remedy = "name a run file; springmass formats FILE says what a file is"
+    remedy = "name a run file; springmass formats FILE shows what a file is"
     try:
         with open_regular(path) as stream:
             head = stream.read(len(layout.MAGIC))
     except OSError as error:
-        raise NotARun(path, f"a run file was demanded, got none ({error.strerror or error})", remedy) from error
+        raise NotARun(path, f"the run file cannot be opened ({error.strerror or error})", remedy) from error
     if not is_run(head):
-        raise NotARun(path, f"a run file (HDF5) was demanded, got a file that begins with {head!r}", remedy)
+        raise NotARun(path, f"expected a run file (HDF5), got a file that begins with {head!r}", remedy)
     return Run(path, *open_header(path, unverified=unverified), unverified)
 
 
 class Run(Contents):
     """An open run file.
 
-    What it says of itself is read at once, samples when they are asked for. Nothing is delivered unchecked:
-    every chunk carries a checksum, and every column read to its end is held against its SHA-256. Of the ways to the
-    samples, :meth:`blocks` and :meth:`dataset` are lazy, :meth:`samples` and :meth:`load_dataset` whole.
+    The header is read when the file is opened, samples on demand. Everything is checked: every chunk has a checksum,
+    and every column that is read to its end is compared with its SHA-256. :meth:`blocks` and :meth:`dataset` read
+    lazily, :meth:`samples` and :meth:`load_dataset` read everything.
 
-    Its ``sha256`` is that of the content: of the header, which holds those of all arrays and original files. Two files
-    of the same content have the same, whatever their bytes.
+    ``sha256`` is the digest of the header, which holds the digests of all arrays and original files. So two files with
+    the same content have the same ``sha256``, even if their bytes differ.
     """
 
     __slots__ = ()
@@ -106,7 +106,7 @@ class Run(Contents):
         self.close()
 
     def close(self) -> None:
-        """Close the file; again does no harm."""
+        """Close the file. Further calls do nothing."""
         self.handle.close()
 
     def __len__(self) -> int:
@@ -123,7 +123,7 @@ class Run(Contents):
 
     @property
     def title(self) -> str:
-        """The run's title; empty where it has none."""
+        """The run's title; may be empty."""
         return self.header.title
 
     @property
@@ -133,52 +133,52 @@ class Run(Contents):
 
     @property
     def format(self) -> str:
-        """The family of recordings that read it; empty where none did."""
+        """The family of recordings that it was read from; empty if there is none."""
         return self.header.format
 
     @property
     def scene(self) -> Mapping[str, Any] | None:
-        """The scene's tables; None where none were given."""
+        """The scene's tables; None if there is no scene."""
         return self.header.scene
 
     @property
     def traps(self) -> tuple[Trap, ...]:
-        """What was seen on reading the old file."""
+        """The remarks of the reader on the recording."""
         return tuple(Trap(**plain(trap)) for trap in self.header.traps)
 
     @property
     def malformed_rows(self) -> int:
-        """Rows of the old file that were not samples."""
+        """Number of rows of the recording that were not samples."""
         return self.header.malformed_rows
 
     @property
     def provenance(self) -> Mapping[str, Any]:
-        """What the writer said of software, configuration and times."""
+        """Software, configuration and times, as the writer stated them."""
         return self.header.provenance
 
     def blocks(self, size: int = 1024) -> Iterable[Block]:
-        """Return the samples in blocks, read as they are asked for.
+        """Return the samples in blocks, which are read on demand.
 
         Parameters
         ----------
         size : int
-            Samples a block; the last may be shorter.
+            Samples per block; the last may be shorter.
 
         Returns
         -------
         iterable of Block
-            Can be gone through more than once, while the run is open.
+            It can be iterated more than once, while the run is open.
 
         Raises
         ------
         ValueError
             If ``size`` is not positive.
         RunDamaged
-            While iterating: where a chunk cannot be read, and before the last chunk's blocks where a whole
-            column is not what was written.
+            During iteration: for a chunk that cannot be read, and before the blocks of the last chunk if the checksum
+            of a whole column differs.
         """
         if size < 1:
-            raise ValueError(f"blocks hold at least 1 sample, got size = {size}")
+            raise ValueError(f"size must be at least 1 sample, got {size}")
         return _Blocks(self, size)
 
     def samples(self) -> Block:
@@ -187,7 +187,7 @@ class Run(Contents):
         Raises
         ------
         RunDamaged
-            If they are not what was written.
+            If they are damaged.
         """
         header, values = self.header, {}
         for name in (name for name in _BLOCK_COLUMNS if name in header.columns):
@@ -199,53 +199,53 @@ class Run(Contents):
         return _block(header, header.first, values)
 
     def dataset(self) -> xarray.Dataset:
-        """Return the samples as a dataset that reads what is asked for, when it is asked for.
+        """Return the samples as a dataset that reads data on demand.
 
         Returns
         -------
         xarray.Dataset
-            On the dimension ``time``: time (s), distance (m), quality, and where the file has them
-            distance_errors (m) and velocity (m/s), with the file's attributes. Its own attributes are kind,
-            channel, title, format and the instrument's name, clock and numbers.
+            On the dimension ``time``: time (s), distance (m), quality, and if the file has them distance_errors (m)
+            and velocity (m/s), with the file's attributes. The attributes of the dataset are kind, channel, title,
+            format and the instrument's name, clock and numbers.
 
         Raises
         ------
         RunClosed, RunDamaged
-            If the run is closed, or the signal's structure is not what was written.
+            If the run is closed, or the structure of the signal was changed.
 
         Notes
         -----
-        Opening reads the times, for they are the index; of the rest, memory holds only the part looked at. A
-        part cannot be held against the digest of the whole: a flipped bit is still an error (every chunk
-        carries a checksum, and reading it raises ``OSError``), an array that someone rewrote is not.
-        :meth:`load_dataset` finds both, and :meth:`verify` does so once for many readings. What has not been
-        read when the run is closed cannot be read any more (``KeyError``): use the dataset inside the run's
-        ``with``, or ``load()`` it there. Closing the dataset leaves the run open.
+        Opening reads the times, because they are the index; other data are read when they are used. A part of a
+        column cannot be compared with the digest of the whole. A flipped bit is still an error (every chunk has a
+        checksum, and reading it raises ``OSError``), but an array that was rewritten goes unnoticed.
+        :meth:`load_dataset` detects both, and so does :meth:`verify`. After the run is closed, data that were not read
+        are no longer available (``KeyError``): use the dataset inside the run's ``with``, or call ``load()`` there.
+        Closing the dataset leaves the run open.
         """
         return lazy_dataset(self)
 
     def load_dataset(self) -> xarray.Dataset:
-        """Return the samples as a dataset in memory, checked and free of the file.
+        """Return the samples as a checked dataset in memory, independent of the file.
 
         Returns
         -------
         xarray.Dataset
-            The same as :meth:`dataset`. It takes 25 to 40 bytes a sample and outlives the run.
+            The same as :meth:`dataset`. It needs 25 to 40 bytes per sample and can be used after the run is closed.
 
         Raises
         ------
         RunClosed, RunDamaged
-            If the run is closed, or the samples are not what was written.
+            If the run is closed, or the samples are damaged.
         """
         return checked_dataset(self, self.samples())
 
     def originals(self) -> tuple[Original, ...]:
-        """Return the original files, bit for bit; none where none were kept.
+        """Return the original files, bit for bit; an empty tuple if there are none.
 
         Raises
         ------
         RunDamaged
-            If one is not what was written.
+            If one is damaged.
         """
         return tuple(
             Original(entry.name, b"".join(verify.original_pieces(self, entry, start)))
@@ -253,27 +253,27 @@ class Run(Contents):
         )
 
     def differences(self) -> tuple[RunDamaged, ...]:
-        """Read everything again and return an error for each thing that is not what was written.
+        """Read everything again and return an error for each array, original file, field or attribute that differs.
 
         Returns
         -------
         tuple of RunDamaged
-            Naming the array, original file, field or attribute; empty for a file that verifies.
+            Empty for a file that verifies.
         """
         return tuple(verify.differences(self))
 
     def verify(self, *, but: Iterable[str] = ()) -> None:
-        """Read everything again and hold it against what was written.
+        """Read everything again and compare it with its digests.
 
         Parameters
         ----------
         but : iterable of str
-            Columns to leave out, such as :data:`CHECKED`, which :meth:`samples` has held against their digests.
+            Columns to leave out, such as :data:`CHECKED`, which :meth:`samples` has checked.
 
         Raises
         ------
         RunDamaged
-            Naming the first array, original file, field or attribute that differs.
+            For the first array, original file, field or attribute that differs.
         """
         for error in verify.differences(self, but=but):
             raise error
@@ -281,7 +281,7 @@ class Run(Contents):
 
 @dataclass(frozen=True, slots=True)
 class _Blocks:
-    """The samples of a run in blocks, anew at every iteration."""
+    """The samples of a run in blocks, read again in every iteration."""
 
     run: Run
     size: int
@@ -316,10 +316,10 @@ _BLOCK_COLUMNS = {
     "velocity": "velocity",
 }
 CHECKED = tuple(_BLOCK_COLUMNS)
-"""The columns that make blocks: whoever reads these to their end has them checked."""
+"""The columns of blocks: their digests are checked when all blocks are read."""
 
 
 def _block(header: Header, first: int, values: Mapping[str, NDArray[Any]]) -> Block:
     fields: dict[str, Any] = {_BLOCK_COLUMNS[n]: array for n, array in values.items() if n in _BLOCK_COLUMNS}
-    # Files from before the quantity was written hold lengths.
+    # Older files do not state the quantity; they hold lengths.
     return Block(first, **fields, quantity=header.quantity or "length", unit=header.unit or "m")

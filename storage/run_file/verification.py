@@ -1,6 +1,6 @@
-"""A run file against its header: every array, original file, field and attribute, each by its name.
+"""Compare every array, original file, field and attribute of a run file with its header.
 
-Columns and original files are digested as they are read, a chunk at a time: memory does not grow with the run.
+Columns and original files are read and digested in chunks, so memory does not grow with the run.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ __all__ = ["differences", "entries", "original_pieces"]
 
 
 def differences(contents: Contents, *, but: Iterable[str] = ()) -> Iterator[RunDamaged]:
-    """Yield an error for everything that is not what was written; nothing for a file that verifies.
+    """Yield an error for each difference; nothing for a file that verifies.
 
     Parameters
     ----------
     contents : Contents
     but : iterable of str
-        Columns that were held against their digests already.
+        Columns that were checked already.
 
     Raises
     ------
@@ -52,14 +52,14 @@ def differences(contents: Contents, *, but: Iterable[str] = ()) -> Iterator[RunD
 
 
 def original_pieces(contents: Contents, entry: FileEntry, start: int) -> Iterator[bytes]:
-    """Yield an original file piece by piece, and hold it against its digest at its end.
+    """Yield an original file in pieces, and compare its digest at its end.
 
     Parameters
     ----------
     contents : Contents
     entry : FileEntry
     start : int
-        Where its bytes begin.
+        Index of its first byte.
 
     Raises
     ------
@@ -75,14 +75,14 @@ def original_pieces(contents: Contents, entry: FileEntry, start: int) -> Iterato
         digest.update(piece)
         yield piece
     if digest.hexdigest() != entry.sha256 and not contents.unverified:
-        raise damaged(contents.path, what, "its SHA-256 differs")
+        raise damaged(contents.path, what, "checksum mismatch (SHA-256)")
 
 
 _PIECE = 16 * CHUNK
 
 
 def entries(contents: Contents) -> Iterator[tuple[FileEntry, int]]:
-    """Yield the original files that the header names, each with where its bytes begin."""
+    """Yield each original file in the header with the index of its first byte."""
     start = 0
     for entry in contents.header.originals:
         yield entry, start
@@ -101,7 +101,7 @@ def _header(contents: Contents) -> None:
     with reading(contents.path, "the header"):
         text = bytes(stored[()])
     if hashlib.sha256(text).hexdigest() != contents.sha256:
-        raise damaged(contents.path, "the header", "its SHA-256 differs")
+        raise damaged(contents.path, "the header", "checksum mismatch (SHA-256)")
 
 
 def _column(contents: Contents, name: str) -> None:
@@ -120,13 +120,13 @@ def _original(contents: Contents, entry: FileEntry, start: int) -> None:
 
 
 def _records(contents: Contents) -> None:
-    """Hold what says where each original file begins and ends against the header."""
+    """Compare the arrays that locate the original files with the header."""
     sizes = np.array([entry.size for entry in contents.header.originals], "<u8")
     for name, expected in layout.records(sizes).items():
         what = f"the array {layout.WIRE}/{name}"
-        found = contents.array(f"{layout.WIRE}/{name}", expected.dtype.str, len(expected), what)
+        array = contents.array(f"{layout.WIRE}/{name}", expected.dtype.str, len(expected), what)
         with reading(contents.path, what):
-            same = np.array_equal(found[:], expected)
+            same = np.array_equal(array[:], expected)
         if not same:
             raise damaged(contents.path, what, "it differs from the header")
 
@@ -135,49 +135,50 @@ def _field(contents: Contents, path: str, value: Any) -> None:
     import h5py
 
     what = f"the field {path}"
-    found = contents.at(path, what)
+    field = contents.at(path, what)
     with reading(contents.path, what):
-        if not isinstance(found, h5py.Dataset):
-            raise ValueError(f"a value was written, got a {type(found).__name__}")
-        _demand_alike(found, value)
-        held = found[()]
-    _compare(contents, what, held, value)
+        if not isinstance(field, h5py.Dataset):
+            raise ValueError(f"expected a value, got a {type(field).__name__}")
+        _check_form(field, value)
+        actual = field[()]
+    _compare(contents, what, actual, value)
 
 
 def _attributes(contents: Contents, path: str, expected: dict[str, Any]) -> None:
-    """Hold the attributes that other tools see against the header: none missing, none added, none changed."""
+    """Compare the attributes for other tools with the header: none missing, none added, none changed."""
     carrier = contents.at(path, f"an attribute of {path}")
     with reading(contents.path, f"an attribute of {path}"):
-        held = carrier.attrs
-        names = {name for name in held if name not in DIMENSION_ATTRIBUTES}
-    if odd := sorted(names ^ set(expected)):
-        state = "is missing" if odd[0] in expected else "was added"
-        raise damaged(contents.path, f"the attribute {path}@{odd[0]}", f"it {state}")
+        attributes = carrier.attrs
+        names = {name for name in attributes if name not in DIMENSION_ATTRIBUTES}
+    if different := sorted(names ^ set(expected)):
+        state = "is missing" if different[0] in expected else "was added later"
+        raise damaged(contents.path, f"the attribute {path}@{different[0]}", f"it {state}")
     for name, value in expected.items():
         what = f"the attribute {path}@{name}"
         with reading(contents.path, what):
-            _demand_alike(held.get_id(name), value)
-            found = held[name]
-        _compare(contents, what, found, value)
+            _check_form(attributes.get_id(name), value)
+            actual = attributes[name]
+        _compare(contents, what, actual, value)
 
 
-def _demand_alike(found: Any, value: Any) -> None:
-    """Look at type, shape and size before anything is read: free texts lead HDF5 about, and sizes fill the memory."""
+def _check_form(stored_item: Any, value: Any) -> None:
+    """Check type, shape and size before reading: texts of variable length can hang HDF5, large ones fill the memory."""
     data, dtype = stored(value)
     expected = np.asarray(data, dtype)
-    is_, demanded = (found.dtype.kind, found.shape), (expected.dtype.kind, expected.shape)
-    if is_ != demanded or found.dtype.itemsize > max(8, expected.dtype.itemsize):
-        raise ValueError(f"{_cut(expected.tolist())} was written, got type {found.dtype} of shape {found.shape}")
+    actual, required = (stored_item.dtype.kind, stored_item.shape), (expected.dtype.kind, expected.shape)
+    if actual != required or stored_item.dtype.itemsize > max(8, expected.dtype.itemsize):
+        found = f"type {stored_item.dtype} of shape {stored_item.shape}"
+        raise ValueError(f"expected {_cut(expected.tolist())}, got {found}")
 
 
-def _compare(contents: Contents, what: str, found: Any, value: Any) -> None:
+def _compare(contents: Contents, what: str, actual: Any, value: Any) -> None:
     data, dtype = stored(value)
     expected = np.asarray(data, dtype)
-    if repr(np.asarray(found).tolist()) != repr(expected.tolist()):
-        raise damaged(contents.path, what, f"{_cut(expected.tolist())} was written, got {_cut(found)}")
+    if repr(np.asarray(actual).tolist()) != repr(expected.tolist()):
+        raise damaged(contents.path, what, f"expected {_cut(expected.tolist())}, got {_cut(actual)}")
 
 
 def _cut(value: Any) -> str:
-    """Return a value as Python writes it, not more of it than a line holds."""
+    """Return the repr of a value, at most 200 characters of it."""
     words = repr(value)
     return words if len(words) <= 200 else f"{words[:200]}..."

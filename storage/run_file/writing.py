@@ -1,4 +1,4 @@
-"""Run files, written whole: :func:`write_run`.
+"""Write run files whole: :func:`write_run`.
 
 Examples
 --------
@@ -53,32 +53,31 @@ def write_run(
 ) -> Path:
     """Write a run file whole.
 
-    The blocks are written as they come, so memory holds no more than a chunk of 65536 samples of them.
+    The blocks are written as they come, so memory holds at most a chunk of 65536 samples.
 
     Parameters
     ----------
     path : str or PathLike
-        The file to be made.
+        The file to make.
     blocks : iterable of Block
-        Blocks that follow each other without a gap. A column that some lack is filled there, as in
-        :func:`acquisition.block.concatenate`.
+        Consecutive blocks. If some lack a column, it is filled there as in :func:`acquisition.block.concatenate`.
     info : SourceInfo
-        The source; its ``kind`` travels with the data.
+        The source; its ``kind`` is stored with the data.
     originals : sequence of Original
-        Files to be given back bit for bit.
+        Files to keep bit for bit.
     scene : mapping, optional
         The scene's tables; JSON-able, string keys. Tuples come back as lists.
     title, channel, format : str
-        The run's title, the quantity taken as distance, the family of recordings that read it.
+        The run's title, the quantity that is read as distance, the family of recordings.
     traps : sequence of Trap
-        What was seen on reading.
+        Remarks of the reader.
     malformed_rows : int
         Rows that were not samples.
     provenance : mapping, optional
-        Whatever else is known; JSON-able, string keys. ``software``, ``version``, ``created_utc``,
-        ``start_time`` (ISO 8601, the moment of t = 0) and ``configuration`` are shown to other tools as well.
+        Anything else that is known; JSON-able, string keys. ``software``, ``version``, ``created_utc``,
+        ``start_time`` (ISO 8601, the time of t = 0) and ``configuration`` also become attributes for other tools.
     overwrite : bool
-        Whether a file that stands there may be replaced.
+        Whether an existing file may be replaced.
 
     Returns
     -------
@@ -88,11 +87,11 @@ def write_run(
     Raises
     ------
     RunExists
-        If a file stands there and may not be replaced; no block has been asked for then.
+        If the file exists and may not be replaced; no block has been read then.
     WriteFailed
-        If the file cannot be written, blocks do not follow each other or hold two quantities, or the scene or the
-        provenance holds what JSON cannot. What the iterable of blocks raises passes through. What stood there before
-        stands.
+        If the file cannot be written, blocks are not consecutive or have different quantities, or JSON cannot store
+        the scene or the provenance. Errors of the iterable of blocks pass through. In all cases an existing file is
+        unchanged.
     """
     with run_writer(path, sigma_m=info.sigma_m, overwrite=overwrite) as run:
         for block in blocks:
@@ -117,7 +116,7 @@ def write_run(
 def run_writer(
     path: str | os.PathLike[str], *, sigma_m: float | None = None, overwrite: bool = False
 ) -> Iterator[RunWriter]:
-    """Give a writer of a run file, which is put in place when the ``with`` ends well.
+    """Give a writer of a run file; the file is put in place when the ``with`` ends without an error.
 
     Parameters
     ----------
@@ -136,7 +135,7 @@ def run_writer(
         run = RunWriter(path, file, sigma_m)
         yield run
         if not run.finished:
-            raise ValueError(f"{path}: a run file was begun and not finished")
+            raise ValueError(f"{path}: the run file was not finished; call RunWriter.finish")
 
 
 class RunWriter:
@@ -149,40 +148,40 @@ class RunWriter:
         self._originals: Originals | None = None
 
     def append(self, block: Block) -> None:
-        """Take the next samples.
+        """Append the next samples.
 
         Raises
         ------
         WriteFailed
-            If they do not follow those before, are of another quantity, or cannot be written.
+            If they do not follow the last ones, are of another quantity, or cannot be written.
         """
         self._columns.append(block)
 
     def keep(self, files: Sequence[tuple[str, int]]) -> None:
-        """Make room for original files of these names and sizes, whose bytes :meth:`take` brings."""
+        """Reserve space for original files of these names and sizes; :meth:`take` appends their bytes."""
         with writing_h5(self.path):
             self._originals = Originals(self._file, files) if files else None
 
     def take(self, number: int, data: bytes) -> None:
-        """Take the next bytes of an original file, in the order in which :meth:`keep` named them."""
+        """Append the next bytes of an original file; ``number`` is its index in the call of :meth:`keep`."""
         assert self._originals is not None
         with writing_h5(self.path):
             self._originals.take(number, data)
 
     def finish(self, info: SourceInfo, *, traps: Sequence[Trap] = (), **header: Any) -> None:
-        """Write the rest and the header.
+        """Write the remaining samples and the header.
 
         Parameters
         ----------
         info : SourceInfo
         traps : sequence of Trap
         **header
-            Of :class:`storage.run_file.header.Header`, what is not known from the samples and the originals.
+            Fields of :class:`storage.run_file.header.Header` that do not follow from the samples and the originals.
 
         Raises
         ------
         WriteFailed
-            If an original is not whole, or the header holds what none may.
+            If an original is incomplete, or a value of the header is not allowed.
         """
         columns = self._columns
         columns.finish()

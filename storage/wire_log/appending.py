@@ -1,7 +1,7 @@
-"""The wire log: the exact bytes off the wire, each read a record with a checksum, appended and never changed.
+"""Write the wire log: the exact bytes from the port, one checksummed record per read, appended and never changed.
 
-:class:`WireLogWriter` appends; :func:`read_log` (of :mod:`storage.wire_log.scanning`) reads whatever is left of a
-log. The layout of a record is that of :mod:`storage.wire_log.records`.
+:class:`WireLogWriter` appends; :func:`storage.wire_log.scanning.read_log` reads a log, even a damaged one.
+:mod:`storage.wire_log.records` defines the layout of a record.
 
 Examples
 --------
@@ -39,17 +39,17 @@ from storage.wire_log.records import Kind, LogHeader, ends_item, frames
 __all__ = ["Item", "LogFile", "WireLogWriter", "Written", "open_log_file"]
 
 FIRST_COPY = 8192
-"""Byte of the log past which the header is first repeated."""
+"""Byte of the log after which the header is first repeated."""
 WRITE_BYTES = 1 << 18
-"""So much is written at a time where many records wait."""
-_APPEND = os.O_WRONLY | os.O_APPEND  # and never made anew
+"""Bytes per write if many records are queued."""
+_APPEND = os.O_WRONLY | os.O_APPEND  # without O_CREAT: the file must exist
 
 Item = tuple[Kind, int, int, bytes]
-"""What a record is made of: kind, channel, host's monotonic clock in ns, payload."""
+"""The parts of a record: kind, channel, host's monotonic clock in ns, payload."""
 
 
 class Written(NamedTuple):
-    """How far a log has come: records, and bytes of the file."""
+    """Size of a log: records, and bytes of the file."""
 
     records: int = 0
     bytes: int = 0
@@ -58,26 +58,26 @@ class Written(NamedTuple):
 class WireLogWriter:
     """Appends records to a new log.
 
-    One thread appends; others may call :meth:`sync` at the same time. :attr:`written` and ``synced`` say how far the
-    log has come, in the kernel's hands and on the disk; ``extended`` how many items of the last call are whole in it.
+    One thread appends; others may call :meth:`sync` at the same time. :attr:`written` counts what the kernel has taken,
+    ``synced`` what is on the disk, and ``extended`` the items of the last :meth:`extend` that are whole in the log.
 
     Parameters
     ----------
     path : str or PathLike
-        The log to be made; its folder must exist.
+        The log to make; its folder must exist.
     header : LogHeader
         Written and synced before the constructor returns.
     open_file : callable
-        Makes a file: the seam for tests.
+        Makes a file; tests replace it.
     log : int, optional
-        The number that all records carry; left out, a random one.
+        The log number in all records; random by default.
 
     Raises
     ------
     RunExists
-        If a file stands there: a recording is never written over.
+        If the file exists: a recording is never overwritten.
     WriteFailed
-        If the log cannot be made; none is left behind then.
+        If the log cannot be made; no file is left then.
     """
 
     def __init__(
@@ -106,8 +106,8 @@ class WireLogWriter:
         try:
             self._file = open_file(self.path)
         except FileExistsError as error:
-            demand = "a new wire log was to be begun, but a file stands there"
-            raise RunExists(self.path, demand, "choose another name; a recording is never written over") from error
+            remedy = "choose another name, recordings are never overwritten"
+            raise RunExists(self.path, "already exists", remedy) from error
         except OSError as error:
             raise self._failed("could not be made", error) from error
         try:
@@ -120,7 +120,7 @@ class WireLogWriter:
             raise
 
     def append(self, kind: Kind, payload: bytes, *, mono_ns: int, channel: int = 0) -> int:
-        """Append a record, or several where the payload is long.
+        """Append a record, or several if the payload is long.
 
         Parameters
         ----------
@@ -139,7 +139,7 @@ class WireLogWriter:
         Raises
         ------
         WriteFailed
-            If the disk does not take it all. Then nothing more is taken; what was written before stands.
+            If the disk does not take all of it. The writer then accepts nothing more; earlier records are kept.
         """
         self.extend(((kind, channel, mono_ns, payload),))
         return self.written.records - 1
@@ -154,41 +154,40 @@ class WireLogWriter:
         Raises
         ------
         WriteFailed
-            If the disk does not take them all. Then nothing more is taken; :attr:`extended` says how many of them are
-            whole in the log.
+            If the disk does not take all of them. The writer then accepts nothing more; :attr:`extended` counts the
+            items that are whole in the log.
         """
         self.extended = 0
         if error := self._append_error or self._sync_error:
             raise error
         batch: list[bytes] = []
-        laid, end = 0, self.written.bytes
+        items_in_batch, end = 0, self.written.bytes
         try:
             for kind, channel, mono_ns, payload in items:
                 if end >= self._next_copy:
-                    # Doubling distances: about twenty copies in a day's log, and no zeroed page takes all of them.
-                    # Before the record and not after it, so that an error always means that the record itself is not
-                    # whole in the log.
+                    # The distance doubles: a day's log has about twenty copies, and no zeroed page destroys all.
+                    # The copy is written first, so that an error always means that the record itself is incomplete.
                     self._next_copy = 2 * end
                     end += self._lay(batch, Kind.HEADER, 0, mono_ns, self._header)
                 end += self._lay(batch, kind, channel, mono_ns, payload)
-                laid += 1
+                items_in_batch += 1
                 if end - self.written.bytes >= WRITE_BYTES:
                     whole, batch = batch, []
-                    self._write(whole, laid)
-                    laid = 0
+                    self._write(whole, items_in_batch)
+                    items_in_batch = 0
         finally:
             if batch:
-                self._write(batch, laid)
+                self._write(batch, items_in_batch)
 
     def _lay(self, batch: list[bytes], kind: Kind, channel: int, mono_ns: int, payload: bytes) -> int:
-        """Add an item's records to those that are to be written; return their bytes."""
+        """Add an item's records to a batch; return their size in bytes."""
         before = len(batch)
         sequence = self.written.records + before
         batch += frames(kind, payload, sequence=sequence, mono_ns=mono_ns, log=self._log, channel=channel)
         return sum(map(len, batch[before:]))
 
     def _write(self, batch: list[bytes], items: int) -> None:
-        """Write the records of so many items, and count those that are whole in the log."""
+        """Write the records of some items, and count those that are whole in the log."""
         if not batch:
             return
         data = b"".join(batch)
@@ -199,15 +198,15 @@ class WireLogWriter:
             self._in_flight = len(batch), items
         try:
             taken = self._file.write(data)
-            while taken < len(data):  # a nearly full disk takes a part, then says why
+            while taken < len(data):  # a nearly full disk takes a part, then reports the error
                 more = self._file.write(memoryview(data)[taken:])
                 if more <= 0:
-                    raise OSError(errno.EIO, f"{taken} of {len(data)} bytes were taken")
+                    raise OSError(errno.EIO, f"only {taken} of {len(data)} bytes were written")
                 taken += more
         except OSError as error:
             whole = [record for record, end in zip(batch, accumulate(map(len, batch)), strict=True) if end <= taken]
             self._count(len(whole), sum(map(len, whole)), sum(map(ends_item, whole)))
-            self._append_error = self._failed("could not be written further", error)
+            self._append_error = self._failed("could not be continued", error)
             raise self._append_error from error
         self._count(len(batch), taken, items)
 
@@ -218,25 +217,25 @@ class WireLogWriter:
             self._in_flight = 0, 0
 
     def stop(self) -> int:
-        """Begin no write any more; return how many items of the last call are in the log or in a write that hangs."""
+        """Start no further write; return how many items of the last call are in the log or in a write that hangs."""
         with self._counting:
             self._append_error = self._append_error or WriteFailed(
-                self.path, "the recording was ended while the disk took nothing", "look at the disk"
+                self.path, "the recording was ended while the disk did not respond", "check the disk"
             )
             return self.extended + self._in_flight[1]
 
     def append_beside(self, items: Iterable[Item]) -> None:
-        """Append items past a write that hangs, through a descriptor of their own, and sync; after :meth:`stop` only.
+        """Append items despite a write that hangs, through a second descriptor, and sync; only after :meth:`stop`.
 
         Notes
         -----
-        The records take their numbers after those of the write that hangs. Should that never reach the log, its
-        records are missing in the count, and every reader of the log says how many.
+        The sequence numbers follow those of the write that hangs. If that write never reaches the log, its numbers are
+        missing, and every reader of the log counts them as lost.
 
         Raises
         ------
         OSError
-            If the disk does not take it all, or the log's name leads to no file.
+            If the disk does not take all of it, or the log no longer exists under its name.
         """
         batch: list[bytes] = []
         with self._counting:
@@ -252,13 +251,13 @@ class WireLogWriter:
             os.fsync(file.fileno())
 
     def sync(self) -> Written:
-        """Return when everything appended before the call is on the disk, and how much that is.
+        """Sync everything appended before the call to the disk, and return how much that is.
 
         Raises
         ------
         WriteFailed
-            If the disk refuses. What :attr:`synced` says stands; the rest is not certain, nor is it ever again:
-            a kernel forgets which pages it failed to write, so a second attempt would prove nothing.
+            If the sync fails. What :attr:`synced` counts is safe. The state of later records stays unknown: a kernel
+            forgets which pages it failed to write, so a second successful sync would prove nothing.
         """
         with self._syncing:
             if self._sync_error:
@@ -278,7 +277,7 @@ class WireLogWriter:
         Raises
         ------
         WriteFailed
-            If the disk says only now that something failed.
+            If the disk reports an earlier error only now.
         """
         try:
             self._file.close()
@@ -287,7 +286,7 @@ class WireLogWriter:
 
     def _failed(self, what: str, error: OSError) -> WriteFailed:
         reason = error.strerror or one_line(error)
-        remedy = "check the disk's space and permissions"
+        remedy = "check the disk space and the permissions"
         if self.written.records:
-            remedy += f"; {self.written.records} records up to byte {self.written.bytes} are kept"
+            remedy += f"; {self.written.records} records ({self.written.bytes} bytes) are kept"
         return WriteFailed(self.path, f"the wire log {what} ({reason})", remedy)

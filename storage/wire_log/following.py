@@ -1,4 +1,4 @@
-"""A wire log read while it is written, as the page of a recording does: by a process of its own, from the file."""
+"""Read a wire log while another process writes it, as the page of a recording does."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from storage.wire_log.window import Window
 __all__ = ["LogFollower"]
 
 AT_ONCE = 10_000
-"""Records that one call returns at most, 100 s of a sensor at 100 Hz: a long log is shown a stretch at a time."""
+"""Most records that one call returns: 100 s of a sensor at 100 Hz. So a long log is shown piece by piece."""
 
 
 class LogFollower:
-    """Gives a growing log's records, each once.
+    """Returns each record of a growing log once.
 
-    It only reads: whatever becomes of it, the recording goes on. A record counts when it is whole in the file, so the
-    log has taken what it gives. Damage is passed over, as by every reader of a log.
+    It only reads, so a failure here does not affect the recording. It returns a record when it is whole in the file,
+    and skips damage like every reader of a log.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class LogFollower:
     ----------
     header : LogHeader
     ended : bool
-        Whether the end record came.
+        Whether the end record has been read.
 
     Raises
     ------
@@ -43,7 +43,7 @@ class LogFollower:
         contents = read_log(path)
         header = contents.header
         if header is None:
-            raise NotALog(path, "a log with a header was demanded, got none", "name the log of a recording")
+            raise NotALog(path, "expected a wire log with a header, got none", "name the log of a recording")
         self.header = header
         self.ended = False
         self._window = Window(contents.parts, live=True)
@@ -51,11 +51,11 @@ class LogFollower:
         self._records = self._scan.records()
 
     def close(self) -> None:
-        """Close the file; again does no harm."""
+        """Close the file. Further calls do nothing."""
         self._window.close()
 
     def records(self) -> list[Record]:
-        """Return the records that came since the last call, ten thousand at most, without the header and its copies.
+        """Return the new records since the last call, at most ten thousand, without the header and its copies.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""A log held open for reading while it is recorded, so that it can be read whatever becomes of its name."""
+"""A log that is kept open for reading during the recording, so that it can be read even after a rename or deletion."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ __all__ = ["HeldLog"]
 
 
 class HeldLog:
-    """One read descriptor of a log, closed when nobody refers to it any more.
+    """One read descriptor of a log, which is closed with the last reference to it.
 
-    Not for Windows, which lets nobody rename or delete an open file.
+    Not for Windows, where an open file cannot be renamed or deleted.
 
     Parameters
     ----------
     path : Path
-        The log, which has just been made.
+        The log, just after it was made.
 
     Raises
     ------
@@ -35,7 +35,7 @@ class HeldLog:
         weakref.finalize(self, os.close, self._descriptor)
 
     def astray(self) -> str:
-        """Return what became of the log's name, for people; empty while it leads to the log."""
+        """Return in words whether the log was deleted, renamed or replaced; empty if its name still leads to it."""
         own = os.fstat(self._descriptor)
         try:
             there = os.stat(self._path)
@@ -44,7 +44,7 @@ class HeldLog:
         return "" if os.path.samestat(there, own) else "another file has taken the name of the log"
 
     def contents(self) -> LogContents:
-        """Return what the log holds by now, under the name that it was begun with.
+        """Return the current content of the log, under its first name.
 
         Raises
         ------
@@ -54,7 +54,7 @@ class HeldLog:
         return LogContents(self._path, [LogPart.at(self._path, self._opened)])
 
     def _opened(self) -> BinaryIO:
-        # A copy of the descriptor shares its position, so one pass over the log ends before the next begins.
+        # A duplicate descriptor shares its position, so passes over the log must not overlap.
         file = os.fdopen(os.dup(self._descriptor), "rb")
         file.seek(0)
         return file

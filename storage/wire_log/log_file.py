@@ -1,4 +1,4 @@
-"""The file under a log, as its writer sees it: the seam between the two."""
+"""The file of a log: the interface between the log's writer and the disk."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ __all__ = ["LogFile", "is_being_written", "open_log_file"]
 
 
 class LogFile(Protocol):
-    """The seam between the writer and the disk; tests put a failing one in its place."""
+    """The interface between the log's writer and the disk; tests replace it with a failing one."""
 
     def write(self, data: bytes | memoryview) -> int:
-        """Append; return how many bytes were taken, as ``os.write`` does. Raises OSError."""
+        """Append; return how many bytes were written, as ``os.write`` does. Raises OSError."""
         ...
 
     def sync(self) -> None:
-        """Return when what was written is on the disk. Raises OSError."""
+        """Sync what was written to the disk. Raises OSError."""
         ...
 
     def close(self) -> None:
@@ -35,9 +35,9 @@ class LogFile(Protocol):
 
 
 class _NewFile(io.FileIO):
-    """A file that was not there yet, locked while it is open; nothing is buffered on this side of the kernel."""
+    """A new file, locked while it is open, and without buffers outside the kernel."""
 
-    # macOS and Windows have no fdatasync; fsync does more than it.
+    # macOS and Windows have no fdatasync; fsync does the same and more.
     _sync: Callable[[int], None] = staticmethod(getattr(os, "fdatasync", os.fsync))
 
     def __init__(self, path: Path) -> None:
@@ -51,9 +51,9 @@ class _NewFile(io.FileIO):
 
 
 def open_log_file(path: Path) -> LogFile:
-    """Make a file that is not there yet, for appending, its name safe on the disk. Raises OSError."""
+    """Make a new file for appending and sync its name to the disk. Raises OSError."""
     file = _NewFile(path)
-    with contextlib.suppress(OSError):  # then the name is as safe as it gets
+    with contextlib.suppress(OSError):  # a disk that cannot sync a folder
         sync_folder(path.parent)
     return file
 
@@ -61,7 +61,7 @@ def open_log_file(path: Path) -> LogFile:
 def is_being_written(file: BinaryIO) -> bool:
     """Return whether the writer of a log's file, in this process or another, still holds its lock.
 
-    False on Windows and on a disk without locks, where nobody can know.
+    False on Windows and on a disk without locks, where this is unknown.
     """
     if sys.platform == "win32":
         return False

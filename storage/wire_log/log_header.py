@@ -1,4 +1,4 @@
-"""What a wire log says in words: its header, with the sensors, the clocks and the bench, and its events."""
+"""The JSON records of a wire log: its header (sensors, clocks, bench) and its events."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ __all__ = ["LATEST_NS", "LOG_VERSION", "LONGEST_TEXT", "LogHeader", "SensorEntry
 
 LOG_VERSION = 1
 LONGEST_TEXT = 64 * 65535
-"""Bytes of the longest header, mark or event."""
+"""Size of the longest header, mark or event, bytes."""
 LATEST_NS = 1 << 62
-"""A host's clock that counts from its start never comes there in 146 years, and UTC in 2116."""
+"""Largest time of a clock, ns: 146 years after the start of the host, or the year 2116 in UTC."""
 DEEPEST = 17
-"""Tables and lists in each other, the header or event itself among them."""
+"""Largest depth of nested tables and lists, including the header or event itself."""
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _Nanoseconds = Annotated[int, Meta(ge=0, le=LATEST_NS)]
@@ -35,18 +35,18 @@ class SensorEntry(Calibrated, frozen=True, forbid_unknown_fields=True):
     channel : int
         Its number within the run.
     family : str
-        As ``--sensor`` took it.
+        Name of the sensor family.
     port : str
         Address of the port.
     baud : int
     rate_hz : float or None
-        Readings per second that it is set to, Hz; None for the family's.
+        Readings per second that it is set to, Hz; None for the family's rate.
     options : mapping
-        Of the family's decoder.
+        Options of the family's decoder.
     calibration : mapping
         Numbers of :class:`acquisition.live.calibration.Calibration` by name; empty for the default.
     clock_ppm : float or None
-        What its clock may be off at most, ppm; None for the family's.
+        Largest rate error of its clock, ppm; None for the family's.
     """
 
     channel: Annotated[int, Meta(ge=0, le=255)]
@@ -59,16 +59,16 @@ class SensorEntry(Calibrated, frozen=True, forbid_unknown_fields=True):
 
 
 class LogHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What a log says of its run before the first byte came.
+    """The description of a run at the start of its log.
 
     Parameters
     ----------
     sensors : tuple of SensorEntry
-        Each with a channel of its own.
+        Each with a different channel.
     mono_ns, unix_ns : int
-        The host's monotonic clock and UTC since 1970 at one and the same moment, ns: the map between the two.
+        The host's monotonic clock and UTC since 1970 at the same moment, ns; they map one clock to the other.
     kind : {"live", "simulated", "replay"}
-        Travels with the data: simulated data cannot pass for measured.
+        It stays with the data, so that simulated data cannot pass for measured.
     scene : mapping or None
         The scene's tables; JSON-able.
     title, version : str
@@ -86,10 +86,10 @@ class LogHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         channels = [sensor.channel for sensor in self.sensors]
         if len(set(channels)) != len(channels):
-            raise ValueRefused("sensors", f"expected each with a channel of its own, got {channels}")
+            raise ValueRefused("sensors", f"expected different channels, got {channels}")
 
     def utc(self, mono_ns: int) -> str:
-        """Return the wall clock (ISO 8601, UTC) at a moment of the monotonic clock in ns; empty beyond year 9999."""
+        """Return the time of the monotonic clock in ns as UTC (ISO 8601); empty after the year 9999."""
         micros = (self.unix_ns + mono_ns - self.mono_ns) // 1000
         try:
             return (_EPOCH + timedelta(microseconds=micros)).isoformat(timespec="microseconds")
@@ -102,30 +102,30 @@ class LogHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Raises
         ------
         TypeError, ValueError
-            If the scene or an option holds what JSON cannot, or a key what :meth:`decode` would refuse.
+            If JSON cannot store the scene or an option, or :meth:`decode` would refuse a value.
         """
         content = {"log": LOG_VERSION, "start_utc": self.utc(self.mono_ns), **plain(self)}
         payload = json_text(content).encode("ascii")
         if len(payload) > LONGEST_TEXT:
-            raise ValueError(f"a header of at most {LONGEST_TEXT} bytes was demanded, got {len(payload)}")
+            raise ValueError(f"expected a header of at most {LONGEST_TEXT} bytes, got {len(payload)}")
         self.decode(payload)
         return payload
 
     @classmethod
     def decode(cls, payload: bytes) -> LogHeader:
-        """Read what :meth:`encode` wrote.
+        """Read the payload that :meth:`encode` made.
 
         Raises
         ------
         storage.schema.ValueRefused
-            If a key holds what it may not, or the log is of another version.
+            If a value is not allowed for its key, or the log has another version.
         """
         content = parsed(payload, "header")
         if isinstance(content, dict):
             if (version := content.pop("log", None)) != LOG_VERSION:
-                reason = f"expected {LOG_VERSION}, the layout that this version reads, got {shown(version)}"
+                reason = f"expected {LOG_VERSION}, the version of the layout, got {shown(version)}"
                 raise ValueRefused("header.log", reason)
-            content.pop("start_utc", None)  # for people; the clock map says the same
+            content.pop("start_utc", None)  # for people; mono_ns and unix_ns hold the same
         return decoded(content, cls, "header", DEEPEST)
 
 
@@ -135,9 +135,9 @@ class _Event(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def event_content(payload: bytes) -> dict[str, Any]:
-    """Return what an event record holds: its kind and its facts.
+    """Return the kind and the facts of an event record.
 
-    One that holds no such thing is an event of the kind "unreadable", with the beginning of its bytes.
+    For a record without them the kind is "unreadable", and the facts hold the beginning of its bytes.
     """
     try:
         return plain(decoded(parsed(payload, "event"), _Event, "event", DEEPEST))

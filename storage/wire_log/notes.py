@@ -1,4 +1,4 @@
-"""What a log says besides bytes: marks, events and the calibrations among them, in bounded memory."""
+"""The marks, events and calibrations of a log, in bounded memory."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from storage.wire_log.records import HIGHEST_CHANNEL, Kind, Record
 
 __all__ = ["Notes"]
 
-KEPT = 10_000
-KEPT_BYTES = 4 << 20
+MAX_NOTES = 10_000
+MAX_BYTES = 4 << 20
 ENDS = frozenset({"lost", "reopened", "replaced", "continues", "ended"})
-"""Events of which the last is kept, however many came before: they say how a recording ended."""
+"""Events whose last occurrence is always kept, because they show how a recording ended."""
 
 
 class Notes:
-    """Collects the notes of a log: the first ten thousand, or four megabytes of them; the rest are counted.
+    """Collects the marks and events of a log: the first ten thousand, or four megabytes; later ones are only counted.
 
     Attributes
     ----------
     counts : Counter
-        By kind of record.
+        Number of records by kind.
     calibrations : dict of int to mapping
         The last calibration of each channel.
     parts : dict of int to int
-        By channel of a sensor that came back as another, the channel of the one before.
+        For each channel of a sensor that replaced another, the channel of the sensor before.
     left_out : int
-        Notes that were not kept. The log inside the run file has them.
+        Number of notes that were not kept. They are in the log inside the run file.
     """
 
     def __init__(self) -> None:
@@ -38,17 +38,17 @@ class Notes:
         self.calibrations: dict[int, Mapping[str, Any]] = {}
         self.parts: dict[int, int] = {}
         self.left_out = 0
-        self._kept: list[tuple[Record, dict[str, Any]]] = []
+        self._notes: list[tuple[Record, dict[str, Any]]] = []
         self._bytes = 0
-        self._late: dict[tuple[int, str], tuple[int, dict[str, Any]]] = {}
+        self._last_ends: dict[tuple[int, str], tuple[int, dict[str, Any]]] = {}
 
     def take(self, record: Record) -> None:
-        """Take a record that holds no data.
+        """Collect a record that is no data record.
 
         Raises
         ------
         storage.schema.ValueRefused
-            If it is a calibration that none can be.
+            If it is a calibration with a value out of range.
         """
         self.counts[record.kind] += 1
         if record.kind is Kind.EVENT:
@@ -59,7 +59,7 @@ class Notes:
             elif content["kind"] == "continues" and isinstance(of := content["facts"].get("of"), int):
                 self.parts.setdefault(record.channel, of)
             elif content["kind"] == "replaced":
-                # The same link as "continues" states, where that record is damaged.
+                # States the same link as "continues", in case that record is damaged.
                 part = content["facts"].get("channel")
                 if isinstance(part, int) and 0 <= part <= HIGHEST_CHANNEL and part != record.channel:
                     self.parts.setdefault(part, record.channel)
@@ -68,24 +68,27 @@ class Notes:
         else:
             return
         self._bytes += len(record.payload)
-        if len(self._kept) < KEPT and self._bytes <= KEPT_BYTES:
-            self._kept.append((record._replace(payload=b""), content))
+        if len(self._notes) < MAX_NOTES and self._bytes <= MAX_BYTES:
+            self._notes.append((record._replace(payload=b""), content))
         else:
             self.left_out += 1
             if content.get("kind") in ENDS:
-                self._late[record.channel, content["kind"]] = record.mono_ns, content
+                self._last_ends[record.channel, content["kind"]] = record.mono_ns, content
 
     def events(self, channel: int | None = None) -> list[tuple[int, Mapping[str, Any]]]:
-        """Return the events of a channel, or of all, in order: host's stamp in ns, kind and facts."""
-        found = [(each.channel, (each.mono_ns, content)) for each, content in self._kept if each.kind is Kind.EVENT]
-        found += [(of, event) for (of, _), event in sorted(self._late.items(), key=lambda item: item[1][0])]
-        return [event for of, event in found if channel in (None, of)]
+        """Return the events of one channel, or of all, in order: host time in ns, kind and facts."""
+        events = [(each.channel, (each.mono_ns, content)) for each, content in self._notes if each.kind is Kind.EVENT]
+        events += [
+            (of_channel, event)
+            for (of_channel, _), event in sorted(self._last_ends.items(), key=lambda item: item[1][0])
+        ]
+        return [event for of_channel, event in events if channel in (None, of_channel)]
 
     def provenance(self, origin_ns: int) -> dict[str, Any]:
-        """Return marks and events as plain numbers and texts, with their times since ``origin_ns``."""
-        found: dict[Kind, list[dict[str, Any]]] = {Kind.MARK: [], Kind.EVENT: []}
-        for record, content in self._kept:
+        """Return marks and events as plain numbers and texts, with their times relative to ``origin_ns``."""
+        by_kind: dict[Kind, list[dict[str, Any]]] = {Kind.MARK: [], Kind.EVENT: []}
+        for record, content in self._notes:
             t_s = (record.mono_ns - origin_ns) * 1e-9
-            found[record.kind].append({"mono_ns": record.mono_ns, "t_s": t_s, "channel": record.channel, **content})
-        told: dict[str, Any] = {"marks": found[Kind.MARK], "events": found[Kind.EVENT]}
-        return told | ({"notes_left_out": self.left_out} if self.left_out else {})
+            by_kind[record.kind].append({"mono_ns": record.mono_ns, "t_s": t_s, "channel": record.channel, **content})
+        provenance: dict[str, Any] = {"marks": by_kind[Kind.MARK], "events": by_kind[Kind.EVENT]}
+        return provenance | ({"notes_left_out": self.left_out} if self.left_out else {})

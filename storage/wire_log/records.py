@@ -1,25 +1,25 @@
-"""The wire log's layout: how a record lies in the file, and what the header says.
+"""The wire log's layout: the bytes of a record.
 
-A log is nothing but records, one after the other, little-endian::
+A log is a sequence of records and nothing else, little-endian::
 
     offset  size  field
          0     2  magic      F5 A9; F5 occurs in no UTF-8 text
          2     2  length     u16, bytes of payload
          4     4  sequence   u32, 0 for the first record, one more for each, modulo 2^32
-         8     8  mono_ns    i64, ns, host's monotonic clock: of the read for data, of the moment for all else
+         8     8  mono_ns    i64, ns, host's monotonic clock: of the read for data, of the moment otherwise
         16     4  log        u32, random, the same in every record of a log
         20     1  kind       1 header, 2 data, 3 mark, 4 event, 5 end
-        21     1  channel    u8, the sensor; 0 where no sensor is meant
-        22     2  parts      u16, bit 0: goes on in the next record; bit 1: goes on from the one before
+        21     1  channel    u8, the sensor; 0 if the record belongs to no sensor
+        22     2  parts      u16, bit 0: continues in the next record; bit 1: continues the previous one
         24     4  crc32      of bytes 0 to 23 and the payload (zlib's polynomial)
         28        payload
 
-``log`` tells the records from those of another log: an old one whose disk blocks show through after a power cut, or
-one that a device happened to send as its data. Payloads over 65535 bytes are split; the parts follow each other.
+``log`` distinguishes the records from those of another log: an old one whose disk blocks reappear after a power cut,
+or one that a device sends as its data. Payloads over 65535 bytes are split into consecutive parts.
 
 =======  ====================================================================================================
-header   JSON, see :class:`LogHeader`. Repeated where the log passes 8, 16, 32, ... KiB: no lost page takes all
-data     the bytes of one read of a port, as they came
+header   JSON, see :class:`LogHeader`. Repeated after 8, 16, 32, ... KiB, so that no lost page destroys all copies
+data     the bytes of one read of a port
 mark     UTF-8 text
 event    JSON ``{"kind": text, "facts": {...}}``: lost, reopened, timeout, overflow, trigger, calibration, ...
 end      JSON, counts; its absence means that the recording was cut short
@@ -55,12 +55,12 @@ __all__ = [
 ]
 
 HIGHEST_CHANNEL = 255
-"""A record has one byte for its channel."""
+"""Largest channel: a record has one byte for it."""
 
 MAGIC = b"\xf5\xa9"
 MAX_PAYLOAD = 65535
 MOST_PARTS = LONGEST_TEXT // MAX_PAYLOAD
-"""Records of the longest mark, event or header: longer ones are not put together again."""
+"""Records of the longest mark, event or header; longer ones are not joined."""
 _HEAD = struct.Struct("<2sHIqIBBH")
 _CRC = struct.Struct("<I")
 _HEAD_AND_CRC = struct.Struct(_HEAD.format + "I")
@@ -69,7 +69,7 @@ _WRAP = 1 << 32
 
 
 class Kind(enum.IntEnum):
-    """What a record holds; the values are part of the log and never change."""
+    """The kind of a record; the values are stored in logs and never change."""
 
     HEADER = 1
     DATA = 2
@@ -79,7 +79,7 @@ class Kind(enum.IntEnum):
 
 
 class Parts(enum.IntFlag):
-    """How a record belongs to its neighbours where a payload was split."""
+    """How a record continues its neighbours if a payload was split."""
 
     GOES_ON = 1
     GOES_ON_FROM = 2
@@ -90,7 +90,7 @@ _ALL_PARTS = int(Parts.GOES_ON | Parts.GOES_ON_FROM)
 
 
 class Record(NamedTuple):
-    """One record; a mark, event or header that was split is joined again, data come part by part.
+    """One record. Split marks, events and headers are joined again; split data are delivered part by part.
 
     Parameters
     ----------
@@ -104,8 +104,7 @@ class Record(NamedTuple):
     channel : int
     payload : bytes
     lost_before : int
-        Records that are missing between this one and the one delivered before it; a frame must not be put together
-        across them.
+        Number of missing records between the previously delivered one and this one. No frame may span them.
     """
 
     offset: int
@@ -121,7 +120,7 @@ class Record(NamedTuple):
         return self.payload.decode("utf-8", "replace")
 
     def json(self) -> Mapping[str, Any]:
-        """Return the payload as a JSON object; empty where it is none."""
+        """Return the payload as a JSON object; empty if it is not one."""
         try:
             content = parsed(self.payload, "record")
         except ValueRefused:
@@ -130,7 +129,7 @@ class Record(NamedTuple):
 
 
 def event_payload(kind: str, facts: Mapping[str, Any]) -> bytes:
-    """Return the payload of an event; facts that JSON cannot hold go in as text, for an event is never lost."""
+    """Return the payload of an event. Facts that JSON cannot store become text, so that no event is lost."""
     try:
         text = json_text({"kind": kind, "facts": facts})
     except (TypeError, ValueError):
@@ -162,7 +161,7 @@ def frames(kind: Kind, payload: bytes, *, sequence: int, mono_ns: int, log: int,
 
 
 def ends_item(record: bytes) -> bool:
-    """Return whether a record is the last of what was appended: no part that goes on, and no copy of the header.
+    """Return whether a record is the last one of an item: neither a part that continues nor a copy of the header.
 
     Examples
     --------
@@ -177,7 +176,7 @@ Unframed = tuple[int, int, int, Kind, int, int, bytes]
 
 
 def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
-    """Return the record that begins at a byte, None where no whole and sound one does.
+    """Return the record that begins at a byte; None if there is no complete and valid one.
 
     Parameters
     ----------
@@ -185,7 +184,7 @@ def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
     at : int
         Index of the record's first byte.
     log : int or None
-        The log it must belong to; None for any.
+        Number of the log to which it must belong; None for any log.
 
     Returns
     -------
@@ -195,14 +194,14 @@ def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
     start = at + HEAD_BYTES
     if start > len(data):
         return None
-    magic, length, sequence, mono_ns, found, code, channel, parts, crc = _HEAD_AND_CRC.unpack_from(data, at)
-    # The cheap checks first: a search through damage comes here for every magic that chance has put there.
+    magic, length, sequence, mono_ns, log_number, code, channel, parts, crc = _HEAD_AND_CRC.unpack_from(data, at)
+    # Cheap checks first, because a search through damaged bytes comes here for every accidental magic.
     kind = _KINDS.get(code)
     if magic != MAGIC or kind is None or parts > _ALL_PARTS or start + length > len(data):
         return None
-    if (log is not None and found != log) or not 0 <= mono_ns <= LATEST_NS:
+    if (log is not None and log_number != log) or not 0 <= mono_ns <= LATEST_NS:
         return None
     payload = data[start : start + length]
     if crc != zlib.crc32(payload, zlib.crc32(data[at : at + _HEAD.size])):
         return None
-    return sequence, mono_ns, found, kind, channel, parts, payload
+    return sequence, mono_ns, log_number, kind, channel, parts, payload

@@ -1,4 +1,4 @@
-"""One pass over the bytes of a log: which records are sound and in order, and what is missing between them."""
+"""One pass over the bytes of a log: it finds the valid records in order and counts what is missing between them."""
 
 from __future__ import annotations
 
@@ -10,29 +10,30 @@ from storage.wire_log.window import Window
 
 __all__ = ["Damage", "Scan"]
 
-KEPT_STRETCHES = 100
+MAX_STRETCHES = 100
 
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """What reading a log to its end found.
+    """The damage of a log that was read to its end.
 
     Parameters
     ----------
     records : int
-        Sound records.
+        Number of valid records.
     lost : int
-        Records missing by their numbers, or incomplete. What is missing after the last sound one has no number.
+        Number of missing or incomplete records, from the sequence numbers. Losses after the last valid record are not
+        counted.
     skipped_bytes : int
         Bytes between records that belong to none.
     stretches : tuple of (int, int)
         Offset and length of the first hundred such stretches.
     strays : int
-        Sound records whose number runs back: copies of earlier ones. They are not delivered.
+        Valid records whose number runs backward: copies of earlier ones. They are not delivered.
     tail_bytes : int
-        Bytes after the last sound record: a record cut short, pages never written.
+        Bytes after the last valid record: an incomplete record, or pages that were never written.
     ended : bool
-        Whether the last record is the end that a recording closes with.
+        Whether the last record is the end record of a recording.
     """
 
     records: int = 0
@@ -45,11 +46,11 @@ class Damage:
 
     @property
     def intact(self) -> bool:
-        """Whether every byte belongs to a record, and every record up to the last is there."""
+        """Whether every byte belongs to a record, and no record before the last is missing."""
         return not (self.lost or self.skipped_bytes or self.strays or self.tail_bytes)
 
     def describe(self) -> str:
-        """Return one line for people."""
+        """Return one line for the user."""
         parts = [f"{self.records} records"]
         if self.lost:
             parts.append(f"{self.lost} lost")
@@ -58,7 +59,7 @@ class Damage:
         if self.strays:
             parts.append(f"{self.strays} out of order left out")
         if self.tail_bytes:
-            parts.append(f"{self.tail_bytes} bytes of a torn end")
+            parts.append(f"{self.tail_bytes} damaged bytes at the end")
         return ", ".join(parts) + ("" if self.ended else "; the recording was cut short")
 
 
@@ -70,7 +71,7 @@ class Scan:
         self._log = log
         self._expected = 0
         self._records = self._lost = self._strays = self._skipped = self._tail = 0
-        self._owed = 0  # lost records that the next record delivered will state
+        self._unreported = 0  # lost records that the next delivered record will report
         self._stretches: list[tuple[int, int]] = []
         self._parts: list[Record] = []
         self._ended = False
@@ -81,38 +82,38 @@ class Scan:
         return Damage(self._records, self._lost, self._skipped, stretches, self._strays, self._tail, self._ended)
 
     def records(self) -> Iterator[Record]:
-        """Yield what can be delivered; :meth:`damage` is complete after the last.
+        """Yield the valid records; :meth:`damage` is complete after the last.
 
-        Of a live log that is what has come; the next call yields what comes later.
+        For a live log these are the records so far; the next call yields later ones.
         """
         window = self._window
         if window.live:
             window.fill()
         while True:
-            found = window.record(self._log)
-            if found is None:
+            unframed = window.record(self._log)
+            if unframed is None:
                 if not self._resynchronise():
                     break
-            elif (record := self._accept(found)) is not None:
+            elif (record := self._accept(unframed)) is not None:
                 yield record
         if not window.live:
             self._drop_parts()
 
     def _resynchronise(self) -> bool:
-        """Go to the next sound record and count what lies before it; False where there is none."""
+        """Go to the next valid record and count the bytes before it; return False if there is none."""
         start = self._window.offset
-        found = self._window.seek(self._log)
+        is_there = self._window.seek(self._log)
         length = self._window.offset - start
-        if not (found or self._window.live):
+        if not (is_there or self._window.live):
             self._tail = length
         elif length:
             self._skipped += length
-            if len(self._stretches) < KEPT_STRETCHES:
+            if len(self._stretches) < MAX_STRETCHES:
                 self._stretches.append((start, length))
-        return found
+        return is_there
 
-    def _accept(self, found: Unframed) -> Record | None:
-        sequence, mono_ns, _, kind, channel, parts, payload = found
+    def _accept(self, unframed: Unframed) -> Record | None:
+        sequence, mono_ns, _, kind, channel, parts, payload = unframed
         window = self._window
         offset = window.offset
         window.at += HEAD_BYTES + len(payload)
@@ -123,7 +124,7 @@ class Scan:
         self._expected = sequence + 1
         self._records += 1
         self._lost += missing
-        self._owed += missing
+        self._unreported += missing
         self._ended = kind is Kind.END
         if kind is not Kind.DATA:
             joined = self._joined(Record(offset, sequence, mono_ns, kind, channel, payload), parts, missing)
@@ -132,17 +133,17 @@ class Scan:
             offset, sequence, mono_ns, _, _, payload, _ = joined
         elif self._parts:
             self._drop_parts()
-        owed, self._owed = self._owed, 0
-        return Record(offset, sequence, mono_ns, kind, channel, payload, owed)
+        lost_before, self._unreported = self._unreported, 0
+        return Record(offset, sequence, mono_ns, kind, channel, payload, lost_before)
 
     def _joined(self, record: Record, parts: int, missing: int) -> Record | None:
-        """Return a text whose parts are all there, None before its last one or where one is missing."""
+        """Return a text when all its parts are there; None before its last part, or if one is missing."""
         goes_on_from = bool(parts & Parts.GOES_ON_FROM)
         if self._parts and (missing or not goes_on_from or self._parts[0].kind is not record.kind):
             self._drop_parts()
         if goes_on_from and not self._parts:
             self._lost += 1
-            self._owed += 1
+            self._unreported += 1
             return None
         self._parts.append(record)
         if parts & Parts.GOES_ON:
@@ -154,5 +155,5 @@ class Scan:
 
     def _drop_parts(self) -> None:
         self._lost += len(self._parts)
-        self._owed += len(self._parts)
+        self._unreported += len(self._parts)
         self._parts = []

@@ -1,4 +1,4 @@
-"""From the records of a wire log to samples, through the chains that showed them live."""
+"""Decode the records of a wire log to samples, by the same chains as in the live view."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from storage.wire_log.records import Kind, Record, SensorEntry
 __all__ = ["BREAKS", "LogDecoder", "chains_of", "decode_log"]
 
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
-"""Events after which the bytes of a channel do not continue those before."""
+"""Events that interrupt the bytes of a channel."""
 HELD_READS = 4096
-"""Of so many reads samples are made at a time: a long run would be a heap of small arrays, or of readings."""
+"""Reads that are decoded at a time; more would take more memory, fewer would give many small arrays."""
 HELD_BYTES = 1 << 18
-"""Or of so many bytes, where a read holds many readings."""
+"""Or bytes that are decoded at a time, because a read may hold many readings."""
 
 
 def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
-    """Return the chains that the sensors' families name, with the calibrations noted in the log.
+    """Return the decoding chain of each sensor, with its calibration from the log.
 
     Raises
     ------
     acquisition.errors.AcquisitionError
-        If there is no such family, or it takes no such options.
+        If a family does not exist or does not have an option.
     """
     return [
         SensorChain(
@@ -42,25 +42,25 @@ def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
 
 
 class LogDecoder:
-    """Makes samples of a log's records, a few at a time.
+    """Decodes the records of a log to samples, piece by piece.
 
-    Where records are missing, or a port went away, no frame is put together across the gap, and the first sample
-    after it is flagged. Channels that are not asked for are passed over.
+    If records are missing or a port was lost, no frame spans the gap, and the first sample after it is flagged.
+    Channels of other sensors are skipped.
 
     Parameters
     ----------
     sensors : sequence of SensorEntry
     chains : sequence of SensorChain
-        One for each of them; they stand after the last byte when all samples were taken.
+        One for each sensor.
     noted : callable
-        Is given every record that holds no data.
+        Called with every record that is not data.
 
     Attributes
     ----------
     reads : list of int
-        Reads of each sensor's port so far.
+        Number of reads of each sensor's port so far.
     last_ns : int
-        Host's stamp of the log's last record, whatever its channel; known at the end.
+        Host time of the log's last record in any channel, ns; known at the end.
     """
 
     def __init__(
@@ -75,13 +75,13 @@ class LogDecoder:
         self._held: list[list[tuple[int, bytes]]] = [[] for _ in self.sensors]
 
     def blocks(self, log: Iterable[Record], *, growing: bool = False) -> Iterator[tuple[int, Block]]:
-        """Yield samples as they come, with the number of the sensor among those asked for.
+        """Yield samples as they are decoded, with the index of their sensor.
 
         Parameters
         ----------
         log : iterable of Record
         growing : bool
-            Whether more records come at a next call.
+            Whether a later call brings more records.
         """
         places = {sensor.channel: (number, held) for number, (sensor, held) in enumerate(self._places())}
         size = mono_ns = 0
@@ -130,7 +130,7 @@ def decode_log(
     sensors: Sequence[SensorEntry],
     chains_for: Callable[[Sequence[SensorEntry]], Sequence[SensorChain]] = chains_of,
 ) -> list[Block]:
-    """Return all samples of each sensor as one block, as :class:`LogDecoder` makes them."""
+    """Return all samples of each sensor as one block; see :class:`LogDecoder`."""
     decoder = LogDecoder(sensors, chains_for(sensors))
     blocks: list[list[Block]] = [[] for _ in sensors]
     for number, block in decoder.blocks(log):

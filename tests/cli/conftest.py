@@ -51,10 +51,7 @@ def cli(capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
 
     def run(*arguments: str | Path) -> Done:
         capsys.readouterr()
-        try:
-            code = main([str(argument) for argument in arguments])
-        except SystemExit as end:  # argparse's own way out
-            code = int(end.code or 0)
+        code = main([str(argument) for argument in arguments])
         captured = capsys.readouterr()
         return Done(code, captured.out, captured.err)
 
@@ -87,5 +84,5 @@ def write(tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def recording(write: Callable[..., Path], rows: list[bytes]) -> Path:
-    """Return a sound recording in a folder of its own."""
+    """Return a sound recording in a new folder."""
     return write(rows)

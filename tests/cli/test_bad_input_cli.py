@@ -44,7 +44,7 @@ def refused(done: Any, path: Path, *words: str) -> None:
         (b"\x89PNG\r\n\x1a\n" + np.random.default_rng(1).bytes(3000), "got a picture"),
         (b"\0" * 5000, "binary data"),
         (b" \r\n\r\n", "nothing"),
-        (b"\x89HDF\r\n\x1a\n" + bytes(300), "is not what was written"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(300), "the file is damaged"),
         (b"Motion Sensor Data File Mar 12, 2024 2:05 PM", "line 1: expected rows"),
         (b"Dear diary,\r\ntoday we hung a mass.\r\n", "no format recognises it"),
         (b"0.01\t25.3 " * 2000, "one line without end"),
@@ -111,7 +111,7 @@ def test_a_header_without_rows_is_refused(cli: Cli, write: Write, end: bytes) ->
 def test_one_row_is_refused(cli: Cli, write: Write, rows: list[bytes]) -> None:
     """One row tells no rate; with the rate given it is still no oscillation."""
     path = write(rows[:1])
-    refused(run(cli, "analyse", path, path), path, "times to tell the rate", "--rate-hz")
+    refused(run(cli, "analyse", path, path), path, "expected different times", "--rate-hz")
     refused(cli("analyse", "--json", "--rate-hz", "100", path), path, "got 1")
 
 
@@ -239,7 +239,7 @@ def test_a_cut_run_file_is_refused(cli: Cli, recording: Path, tmp_path: Path, cu
     path = tmp_path / "run.h5"
     assert cli("convert", recording, path).code == 0
     path.write_bytes(path.read_bytes()[:-cut])
-    refused(cli("analyse", "--json", path), path, "restore the file from a copy")
+    refused(cli("analyse", "--json", path), path, "restore a copy")
 
 
 def test_hdf5_of_another_program_is_refused(cli: Cli, tmp_path: Path) -> None:

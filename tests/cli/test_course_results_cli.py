@@ -48,12 +48,6 @@ def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return top / "out"
 
 
-@pytest.fixture(autouse=True)
-def index(tmp_path, monkeypatch):
-    """The index lies apart from the user's."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-
-
 def test_the_catalog_lists_what_an_expression_selects(course, cli):
     """By a tag and an uncertainty, sorted, as CSV and as JSON; an expression that is none is one line."""
     where = "section = 'A' and period_u < 1e-4"
@@ -66,14 +60,14 @@ def test_the_catalog_lists_what_an_expression_selects(course, cli):
     assert row["run"] == "run3"
     wrong = cli("catalog", course, "--where", "secton = 'A'")
     assert wrong.code == 2
-    assert "an expression over columns was demanded" in wrong.complaint
+    assert "secton" in wrong.complaint
 
 
 def test_a_course_is_compared_by_spring_and_disc(course, cli):
     """One spring constant of all runs, one drag coefficient a disc, scatter within and between benches."""
     done = cli("compare", course, "--json")
-    told = json.loads(done.out)
-    found = {(one["quantity"], one["group"]): one for one in told["agreements"]}
+    compared = json.loads(done.out)
+    found = {(one["quantity"], one["group"]): one for one in compared["agreements"]}
     (spring,) = (one for (quantity, _), one in found.items() if quantity == "spring_constant")
     assert spring["runs"] == 8
     assert spring["benches"] == 2
@@ -81,7 +75,7 @@ def test_a_course_is_compared_by_spring_and_disc(course, cli):
     for disc, drag in DRAG.items():
         assert found["drag_coefficient", disc]["runs"] == 4
         assert found["drag_coefficient", disc]["mean"]["value"] == pytest.approx(drag, rel=0.03)
-    assert told["suspects"] == []
+    assert compared["suspects"] == []
     assert "counts all damping as drag" in cli("compare", course, "--where", "disc = 'thin'").out
 
 
@@ -107,4 +101,4 @@ def test_the_map_holds_the_drag_that_was_put_in(course, cli, tmp_path):
         assert reynolds == pytest.approx(RHO * omega * amplitude / math.sqrt(2.0) * DIAMETER_M / eta, rel=0.01)
     first = [float(point["keulegan_carpenter_number"]) for point in points[7::8]]
     assert first == pytest.approx([2.0 * math.pi * 0.05 / DIAMETER_M] * 8, rel=0.03)
-    assert "needs bob, disc and air" in cli("map", course, "--where", "disc = 'none'", "--out", tmp_path).complaint
+    assert cli("map", course, "--where", "disc = 'none'", "--out", tmp_path).code == 3

@@ -65,12 +65,12 @@ def test_a_foreign_package_is_found(foreign: Path) -> None:
     (line,) = (line for line in done.stdout.splitlines() if line.startswith("FAIL"))
     assert line.split()[:3] == ["FAIL", "package", "storage"]
     assert str((foreign / "storage").resolve()) in line
-    assert "install springmass into an environment of its own" in done.stdout
+    assert "install springmass into a virtual environment" in done.stdout
 
 
 @pytest.mark.skipif(not PREFIX, reason="a checkout imports the packages by their own names")
 def test_a_foreign_package_next_to_a_wheel_does_no_harm(foreign: Path) -> None:
-    """Whoever installed a wheel may have packages of their own of the same names."""
+    """Whoever installed a wheel may have other packages of the same names."""
     done = python(foreign, "doctor")
     assert (done.returncode, done.stderr) == (0, "")
 

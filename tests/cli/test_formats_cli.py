@@ -95,8 +95,8 @@ def test_channels_runs_and_what_is_missing_are_told(cli: Cli, tmp_path: Path) ->
     assert "Run #1: Position (mm), 2 samples, rate not stated" in done.out
     assert "Run #2: Position (mm), 1 samples, rate not stated" in done.out
     assert facts["needs"].count("--run") == 1
-    (told,) = cli("formats", "--json", path).results
-    assert [(each["run"], each["name"], each["unit"], each["samples"]) for each in told["channels"]] == [
+    (result,) = cli("formats", "--json", path).results
+    assert [(each["run"], each["name"], each["unit"], each["samples"]) for each in result["channels"]] == [
         ("Run #1", "Position", "mm", 2),
         ("Run #2", "Position", "mm", 1),
     ]
@@ -205,13 +205,13 @@ def test_how_a_file_is_read_is_shown(cli: Cli, tmp_path: Path) -> None:
         'format     table: numbers begin in line 3, below "n", "t", "theta", "state"',
         "above      line 1     Pendulum 3",
         "above      line 2     n\\tt (s)\\ttheta (rad)\\tstate",
-        "column 1   n: beside others: taken where it is named: 0, 1, 2, 3, ...",
+        "column 1   n: read only if it is named: 0, 1, 2, 3, ...",
         "column 2   t (s): time: 0.0, 0.1, 0.2, 0.3, ...",
         "column 3   theta (rad): channel: 0, 1, 2, 0, ...",
-        "column 4   state: beside others: taken where it is named: ok, ok, ok, ok, ...",
+        "column 4   state: read only if it is named: ok, ok, ok, ok, ...",
     ]
-    (told,) = cli("formats", "--explain", "--json", path).results
-    assert told["tables"][0]["columns"][1]["meaning"] == "time"
+    (result,) = cli("formats", "--explain", "--json", path).results
+    assert result["tables"][0]["columns"][1]["meaning"] == "time"
 
 
 def test_how_markup_is_read_is_shown(cli: Cli, tmp_path: Path) -> None:

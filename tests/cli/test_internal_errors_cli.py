@@ -71,7 +71,7 @@ def test_a_defect_in_a_batch_is_a_failed_run(
     cli: Cli, recording: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The batch goes on, and the row says what happened."""
-    monkeypatch.setattr("springmass.batch.worker.analyse", defect)
+    monkeypatch.setattr("springmass.runs.analysing.analyse", defect)
     done = cli("batch", recording, "-o", tmp_path / "course", "--jobs", "1", "--reports", "0")
     assert done.code != INTERNAL
     table = (tmp_path / "course/results.csv").read_text(encoding="utf-8")

@@ -42,11 +42,11 @@ def test_several_inputs_share_one_table_and_one_file_of_numbers(cli: Cli, bench:
     with (tmp_path / "out" / "together.results" / "results.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     results = json.loads((tmp_path / "out" / "together.results" / "results.json").read_text())
-    told = {(row["run"], row["name"]): float(row["value"]) for row in rows}
+    values = {(row["run"], row["name"]): float(row["value"]) for row in rows}
     for run, result in zip(runs, results, strict=True):
         for name, estimate in result["estimates"].items():
-            assert told[run.stem, name] == estimate["value"]
-    assert ("damped_simulated_position", "linear+quadratic.beta") in told
+            assert values[run.stem, name] == estimate["value"]
+    assert ("damped_simulated_position", "linear+quadratic.beta") in values
 
 
 def test_a_folder_gives_its_recordings_and_names_what_is_none(cli: Cli, bench: Path) -> None:
@@ -67,7 +67,7 @@ def test_a_folder_without_a_recording_is_refused(cli: Cli, bench: Path) -> None:
     (bench / "old" / "readme.md").write_text("nothing")
     done = cli("analyse", bench / "old", "--json")
     assert (done.code, done.out) == (3, "")
-    assert "a folder with recordings was demanded, got none in it: readme.md" in done.complaint
+    assert "expected a folder with recordings, got none: readme.md" in done.complaint
 
 
 def test_a_folder_has_one_scene_for_all_of_it(cli: Cli, bench: Path, data: Path) -> None:

@@ -98,7 +98,7 @@ def test_a_report_of_any_name_is_a_report(cli: Cli, data: Path, tmp_path: Path, 
         assert hidden == [], file
     rows = list(csv.reader((tmp_path / "together/results.csv").read_text("utf-8").splitlines()))
     assert {row[0] for row in rows[1:]} == {cell(name), "other"}
-    assert "<script>" not in found["report.html"]
+    assert found["report.html"].count("<script>") == 1  # the charts'; a name never opens another
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems take names of text alone")
@@ -148,20 +148,6 @@ def test_a_course_shows_no_escapes(cli: Cli, tmp_path: Path, monkeypatch: pytest
         assert json.loads(row["findings"] or "[]") is not None
         assert json.loads(row["messages"] or "[]") is not None
     assert [c for c in Path("out/index.html").read_text("utf-8") if not c.isprintable() and c not in "\n\u00a0"] == []
-
-
-def test_a_table_made_by_hand_shows_no_escapes(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A name that somebody wrote into the table of a course comes out of the catalog visible."""
-    monkeypatch.chdir(tmp_path)
-    short_course(Path("runs"), 1)
-    assert cli("batch", "runs", "-o", "out", "--jobs", "1", "--reports", "0", "--accuracy", "fast").code == 0
-    Path("out/results.parquet").unlink(missing_ok=True)
-    text = Path("out/results.csv").read_text("utf-8")
-    Path("out/results.csv").write_text(text.replace("run000,", f"{ESCAPE},", 1), "utf-8")
-    done = cli("catalog", "out")
-    assert done.code == 0, done.err
-    assert visible(ESCAPE) in done.out
-    assert (done.out + done.err).replace("\n", "").isprintable()
 
 
 def test_the_last_lines_of_a_recording_show_no_escapes(cli: Cli, tmp_path: Path) -> None:

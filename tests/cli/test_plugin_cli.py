@@ -23,7 +23,7 @@ from bench_extras import MIDPOINT, THREE_HALVES
 from springmass.extend import Equation, Problem, get_integrator
 
 t = np.arange(6000) / 100
-y = 0.2 + THREE_HALVES.amplitude(t, np.array([0.05, 0.2])) * np.cos(8 * t)
+y = 0.2 + THREE_HALVES.curve(t, np.array([0.05, 0.2]))[0] * np.cos(8 * t)
 y += 1e-4 * np.random.default_rng(1).standard_normal(t.size)
 print(sm.analyse((t, y), laws=[..., THREE_HALVES]).motion.damping.selected)
 problem = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073), 0.05)
@@ -34,7 +34,7 @@ print(float(np.max(np.abs(MIDPOINT.run(problem, 0.001, 1000).y - exact.y))))
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Install the package by pip into a folder of its own, without network, and return the folder."""
+    """Install the package by pip into a separate folder, without network, and return the folder."""
     folder = tmp_path_factory.mktemp("plugin")
     source = shutil.copytree(PLUGIN, folder / "source")
     quiet = ["--quiet", "--disable-pip-version-check", "--no-index", "--no-deps", "--no-build-isolation"]

@@ -58,12 +58,12 @@ class Board:
         os.close(self._master)
 
     def _run(self) -> None:
-        asked, number, began_s = b"", 0, 0.0
+        received, number, began_s = b"", 0, 0.0
         while not self._stop.wait(PERIOD_S):
             with contextlib.suppress(BlockingIOError):
-                asked += os.read(self._master, 4096)
-            while b"\n" in asked:
-                command, _, asked = asked.partition(b"\n")
+                received += os.read(self._master, 4096)
+            while b"\n" in received:
+                command, _, received = received.partition(b"\n")
                 self.heard.append(command.decode("ascii"))
                 self._obey(self.heard[-1])
             began_s = began_s or time.monotonic()

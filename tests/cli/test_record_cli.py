@@ -26,8 +26,8 @@ from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from pipeline.analyse import Oscillation, analyse
 from pipeline.streaming import NotYet
 from springmass import load
-from springmass.session.console import Console
 from springmass.session.display.progress import Progress
+from springmass.terminal.console import Console
 from springmass.terminal.recording import ProgressLine, line_of
 from storage.run_file.reading import open_run
 
@@ -136,7 +136,7 @@ def test_a_name_too_long_for_the_log_is_refused_before_the_recording(
     """A name of 255 bytes leaves no room for the log's longer suffix: one line, exit code 2, nothing there."""
     done = cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / ("x" * 252 + ".h5"))
     assert done.code == 2
-    assert "at most 255 bytes was demanded, got 257" in done.complaint
+    assert "at most 255 bytes, got 257" in done.complaint
     assert not list(tmp_path.glob("x*"))
 
 
@@ -157,7 +157,7 @@ def test_a_busy_port_is_called_busy(cli: Callable, tmp_path: Path) -> None:
         done = cli("record", "--port", sensor.path, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
         holder.close()
     assert done.code == 4
-    assert "busy" in done.complaint
+    assert "used by another program" in done.complaint
 
 
 def test_silence_is_told_before_a_run_starts(cli: Callable, tmp_path: Path, silent_port: str) -> None:
@@ -241,20 +241,20 @@ def test_a_trigger_keeps_the_seconds_before_it(cli: Callable, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
-        (("--option", "colour=red"), "takes these options"),
+        (("--option", "colour=red"), "expected options among"),
         (("--ruler", "0.4"), "--still"),
         (("--pre", "1"), "--trigger"),
     ],
 )
 def test_options_that_would_do_nothing_are_refused(
-    cli: Callable, tmp_path: Path, scene: Path, options: tuple[str, str], said: str
+    cli: Callable, tmp_path: Path, scene: Path, options: tuple[str, str], message: str
 ) -> None:
     """An option that no sensor takes, or that needs another: one line, exit code 2, nothing recorded."""
     done = cli("record", "--simulate", scene, "--sensor", "line-protocol", *options, "-o", tmp_path / "run.h5")
     assert done.code == 2
-    assert said in done.complaint
+    assert message in done.complaint
     assert not (tmp_path / "run.h5").exists()
 
 
@@ -276,7 +276,7 @@ def test_a_disk_nearly_full_is_told_before_a_run_starts(
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=1000))
     done = cli("record", "--simulate", scene, "--seconds", "60", "-o", tmp_path / "run.h5")
     assert done.code == 4
-    assert "make room" in done.complaint
+    assert "free disk space" in done.complaint
     assert not (tmp_path / "run.wire").exists()
 
 
@@ -325,9 +325,9 @@ def test_being_told_to_end_closes_the_run_cleanly(tmp_path: Path, scene: Path, n
     """Ctrl-C, kill and a closed terminal: the run file is complete up to there, exit code 130."""
     child = start(scene, tmp_path / "run.h5")
     child.send_signal(number)
-    _, told = child.communicate(timeout=120)
-    assert child.returncode == 130, told
-    assert "Traceback" not in told
+    _, errors = child.communicate(timeout=120)
+    assert child.returncode == 130, errors
+    assert "Traceback" not in errors
     with open_run(tmp_path / "run.h5") as run:
         run.verify()
         assert len(run) >= 20  # a hundred where the machine has time
@@ -460,19 +460,20 @@ def test_several_distances_need_somebody_who_presses_enter(
 
 def test_off_a_terminal_the_progress_line_comes_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
     """After 1, 10, 40 and 70 seconds, and what moves is looked into for those lines alone."""
-    asked: list[float] = []
+    requested: list[float] = []
 
     def progress(seconds: float) -> Progress:
         def motion() -> NotYet:
-            asked.append(seconds)
+            requested.append(seconds)
             return NotYet("no samples so far")
 
         return Progress(seconds, 0, 0, 0, 0.0, motion, None, None, waiting=False)
 
-    line = ProgressLine(Console(SystemClock(), pytest.fail))
-    for second in range(1, 81):
-        line(progress(float(second)))
-    assert asked == [1.0, 10.0, 40.0, 70.0]
+    with Console(pytest.fail) as console:
+        line = ProgressLine(console)
+        for second in range(1, 81):
+            line(progress(float(second)))
+    assert requested == [1.0, 10.0, 40.0, 70.0]
     assert capsys.readouterr().err.count("no samples so far") == 4
 
 

@@ -47,13 +47,20 @@ def test_an_option_given_twice_is_refused(cli: Cli, line: tuple[str, ...]) -> No
 
 
 @pytest.mark.parametrize(
-    ("line", "near"), [(("analyze", "x.txt"), "analyse"), (("analyse", "x.txt", "--accuracy", "bst"), "best")]
+    ("line", "near"),
+    [
+        (("analyze", "x.txt"), "analyse"),
+        (("analyse", "x.txt", "--accuracy", "bst"), "best"),
+        (("analyse", "x.txt", "--chanel", "y"), "--channel"),
+        (("record", "--trigg", "0.01"), "--trigger"),
+        (("--verison",), "--version"),
+    ],
 )
 def test_a_word_nearly_right_is_answered_with_the_right_one(cli: Cli, line: tuple[str, ...], near: str) -> None:
-    """A command or a choice mistyped."""
+    """A command, an option or a choice mistyped; nothing is abbreviated."""
     done = cli(*line)
     assert done.code == 2
-    assert done.err.rstrip().endswith(f"did you mean {near}?")
+    assert done.complaint.endswith(f"did you mean {near}?")
 
 
 def test_a_mass_in_grams_is_asked_about(cli: Cli, data: Path, tmp_path: Path) -> None:
@@ -61,6 +68,31 @@ def test_a_mass_in_grams_is_asked_about(cli: Cli, data: Path, tmp_path: Path) ->
     scene = tmp_path / "grams.toml"
     scene.write_text("[bob]\nmass_kg = 217.6\n", encoding="utf-8")
     done = cli("analyse", data / "damped_simulated_position.txt", "--json", "--accuracy", "fast", "--scene", scene)
-    said = [f["message"] for f in done.results[0]["findings"] if f["code"] == "scene_implausible"]
-    assert len(said) == 1
-    assert "[bob] mass_kg = 217.6 is beyond 0.001 to 20 kg (did you mean grams: 0.2176?)" in said[0]
+    messages = [f["message"] for f in done.results[0]["findings"] if f["code"] == "scene_implausible"]
+    assert len(messages) == 1
+    assert "[bob] mass_kg = 217.6 is beyond 0.001 to 20 kg (did you mean grams: 0.2176?)" in messages[0]
+
+
+def test_the_earlier_name_of_the_output_still_works(cli: Cli, data: Path, tmp_path: Path) -> None:
+    """`--out` is `-o`, of a simulation `--folder`; after `--` it is a file."""
+    recording = data / "undamped_simulated_position.txt"
+    for option in (("-o", "{}"), ("--output={}",), ("--out", "{}"), ("--out={}",)):
+        folder = tmp_path / f"folder{len(list(tmp_path.iterdir()))}"
+        assert cli("analyse", recording, "--accuracy", "fast", *(word.format(folder) for word in option)).code == 0
+        assert (folder / "undamped_simulated_position.results" / "report.html").is_file()
+    scene = ("--against", recording, "--scene", data / "undamped.scene.toml", "--json")
+    assert cli("simulate", *scene, "--out", tmp_path / "predicted").code == 0
+    assert (tmp_path / "predicted" / "undamped.simulated" / "run.h5").is_file()
+    assert cli("analyse", "--json", "--", "--out").complaint.startswith("springmass: --out: ")
+    assert cli("analyse", recording, "-o", "a", "--out", "b").complaint.startswith(
+        "springmass: --output was given twice"
+    )
+
+
+def test_a_value_that_begins_with_a_minus_hangs_on_its_option(cli: Cli, data: Path) -> None:
+    """A text takes an equals sign, a number stands alone."""
+    recording = data / "undamped_simulated_position.txt"
+    assert "--channel=-..." in cli("analyse", recording, "--channel", "-x").complaint
+    assert '"-x"' in cli("analyse", recording, "--json", "--channel=-x").complaint
+    (result,) = cli("analyse", recording, "--json", "--from", "-2").results
+    assert result["provenance"]["parameters"]["from_s"] == -2.0

@@ -17,10 +17,18 @@ Cli = Callable[..., Any]
 
 @pytest.fixture
 def run(tmp_path: Path, data: Path) -> Path:
-    """Return a copy of the damped recording in a folder of its own."""
+    """Return a copy of the damped recording in a new folder."""
     path = tmp_path / "damped.txt"
     path.write_bytes((data / "damped_simulated_position.txt").read_bytes())
     return path
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_scene_may_have_the_encoding_of_a_shell_or_editor(cli: Cli, tmp_path: Path, encoding: str) -> None:
+    """PowerShell 5 saves the template in UTF-16; some editors begin UTF-8 with a byte order mark."""
+    path = tmp_path / "bench.toml"
+    path.write_text(cli("scene").out, encoding=encoding)
+    assert read_scene(path).spring_mass_kg is not None
 
 
 def test_the_template_is_a_scene_and_passes_its_check(cli: Cli, tmp_path: Path) -> None:
@@ -95,7 +103,7 @@ def test_what_is_noted_beside_a_recording_is_used_and_said(cli: Cli, run: Path, 
     beside = run.with_name("damped.about.toml")
     assert [mark["t_s"] for mark in tomllib.loads(beside.read_text())["marks"]] == [3.0, 12.5]
     done = cli("analyse", run, "--json")
-    assert done.complaint == f"{beside}: its scene, 1 notes, 2 marks noted beside the recording"
+    assert done.complaint == f"{beside}: its scene, 1 notes, 2 marks read from the notes next to the file"
     (result,) = done.results
     assert "spring_constant" in result["estimates"]
     assert result["recorded"]["marks"] == [{"t_s": 3.0, "text": "door"}, {"t_s": 12.5, "text": 'touched "it"'}]
@@ -106,7 +114,7 @@ def test_what_is_noted_beside_a_recording_is_used_and_said(cli: Cli, run: Path, 
 
 
 def test_the_scene_last_used_is_remembered_and_said(cli: Cli, data: Path, tmp_path: Path) -> None:
-    """analyse notes a given scene beside the recording, once, and uses it from then on; --no-report writes nothing."""
+    """analyse saves a given scene next to the recording, once, and then uses it; --no-report writes nothing."""
     recording = tmp_path / "morning.txt"
     recording.write_bytes((data / "damped_simulated_position.txt").read_bytes())
     beside, given = recording.with_name("morning.about.toml"), ("--scene", data / "damped.scene.toml")
@@ -114,12 +122,12 @@ def test_the_scene_last_used_is_remembered_and_said(cli: Cli, data: Path, tmp_pa
     assert not beside.exists()
     line = ("analyse", recording, *given, "--mass-kg", "0.3", "--out", tmp_path)
     first = cli(*line)
-    assert f"{beside}: this scene, used from now on with {recording}" in first.err
+    assert f"bench data saved for this file: {beside}" in first.err
     (result,) = cli("analyse", recording, "--json").results
     assert result["provenance"]["parameters"]["scene"]["bob"]["mass_kg"] == 0.3
     again = cli(*line)
     assert "from now on" not in again.err
-    assert f"{beside}: its scene noted beside the recording" in again.err
+    assert f"{beside}: its scene read from the notes next to the file" in again.err
 
 
 def test_scenes_of_several_are_remembered_and_the_bundled_recordings_left_alone(
@@ -130,7 +138,7 @@ def test_scenes_of_several_are_remembered_and_the_bundled_recordings_left_alone(
         (tmp_path / name).write_bytes((data / "damped_simulated_position.txt").read_bytes())
     runs = sorted(tmp_path.glob("*.txt"))
     done = cli("analyse", *runs, "--scene", data / "damped.scene.toml", "--out", tmp_path / "out")
-    assert "scenes noted beside 2 recordings" in done.err
+    assert "bench data saved for 2 recordings" in done.err
     assert sorted(path.name for path in tmp_path.glob("*.about.toml")) == ["a.about.toml", "b.about.toml"]
 
 
@@ -148,7 +156,7 @@ def test_where_no_scene_can_be_noted_the_numbers_come_all_the_same(
     done = cli("analyse", recording, "--scene", data / "damped.scene.toml", "--out", tmp_path / "out")
     assert done.code == 0
     assert "spring constant" in done.out
-    assert f"the scene is not noted beside {recording}" in done.err
+    assert "the bench data are not saved" in done.err
 
 
 @pytest.mark.parametrize(
@@ -171,16 +179,23 @@ def test_notes_of_nothing_are_refused(cli: Cli, line: tuple[str, ...]) -> None:
     assert cli("scene", *line).code == 2
 
 
-def test_help_and_completion(cli: Cli) -> None:
-    """`help COMMAND` is `COMMAND --help`; the scripts of the shells name commands and options."""
-    assert cli("help", "analyse").out == cli("analyse", "--help").out
-    assert cli("help").out == cli("--help").out
-    assert cli("help", "analyze").err.rstrip().endswith("did you mean analyse?")
-    for shell in ("bash", "zsh", "tcsh"):
-        done = cli("completion", shell)
-        assert done.code == 0
-        assert "analyse" in done.out
-        assert "accuracy" in done.out
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
+def test_the_script_of_a_shell_names_commands_options_and_choices(cli: Cli, shell: str) -> None:
+    """`--completion SHELL` prints what the shell needs, and writes no file."""
+    done = cli("--completion", shell)
+    assert (done.code, done.err) == (0, "")
+    for word in ("analyse", "simulate", "accuracy", "standard", "completion"):
+        assert word in done.out
+    assert "shard" not in done.out
+
+
+@pytest.mark.parametrize("flag", ["-q", "--quiet"])
+def test_quiet_may_follow_the_command(cli: Cli, run: Path, flag: str) -> None:
+    """An option of every command holds before the command and after it."""
+    for line in ((flag, "analyse", run, "--no-report"), ("analyse", run, "--no-report", flag)):
+        done = cli(*line)
+        assert (done.code, done.err) == (0, "")
+    assert "read:" in cli("analyse", run, "--no-report", "-v").err
 
 
 def test_quiet_leaves_what_is_wrong(cli: Cli, run: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -78,8 +78,8 @@ def test_run_file_and_figures_are_written(cli: Callable, scene: Path, tmp_path: 
     for name in names[:4]:
         text = (folder / "figures" / f"{name}.svg").read_text(encoding="utf-8")
         assert all(word in text for word in ("forward Euler", "symplectic Euler", "exact"))
-    told = json.loads((folder / "simulation.json").read_text())
-    assert told["method"] in done.out or "Strang" in done.out
+    results = json.loads((folder / "simulation.json").read_text())
+    assert results["method"] in done.out or "Strang" in done.out
 
 
 def test_an_unstable_step_is_refused_with_limit_and_remedy(cli: Callable, scene: Path, tmp_path: Path) -> None:
@@ -142,8 +142,8 @@ def test_the_prediction_is_that_of_the_method_and_step_asked_for(cli: Callable, 
     found = {}
     for method, step in (("exact", 0.01), ("auto", 0.01), ("forward-euler", 0.001), ("forward-euler", 0.0005)):
         arguments = ("--scene", path, "--against", run, "--method", method, "--dt", str(step), "--json")
-        (told,) = cli("simulate", *arguments).results
-        found[method, step] = told["against"]["rms_m"]
+        (result,) = cli("simulate", *arguments).results
+        found[method, step] = result["against"]["rms_m"]
         if method == "forward-euler":
             every = round(0.01 / step)
             off = get_integrator(method).run(problem, step, 1000 * every, every=every).y - truth
@@ -208,7 +208,7 @@ def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (("--method", "leapfrog"), "allowed are auto, forward-euler"),
         (("--dt", "0"), "--dt must be more than 0 s"),
@@ -224,15 +224,17 @@ def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path:
         (("--dt", "1e200", "--seconds", "1e201"), "the step must be between 1e-100 and 1e+100 s, got 1e+200"),
     ],
 )
-def test_bad_input_is_one_line_with_code_two(cli: Callable, scene: Path, arguments: tuple[str, ...], told: str) -> None:
+def test_bad_input_is_one_line_with_code_two(
+    cli: Callable, scene: Path, arguments: tuple[str, ...], message: str
+) -> None:
     """What cannot be is said before anything is written."""
     done = cli("simulate", "--scene", scene, "--json", *arguments)
     assert (done.code, done.out) == (2, "")
-    assert told in done.complaint
+    assert message in done.complaint
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "message"),
     [
         ("mass_kg = 0.2", "mass_kg = -0.2", "mass_kg must be more than 0 kg"),
         ("displacement_m = 0.05", "displacement_m = nan", "finite number"),
@@ -240,13 +242,13 @@ def test_bad_input_is_one_line_with_code_two(cli: Callable, scene: Path, argumen
         ("constant_n_per_m = 20.0", "constant_n_per_m = 20.0\ncubic_n_per_m3 = -9000.0", "softening spring"),
     ],
 )
-def test_a_scene_that_cannot_move_is_one_line(cli: Callable, tmp_path: Path, old: str, new: str, told: str) -> None:
+def test_a_scene_that_cannot_move_is_one_line(cli: Callable, tmp_path: Path, old: str, new: str, message: str) -> None:
     """Negative mass, a start that is no number, no spring, a spring that lets go: exit code 2."""
     path = tmp_path / "bad.toml"
     path.write_text(MIXED.replace(old, new))
     done = cli("simulate", "--scene", path, "--json")
     assert (done.code, done.out) == (2, "")
-    assert told in done.complaint
+    assert message in done.complaint
 
 
 def test_friction_stops_the_simulated_bob(cli: Callable, tmp_path: Path) -> None:
@@ -323,9 +325,9 @@ def test_a_tolerance_far_below_the_band_is_pointed_out(cli: Callable, bench: Pat
     """What the default is by the band is said, and which input makes a finer tolerance idle."""
     arguments = ("simulate", "--scene", bench, "--seconds", "120", "--json")
     assert "a hundredth of the band" in cli(*arguments).err
-    told = " ".join(cli(*arguments, "--tolerance", "1e-9").err.split())
-    assert "far below the band: u(" in told
-    assert "1e-03 is enough here" in told
+    output = " ".join(cli(*arguments, "--tolerance", "1e-9").err.split())
+    assert "far below the band: u(" in output
+    assert "1e-03 is enough here" in output
 
 
 def test_without_noise_the_last_reading_is_as_good_as_the_others(cli: Callable, bench: Path, tmp_path: Path) -> None:
@@ -336,7 +338,7 @@ def test_without_noise_the_last_reading_is_as_good_as_the_others(cli: Callable, 
     found = json.loads(cli("analyse", "--json", run).out)
     assert found["quality"]["used"] == found["input"]["samples"] == 2001
     codes = {each["code"] for each in found["findings"]}
-    assert not codes & {"false_echoes", "rest_drift", "correlated_residuals", "missing_samples"}
+    assert not codes & {"false_echoes", "rest_drift", "model_misfit", "missing_samples"}
 
 
 def test_readings_are_a_recording_like_any_other(cli: Callable, bench: Path, tmp_path: Path) -> None:

@@ -6,33 +6,32 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 from storage.run_file.reading import open_run
+from tests.screen import OnTerminal
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are POSIX's")
 
 
-def test_a_terminal_gets_one_page_that_fits(screen: ModuleType, data: Path, tmp_path: Path) -> None:
-    """Table 1, budget and findings of a run: ±, millimetres, and no line broken by the terminal."""
+def test_a_terminal_gets_one_page_that_fits(data: Path, tmp_path: Path) -> None:
+    """Table 1, damping and warnings of a run: ±, millimetres, at most 30 lines, none broken by the terminal."""
     arguments = ["analyse", str(data / "damped_simulated_position.txt"), "--no-report"]
     arguments += ["--scene", str(data / "damped.scene.toml")]
-    with screen.OnTerminal(arguments, tmp_path) as terminal:
+    with OnTerminal(arguments, tmp_path) as terminal:
         assert terminal.end() == 0
     assert terminal.screen.wrapped == 0
+    assert len(terminal.screen.text.splitlines()) <= 30
     assert "52.006 ± 0.0" in terminal.screen.text
     assert "s⁻¹" in terminal.screen.text
     assert "+-" not in terminal.screen.text
 
 
-def test_several_runs_on_a_terminal_share_a_table_and_leave_no_bar_behind(
-    screen: ModuleType, data: Path, tmp_path: Path
-) -> None:
+def test_several_runs_on_a_terminal_share_a_table_and_leave_no_bar_behind(data: Path, tmp_path: Path) -> None:
     """The bar shows how many of how many, and is gone at the end; digits of u stand in parentheses."""
     runs = [str(data / f"{name}_simulated_position.txt") for name in ("undamped", "damped", "clipped")]
-    with screen.OnTerminal(["analyse", *runs, "--no-report"], tmp_path) as terminal:
+    with OnTerminal(["analyse", *runs, "--no-report"], tmp_path) as terminal:
         assert terminal.end() == 0
     assert "/3" in terminal.screen.raw
     assert "/3" not in terminal.screen.text
@@ -43,19 +42,19 @@ def test_several_runs_on_a_terminal_share_a_table_and_leave_no_bar_behind(
 @pytest.mark.parametrize(
     "environment", [{"TERM": "dumb"}, pytest.param({"PYTHONIOENCODING": "ascii"}, marks=pytest.mark.trials)]
 )
-def test_a_poor_terminal_gets_ascii(
-    screen: ModuleType, data: Path, tmp_path: Path, environment: dict[str, str]
-) -> None:
+def test_a_poor_terminal_gets_ascii(data: Path, tmp_path: Path, environment: dict[str, str]) -> None:
     """Without a cursor it is what a pipe gets; without superscripts it is ASCII."""
     arguments = ["analyse", str(data / "undamped_simulated_position.txt"), "--no-report"]
-    with screen.OnTerminal(arguments, tmp_path, environment=environment) as terminal:
+    with OnTerminal(arguments, tmp_path, environment=environment) as terminal:
         assert terminal.end() == 0
     assert terminal.screen.text.isascii()
     piped = subprocess.run(
         [sys.executable, "-m", "springmass", *arguments], capture_output=True, text=True, check=True
     ).stdout
     assert piped.isascii()
-    assert ("0.05101 +- 0.00028 m" in terminal.screen.text) == ("TERM" in environment)
+    # The same numbers in both.
+    assert "51.01 +- 0.28 mm" in terminal.screen.text
+    assert "51.01 +- 0.28 mm" in piped
 
 
 SCENE = """
@@ -69,10 +68,10 @@ displacement_m = 0.05
 
 
 @pytest.mark.parametrize("columns", [80, pytest.param(50, marks=pytest.mark.trials)])
-def test_a_recording_stays_in_its_lines_and_takes_marks(screen: ModuleType, tmp_path: Path, columns: int) -> None:
-    """Progress, trace and keys are rewritten in place; space marks at once, a word with Enter, Ctrl-C stops."""
+def test_a_recording_stays_in_its_lines_and_takes_marks(tmp_path: Path, columns: int) -> None:
+    """Progress, trace and keys are rewritten in place; space marks immediately, a word with Enter, Ctrl-C stops."""
     (tmp_path / "bench.toml").write_text(SCENE)
-    with screen.OnTerminal(["record", "--simulate", "bench.toml", "-o", "run.h5"], tmp_path, columns) as terminal:
+    with OnTerminal(["record", "--simulate", "bench.toml", "-o", "run.h5"], tmp_path, columns) as terminal:
         terminal.until("space marks, Ctrl-C stops")
         terminal.type(" ")
         terminal.until("mark 1 at")
@@ -89,11 +88,24 @@ def test_a_recording_stays_in_its_lines_and_takes_marks(screen: ModuleType, tmp_
     assert "next: springmass analyse run.h5" in terminal.screen.text
 
 
-def test_a_recording_without_a_trace_has_two_lines(screen: ModuleType, tmp_path: Path) -> None:
+def test_a_recording_without_a_trace_has_two_lines(tmp_path: Path) -> None:
     """--no-trace leaves progress and keys."""
     (tmp_path / "bench.toml").write_text(SCENE)
     arguments = ["record", "--simulate", "bench.toml", "--seconds", "2", "--no-trace", "-o", "run.h5"]
-    with screen.OnTerminal(arguments, tmp_path) as terminal:
+    with OnTerminal(arguments, tmp_path) as terminal:
         terminal.until("space marks")
         assert len(terminal.screen.text.splitlines()) == 2
         assert terminal.end() == 0
+
+
+def test_the_address_of_the_page_stays_above_the_progress(tmp_path: Path) -> None:
+    """The recorder prints the address, so that the lines that it rewrites do not cover it."""
+    (tmp_path / "bench.toml").write_text(SCENE)
+    arguments = ["record", "--simulate", "bench.toml", "--seconds", "4", "--page", "--no-browser", "-o", "run.h5"]
+    with OnTerminal(arguments, tmp_path) as terminal:
+        terminal.until("space marks")
+        terminal.until("trust")
+        assert "page: http://127.0.0.1:" in terminal.screen.text
+        assert terminal.screen.wrapped == 0
+        terminal.type("\x03")
+        terminal.end()

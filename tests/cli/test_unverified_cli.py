@@ -44,14 +44,14 @@ def test_a_rewritten_array_is_refused_by_name(cli: Cli, edited: Path, tmp_path: 
     out = tmp_path / "out.h5"
     done = cli(*arguments(command, edited, out, data))
     assert (done.code, done.out) == (3, "")
-    assert done.complaint.startswith(f"springmass: {edited}: the column 'distance' is not what was written")
+    assert done.complaint.startswith(f"springmass: {edited}: the column 'distance' is damaged")
     assert "--unverified" in done.complaint
     assert not out.exists()
 
 
 @pytest.mark.parametrize("command", ["analyse", "convert", "replay", "trade", "simulate", "compare", "formats"])
 def test_unverified_looks_at_it_and_says_so(cli: Cli, edited: Path, tmp_path: Path, data: Path, command: str) -> None:
-    """The answer comes, and with it the line that it is of a file that is not what was written."""
+    """The answer comes with the line that the file failed verification."""
     done = cli(*arguments(command, edited, tmp_path / "out.h5", data), "--unverified")
     assert done.code == 0
     assert f"{edited}: edited.h5 did not verify and was read all the same: the column 'distance'" in done.err
@@ -100,4 +100,4 @@ def test_whatever_was_changed_is_named(
         change(file)
     done = cli("analyse", "--json", path)
     assert done.code == 3
-    assert f"{path}: {named} is not what was written" in done.complaint
+    assert f"{path}: {named} is damaged" in done.complaint

@@ -323,9 +323,9 @@ def test_back_in_step_within_two_frames_of_garbage(case: Case, at: int) -> None:
             after = decoder.feed(2, b"".join(frames[at:]))
             assert columns(before) == columns(clean, slice(0, max(at - case.lead, 0)))
             sent = clean
-        left = min(N - at, len(sent)) - 2
-        if left > 0:
-            assert columns(after, slice(-left, None)) == columns(sent, slice(-left, None)), garbage(seed)
+        remaining = min(N - at, len(sent)) - 2
+        if remaining > 0:
+            assert columns(after, slice(-remaining, None)) == columns(sent, slice(-remaining, None)), garbage(seed)
 
 
 @every_case
@@ -343,9 +343,9 @@ def test_back_in_step_within_two_frames_of_a_lost_byte(case: Case) -> None:
             assert columns(decoder.feed(0, b"".join(frames))) == columns(clean)
             continue
         readings, _ = run(case, data[:at] + data[at + 1 :])
-        left = N - 8 - 2
+        remaining = N - 8 - 2
         assert len(readings) >= len(clean) - 2
-        assert columns(readings, slice(-left, None)) == columns(clean, slice(-left, None)), at
+        assert columns(readings, slice(-remaining, None)) == columns(clean, slice(-remaining, None)), at
 
 
 @every_case
@@ -410,13 +410,13 @@ def test_what_it_gave_does_not_change_when_it_goes_on(case: Case) -> None:
     frames = case.frames()
     decoder = case.decoder()
     first = decoder.feed(0, b"".join(frames[:5]))
-    kept = columns(first)
+    before = columns(first)
     second = decoder.feed(0, b"".join(frames[5:]))
     for readings in (first, second):
         readings.distance_m[:] = 7
         readings.temperature_c[:] = 7
         assert not (readings.distance_m == 7).any()
-    assert columns(first) == kept
+    assert columns(first) == before
     assert not (decoder.feed(0, b"".join(frames)).distance_m == 7).any()
 
 
@@ -447,11 +447,13 @@ def test_a_polled_sensor_is_asked_in_turn(case: Case) -> None:
     for lost in (frozenset[int](), frozenset({0, 7, 8, 15, 21}), frozenset(range(0, 40, 3))):
         talk = list(conversation(case, lost))
         readings = Readings(reading for _, given in talk for reading in given)
-        asked = [request for request, _ in talk]
-        assert len(readings) == asked.count(poll.request)
+        requests = [request for request, _ in talk]
+        assert len(readings) == requests.count(poll.request)
         assert not readings.flags.any()
         assert (np.abs(in_metres(readings) - 0.7) < 0.21).all()
-        assert bool(np.isfinite(readings.temperature_c).any()) is (every > 0 and asked.count(poll.request) < len(asked))
+        assert bool(np.isfinite(readings.temperature_c).any()) is (
+            every > 0 and requests.count(poll.request) < len(requests)
+        )
 
 
 def test_out_of_step_the_us100_gives_no_distance_and_finds_back() -> None:

@@ -204,19 +204,19 @@ def preamble(t: Any, x: Any) -> bytes:
 def clock(t: Any, x: Any) -> bytes:
     """Write clock times that pass midnight."""
     total = [86399.5 + float(each) for each in t]
-    told = [f"{int(s // 3600) % 24:02d}:{int(s // 60) % 60:02d}:{s % 60:06.3f}" for s in total]
-    body = (f"{a};{row}" for a, row in zip(told, rows(t, x, "{x:.5f}"), strict=True))
+    clock_times = [f"{int(s // 3600) % 24:02d}:{int(s // 60) % 60:02d}:{s % 60:06.3f}" for s in total]
+    body = (f"{a};{row}" for a, row in zip(clock_times, rows(t, x, "{x:.5f}"), strict=True))
     return "\n".join(["Chart recorder", "Time;Position (m)", *body]).encode()
 
 
 def labx(t: Any, x: Any) -> bytes:
     """Write CASSY Lab's XML."""
-    told = (("Index", "n", "", range(len(t))), ("Zeit", "t", "s", t), ("Weg", "s_A1", "m", x))
+    described = (("Index", "n", "", range(len(t))), ("Zeit", "t", "s", t), ("Weg", "s_A1", "m", x))
     channels = "".join(
         f"<channels><channel><quantity>{name}</quantity><symbol>{symbol}</symbol><unit>{unit}</unit><values>"
         + "".join(f"<value>{each:.9g}</value>".replace("nan", "NaN") for each in values)
         + "</values></channel></channels>"
-        for name, symbol, unit, values in told
+        for name, symbol, unit, values in described
     )
     return f'<?xml version="1.0" encoding="utf-8"?><cassylab><allchannels>{channels}</allchannels></cassylab>'.encode()
 
@@ -224,8 +224,8 @@ def labx(t: Any, x: Any) -> bytes:
 def lab(t: Any, x: Any) -> bytes:
     """Write CASSY Lab's text: each channel in three lines and one of settings, rows behind their number."""
     settings = "0 60 10 0 1 0 0 1 0 0 0 0 0 0 1 1"
-    told = (("Index", "n", ""), ("Zeit", "t", "s"), ("Frequenz", "f", "Hz"), ("Weg", "s_A1", "m"))
-    head = [line for each in told for line in (*each, settings)]
+    described = (("Index", "n", ""), ("Zeit", "t", "s"), ("Frequenz", "f", "Hz"), ("Weg", "s_A1", "m"))
+    head = [line for each in described for line in (*each, settings)]
     body = (f"{i}\t{row}" for i, row in enumerate(rows(t, x, "{t:.3f}\t{x:.5f}"), 1))
     return "\r\n".join(["CL4", "265 0.1", *head, "4 0 0 3", f"3 {len(t)}", *body]).encode()
 
@@ -256,8 +256,8 @@ def workbook(sheets: dict[str, str]) -> bytes:
     links = [(f"r{i}", "worksheet", f"worksheets/sheet{i}.xml") for i in range(1, len(sheets) + 1)]
     links.append(("styles", "styles", "styles.xml"))
 
-    def relationships(told: list[tuple[str, str, str]]) -> str:
-        inner = (f'<Relationship Id="{a}" Type="{office}/{b}" Target="{c}"/>' for a, b, c in told)
+    def relationships(entries: list[tuple[str, str, str]]) -> str:
+        inner = (f'<Relationship Id="{a}" Type="{office}/{b}" Target="{c}"/>' for a, b, c in entries)
         return f'<Relationships xmlns="{package}/relationships">{"".join(inner)}</Relationships>'
 
     named = (f'<sheet name="{name}" sheetId="{i}" r:id="r{i}"/>' for i, name in enumerate(sheets, 1))
@@ -549,15 +549,18 @@ def test_half_a_file_is_read_or_refused_in_one_line(case: Case) -> None:
             continue
         sound = recording.samples.flags == 0
         shift = 0 if case.offset_known else recording.samples.distance[0] - DISTANCE[0]
-        found = recording.samples.distance[sound] - shift
-        np.testing.assert_allclose(found, DISTANCE[: sound.size][sound], atol=1e-9)
+        result = recording.samples.distance[sound] - shift
+        np.testing.assert_allclose(result, DISTANCE[: sound.size][sound], atol=1e-9)
     assert refusals
     assert not any("\n" in refusal for refusal in refusals)
 
 
 @every_case
-def test_a_rate_that_contradicts_the_file_is_refused(case: Case) -> None:
-    """The user cannot overrule what the times say."""
+def test_a_rate_must_not_contradict_the_file(case: Case) -> None:
+    """The user cannot overrule what the times say; the rate that they have changes nothing."""
+    given = format_of(case.format).read("run.dat", whole(case), **(dict(case.options) | {"rate_hz": RATE_HZ}))
+    assert given.info.rate_hz == RATE_HZ
+    np.testing.assert_array_equal(given.samples.t, T)
     with pytest.raises(FormatError, match="37"):
         format_of(case.format).read("run.dat", whole(case), rate_hz=37.0, **case.options)
 

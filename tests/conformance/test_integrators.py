@@ -52,8 +52,8 @@ def error_of(case: dict[str, Any], trajectory: Trajectory) -> float:
 def test_the_error_against_forty_digits_is_small(integrator: Integrator, name: str) -> None:
     """Against a reference that shares no code each method errs by no more than its order lets it, or refuses."""
     case = STORED["cases"][name]
-    kept = [k for k, row in enumerate(case["rows"]) if row <= 3000]
-    case = {**case, "rows": [case["rows"][k] for k in kept], "y": [case["y"][k] for k in kept]}
+    chosen = [k for k, row in enumerate(case["rows"]) if row <= 3000]
+    case = {**case, "rows": [case["rows"][k] for k in chosen], "y": [case["y"][k] for k in chosen]}
     problem, steps = problem_of(case), case["rows"][-1]
     if integrator.refusal(problem):
         with pytest.raises(DynamicsError, match=integrator.name):
@@ -61,9 +61,9 @@ def test_the_error_against_forty_digits_is_small(integrator: Integrator, name: s
         return
     parts = 4 if integrator.order else 1
     if integrator.stable_step(problem) < STEP / parts:
-        return  # what becomes of such a step has a test of its own
-    found = error_of(case, integrator.run(problem, STEP / parts, steps * parts, every=parts))
-    assert found <= (LARGEST[integrator.name] if not integrator.no_estimate(problem) else 0.1)
+        return  # another test covers such a step
+    result = error_of(case, integrator.run(problem, STEP / parts, steps * parts, every=parts))
+    assert result <= (LARGEST[integrator.name] if not integrator.no_estimate(problem) else 0.1)
 
 
 @pytest.mark.parametrize("name", FIXED)
@@ -136,8 +136,8 @@ def test_a_bob_at_rest_stays(integrator: Integrator) -> None:
 def test_bad_input_is_one_line(integrator: Integrator) -> None:
     """A step or a number of steps that cannot be is refused in one line."""
     problem = Problem(Equation(angular_frequency_per_s=8.66), 0.05)
-    bad = ((0.0, 10, 1), (-0.01, 10, 1), (math.nan, 10, 1), (0.01, 0, 1), (0.01, 10, 3), (0.01, 10, 0))
-    for step, steps, every in bad:
+    invalid = ((0.0, 10, 1), (-0.01, 10, 1), (math.nan, 10, 1), (0.01, 0, 1), (0.01, 10, 3), (0.01, 10, 0))
+    for step, steps, every in invalid:
         with pytest.raises(DynamicsError) as caught:
             integrator.run(problem, step, steps, every=every)
         assert "\n" not in str(caught.value)

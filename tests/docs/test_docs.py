@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 import ast
 import json
 import re
+import runpy
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,13 @@ import pytest
 from acquisition.recordings.identify import formats
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS
-from springmass import analyse, load, sample_data
-from springmass.cli import build_parser, main
-from springmass.runs.analysing import analyse_loaded
-from springmass.runs.json_results import all_findings
+from springmass import analyse, sample_data
+from springmass.cli import main
+from springmass.command_line import COMMANDS
+from springmass.glossary import TERMS
+from springmass.runs.analysing import load_and_analyse
+from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import read_scene
-from springmass.terminal.arguments import COMMANDS
 from storage.run_file.layout import COLUMNS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,6 +36,7 @@ PLANNED: tuple[str, ...] = ()
 
 # Objects of the JSON whose keys are names, and what the page calls them.
 NAMED = {"estimates": "NAME", "budget": "NAME", "damping.laws": "LAW", "damping.laws.LAW.parameters": "NAME"}
+NAMED |= {"damping.weights": "LAW", "damping.coefficients": "NAME"}
 NAMED |= {f"joint_damping[].{laws}": name for laws, name in (("laws", "LAW"), ("laws.LAW.parameters", "NAME"))}
 
 
@@ -100,8 +102,7 @@ def test_every_finding_code_in_the_code_is_documented() -> None:
 def test_every_finding_on_the_sample_data_is_documented() -> None:
     """Codes that are built from tables and not written out are seen where they appear."""
     for path in sorted(sample_data().glob("*_position.txt")):
-        loaded = load(path)
-        codes = {finding.code for finding in all_findings(loaded, analyse(loaded.track))}
+        codes = {finding.code for finding in analyse(path).findings}
         assert codes - rows("findings.md") == set()
 
 
@@ -111,10 +112,7 @@ def test_the_page_of_findings_invents_nothing() -> None:
     assert [name for name in rows("findings.md") if f'"{name}"' not in code and name not in PLANNED] == []
 
 
-def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
-    """Yield every command with its parser."""
-    (commands,) = (a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction))
-    yield from commands.choices.items()
+GENERATE = runpy.run_path(str(REFERENCE / "generate.py"))
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -123,28 +121,57 @@ def test_every_command_and_option_is_documented(command: str) -> None:
     text = (REFERENCE / "command-line.md").read_text(encoding="utf-8")
     section = re.search(rf"^## springmass {command}\n(.*?)(?=^## |\Z)", text, re.MULTILINE | re.DOTALL)
     assert section, command
-    (parser,) = (p for name, p in parsers() if name == command)
-    for action in parser._actions:
-        names = [s for s in action.option_strings if s not in ("-h", "--help")] or [str(action.metavar or "-h")]
-        for name in names:
-            assert name == "-h" or f"`{name}" in section[1], f"{command}: {name}"
+    for argument in GENERATE["arguments_of"](command):
+        assert f"`{argument.name}" in section[1], f"{command}: {argument.name}"
+
+
+def test_the_tables_of_options_are_as_declared() -> None:
+    """``python docs/reference/generate.py`` changes nothing in the page."""
+    text = (REFERENCE / "command-line.md").read_text(encoding="utf-8")
+    assert GENERATE["updated"](text) == text
+    assert len(GENERATE["TABLE"].findall(text)) == len(COMMANDS) + 1
+
+
+def test_the_page_of_findings_is_that_of_the_registry() -> None:
+    """``python docs/reference/generate.py`` changes nothing in the page of findings."""
+    assert GENERATE["findings_page"]() == (REFERENCE / "findings.md").read_text(encoding="utf-8")
+
+
+def test_a_row_of_the_page_of_findings_has_at_most_30_words() -> None:
+    """Code, severity, meaning and advice together."""
+    for line in (REFERENCE / "findings.md").read_text(encoding="utf-8").splitlines():
+        if line.startswith("| `"):
+            assert len(re.findall(r"[\w'-]*[A-Za-z0-9][\w'-]*", line)) <= 30, line
+
+
+def test_the_glossary_page_is_that_of_the_program() -> None:
+    """``python docs/reference/generate.py`` changes nothing in the glossary, which is sorted and says nothing twice."""
+    assert GENERATE["glossary_page"]() == (REFERENCE / "glossary.md").read_text(encoding="utf-8")
+    names = [each.name for each in TERMS]
+    assert names == sorted(set(names), key=str.casefold)
 
 
 def test_every_option_in_the_reference_exists() -> None:
     """The reference names no option that the program does not know."""
-    known = {s for _, parser in parsers() for action in parser._actions for s in action.option_strings}
+    known = {name for command in COMMANDS for each in GENERATE["arguments_of"](command) for name in each.names}
     text = (REFERENCE / "command-line.md").read_text(encoding="utf-8")
     named = set(re.findall(r"`(--?[a-z][a-z-]*)", without_code(text)))
-    assert named <= known | {"--version", "-q", "--quiet", "-v", "--verbose"}
+    assert named <= known | {"--help", "--version", "-h", "-q", "--quiet", "-v", "--verbose", "--out"}
+
+
+def test_help_texts_are_short() -> None:
+    """A help text is a noun phrase or an imperative of at most 80 characters, without a full stop."""
+    for command in COMMANDS:
+        for argument in GENERATE["arguments_of"](command):
+            assert 0 < len(argument.parameter.help) <= 80, f"{command}: {argument.name}"
+            assert not re.search(r"[^.]\.$", argument.parameter.help), f"{command}: {argument.name}"
 
 
 def test_every_estimate_is_documented() -> None:
     """What a full scene and either method give stands in the page of estimates."""
     data = sample_data()
-    loaded = load(data / "damped_simulated_position.txt", velocity=data / "damped_simulated_velocity.txt")
-    done = analyse_loaded(
-        loaded, read_scene(data / "damped.scene.toml"), parameters={}, with_classic=True, time_utc="now"
-    )
+    scene, pair = read_scene(data / "damped.scene.toml"), ReadOptions(velocity=data / "damped_simulated_velocity.txt")
+    done = load_and_analyse(data / "damped_simulated_position.txt", pair, scene, with_classic=True)
     assert done.classic is not None
     names = set(done.analysis.estimates) | set(done.classic.estimates)
     assert "drag_coefficient" in names
@@ -154,8 +181,8 @@ def test_every_estimate_is_documented() -> None:
 def test_every_field_of_the_json_is_documented() -> None:
     """Each key of a result, by its path, has a row in the page of the JSON."""
     data = sample_data()
-    loaded = load(data / "damped_simulated_position.txt")
-    result = analyse_loaded(loaded, read_scene(data / "damped.scene.toml"), parameters={}, time_utc="now").result
+    run = load_and_analyse(data / "damped_simulated_position.txt", scene=read_scene(data / "damped.scene.toml"))
+    result = run.described({}, time_utc="now").result
     documented = rows("json.md")
     assert set(paths(json.loads(json.dumps(result)))) - documented == set()
 
@@ -178,7 +205,7 @@ def paths(value: Any, above: str = "") -> Iterator[str]:
         for item in value:
             yield from paths(item, f"{above}[]")
         return
-    if not isinstance(value, dict) or above == "provenance.parameters":
+    if not isinstance(value, dict) or above == "provenance.parameters" or above.endswith("findings[].values"):
         return
     for key, inner in value.items():
         shown = NAMED.get(above, key)
@@ -198,7 +225,7 @@ def test_every_key_of_a_scene_is_documented() -> None:
     attributes = set(Scene.__dataclass_fields__)
     assert len(documented) == len(attributes)
     for table, key in documented:
-        value: object = {"position": "below", "mean_samples": 5, "median_samples": 5}.get(key, 0.5)
+        value: object = {"position": "below", "law": "linear", "mean_samples": 5, "median_samples": 5}.get(key, 0.5)
         assert Scene.from_mapping({table: {key: value}}) != Scene()
 
 

@@ -14,7 +14,7 @@ NOTEBOOK = Path(__file__).resolve().parents[2] / "docs" / "tutorial.ipynb"
 
 @pytest.fixture(scope="module")
 def executed() -> Any:
-    """Return the notebook, executed by a kernel of its own in the folder of the documentation."""
+    """Return the notebook, executed by a new kernel in the folder of the documentation."""
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     client = nbclient.NotebookClient(
         notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(NOTEBOOK.parent)}}
@@ -38,8 +38,10 @@ def test_the_notebook_runs_and_shows_what_it_says(executed: Any) -> None:
     assert any("14.00" in text for text in outputs(executed, "text/plain"))
     errors = [each for cell in executed.cells for each in cell.get("outputs", ()) if each.output_type == "error"]
     assert errors == []
-    said = [each.text for cell in executed.cells for each in cell.get("outputs", ()) if each.get("name") == "stderr"]
-    assert said == []
+    warnings = [
+        each.text for cell in executed.cells for each in cell.get("outputs", ()) if each.get("name") == "stderr"
+    ]
+    assert warnings == []
 
 
 def test_the_notebook_is_kept_without_outputs() -> None:

@@ -56,6 +56,7 @@ LONG = (
 """Pages with many commands: they run with the trials."""
 ELSEWHERE = (
     "docs/how-to/analyse-a-course.md",  # tests/cli/test_batch_cli.py, with folders of recordings
+    "docs/how-to/many-machines.md",  # tests/docs/test_many_machines.py, with a cluster on this machine
     "docs/how-to/watch-a-recording.md",  # tests/pages: a page stays open until its reader ends it
     "docs/reference/page-messages.md",  # tests/pages/test_bench_page.py, with the address of a page
 )
@@ -152,9 +153,9 @@ def run_python(page: str, block: Block, names: dict[str, object]) -> None:
         return
     session = doctest.DocTestParser().get_doctest(block.body, {}, where, page, block.line)
     session.globs = names
-    said: list[str] = []
-    outcome = doctest.DocTestRunner(optionflags=OPTIONS).run(session, out=said.append, clear_globs=False)
-    assert outcome.failed == 0, "".join(said)
+    output: list[str] = []
+    outcome = doctest.DocTestRunner(optionflags=OPTIONS).run(session, out=output.append, clear_globs=False)
+    assert outcome.failed == 0, "".join(output)
 
 
 def run_console(page: str, block: Block, folder: Path, status: int) -> int:
@@ -171,8 +172,8 @@ def run_console(page: str, block: Block, folder: Path, status: int) -> int:
             check=False,
         )
         status = done.returncode
-        asked = following is not None and following.text == "echo $?"
-        assert status == 0 or asked, f"{where}: exit code {status}\n{done.stdout}"
+        expected = following is not None and following.text == "echo $?"
+        assert status == 0 or expected, f"{where}: exit code {status}\n{done.stdout}"
         if command.expected.strip():
             same = doctest.OutputChecker().check_output(plain(command.expected), plain(done.stdout), OPTIONS)
             assert same, f"{where}\nstated:\n{command.expected}\ngot:\n{done.stdout}"

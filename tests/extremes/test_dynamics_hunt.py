@@ -43,7 +43,7 @@ def coefficients(rng: np.random.Generator) -> dict[str, float]:
 
 
 def attempt(call: Callable[[], Any], *, infinite: bool = False) -> Any:
-    """Return what a call gives, every number in it finite; a refusal in one line is as good."""
+    """Return what a call gives, every number in it finite; a refusal in one line passes too."""
     try:
         found = call()
     except DynamicsError as error:

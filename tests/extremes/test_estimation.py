@@ -50,7 +50,7 @@ def outcome(t: F8, y: F8, tier: str, scene: Scene | None = None) -> Analysis | s
 
 
 def is_right(found: Analysis) -> bool:
-    """Whether period and amplitude agree with the truth within five of their own uncertainties."""
+    """Whether period and amplitude agree with the truth within five of the stated uncertainties."""
     period, amplitude = found.estimates["period"], found.estimates["amplitude"]
     return abs(period.value - PERIOD) <= 5 * period.u and abs(amplitude.value - AMPLITUDE) <= 5 * amplitude.u
 

@@ -67,7 +67,7 @@ WIRES: dict[str, tuple[str, dict[str, Any], bytes]] = {
     for family in families()
 }
 STAMPS: dict[str, Callable[[int], int]] = {
-    "all at once": lambda _: 0,
+    "all together": lambda _: 0,
     "forward": lambda i: i * 10_000_000,
     "backward": lambda i: -i * 10_000_000,
     "from end to end": lambda i: -STAMP - 1 if i % 2 else STAMP,

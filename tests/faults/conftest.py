@@ -1,4 +1,4 @@
-"""A sensor that shares no code with the decoders, a recording of it as a process of its own, and a limit of time."""
+"""A sensor that shares no code with the decoders, a recording of it in a separate process, and a time limit."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LIMIT_S = 180.0
 
 
 def line_of(number: int, *, heard: bool = True) -> bytes:
-    """Return a reading whose echo time tells its number, as docs/reference/line-protocol.md has it."""
+    """Return a reading whose echo time encodes its number, in the form of docs/reference/line-protocol.md."""
     echo = f"{FIRST_US + STEP_US * number:.2f}" if heard else ""
     body = f"R1,{number},{number * 10_000},{echo},2000,{'E' if heard else 'N'}".encode("ascii")
     return b"$%s*%04X\n" % (body, binascii.crc_hqx(body, 0xFFFF))

@@ -49,7 +49,7 @@ def children(pid: int) -> list[int]:
         below = [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
     except OSError:
         return []
-    return [each for one in below for each in (one, *children(one))]
+    return [each for first in below for each in (first, *children(first))]
 
 
 def is_worker(pid: int) -> bool:
@@ -93,8 +93,8 @@ def test_a_killed_pass_is_completed(place, tmp_path, who):
 
 def used_s(pid: int) -> float:
     """Return the processor time that a process has used, s."""
-    told = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(told[11]) + int(told[12])) / os.sysconf("SC_CLK_TCK")
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 @pytest.mark.trials
@@ -115,28 +115,3 @@ def test_a_worker_of_dask_killed_in_the_middle_is_replaced(tmp_path, cluster):
         os.kill(victim, signal.SIGKILL)
     assert process.wait(LIMIT_S) == 0
     assert contents(tmp_path / "out") == contents(tmp_path / "clean" / "out")
-
-
-@pytest.mark.trials
-def test_an_array_of_shards_with_one_killed_is_put_together(place, tmp_path):
-    """Three shards at the same time, as a Slurm array starts them, one of them killed: the last pass does its part."""
-    runs, clean, seconds = place
-    out = tmp_path / "out"
-    line = f'exec "{sys.executable}" -m springmass batch "{runs}" -o "{out}" --jobs 1 --shard "$SLURM_ARRAY_TASK_ID/3"'
-    shards = [
-        subprocess.Popen(
-            ["sh", "-c", f"{line} {' '.join(OPTIONS)}"],
-            env={**os.environ, "SLURM_ARRAY_TASK_ID": str(i)},
-            stderr=subprocess.DEVNULL,
-        )
-        for i in (1, 2, 3)
-    ]
-    try:
-        shards[1].wait(0.5 * seconds)
-    except subprocess.TimeoutExpired:
-        shards[1].kill()
-    codes = [shard.wait(LIMIT_S) for shard in shards]
-    assert codes[0] == codes[2] == 0
-    assert not (out / "results.csv").exists()
-    assert started(runs, out, "--jobs", "1").wait(LIMIT_S) == 0
-    assert contents(out) == clean

@@ -39,7 +39,7 @@ def ip(*arguments: str) -> None:
 
 @pytest.fixture
 def far() -> Iterator[tuple[str, str, str]]:
-    """Give another host's name, its address, and its network card: a namespace of its own behind a virtual cable."""
+    """Yield the name of another host, its address, and its network card: a namespace behind a virtual cable."""
     if shutil.which("ip") is None or os.geteuid() != 0:
         pytest.skip("network namespaces need root and iproute2")
     name = f"sm{os.getpid()}"
@@ -53,7 +53,7 @@ def far() -> Iterator[tuple[str, str, str]]:
         ip("-n", name, "link", "set", theirs, "up")
         yield name, "198.18.77.2", theirs
     finally:
-        subprocess.run(["ip", "link", "del", ours], check=False, capture_output=True)  # at once, unlike the namespace
+        subprocess.run(["ip", "link", "del", ours], check=False, capture_output=True)  # takes effect immediately
         ip("netns", "del", name)
 
 
@@ -73,11 +73,11 @@ def test_a_cut_network_is_a_sensor_gone(bench: Any, tmp_path: Path, far: tuple[s
             recording.until_bytes(16_000)
             ip("-n", host, "link", "set", card, "down")
             assert recording.ended(RUN_S + ANSWER_S) == 4
-            said = recording.process.stderr.read().decode()
+            output = recording.process.stderr.read().decode()
         finally:
             server.kill()
-    assert "Traceback" not in said
-    assert "sensor_lost" in said
+    assert "Traceback" not in output
+    assert "sensor_lost" in output
     bench.demand_whole(bench.numbers(out))
     with open_run(out) as run:
         kinds = [event["kind"] for event in run.provenance["events"]]

@@ -85,8 +85,8 @@ def test_a_file_size_limit_is_one_line_and_loses_nothing(tmp_path: Path) -> None
     counts, message = done.stdout.splitlines()
     records, put = map(int, counts.split())
     assert done.stderr == ""
-    assert message.startswith(f"{log}: the wire log could not be written further (File too large); check the disk's")
-    assert message.endswith(f"{records} records up to byte {read_log(log).damage.skipped_bytes + whole(log)} are kept")
+    assert message.startswith(f"{log}: the wire log could not be continued (File too large); check the disk")
+    assert message.endswith(f"{records} records ({read_log(log).damage.skipped_bytes + whole(log)} bytes) are kept")
     assert reads_of(log) == [b"R%04d\r" % number for number in range(put - 1)]
     assert read_log(log).damage.records == records
     assert log.stat().st_size == LIMIT

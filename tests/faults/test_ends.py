@@ -183,17 +183,17 @@ Recorder.__init__.__kwdefaults__["open_file"] = Disk
 """
 
 
-def told(recording: Any) -> str:
+def output_of(recording: Any) -> str:
     """Return what is said until the process ends."""
     assert recording.process.stderr is not None
-    said = recording.process.stderr.read().decode()
-    assert "Traceback" not in said
-    return str(said)
+    output = recording.process.stderr.read().decode()
+    assert "Traceback" not in output
+    return str(output)
 
 
 @pytest.mark.trials
 def test_a_second_ctrl_c_while_the_disk_hangs_leaves_the_log_and_says_where(bench: Any, tmp_path: Path) -> None:
-    """The first waits for the disk; the second ends at once, removes nothing, and names the log and what to do."""
+    """The first waits for the disk; the second ends immediately, removes nothing, and names the log and a remedy."""
     out = tmp_path / "run.h5"
     with bench.feeder() as feeder:
         recording = bench.record(feeder.port, out, before=HUNG_DISK, stderr=subprocess.PIPE, prepare=usual_signals)
@@ -206,9 +206,9 @@ def test_a_second_ctrl_c_while_the_disk_hangs_leaves_the_log_and_says_where(benc
             recording.ended(2.0)
         recording.process.send_signal(signal.SIGINT)
         assert recording.ended(ANSWER_S) == 130
-        said = told(recording)
-    assert f"the log stays: {recording.log}" in said
-    assert "springmass recover" in said
+        output = output_of(recording)
+    assert f"the log stays: {recording.log}" in output
+    assert "springmass recover" in output
     assert not out.exists()
     assert main(["recover", str(recording.log)]) == 0
     numbers = bench.numbers(out)
@@ -228,10 +228,10 @@ def test_a_disk_that_takes_nothing_more_ends_the_recording_with_what_it_has(benc
     with bench.feeder() as feeder:
         recording = bench.record(feeder.port, out, stderr=subprocess.PIPE, prepare=limited)
         assert recording.ended(ANSWER_S) == 4
-        said = told(recording)
-    assert "could not be written further (File too large)" in said
+        output = output_of(recording)
+    assert "could not be continued (File too large)" in output
     assert recording.log.exists()
-    assert "springmass recover" in said  # the run file holds the log, so the limit is too low for it as well
+    assert "springmass recover" in output  # the run file holds the log, so the limit is too low for it as well
     assert not out.exists()
     assert main(["recover", str(recording.log)]) == 0
     numbers = bench.numbers(out)
@@ -270,8 +270,8 @@ def test_a_file_that_may_not_grow_ends_the_recording_with_its_run_file(bench: An
     with bench.feeder() as feeder:
         recording = bench.record(feeder.port, out, before=EFBIG_AT, stderr=subprocess.PIPE, prepare=usual_signals)
         assert recording.ended(ANSWER_S) == 4
-        said = told(recording)
-    assert "could not be written further (File too large)" in said
+        output = output_of(recording)
+    assert "could not be continued (File too large)" in output
     assert recording.log.stat().st_size == 20_000
     numbers = bench.numbers(out)
     bench.demand_whole(numbers)
@@ -300,11 +300,11 @@ def test_a_log_whose_name_is_taken_away_becomes_its_run_file(bench: Any, tmp_pat
     with bench.feeder() as feeder:
         recording = bench.record(feeder.port, out, "--seconds", "4", stderr=subprocess.PIPE, prepare=usual_signals)
         recording.until_bytes(SECONDS // 2)
-        left = take_away(recording.log, by)
+        remaining = take_away(recording.log, by)
         assert recording.ended(4.0 + ANSWER_S) == 0
-        said = told(recording)
-    assert f"{recording.log}: " in said
-    assert ("renamed" if "renamed" in by else by) in said
+        output = output_of(recording)
+    assert f"{recording.log}: " in output
+    assert ("renamed" if "renamed" in by else by) in output
     numbers = bench.numbers(out)
     bench.demand_whole(numbers)
     assert len(numbers) > 350
@@ -313,9 +313,9 @@ def test_a_log_whose_name_is_taken_away_becomes_its_run_file(bench: Any, tmp_pat
         (original,) = run.originals()
     assert original.name == "run.wire"
     if by == "another file":
-        assert left.read_bytes() == b"mine"
+        assert remaining.read_bytes() == b"mine"
     elif by != "deleted":
-        assert left.read_bytes() == original.data
+        assert remaining.read_bytes() == original.data
     else:
         assert [path.name for path in out.parent.iterdir()] == ["run.h5"]
 
@@ -356,7 +356,7 @@ def test_a_sensor_that_hears_one_ping_of_five_is_recorded(bench: Any, tmp_path: 
         recording = bench.record(feeder.port, out, "--seconds", "4", stderr=subprocess.PIPE, prepare=usual_signals)
         recording.until_bytes(SECONDS // 4)
         assert recording.ended(4.0 + ANSWER_S) == 0
-        told(recording)
+        output_of(recording)
     numbers = bench.numbers(out)
     assert np.all(np.diff(numbers) == 5)
     assert len(numbers) > 70

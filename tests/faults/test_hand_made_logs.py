@@ -197,28 +197,28 @@ def test_a_hand_made_log_gets_an_answer(tmp_path: Path, capsys: pytest.CaptureFi
         path.write_bytes(log.data)
         with answer_within(SECONDS):
             code = main(["recover", str(path), "-o", str(out)])
-        said = capsys.readouterr().err
-        assert code in answers, (number, said[-600:])
+        output = capsys.readouterr().err
+        assert code in answers, (number, output[-600:])
         answers[code] += 1
         if code == 0 and out.exists():
             with open_run(out) as run:
                 run.verify()
-                found = run.samples()
+                result = run.samples()
                 assert run.originals()[0].data == bytes(log.data)
             speed, scale, offset = speed_scale_offset(out)
             assert 100 < speed < 2000
             assert 0 < scale < 1e4
             expected = np.sort([scale * 0.5e-6 * speed * echo + offset for echo in log.echoes])
-            known = found.distance[np.isfinite(found.distance)]
+            known = result.distance[np.isfinite(result.distance)]
             nearest = expected[np.searchsorted(expected, known - 1e-9).clip(0, max(expected.size - 1, 0))]
             assert np.allclose(known, nearest, rtol=1e-12, atol=1e-12), number
-            assert np.isfinite(found.t).all()
+            assert np.isfinite(result.t).all()
             assert all(math.isfinite(gap["length_s"]) for gap in run.provenance["decoding"]["gaps"])
             out.unlink()
         elif code != 0:
-            assert said.startswith(f"springmass: {path}: "), said[:300]
-            assert said.count("\n") == 1, said[:600]
-            assert len(said) < 1000, said[:1200]
+            assert output.startswith(f"springmass: {path}: "), output[:300]
+            assert output.count("\n") == 1, output[:600]
+            assert len(output) < 1000, output[:1200]
             assert not out.exists()
     assert min(answers.values()) > LOGS // 10, answers
     print(f"hand-made logs: {LOGS}, {answers[0]} recovered, {answers[3]} refused")

@@ -181,11 +181,11 @@ def write(path: Path, header: dict[str, Any], arrays: dict[str, np.ndarray], tex
             file["/wire/record_offset"] = np.cumsum(sizes) - sizes
             file["/wire/record_len"] = sizes
             file["/wire/record_mono_ns"] = np.full(len(sizes), -1, "<i8")
-            told = [
+            reported = [
                 {"name": name, "size": len(data), "sha256": hashlib.sha256(data).hexdigest()}
                 for name, data in texts.items()
             ]
-            header["originals"] = header["originals"] or told
+            header["originals"] = header["originals"] or reported
         # What HDF5 cannot hold, or what is no table any more, the header says all the same.
         with contextlib.suppress(TypeError, ValueError, AttributeError, OverflowError, KeyError):
             decorate(file, header, arrays)
@@ -196,7 +196,7 @@ def write(path: Path, header: dict[str, Any], arrays: dict[str, np.ndarray], tex
 
 def decorate(file: Any, header: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
     """Write what other tools see, as the header has it."""
-    info, told = header["info"], header["provenance"]
+    info, provenance = header["info"], header["provenance"]
     root = {"Conventions": "CF-1.11", "NX_class": "NXroot", "default": "entry", "kind": info["kind"]}
     for name, value in root.items():
         put(file, name, value)
@@ -213,8 +213,8 @@ def decorate(file: Any, header: dict[str, Any], arrays: dict[str, np.ndarray]) -
     put(file["/raw"], "NX_class", "NXcollection")
     put(file["/entry/instrument"], "NX_class", "NXinstrument")
     process = {"NX_class": "NXprocess", "malformed_rows": header["malformed_rows"]}
-    process |= {name: told[name] for name in ("software", "version", "created_utc") if told.get(name)}
-    process |= {"configuration": canonical(told["configuration"])} if "configuration" in told else {}
+    process |= {name: provenance[name] for name in ("software", "version", "created_utc") if provenance.get(name)}
+    process |= {"configuration": canonical(provenance["configuration"])} if "configuration" in provenance else {}
     process |= {"traps": canonical(header["traps"])} if header["traps"] else {}
     if header["originals"]:
         process["original_sha256"] = [entry["sha256"] for entry in header["originals"]]
@@ -237,7 +237,7 @@ def decorate(file: Any, header: dict[str, Any], arrays: dict[str, np.ndarray]) -
             at.attrs.create("_FillValue", np.array(np.nan, "<f4" if name == "distance_errors" else "<f8"))
         if name == "time":
             put(at, "clock", info["clock"])
-            put(at, "epoch", told.get("start_time") or "unknown")
+            put(at, "epoch", provenance.get("start_time") or "unknown")
         if name == "distance":
             if header.get("quantity"):
                 put(at, "quantity", header["quantity"])
@@ -247,7 +247,7 @@ def decorate(file: Any, header: dict[str, Any], arrays: dict[str, np.ndarray]) -
             put(at, "standard_name", "quality_flag")
             at.attrs.create("flag_masks", np.array([1, 2, 4, 8, 16, 32, 64], "u1"))
             put(at, "flag_meanings", FLAGS)
-    for path, value in (("/entry/title", header["title"]), ("/entry/start_time", told.get("start_time"))):
+    for path, value in (("/entry/title", header["title"]), ("/entry/start_time", provenance.get("start_time"))):
         if value:
             field(file, path, value)
     for name in ("name", "kind", "clock"):
@@ -267,8 +267,8 @@ def strange(rng: np.random.Generator) -> Any:
 def paths_of(tree: Any, above: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """Return the path of every value of a header, tables and lists among them."""
     inner = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
-    found = [(*above, key) for key, _ in inner]
-    return found + [path for key, value in inner for path in paths_of(value, (*above, key))]
+    result = [(*above, key) for key, _ in inner]
+    return result + [path for key, value in inner for path in paths_of(value, (*above, key))]
 
 
 def in_header(path: Path, rng: np.random.Generator) -> str:
@@ -404,18 +404,18 @@ def in_size(path: Path, rng: np.random.Generator) -> str:
 
 def everywhere(file: Any) -> list[str]:
     """Return every path of a file."""
-    found: list[str] = []
-    file.visit(found.append)
-    return found
+    result: list[str] = []
+    file.visit(result.append)
+    return result
 
 
 def in_links(path: Path, rng: np.random.Generator) -> str:
     """A name leads out of the file, in a circle, to what is missing, or to something of another kind."""
     write(path, copy.deepcopy(HEADER), samples(), {"run.wire": ORIGINAL})
-    pipe, other = path.with_name("pipe"), path.with_name("other.h5")
+    pipe, second = path.with_name("pipe"), path.with_name("other.h5")
     if not pipe.exists():
         os.mkfifo(pipe)
-        with h5py.File(other, "w") as file:
+        with h5py.File(second, "w") as file:
             file["x"] = samples()["distance"]
             file["s"] = b"secret"
         path.with_name("raw").write_bytes(bytes(N * 8))
@@ -434,11 +434,11 @@ def in_links(path: Path, rng: np.random.Generator) -> str:
         if kind == 0:
             file[name] = h5py.SoftLink(str(rng.choice(["/entry", "/nowhere", "..", f"/{name}", "/entry/signal/time"])))
         elif kind in (1, 2):
-            where = str(rng.choice([pipe, other, path, "/etc/hostname", "/dev/zero", "nowhere.h5"]))
+            where = str(rng.choice([pipe, second, path, "/etc/hostname", "/dev/zero", "nowhere.h5"]))
             file[name] = h5py.ExternalLink(where, str(rng.choice(["/x", "/", "/s"])))
         elif kind in (3, 4):
             layout = h5py.VirtualLayout(shape or (1,), dtype)
-            source = h5py.VirtualSource(str(rng.choice([pipe, other, "."])), "x", shape or (1,))
+            source = h5py.VirtualSource(str(rng.choice([pipe, second, "."])), "x", shape or (1,))
             layout[...] = source[...]
             file.create_virtual_dataset(name, layout)
         elif kind in (5, 6):
@@ -502,8 +502,8 @@ def command(rng: np.random.Generator, path: Path) -> list[str]:
         ["convert", f"{out}.lvm", "--overwrite"],
         ["simulate", "--scene", str(scene), "--json", "--against"],
     ]
-    name, *rest = choices[rng.integers(len(choices))]
-    return [name, *rest, str(path)] if "--against" in rest else [name, str(path), *rest]
+    name, *remainder = choices[rng.integers(len(choices))]
+    return [name, *remainder, str(path)] if "--against" in remainder else [name, str(path), *remainder]
 
 
 @pytest.mark.trials
@@ -518,20 +518,20 @@ def test_any_run_file_gets_an_answer(
     for number in files:
         rng = np.random.default_rng([14, number])
         make = KINDS[number % len(KINDS)]
-        left = make(path, rng)
+        remaining = make(path, rng)
         arguments = command(rng, path)
         with answer_within(SECONDS):
             code = main(arguments)
-        said = capsys.readouterr()
-        where = (number, make.__name__, arguments, said.err)
+        output = capsys.readouterr()
+        where = (number, make.__name__, arguments, output.err)
         assert code in ANSWERS, where
-        assert "Traceback" not in said.err, where
-        assert said.err.isascii() or said.err.replace("\n", "").isprintable(), where
+        assert "Traceback" not in output.err, where
+        assert output.err.isascii() or output.err.replace("\n", "").isprintable(), where
         if code:
-            assert said.err.splitlines()[-1].startswith("springmass: "), where
-        elif arguments[0] == "analyse" and left == "same":
+            assert output.err.splitlines()[-1].startswith("springmass: "), where
+        elif arguments[0] == "analyse" and remaining == "same":
             answered += 1
-            period = json.loads(said.out)["estimates"]["period"]
+            period = json.loads(output.out)["estimates"]["period"]
             assert abs(period["value"] - PERIOD_S) < 5 * period["u"], where
     assert answered
 
@@ -578,12 +578,10 @@ def test_what_is_no_regular_file_is_refused_at_once(
             continue  # which lists what is in a folder
         with answer_within(SECONDS):
             code = main(arguments)
-        said = capsys.readouterr()
-        assert code in (2, 3), (arguments, said.err)
-        demand = f"a regular file was demanded, got a {kind}"
-        if (
-            arguments[:2] == ["analyse", str(path)] and kind == "directory"
-        ):  # an input, of whose recordings none is there
-            demand = "a folder with recordings was demanded, got none"
-        assert demand in said.err
-        assert said.err.count("\n") == 1
+        output = capsys.readouterr()
+        assert code in (2, 3), (arguments, output.err)
+        demand = f"expected a regular file, got a {kind}"
+        if arguments[:2] == ["analyse", str(path)] and kind == "directory":  # a folder without recordings
+            demand = "expected a folder with recordings, got none"
+        assert demand in output.err
+        assert output.err.count("\n") == 1

@@ -144,9 +144,9 @@ def demand_complete(put: list[tuple[int, bytes]], records: list[Record], channel
     """Demand every read of a channel, but those that its overflow event counts in its place; return their number."""
     of_channel = [record for record in records if record.channel == channel]
     events = [record for record in of_channel if record.kind is Kind.EVENT and record.json()["kind"] == "overflow"]
-    kept = [(record.mono_ns, record.payload) for record in of_channel if record.kind is Kind.DATA]
+    recorded = [(record.mono_ns, record.payload) for record in of_channel if record.kind is Kind.DATA]
     if not events:
-        assert kept == put
+        assert recorded == put
         return 0
     (event,) = events
     facts = event.json()["facts"]
@@ -154,7 +154,7 @@ def demand_complete(put: list[tuple[int, bytes]], records: list[Record], channel
     lost = put[first : first + facts["records"]]
     assert (lost[0][0], lost[-1][0]) == (facts["first_ns"], event.mono_ns)
     assert sum(len(data) for _, data in lost) == facts["bytes"]
-    assert kept == put[:first] + put[first + len(lost) :]
+    assert recorded == put[:first] + put[first + len(lost) :]
     before = [record for record in of_channel[: of_channel.index(event)] if record.kind is Kind.DATA]
     assert len(before) == first
     return len(lost)
@@ -194,14 +194,14 @@ def test_the_reading_thread_never_waits_for_the_disk(tmp_path: Path) -> None:
     header = LogHeader(sensors=(SensorEntry(0, "text-lines"),), mono_ns=0, unix_ns=0)
     writer = threading.Thread(target=write_all, args=(device, sent), daemon=True)
     with Recorder(tmp_path / "run.wire", header, SystemClock(), open_file=hanging) as recorder:
-        kept = Kept(recorder, len(sent))
-        reader = PortReader([Line(SerialPort(os.ttyname(port), 9600))], kept, SystemClock())
+        recorded = Kept(recorder, len(sent))
+        reader = PortReader([Line(SerialPort(os.ttyname(port), 9600))], recorded, SystemClock())
         reader.start()
         disk[0].goes.clear()
         writer.start()
         writer.join(WAIT_S)
         assert not writer.is_alive()
-        assert kept.all_came.wait(WAIT_S)
+        assert recorded.all_came.wait(WAIT_S)
         reader.stop()
         assert disk[0].hangs.wait(WAIT_S)
         assert (recorder.status.dropped_records, recorder.status.records) == (0, 1)

@@ -56,7 +56,7 @@ class Outcome:
 
 
 def packet(number: int) -> bytes:
-    """Return a packet that tells its number."""
+    """Return a packet that contains its number."""
     return struct.pack("<Q", number) + bytes([number % 256]) * (PACKET - 8)
 
 
@@ -66,25 +66,25 @@ def trial(log: Path, mode: str, rng: np.random.Generator) -> Outcome:
     command = [sys.executable, "-B", __file__, str(port), str(log), mode]
     with subprocess.Popen(command, stdout=subprocess.PIPE, pass_fds=[port]) as child:
         assert child.stdout is not None
-        said = child.stdout.read(8)
+        output = child.stdout.read(8)
         last, sent = int(rng.integers(1, 120)), 0
         for sent in range(1, last + 1):
             os.write(feed, packet(sent - 1))
             # Only at the pace of a bench is a read over before the next one comes.
             if mode != "flood" and sent < last:
-                said = child.stdout.read(8)
+                output = child.stdout.read(8)
         if mode == "flood":
-            said = child.stdout.read(8 * int(rng.integers(1, last + 1)))
+            output = child.stdout.read(8 * int(rng.integers(1, last + 1)))
         for _ in range(int(10 ** rng.uniform(0, 5))):  # somewhere between the packet's arrival and its record
             pass
         os.kill(child.pid, signal.SIGKILL)
         # What the child said before it died counts, heard or not.
-        said += child.stdout.read()
+        output += child.stdout.read()
     os.close(feed)
-    left = b"".join(iter(lambda: os.read(port, 1 << 16), b""))
+    remaining = b"".join(iter(lambda: os.read(port, 1 << 16), b""))
     os.close(port)
-    written, synced = struct.unpack("<II", said[: len(said) // 8 * 8][-8:])
-    return Outcome(sent, sent - len(left) // PACKET, written, synced)
+    written, synced = struct.unpack("<II", output[: len(output) // 8 * 8][-8:])
+    return Outcome(sent, sent - len(remaining) // PACKET, written, synced)
 
 
 @pytest.mark.trials

@@ -91,12 +91,12 @@ def test_killed_while_the_run_file_is_built_old_or_new_stands(tmp_path: Path) ->
             assert child.stdout is not None
             child.stdout.readline()
             child.kill()
-        found = samples_in(out) if out.exists() else 0
-        assert found in ((500, 800) if trial % 2 else (0, 800)), f"killed at call {stop_at} of {calls}"
-        assert found == 800 or log.read_bytes() == bytes_of_log
+        result = samples_in(out) if out.exists() else 0
+        assert result in ((500, 800) if trial % 2 else (0, 800)), f"killed at call {stop_at} of {calls}"
+        assert result == 800 or log.read_bytes() == bytes_of_log
         if log.exists():
             assert recover(log, out, overwrite=True).runs[0].samples == 800
-        states.append(found == 800)
+        states.append(result == 800)
     assert {False, True} <= set(states), "the kills hit only one side"
     print(f"kill -9 while building: {TRIALS} trials, {states.count(False)} old, {states.count(True)} new")
 

@@ -1,4 +1,4 @@
-"""Network sensors that drop out: what arrives late, at once, twice cut or not at all moves no period beyond its u.
+"""Network sensors that drop out: readings that are late, in bursts, cut or lost move no period by more than its u.
 
 The sensors are written here, from the pages of their wire forms: they share no code with the decoders. Time is
 simulated; the bytes go through the recorder, recovery and the analysis of the command line. ``SPRINGMASS_TRIALS`` asks
@@ -81,12 +81,12 @@ def planned(rng: np.random.Generator) -> Plan:
     """Return a recording with one to three dropouts of random place and length, up to four fifths of it in all."""
     family = list(SENSORS)[int(rng.choice(3, p=[0.6, 0.2, 0.2]))]
     seconds = float(rng.uniform(15.0, 60.0))
-    left, dropouts = 0.8 * seconds, []
+    remaining, dropouts = 0.8 * seconds, []
     for _ in range(int(rng.integers(1, 4))):
-        length = float(rng.uniform(0.05, 1.0)) * left
+        length = float(rng.uniform(0.05, 1.0)) * remaining
         start = float(rng.uniform(-0.2 * length, seconds - 0.5 * length))
         dropouts.append((start, start + length, bool(rng.random() < 0.25)))
-        left -= length
+        remaining -= length
     ppm = float(rng.uniform(-50.0, 50.0) if rng.random() < 0.5 else rng.uniform(-6000.0, 6000.0))
     return Plan(family, seconds, sorted(dropouts), ppm, float(rng.uniform(0.5, 1.5)))
 
@@ -166,20 +166,20 @@ def test_thirteen_of_twenty_seconds_at_once_cost_no_accuracy(
     """A device with a clock is as well known behind a stall as without one, and the finding says what happened."""
     plain = Plan("line-protocol", 20.0, [], ppm, 0.7431)
     stalled = replace(plain, dropouts=[(*dropout, False)])
-    found = []
+    results = []
     for name, plan in (("plain", plain), ("stalled", stalled)):
         (tmp_path / name).mkdir()
         code, result = analysed(plan, tmp_path / name, np.random.default_rng(8), capsys)
         assert code == 0
-        found.append(result)
-    undisturbed, disturbed = found
+        results.append(result)
+    undisturbed, disturbed = results
     codes = [finding["code"] for finding in disturbed["findings"]]
     assert "late_readings" in codes
     assert not {"late_readings", "clock_refused"} & {finding["code"] for finding in undisturbed["findings"]}
-    period, other = undisturbed["estimates"]["period"], disturbed["estimates"]["period"]
-    assert abs(other["value"] - plan.period_s) < 3.0 * other["u"]
-    assert abs(other["value"] - period["value"]) < 1e-4 * period["value"]
-    assert period["u"] <= other["u"] < 5e-5 * period["value"]
+    period, second = undisturbed["estimates"]["period"], disturbed["estimates"]["period"]
+    assert abs(second["value"] - plan.period_s) < 3.0 * second["u"]
+    assert abs(second["value"] - period["value"]) < 1e-4 * period["value"]
+    assert period["u"] <= second["u"] < 5e-5 * period["value"]
 
 
 @pytest.mark.parametrize(("stated", "refused"), [([], True), (["--clock-ppm", "40000"], False)])
@@ -190,11 +190,11 @@ def test_a_correction_beyond_the_clock_is_refused_unless_the_clock_is_said_to_ne
     plan = Plan("line-protocol", 20.0, [], 30_000.0, 0.7431)
     code, result = analysed(plan, tmp_path, np.random.default_rng(8), capsys, *stated)
     period = result["estimates"]["period"]
-    told = {finding["code"]: finding for finding in result["findings"]}
-    assert (code, "clock_refused" in told) == (0, refused)
+    reported = {finding["code"]: finding for finding in result["findings"]}
+    assert (code, "clock_refused" in reported) == (0, refused)
     assert abs(period["value"] - plan.period_s) < 3.0 * period["u"]
     if refused:
-        assert told["clock_refused"]["severity"] == "warning"
+        assert reported["clock_refused"]["severity"] == "warning"
         assert period["u"] == pytest.approx(0.03 / math.sqrt(3.0) * period["value"], rel=0.01)
     else:
         assert period["u"] < 1e-4 * period["value"]

@@ -31,7 +31,7 @@ RIGHT_S = 0.01
 SECOND = 6000
 """Bytes of a log of about a second."""
 SECOND_PLUG = 20_000
-"""Number of the first reading after the replug: each reading's echo tells its number, and so when it was taken."""
+"""Number of the first reading after the replug: each echo encodes the number of its reading, and so its time."""
 SERIAL_NUMBERS = """
 import os
 from pathlib import Path
@@ -108,8 +108,8 @@ class Sensor:
             line = checked(f"R1,{counter},{us},{FIRST_US + STEP_US * number:.2f},2000,E")
             with contextlib.suppress(BlockingIOError):
                 if self._name is not None and b"?" in os.read(self._master, 100):
-                    said = f"I1,springmass-rangefinder,2.0.0,{self._name},100,100,25000,0,0"
-                    os.write(self._master, checked(said))
+                    output = f"I1,springmass-rangefinder,2.0.0,{self._name},100,100,25000,0,0"
+                    os.write(self._master, checked(output))
             with contextlib.suppress(BlockingIOError):  # nobody reads: a sensor's bytes are lost then
                 os.write(self._master, b"R0431\r" * 4 if self._stranger else line)
             sent += 1

@@ -62,10 +62,10 @@ def scene_text(rng: np.random.Generator) -> str:
     lines = []
     for table, keys in RANGES.items():
         lines.append(f"[{table}]")
-        for key, (least, greatest, signed) in keys.items():
+        for key, (lower, greatest, signed) in keys.items():
             if rng.random() < 0.4 and (table, key) not in {("bob", "mass_kg"), ("spring", "constant_n_per_m")}:
                 continue
-            size = least * (greatest / least) ** rng.choice([0.0, 1.0, rng.random(), 0.5])
+            size = lower * (greatest / lower) ** rng.choice([0.0, 1.0, rng.random(), 0.5])
             number = f"{size * (rng.choice([-1, 1]) if signed else 1):.17g}"
             if rng.random() < 0.02:
                 number = str(rng.choice(STRANGE))
@@ -179,11 +179,11 @@ def test_any_scene_gets_an_answer(
         arguments = command(rng, path)
         with answer_within(SECONDS):
             code = main(arguments)
-        said = capsys.readouterr()
-        where = (number, arguments, text[:500], said.err)
+        output = capsys.readouterr()
+        where = (number, arguments, text[:500], output.err)
         assert code in ANSWERS, where
-        assert "Traceback" not in said.err, where
-        assert said.err.replace("\n", "").isprintable(), where
+        assert "Traceback" not in output.err, where
+        assert output.err.replace("\n", "").isprintable(), where
         if code == 2:
-            assert said.err.splitlines()[-1].startswith("springmass: "), where
-            assert len(said.err) < 5000, where
+            assert output.err.splitlines()[-1].startswith("springmass: "), where
+            assert len(output.err) < 5000, where

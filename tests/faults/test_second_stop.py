@@ -80,7 +80,7 @@ def test_a_second_stop_counts_what_the_hanging_disk_did_not_take(bench: Any, tmp
     assert "Traceback" not in stderr
     put = reads_put(tmp_path)
     log = read_log(recording.log)
-    kept = sum(record.kind is Kind.DATA for record in log)
+    recorded = sum(record.kind is Kind.DATA for record in log)
     assert main(["recover", str(recording.log)]) == 0
     bench.demand_whole(bench.numbers(out))
     with open_run(out) as run:
@@ -89,4 +89,4 @@ def test_a_second_stop_counts_what_the_hanging_disk_did_not_take(bench: Any, tmp
     assert f"did not take {dropped} reads" in stderr
     # The write that hung holds the rest, perhaps with a copy of the header.
     assert dropped > 0
-    assert 0 <= (hung := put - kept - dropped) <= log.damage.lost <= hung + 1
+    assert 0 <= (hung := put - recorded - dropped) <= log.damage.lost <= hung + 1

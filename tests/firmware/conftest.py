@@ -86,7 +86,7 @@ class Emulated:
     clock_ppm: float
     ram: int
     watchdog: int
-    all_said: bool
+    all_sent: bool
 
     def true_ns(self, cycle: float) -> int:
         """True time of a cycle."""
@@ -121,7 +121,7 @@ Emulate = Callable[..., Emulated]
 
 @pytest.fixture
 def emulate(built: Built, tmp_path: Path) -> Emulate:
-    """Run the firmware for some seconds of its own time; options as the bench takes them, say as (s, command)."""
+    """Run the firmware for some seconds of its clock; options as the bench takes them, say as (s, command)."""
 
     def run(seconds: float, *, say: tuple[tuple[float, str], ...] = (), **options: object) -> Emulated:
         log = tmp_path / "bench.log"
@@ -131,14 +131,14 @@ def emulate(built: Built, tmp_path: Path) -> Emulate:
             words.append(option if value is True else f"{option}={value}")
         done = subprocess.run([built.bench, built.elf, *words], capture_output=True, timeout=1200)
         assert done.returncode == 0, done.stderr.decode(errors="replace")
-        _, cycles, _, ram, _, watchdog, _, said = done.stdout.decode("ascii").split()
+        _, cycles, _, ram, _, watchdog, _, all_sent = done.stdout.decode("ascii").split()
         assert int(cycles) >= seconds * CPU_HZ * 0.99
-        return read_log(log, float(str(options.get("clock_ppm", 0.0))), int(ram), int(watchdog), said == "1")
+        return read_log(log, float(str(options.get("clock_ppm", 0.0))), int(ram), int(watchdog), all_sent == "1")
 
     return run
 
 
-def read_log(path: Path, clock_ppm: float, ram: int, watchdog: int, all_said: bool) -> Emulated:
+def read_log(path: Path, clock_ppm: float, ram: int, watchdog: int, all_sent: bool) -> Emulated:
     """Read what the bench wrote."""
     pulses, lines = [], []
     with path.open(encoding="ascii") as file:
@@ -153,4 +153,4 @@ def read_log(path: Path, clock_ppm: float, ram: int, watchdog: int, all_said: bo
     ticks = np.where((up > 0) & (down > 0), down - up, -1)
     flight = np.array([p[3] for p in pulses], np.float64)
     pings = Pings(numbers[:, 0], numbers[:, 1], [p[2] for p in pulses], flight, ticks)
-    return Emulated(pings, lines, clock_ppm, ram, watchdog, all_said)
+    return Emulated(pings, lines, clock_ppm, ram, watchdog, all_sent)

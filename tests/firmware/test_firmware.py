@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import subprocess
 from collections import Counter
@@ -14,6 +13,7 @@ import pytest
 from acquisition.decoders.family import Identity
 from acquisition.decoders.line_protocol import FAMILY, LONGEST, LineProtocolDecoder
 from acquisition.live.firmware import HEX, MODEL, VERSION, WIRING
+from docs.figures import wiring
 
 from .conftest import ROOT, Built, Emulate, Emulated
 
@@ -85,7 +85,7 @@ def test_pings_without_an_echo_are_coded(emulate: Emulate, trouble: dict[str, ob
 
 
 def test_a_missing_transducer_is_told_from_a_missing_target(emulate: Emulate) -> None:
-    """No answer is A at once; no echo is N; the readings go on when it is back."""
+    """No answer gives A immediately; no echo is N; the readings go on when it is back."""
     absent = statuses(emulate(3.0, absent="1,2"))
     assert re.fullmatch("E{90,}A{99,101}E{90,}", absent)
     gone = statuses(emulate(3.0, gone="1,2"))
@@ -118,7 +118,7 @@ def test_a_ghost_is_scattered_by_pings_at_random_intervals(emulate: Emulate) -> 
 
 def test_commands_set_rate_gate_spread_and_name_and_are_answered(emulate: Emulate) -> None:
     """Each by a line of what it is now; one that is none by a refusal; nothing else changes."""
-    said = (
+    commands = (
         "?",
         "R125",
         "G200,2100",
@@ -131,14 +131,14 @@ def test_commands_set_rate_gate_spread_and_name_and_are_answered(emulate: Emulat
         "Nname that is too long",
         "hm",
     )
-    run = emulate(4.0, say=tuple((0.5 + 0.2 * i, text) for i, text in enumerate(said)))
+    run = emulate(4.0, say=tuple((0.5 + 0.2 * i, text) for i, text in enumerate(commands)))
     decoder = LineProtocolDecoder()
     identities = []
     for _, line in run.lines:
-        decoder.told.identity = None
+        decoder.status.identity = None
         decoder.feed(0, line)
-        if decoder.told.identity:
-            identities.append(decoder.told.identity)
+        if decoder.status.identity:
+            identities.append(decoder.status.identity)
     settings = {"rate_hz": 100, "near_us": 116, "far_us": 25_000, "spread_us": 0, "thermometer": 0}
     expected = [Identity(MODEL, VERSION, "", dict(settings))] * 2
     for name, change in (
@@ -155,7 +155,7 @@ def test_commands_set_rate_gate_spread_and_name_and_are_answered(emulate: Emulat
         "refused_command": 6,
         "garbage_bytes": 6 * len("$X1,command*392D\n"),
     }
-    assert decoder.told.conditions.keys() == {"too_far"}
+    assert decoder.status.conditions.keys() == {"too_far"}
     demand_true_echoes(run)
 
 
@@ -193,7 +193,7 @@ def test_random_commands_do_no_harm(emulate: Emulate) -> None:
 
 def demand_unharmed(run: Emulated, seconds: float) -> None:
     """Demand that the readings went on without a gap, and that it still knows what it is."""
-    assert run.all_said
+    assert run.all_sent
     rows = run.readings()
     assert [row[0] for row in rows] == list(range(len(rows)))
     last_s = run.lines[-1][0] / 16e6
@@ -203,8 +203,8 @@ def demand_unharmed(run: Emulated, seconds: float) -> None:
         decoder.feed(0, line)
     assert decoder.faults["bad_checksum"] == decoder.faults["bad_frame"] == decoder.faults["unknown_record"] == 0
     assert decoder.faults["refused_command"] > 0
-    assert decoder.told.identity is not None
-    settings = decoder.told.identity.settings
+    assert decoder.status.identity is not None
+    settings = decoder.status.identity.settings
     assert 10 <= settings["rate_hz"] <= 125
     assert 116 <= settings["near_us"] <= settings["far_us"] <= 30_000
     assert run.watchdog == 0
@@ -253,11 +253,6 @@ def test_what_the_family_says_is_what_the_firmware_does(emulate: Emulate) -> Non
 
 def test_the_wiring_is_drawn_by_its_script_and_names_the_pins_of_the_firmware(tmp_path: Path) -> None:
     """The drawing on the page is what docs/figures/wiring.py draws."""
-    spec = importlib.util.spec_from_file_location("wiring", ROOT / "docs" / "figures" / "wiring.py")
-    assert spec is not None
-    assert spec.loader is not None
-    wiring = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(wiring)
     drawn = wiring.main(tmp_path).read_text(encoding="utf-8")
     assert drawn == (ROOT / "docs" / "figures" / "wiring.svg").read_text(encoding="utf-8")
     for pin in ("D8", "D9", "D2", "TRIG", "ECHO", "4.7 k"):

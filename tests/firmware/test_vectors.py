@@ -23,7 +23,7 @@ SCRIPT = (
     (6.0, "J500"),
     (6.2, "R125"),
 )
-"""Commands that bring out every line that the firmware knows, with the troubles of :func:`said`."""
+"""Commands that bring out every line that the firmware knows, with the troubles of :func:`sent_lines`."""
 
 
 def vectors(page: Path = PAGE) -> list[str]:
@@ -45,7 +45,7 @@ def crc(body: str) -> str:
 
 
 @pytest.fixture
-def said(emulate: Emulate) -> list[str]:
+def sent_lines(emulate: Emulate) -> list[str]:
     """Return what the firmware says at a bench where a bob of 0.4 m hangs still, and much goes wrong."""
     run = emulate(
         7.0,
@@ -62,16 +62,16 @@ def said(emulate: Emulate) -> list[str]:
     return [line.decode("ascii") for _, line in run.lines]
 
 
-def test_the_firmware_sends_the_vectors_of_the_page(said: list[str]) -> None:
+def test_the_firmware_sends_the_vectors_of_the_page(sent_lines: list[str]) -> None:
     """Each of them, and among them every status, a temperature, both identifications and the refusal."""
     wanted = vectors()
     assert {line.partition("*")[0][-1] for line in wanted if line.startswith("$R1")} == set("ENBCFAS")
     assert sum(line.startswith("$I1") for line in wanted) == 2
     assert "$X1,command*392D" in wanted
-    assert [line for line in wanted if f"{line}\n" not in said] == []
+    assert [line for line in wanted if f"{line}\n" not in sent_lines] == []
 
 
-def test_every_line_of_the_firmware_is_of_the_page_s_form_and_decodes_to_its_fields(said: list[str]) -> None:
+def test_every_line_of_the_firmware_is_of_the_page_s_form_and_decodes_to_its_fields(sent_lines: list[str]) -> None:
     """The page's table of fields as one expression, the checksum bit by bit; the decoder agrees on every field."""
     form = re.compile(
         r"\$(R1,([0-9]{1,10}),([0-9]{1,10}),([0-9]{1,6}\.[0-9]{2})?,(-?[0-9]{1,5})?,([ENBCFAS])"
@@ -79,7 +79,7 @@ def test_every_line_of_the_firmware_is_of_the_page_s_form_and_decodes_to_its_fie
         r"|X1,command)\*([0-9A-F]{4})\n"
     )
     decoder, read, written = LineProtocolDecoder(), [], []
-    for line in said:
+    for line in sent_lines:
         whole = form.fullmatch(line)
         assert whole is not None, line
         assert len(line) <= 97

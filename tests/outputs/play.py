@@ -22,7 +22,7 @@ import springmass as sm
 from acquisition.errors import AcquisitionError
 from pipeline.analyse import Oscillation
 from pipeline.errors import AnalysisError, PipelineError
-from pipeline.registry.findings import FINDINGS
+from pipeline.findings.registry import FINDINGS
 from pipeline.registry.quantities import QUANTITIES
 from springmass.cli import main
 from springmass.errors import INTERNAL, OK, UNREADABLE
@@ -52,10 +52,7 @@ class Ran:
         out, err = (_Terminal(), _Terminal()) if terminal else (io.StringIO(), io.StringIO())
         environment = {"COLUMNS": str(COLUMNS), "TERM": "xterm-256color"} if terminal else {}
         with mock.patch.dict(os.environ, environment), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            try:
-                self.code = main(list(arguments))
-            except SystemExit as end:  # argparse ends so
-                self.code = int(end.code or 0)
+            self.code = main(list(arguments))
         self.out, self.err = out.getvalue(), err.getvalue()
         assert self.code != INTERNAL, self.err
         assert "Traceback" not in self.err
@@ -95,7 +92,9 @@ def play(subject: Subject, folder: Path) -> int:
     (line,) = as_json.out.splitlines()
     result = _strict_json(line)
     assert set(result["estimates"]) <= set(QUANTITIES)
-    assert {(f["code"], f["severity"]) for f in result["findings"]} <= {(c, s) for c in FINDINGS for s in FINDINGS[c]}
+    assert {(f["code"], f["severity"]) for f in result["findings"]} <= {
+        (c, s) for c in FINDINGS for s in FINDINGS[c].severities
+    }
     read_page(written / "report.html")
     return played + 3 + 1 + read_tables(written)
 
@@ -193,10 +192,10 @@ def _play_in_python(subject: Subject, folder: Path) -> int:
                 draw().figure.canvas.draw()
         pyplot.close("all")
     if subject.laws:
+        from springmass import load
         from springmass.report.write import write_report
         from springmass.runs.analysing import Analysed
         from springmass.runs.json_results import result_of
-        from springmass.runs.loading import load
 
         loaded = load(subject.path, **subject.answers)
         result = result_of(loaded, found, time_utc="2026-01-01T00:00:00+00:00", accuracy="standard", parameters={})

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import springmass as sm
 from acquisition.errors import AcquisitionError, NeedsAnswer
 from acquisition.recordings.questions import Missing
-from springmass.runs.loading import load, sample_data
+from springmass import load, sample_data
 from tests.trials.troubles.kinds import KINDS
 from tests.trials.troubles.record import Kind
 
@@ -61,16 +61,16 @@ def recordings(*, every: bool) -> Iterator[Subject]:
     for path in sorted(RECORDINGS.rglob("*")):
         if path.is_file() and path.name != "ORIGIN.md":
             for answers in _answers(path, {}, every=every):
-                said = " ".join(str(value) for value in answers.values())
-                yield Subject(f"{path.relative_to(RECORDINGS).as_posix()} {said}".strip(), path, answers)
+                given = " ".join(str(value) for value in answers.values())
+                yield Subject(f"{path.relative_to(RECORDINGS).as_posix()} {given}".strip(), path, answers)
 
 
 def _answers(path: Path, given: dict[str, str | float], *, every: bool) -> Iterator[dict[str, str | float]]:
     """Answer the first question until the reader asks none; a file that is refused is a subject, too."""
     try:
         load(path, **given)
-    except NeedsAnswer as asked:
-        need = asked.question.needs[0]
+    except NeedsAnswer as error:
+        need = error.question.needs[0]
         branches = every and need.what in (Missing.RUN, Missing.CHANNEL)
         for choice in need.choices if branches else (need.example,):
             yield from _answers(path, {**given, need.what.value: choice}, every=every)
@@ -127,8 +127,8 @@ def specials(folder: Path) -> Iterator[Subject]:
     two = 0.3 + 0.03 * np.cos(6.1 * t) + 0.028 * np.cos(9.7 * t + 1.0) + 3e-4 * _noise(t, 5)
     yield _made(folder, "two modes", t, two)
     for name, coefficients in (
-        ("law of one's own", {"d": "1/(m^1/2 s)"}),
-        ("law with a coefficient n", {"n": "1/(m^1/2 s)"}),
+        ("law of one's own", {"d": (-1 / 2, -1)}),
+        ("law with a coefficient n", {"n": (-1 / 2, -1)}),
     ):
         law = sm.make_law("three-halves", _three_halves, coefficients, _guess)
         yield _made(folder, name, t, swing, laws=(law,), scene=bench)

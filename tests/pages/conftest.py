@@ -1,10 +1,9 @@
-"""Pages in a browser: Debian's Chromium, driven by playwright, never a browser that was fetched from elsewhere."""
+"""Pages in a browser, driven by playwright."""
 
 from __future__ import annotations
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,15 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page
 
 from springmass.cli import main
 from springmass.runs.loading import sample_data
-
-QUIET = (
-    "--no-sandbox --disable-gpu --disable-background-networking --disable-component-update --disable-sync "
-    "--no-first-run --disable-dev-shm-usage"
-)
+from tests.browser import chromium, headless
 
 LIMIT_S = 60.0
 SCENE = """
@@ -45,14 +40,12 @@ displacement_m = 0.05
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """Headless Chromium, offline. Where it is not installed the pages are not looked at; in CI that is a failure."""
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        absent = "no chromium on the PATH; apt-get install chromium, as .ci/run does"
-        (pytest.fail if os.environ.get("CI") else pytest.skip)(absent)
-    with sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=chromium, args=QUIET.split())
+    try:
+        chromium()
+    except FileNotFoundError as absent:
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(str(absent))
+    with headless() as launched:
         yield launched
-        launched.close()
 
 
 @pytest.fixture(scope="session")
@@ -81,7 +74,7 @@ class Program:
 
     process: subprocess.Popen[str]
     address: str
-    said: list[str]
+    messages: list[str]
     out: Path
 
     def ended(self) -> int:
@@ -110,16 +103,16 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
                 env={**os.environ, "PYTHONUNBUFFERED": "1"},
                 preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL) and None,
             )
-            said: list[str] = []
-            told = threading.Event()
+            messages: list[str] = []
+            address_known = threading.Event()
 
             def read() -> None:
                 assert process.stderr is not None
                 for line in process.stderr:
-                    said.append(line)
+                    messages.append(line)
                     if "page: http" in line:
-                        told.set()
-                told.set()
+                        address_known.set()
+                address_known.set()
 
             reader = threading.Thread(target=read)
             reader.start()
@@ -133,10 +126,10 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
                 process.stderr.close()
 
             stack.callback(stop)
-            assert told.wait(LIMIT_S)
-            found = re.search(r"page: (http\S+)", "".join(said))
-            assert found, "".join(said)
-            return Program(process, found[1], said, tmp_path / "run.h5")
+            assert address_known.wait(LIMIT_S)
+            found = re.search(r"page: (http\S+)", "".join(messages))
+            assert found, "".join(messages)
+            return Program(process, found[1], messages, tmp_path / "run.h5")
 
         yield started
 
@@ -155,7 +148,7 @@ def record(start: Callable[..., Program], tmp_path: Path) -> Callable[..., Progr
 
 @pytest.fixture
 def context(browser: Browser) -> Iterator[BrowserContext]:
-    """Return a browser of its own, as far as cookies go, in which an error on a page fails the test."""
+    """Return a browser with separate cookies, in which an error on a page fails the test."""
     context = browser.new_context(viewport={"width": 1366, "height": 900})
     context.set_default_timeout(LIMIT_S * 1e3)
     wrong: list[Any] = []
@@ -180,15 +173,8 @@ OUTSIDE = """() => {
     if (box.left < -0.5 || box.right > wide + 0.5) found.push('outside ' + name(e));
     if (style.overflowX !== 'visible' && e.scrollWidth > e.clientWidth + 1) found.push('cut off ' + name(e));
   }
-  for (const svg of document.querySelectorAll('svg')) {
-    const frame = svg.getBoundingClientRect();
-    for (const text of svg.querySelectorAll('text')) {
-      const box = text.getBoundingClientRect();
-      if (box.left < frame.left - 1 || box.right > frame.right + 1
-          || box.top < frame.top - 1 || box.bottom > frame.bottom + 1)
-        found.push('outside its figure ' + name(text));
-    }
-  }
+  for (const picture of document.images)
+    if (!picture.complete || picture.naturalWidth === 0) found.push('not shown ' + name(picture));
   return found;
 }"""
 
@@ -221,7 +207,7 @@ def show(page: Page) -> Callable[[Path, str], None]:
 
 @pytest.fixture
 def clipped(page: Page, show: Callable[[Path, str], None]) -> Callable[[Path, str], list[str]]:
-    """Return a function that names what of a page lies outside a medium, is cut off, or leaves its figure."""
+    """Return a function that names what of a page lies outside a medium, is cut off, or is not shown."""
 
     def outside(path: Path, width: str) -> list[str]:
         show(path, width)

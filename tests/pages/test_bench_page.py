@@ -68,7 +68,7 @@ def test_from_opening_to_the_run_file(record: Callable[..., Any], context: Brows
     page.wait_for_function(MOVES)
     period = page.evaluate("motion.estimates.period")
     assert period["value"] == pytest.approx(0.7573, abs=0.005)
-    assert "Whenever you stop" in page.inner_text("#stopping")
+    assert "If you stop now: T between" in page.inner_text("#stopping")
     page.keyboard.press("m")
     answer(page, "lamp on")
     page.wait_for_function("() => state.marks.length === 1")
@@ -129,11 +129,67 @@ def test_a_region_of_an_old_run_is_fitted(replay: Page) -> None:
     replay.mouse.down()
     replay.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
     replay.mouse.up()
-    replay.wait_for_selector("#region:not([hidden]) dd")
-    text = replay.inner_text("#region-estimates")
-    value = float(text.split("period\n")[1].split("(")[0])
-    assert value == pytest.approx(0.7901, abs=0.0005)
-    assert "Region" in replay.inner_text("#region-title")
+    replay.wait_for_selector("#region-estimates tr[data-name='period']")
+    assert "Selection" in replay.inner_text("#region-title")
+    assert replay.locator("#region-fits thead th").all_inner_texts() == ["Fit", "Selection", "Whole run"]
+    part, whole = replay.locator("#region-estimates tr[data-name='period'] td").all_inner_texts()
+    assert float(part.split("(")[0]) == pytest.approx(0.7901, abs=0.0005)
+    assert whole == replay.evaluate("short(motion.estimates.period)")
+
+
+def test_statistics_of_a_selection_are_those_of_its_samples(replay: Page) -> None:
+    """Number, mean, standard deviation, least, greatest and the slope of a straight line, by numpy."""
+    samples = springmass.load(springmass.sample_data() / "damped_simulated_position.txt").samples
+    part = (samples.t >= 10.0) & (samples.t <= 12.5)
+    t, y = samples.t[part], samples.distance[part]
+    found = replay.evaluate("statistics({ from: 10, to: 12.5 })")
+    expected = {
+        "n": t.size,
+        "mean": y.mean(),
+        "deviation": y.std(ddof=1),
+        "least": y.min(),
+        "most": y.max(),
+        "slope": np.polyfit(t, y, 1)[0],
+    }
+    assert found == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_replay_shows_the_numbers_of_its_moment(replay: Page) -> None:
+    """At a third of the run those of the samples so far, at its end those of the whole run; a forecast at neither."""
+    assert "Standard accuracy, whole run" in replay.inner_text("#tier")
+    assert replay.inner_text("#stopping") == ""
+    whole = replay.inner_text("#estimates")
+    replay.locator("#time").fill("0.333")
+    replay.wait_for_function("() => moment && Math.abs(moment.to - play_time) < 0.3")
+    assert replay.inner_text("#tier").startswith("Fast accuracy, samples up to ")
+    amplitude = replay.evaluate("shown_message().estimates.amplitude_now.value")
+    assert amplitude > 1.2 * replay.evaluate("motion.estimates.amplitude_now.value")
+    assert replay.inner_text("#estimates") != whole
+    assert replay.inner_text("#stopping") == ""
+    replay.locator("#time").fill("1")
+    replay.wait_for_function("() => moment === null")
+    assert replay.inner_text("#estimates") == whole
+
+
+@pytest.mark.parametrize(
+    ("text", "metres"),
+    [("0.25 m", 0.25), ("250 mm", 0.25), ("25 cm", 0.25), ("250", 0.25), ("0,25 m", 0.25), (" .25m ", 0.25)],
+)
+def test_lengths_are_read_with_their_unit(replay: Page, text: str, metres: float) -> None:
+    """In m, cm or mm, and a bare number as mm."""
+    assert replay.evaluate("(text) => length_between(0.01, 20, '')(text)", text) == pytest.approx(metres)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("0.25", "Did you mean 0.25 m?"), ("abc", "Cannot read"), ("25 ft", "Cannot read"), ("", "Cannot read")],
+)
+def test_a_length_that_cannot_be_is_named(replay: Page, text: str, says: str) -> None:
+    """With what was written, and what to write."""
+    error = replay.evaluate(
+        "(t) => { try { length_between(0.01, 20, '25 cm')(t); } catch (e) { return e.message; } }", text
+    )
+    assert says in error
 
 
 def test_an_old_run_is_played(replay: Page) -> None:
@@ -255,7 +311,7 @@ def test_two_look_and_a_stranger_does_not(record: Callable[..., Any], browser: A
     netloc = urlsplit(program.address).netloc
     connection = http.client.HTTPConnection(netloc)
     connection.request("GET", "/", headers={"Host": "evil.example"})
-    assert connection.getresponse().status == 403
+    assert connection.getresponse().status == 400
     connection.close()
     with pytest.raises(InvalidStatus):
         connect(f"ws://{netloc}/v1/run", origin="http://evil.example")  # type: ignore[arg-type]
@@ -272,13 +328,13 @@ def test_the_client_of_the_documentation(record: Callable[..., Any]) -> None:
     client = re.sub(r'"http://127[^"]*"', repr(program.address), client)
     with subprocess.Popen([sys.executable, "-u", "-c", client], stdout=subprocess.PIPE, text=True) as reading:
         assert reading.stdout is not None
-        said: list[str] = []
-        while not {"hello", "state"} <= set(said) or not any(line.startswith("[") for line in said):
+        printed: list[str] = []
+        while not {"hello", "state"} <= set(printed) or not any(line.startswith("[") for line in printed):
             line = reading.stdout.readline()
             assert line, "the client ended"
-            said.append(line.strip())
+            printed.append(line.strip())
         reading.kill()
-    assert said[0] == "hello"
+    assert printed[0] == "hello"
     program.end()
 
 

@@ -12,11 +12,11 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 from springmass.runs.loading import sample_data
+from tests.screen import OnTerminal
 
 SCENE = """
 [bob]
@@ -54,11 +54,11 @@ def bench(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def typed(screen: ModuleType, bench: Path) -> Callable[..., str]:
+def typed(bench: Path) -> Callable[..., str]:
     """Return a function that types a command, and gives the screen at its end; no line is wider than the terminal."""
 
     def type_it(*arguments: str, ends: int = 0, shows: tuple[str, ...] = ()) -> str:
-        with screen.OnTerminal(list(arguments), bench) as terminal:
+        with OnTerminal(list(arguments), bench) as terminal:
             code, text = terminal.end(), terminal.screen.text
         assert code == ends, text
         for words in shows:
@@ -72,7 +72,7 @@ def typed(screen: ModuleType, bench: Path) -> Callable[..., str]:
 def test_finding_the_way(typed: Callable[..., str], bench: Path) -> None:
     """Version, help, near misses, what files hold, and a scene to fill in: each ends with what to type next."""
     typed("--version", shows=("springmass ",))
-    typed("help", "record", shows=("--simulate", "--trigger"))
+    typed("record", "--help", shows=("--simulate", "--trigger"))
     typed("analyze", "damped.txt", ends=2, shows=("did you mean analyse?",))
     typed("formats", "damped.txt", shows=("motion-sensor", "100 Hz", "next: springmass analyse damped.txt"))
     typed("sensors", shows=("line-protocol", "next: springmass ports"))
@@ -85,7 +85,9 @@ def test_finding_the_way(typed: Callable[..., str], bench: Path) -> None:
 @pytest.mark.trials
 def test_from_a_file_to_a_figure(typed: Callable[..., str], clipped: Callable[..., list[str]], bench: Path) -> None:
     """One run with its report, two in one table, the comparison: nothing wraps, nothing is clipped on any medium."""
-    shown = typed("analyse", "damped.txt", "--scene", "bench.toml", shows=("period", "±", "next: open damped.results"))
+    shown = typed(
+        "analyse", "damped.txt", "--scene", "bench.toml", shows=("period", "±", "report: damped.results/report.html")
+    )
     assert max(map(len, shown.splitlines())) <= 80
     for width in ("laptop", "phone", "A4"):
         assert clipped(bench / "damped.results" / "report.html", width) == []
@@ -96,15 +98,15 @@ def test_from_a_file_to_a_figure(typed: Callable[..., str], clipped: Callable[..
     assert len(re.findall(r"^ *period", together, re.MULTILINE)) == 1
     both = ("runs/undamped.txt", "runs/damped.txt")
     scenes = ("--scene", "bench.toml", "--scene", "bench.toml")
-    typed("compare", *both, *scenes, shows=("N/m", "--out DIR writes the report"))
+    typed("compare", *both, *scenes, shows=("N/m", "-o DIR writes the report"))
     typed("-q", "analyse", both[0], "--no-report", shows=("period",))
     typed("-v", "analyse", both[0], "--no-report", shows=("read: runs/undamped.txt", "scene that states nothing"))
 
 
 @pytest.mark.trials
-def test_at_the_bench(screen: ModuleType, typed: Callable[..., str], bench: Path) -> None:
+def test_at_the_bench(typed: Callable[..., str], bench: Path) -> None:
     """Recorded by a key, marked, stopped; noted beside it; analysed with what was noted; read in Python."""
-    with screen.OnTerminal(["record", "--simulate", "bench.toml", "-o", "bob.h5"], bench) as terminal:
+    with OnTerminal(["record", "--simulate", "bench.toml", "-o", "bob.h5"], bench) as terminal:
         terminal.until("space marks, Ctrl-C stops")
         terminal.type(" ")
         terminal.until("mark 1 at")
@@ -115,7 +117,7 @@ def test_at_the_bench(screen: ModuleType, typed: Callable[..., str], bench: Path
         assert terminal.screen.wrapped == 0
         assert "next: springmass analyse" in terminal.screen.text
     typed("scene", "bob.h5", "--note", "cardboard disc", "--mark", "2=door", shows=("used from now on",))
-    typed("analyse", "bob.h5", shows=("noted beside the recording", "period", "N/m"))
+    typed("analyse", "bob.h5", shows=("read from the notes next to the file", "period", "N/m"))
     page = (bench / "bob.results" / "report.html").read_text("utf-8")
     assert all(words in page for words in ("cardboard disc", "door"))
     typed("replay", "bob.h5", "--speed", "max", "-o", "again.h5", shows=("next: springmass analyse again.h5",))
@@ -128,12 +130,12 @@ def test_at_the_bench(screen: ModuleType, typed: Callable[..., str], bench: Path
 
 
 @pytest.mark.trials
-def test_a_sensor_that_says_nothing(screen: ModuleType, bench: Path) -> None:
+def test_a_sensor_that_says_nothing(bench: Path) -> None:
     """A port on which nothing speaks is named with what to check, and its recording ends in exit code 4."""
     master, slave = os.openpty()
     try:
         arguments = ["record", "--port", os.ttyname(slave), "--sensor", "line-protocol", "--seconds", "4"]
-        with screen.OnTerminal(arguments, bench) as terminal:
+        with OnTerminal(arguments, bench) as terminal:
             terminal.until("baud")
             assert terminal.end() == 4
     finally:

@@ -19,8 +19,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 import springmass
-from springmass.page.desk import Desk
 from springmass.page.feeds import view_of
+from springmass.page.state import PageState
 from springmass.page.web import bounds
 from springmass.page.web.server import Opening, serve
 from springmass.runs.loading import load
@@ -91,7 +91,7 @@ def lines_after(program: Any) -> list[str]:
     """End a page; return what it wrote besides its address and its end."""
     program.end()
     usual = ("page: http", "viewers in this network", "the page is closed")
-    return [line for line in program.said if not line.startswith(usual)]
+    return [line for line in program.messages if not line.startswith(usual)]
 
 
 @pytest.mark.trials
@@ -113,7 +113,7 @@ def test_a_browser_that_leaves_is_no_event(record: Callable[..., Any]) -> None:
     assert client.get("/").status == 200
     program.end()
     wrong = ("springmass: ", "Traceback", "Exception", "Error", "future:", "task:", "  File")
-    assert [line for line in program.said if line.startswith(wrong)] == []
+    assert [line for line in program.messages if line.startswith(wrong)] == []
 
 
 @pytest.mark.parametrize("message", MESSAGES.values(), ids=MESSAGES)
@@ -123,7 +123,7 @@ def test_a_message_that_is_none_closes_the_socket(page: tuple[Any, Client], mess
     with client.socket() as looking:
         assert {client.code_after(message) for _ in range(TRIES)} == {1003}
         looking.send('{"type": "region", "from": 1, "to": 20}')
-        while not (isinstance(told := looking.recv(timeout=LIMIT_S), str) and json.loads(told)["type"] == "region"):
+        while not (isinstance(answer := looking.recv(timeout=LIMIT_S), str) and json.loads(answer)["type"] == "region"):
             pass
     lines = lines_after(program)
     assert len(lines) == 1
@@ -134,8 +134,8 @@ def test_a_message_that_is_none_closes_the_socket(page: tuple[Any, Client], mess
 def test_what_the_gate_does_not_understand_is_refused(page: tuple[Any, Client]) -> None:
     """An origin or a host that is no address, a path with a null, a long message, words that are no HTTP."""
     program, client = page
-    for name in ("Origin", "Host"):
-        assert client.get("/", {"Cookie": client.cookie, name: "http://[::1"}).status == 403
+    for name, status in (("Origin", 403), ("Host", 400)):
+        assert client.get("/", {"Cookie": client.cookie, name: "http://[::1"}).status == status
     assert client.get("/static/%00").status == 404
     assert client.code_after("x" * 5000) == 1009
     with socket.create_connection(client.place, LIMIT_S) as raw:
@@ -157,7 +157,9 @@ def test_idle_connections_are_bounded(page: tuple[Any, Client]) -> None:
             held = [stack.enter_context(socket.create_connection(client.place, LIMIT_S)) for _ in range(1500)]
             closed = sum(_is_closed(each) for each in held[bounds.MOST_CONNECTIONS :])
             looking.send('{"type": "region", "from": 1, "to": 20}')
-            while not (isinstance(told := looking.recv(timeout=LIMIT_S), str) and json.loads(told)["type"] == "region"):
+            while not (
+                isinstance(answer := looking.recv(timeout=LIMIT_S), str) and json.loads(answer)["type"] == "region"
+            ):
                 pass
         assert closed == 1500 - bounds.MOST_CONNECTIONS
         assert client.get("/").status == 200
@@ -175,13 +177,13 @@ def _is_closed(connection: socket.socket) -> bool:
 
 
 @pytest.fixture
-def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Desk], Client]]:
-    """Return a function that serves a desk from a thread, with a limit of 0.3 s for a request, and makes a client."""
+def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[PageState], Client]]:
+    """Return a function that serves a page from a thread, with a limit of 0.3 s for a request, and makes a client."""
     monkeypatch.setattr(bounds, "REQUEST_WITHIN_S", 0.3)
     over = threading.Event()
     threads = []
 
-    def serving(desk: Desk) -> Client:
+    def serving(page_state: PageState) -> Client:
         opened = threading.Event()
         addresses: list[str] = []
 
@@ -189,7 +191,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Desk], Client]
             addresses.append(str(address))
             opened.set()
 
-        thread = threading.Thread(target=serve, args=(desk, Opening(opened=ready)), kwargs={"until": over.is_set})
+        thread = threading.Thread(target=serve, args=(page_state, Opening(opened=ready)), kwargs={"until": over.is_set})
         thread.start()
         threads.append(thread)
         assert opened.wait(LIMIT_S)
@@ -202,11 +204,11 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Desk], Client]
         assert not thread.is_alive()
 
 
-def old_run(desk: Desk) -> Desk:
-    """Put an old run on a desk."""
+def old_run(page_state: PageState) -> PageState:
+    """Show an old run."""
     loaded = load(recording())
-    desk.show(view_of(loaded), loaded.scene)
-    return desk
+    page_state.show(view_of(loaded), loaded.scene)
+    return page_state
 
 
 @pytest.mark.parametrize(
@@ -220,25 +222,25 @@ def old_run(desk: Desk) -> Desk:
     ],
     ids=["nothing", "half a line", "half a head", "half a body", "half a handshake"],
 )
-def test_a_half_sent_request_is_closed(served: Callable[[Desk], Client], parts: list[bytes]) -> None:
+def test_a_half_sent_request_is_closed(served: Callable[[PageState], Client], parts: list[bytes]) -> None:
     """A request that never ends holds its connection no longer than the limit; a socket that only looks stays."""
-    desk = old_run(Desk(None))
-    client = served(desk)
+    page_state = old_run(PageState(None))
+    client = served(page_state)
     with client.socket() as looking, socket.create_connection(client.place, LIMIT_S) as half:
         for part in parts:
             half.sendall(part)
         while half.recv(1000):
             pass  # the answer to the head of a request, if there is one; then the end
         looking.send('{"type": "region", "from": 1, "to": 20}')
-        while not (isinstance(told := looking.recv(timeout=LIMIT_S), str) and json.loads(told)["type"] == "region"):
+        while not (isinstance(answer := looking.recv(timeout=LIMIT_S), str) and json.loads(answer)["type"] == "region"):
             pass
-    desk.close()
+    page_state.close()
 
 
-def test_a_second_half_request_is_closed_too(served: Callable[[Desk], Client]) -> None:
+def test_a_second_half_request_is_closed_too(served: Callable[[PageState], Client]) -> None:
     """After a whole request on the same connection, the time for the next one runs from its first byte."""
-    desk = old_run(Desk(None))
-    client = served(desk)
+    page_state = old_run(PageState(None))
+    client = served(page_state)
     connection = http.client.HTTPConnection(client.netloc, timeout=LIMIT_S)
     connection.request("GET", "/static/page.css", headers={"Cookie": client.cookie})
     answered = connection.getresponse()
@@ -246,15 +248,15 @@ def test_a_second_half_request_is_closed_too(served: Callable[[Desk], Client]) -
     connection.sock.sendall(b"GET / HTTP/1.1\r\nHost:")
     assert connection.sock.recv(1000) == b""
     connection.close()
-    desk.close()
+    page_state.close()
 
 
 def test_a_defect_of_the_page_is_a_line_and_the_page_goes_on(
-    served: Callable[[Desk], Client], caplog: pytest.LogCaptureFixture
+    served: Callable[[PageState], Client], caplog: pytest.LogCaptureFixture
 ) -> None:
     """What goes wrong while it is brought up to date is logged, and the next turn is as if nothing had been."""
 
-    class Failing(Desk):
+    class Failing(PageState):
         turns = 0
 
         def poll(self) -> None:
@@ -263,13 +265,13 @@ def test_a_defect_of_the_page_is_a_line_and_the_page_goes_on(
                 raise RuntimeError("a defect")
             super().poll()
 
-    desk = old_run(Failing(None))
-    client = served(desk)
+    page_state = old_run(Failing(None))
+    client = served(page_state)
     with client.socket() as run:
         kinds = {json.loads(m)["type"] for m in (run.recv(timeout=LIMIT_S) for _ in range(4)) if isinstance(m, str)}
     assert {"hello", "state"} <= kinds
     assert any(record.exc_info for record in caplog.records)
-    desk.close()
+    page_state.close()
 
 
 def _answers(client: Client) -> bool:
@@ -302,6 +304,6 @@ def test_no_client_disturbs_a_recording(record: Callable[..., Any]) -> None:
         (ended,) = [event["facts"] for event in run.provenance["events"] if event["kind"] == "ended"]
     assert len(samples) > 750
     assert np.isfinite(samples.distance).all()
-    assert "Traceback" not in "".join(program.said)
-    assert len([line for line in program.said if line.startswith("springmass: page:")]) < 20
+    assert "Traceback" not in "".join(program.messages)
+    assert len([line for line in program.messages if line.startswith("springmass: page:")]) < 20
     assert ended["by"] != "the page"

@@ -110,5 +110,6 @@ def test_a_notebook_shows_it(tmp_path: Path) -> None:
 def test_what_is_missing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the extra one line says what to install."""
     monkeypatch.setitem(sys.modules, "anywidget", None)
+    monkeypatch.delitem(sys.modules, "springmass.api.live_widget", raising=False)
     with pytest.raises(ProgramError, match="pip install"):
         springmass.live(RUN)

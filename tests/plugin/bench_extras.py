@@ -96,7 +96,7 @@ def first_guess(t, amplitude):
     return level**-2, 2 * slope
 
 
-THREE_HALVES = make_law("three-halves", falling, {"d": "1/(m^1/2 s)"}, first_guess)
+THREE_HALVES = make_law("three-halves", falling, {"d": (-1 / 2, -1)}, first_guess)
 
 
 def _midpoint(equation: Equation, h: float):

@@ -53,7 +53,7 @@ def chains(family: str = "line-protocol") -> list[SensorChain]:
 
 
 def alone(reads: Sequence[Read], each: Sequence[SensorChain]) -> list[Block]:
-    """Feed every read to its chain, and take its samples at once."""
+    """Feed every read to its chain, and take its samples immediately."""
     parts: list[list[Block]] = [[] for _ in each]
     for channel, host_ns, data in reads:
         if data:

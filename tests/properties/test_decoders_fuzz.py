@@ -14,7 +14,6 @@ import re
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -24,6 +23,7 @@ from hypothesis import strategies as st
 from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.readings import COLUMNS, Readings
+from tests.hunt import hunt
 
 FAMILIES = {family.name: family for family in families()}
 MOST_PENDING = 512
@@ -258,10 +258,10 @@ def target(data: bytes) -> None:
 @pytest.mark.skipif(
     importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
 )
-def test_a_coverage_guided_hunt_finds_nothing(hunt: ModuleType, tmp_path: Path) -> None:
+def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
     """Some thousand inputs, grown from sound streams towards code not yet reached; bounded in number and seconds."""
     names = sorted(FAMILIES)
     seeds = {name: bytes([i, 40]) + b"".join(own_stream(FAMILIES[name], 0, 3)) for i, name in enumerate(names)}
     imports = "import acquisition.decoders.registry as r; r.families()"
     bounds = {"runs": COVERAGE_RUNS, "seconds": 6, "longest": 300}
-    assert hunt.hunt(__file__, "acquisition", imports, seeds, tmp_path, **bounds) >= 100
+    assert hunt(__name__, "acquisition", imports, seeds, tmp_path, **bounds) >= 100

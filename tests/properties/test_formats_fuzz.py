@@ -1,21 +1,18 @@
 """Readers under damaged files: refused in one line or read truly, within bounds of memory.
 
-Three hunters use the same check, over the files of the conformance suite: hypothesis, a mutator that always runs, and
-a coverage-guided fuzzer where one is installed. A fourth holds the readers to pandas, lvm_read and npTDMS where they
-read the same file.
+Two hunters use the same check, over the files of the conformance suite: hypothesis, and a coverage-guided fuzzer where
+one is installed. The readers are compared with pandas, lvm_read and npTDMS where those read the same file.
 """
 
 from __future__ import annotations
 
 import importlib.util
 import io
-import random
 import re
-import sys
 import tracemalloc
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -26,28 +23,17 @@ from hypothesis import strategies as st
 from acquisition.errors import FormatError
 from acquisition.recordings.identify import formats, get_format
 from acquisition.recordings.recording import Recording
-from acquisition.recordings.tables.text import decode, parse_number
+from acquisition.recordings.tables.text import decode, parse_number, split_cells, unify
+from tests.conformance.test_formats import CASES as ALL_CASES
+from tests.hunt import hunt
 
-CONFORMANCE = Path(__file__).parents[1] / "conformance" / "test_formats.py"
 NAMES = sorted(each.name for each in formats())
-MUTANTS = 40
 COVERAGE_RUNS = 6_000
 MOST_MEMORY, BASE_MEMORY = 20, 3 << 20
 SHORT = np.arange(40) / 100.0
 
 
-def cases() -> list[Any]:
-    """Return the files of the conformance suite."""
-    spec = importlib.util.spec_from_file_location("springmass_conformance_formats", CONFORMANCE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return [case for case in module.CASES if case.format != "example"]
-
-
-CASES = cases()
+CASES: list[Any] = [case for case in ALL_CASES if case.format != "example"]
 SEEDS = [(case, case.build(SHORT, np.round(0.2 + 0.05 * np.sin(7.9 * SHORT), 5))) for case in CASES]
 
 
@@ -73,6 +59,22 @@ def printed(data: bytes) -> np.ndarray:
     return np.unique(found[np.isfinite(found)])  # a NaN among them would spoil the order that is searched
 
 
+def demand_printed_pairs(recording: Recording, data: bytes, sound: np.ndarray) -> None:
+    """Demand that each sound value of MotionSensor.vi stands in a line of the file behind its time."""
+    pairs = []
+    for line in unify(decode(data)).split("\n"):
+        cells = [parse_number(cell.strip("\0\x1a")) for cell in re.findall(r"[^\t ;\n]+", line)]
+        cells += [parse_number(cell) for cell in split_cells(line, ",")]
+        pairs += [pair for pair in pairwise(cells) if None not in pair]
+    known = np.array(pairs, float).reshape(-1, 2)
+    samples = recording.samples
+    stated = samples.distance if recording.channel == "distance" else samples.velocity
+    assert stated is not None
+    for t, value in zip(samples.t[sound], stated[sound], strict=True):
+        at = np.abs(known[:, 0] - t) <= 0.00051
+        assert not np.isfinite(value) or (np.abs(known[at, 1] / 100 - value) <= 1e-12 * (1 + abs(value))).any()
+
+
 def check(name: str, data: bytes, options: dict[str, Any]) -> Recording | str:
     """Read; hold a recording to its promises, and its values to what is printed."""
     recording = read(name, data, options)
@@ -88,6 +90,8 @@ def check(name: str, data: bytes, options: dict[str, Any]) -> Recording | str:
     values = samples.distance[sound] if recording.channel != "velocity" else np.empty(0)
     if name in ("tdms", "phyphox", "workbook", "zip", "tracker") or not values.size:
         return recording
+    if name == "motion-sensor":
+        demand_printed_pairs(recording, data, sound)
     assert np.isfinite(values).all()
     known = printed(data)
     for scale in (1.0, 100.0, 1000.0, 1e6):
@@ -175,31 +179,6 @@ def test_tokens_in_any_order_are_refused_or_read(name: str, parts: list[bytes]) 
     check(name, b"".join(parts), {"unit": "m", "rate_hz": 50.0} if name != "motion-sensor" else {})
 
 
-@pytest.mark.parametrize("number", range(len(SEEDS)), ids=lambda i: f"{SEEDS[i][0].format}:{SEEDS[i][0].label}")
-def test_mutants_of_its_own_files_are_refused_or_read_truly(number: int) -> None:
-    """Seeded mutants, each of the last that was of use: a fuzzer that needs nothing installed."""
-    case, data = SEEDS[number]
-    rng = random.Random(f"springmass {case.format} {case.label}")
-    pool = [data]
-    outcomes = set()
-    for _ in range(MUTANTS):
-        faults = [
-            (
-                rng.choice(KINDS),
-                rng.random(),
-                rng.choice(TOKENS) if rng.random() < 0.5 else rng.randbytes(rng.randint(1, 9)),
-            )
-            for _ in range(rng.randint(1, 4))
-        ]
-        mutant = spoil(rng.choice(pool), faults)[:6000]
-        done = check(case.format, mutant, answers(case))
-        outcome = re.sub(r"\d+", "", done)[:60] if isinstance(done, str) else (len(done.samples), len(done.traps))
-        if outcome not in outcomes:
-            outcomes.add(outcome)
-            pool.append(mutant)
-    assert len(outcomes) > 3
-
-
 @pytest.mark.trials
 @pytest.mark.parametrize("number", range(len(SEEDS)), ids=lambda i: f"{SEEDS[i][0].format}:{SEEDS[i][0].label}")
 def test_memory_stays_within_twenty_files(number: int) -> None:
@@ -244,7 +223,7 @@ def test_files_made_to_be_large_inside_are_bounded(build: Callable[[], bytes], n
 def test_xml_that_would_swell_is_refused() -> None:
     """Entities are not expanded."""
     data = b'<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><phyphox><title>&b;</title></phyphox>'
-    assert "got a document type" in str(read("phyphox", data, {}))
+    assert "document type" in str(read("phyphox", data, {}))
 
 
 # Differential --------------------------------------------------------------------------------------------------
@@ -262,15 +241,12 @@ def test_xml_that_would_swell_is_refused() -> None:
         ("bare", "tabs", {"sep": "\t", "header": None}, 100),
     ],
 )
-@pytest.mark.parametrize("seed", range(3))
-def test_pandas_reads_the_same_numbers(
-    name: str, label: str, arguments: dict[str, Any], scale: float, seed: int
-) -> None:
+def test_pandas_reads_the_same_numbers(name: str, label: str, arguments: dict[str, Any], scale: float) -> None:
     """Times and values are those of pandas, to the last bit of a decimal fraction."""
     import pandas as pd
 
     (case,) = (case for case in CASES if (case.format, case.label) == (name, label))
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     t = (rng.integers(0, 400) + np.arange(500)) / 100.0
     x = np.round(rng.normal(0.3, 0.2, 500), 5)
     x[rng.integers(0, 500, 20)] = np.nan
@@ -322,10 +298,13 @@ def test_nptdms_writes_what_is_read(values: list[float], step: float, offset: fl
 # Coverage-guided -----------------------------------------------------------------------------------------------
 
 
+HUNTED = [case for case in CASES if case.format != "workbook"]  # read in another process, whose coverage is not seen
+
+
 def target(data: bytes) -> None:
     """What a hunt guided by coverage calls: the first byte says the case, the others are the file."""
     if len(data) > 1:
-        case = CASES[data[0] % len(CASES)]
+        case = HUNTED[data[0] % len(HUNTED)]
         check(case.format, data[1:], answers(case))
 
 
@@ -333,12 +312,12 @@ def target(data: bytes) -> None:
     importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
 )
 @pytest.mark.trials
-def test_a_coverage_guided_hunt_finds_nothing(hunt: ModuleType, tmp_path: Path) -> None:
+def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
     """Some thousand inputs, grown from sound files towards code not yet reached; bounded in number and seconds."""
     few = np.arange(6) / 100.0
-    seeds = {f"{i}": bytes([i]) + case.build(few, np.round(0.2 + few, 5)) for i, case in enumerate(CASES)}
+    seeds = {f"{i}": bytes([i]) + case.build(few, np.round(0.2 + few, 5)) for i, case in enumerate(HUNTED)}
     imports = "import acquisition.recordings.identify as r; r.formats(); import acquisition.recordings.tables.sheet"
     watched = "acquisition.recordings.families"
     options = ["-timeout=20", "-rss_limit_mb=2048"]
     bounds = {"runs": COVERAGE_RUNS, "seconds": 12, "longest": 1200}
-    assert hunt.hunt(__file__, watched, imports, seeds, tmp_path, options=options, **bounds) >= 10
+    assert hunt(__name__, watched, imports, seeds, tmp_path, options=options, **bounds) >= 10

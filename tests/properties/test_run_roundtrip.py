@@ -119,8 +119,8 @@ def test_everything_comes_back_bit_for_bit(
 
 def everything(run: Run) -> tuple[Any, ...]:
     """Return all that a run says."""
-    said = (run.info, run.title, run.channel, run.format, run.scene, run.traps, run.provenance)
-    return *said, run.malformed_rows, bits(run.samples()), run.originals()
+    described = (run.info, run.title, run.channel, run.format, run.scene, run.traps, run.provenance)
+    return *described, run.malformed_rows, bits(run.samples()), run.originals()
 
 
 @pytest.fixture(scope="module")

@@ -42,7 +42,7 @@ def in_order(part: list[Key], whole: list[Key]) -> bool:
     return all(item in rest for item in part)
 
 
-def told(contents: LogContents, whole: list[Key]) -> bool:
+def damage_reported(contents: LogContents, whole: list[Key]) -> bool:
     """Tell whether every record is one that was written, and whatever is missing before the last is counted."""
     records = list(contents)
     read = [key(record) for record in records]
@@ -75,7 +75,7 @@ def test_zeroed_pages_are_seen_and_cost_only_themselves(seed: int) -> None:
         at = PAGE * int(rng.integers(0, len(data) // PAGE + 1))
         contents = parse_log(data[:at] + bytes(len(data[at : at + PAGE])) + data[at + PAGE :])
         touched = sum(start < at + PAGE and end > at for start, end in itertools.pairwise(starts))
-        assert told(contents, whole)
+        assert damage_reported(contents, whole)
         assert not contents.damage.intact
         assert contents.damage.records >= len(whole) - touched
 
@@ -89,7 +89,7 @@ def test_flipped_bits_are_seen_and_cost_one_record(seed: int) -> None:
     for _ in range(100):
         at, bit = int(rng.integers(0, len(data))), int(rng.integers(0, 8))
         contents = parse_log(data[:at] + bytes([data[at] ^ 1 << bit]) + data[at + 1 :])
-        assert told(contents, whole)
+        assert damage_reported(contents, whole)
         assert not contents.damage.intact
         assert contents.damage.records == len(whole) - 1
 

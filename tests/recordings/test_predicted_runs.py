@@ -13,7 +13,6 @@ import pytest
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.derived_drag import derive_drag
 from pipeline.bench.scene import Scene
-from pipeline.damping.laws import find_law
 from pipeline.dynamics.band import spread
 from pipeline.numerics.estimate import Estimate
 from pipeline.track import Track
@@ -53,11 +52,10 @@ def test_the_amplitude_with_a_disc_is_predicted() -> None:
     assert ready.from_run == ("start_displacement_m", "start_velocity_m_per_s")
     band = spread(ready.solved, 120.0, ready.measured)
     middle, quantiles = band.amplitude_at(np.array([60.0]))
-    law = find_law(motion.damping.selected)
-    measured = float(law.amplitude(np.array([60.0]), motion.damping.best.joint.values)[0])
+    measured = float(motion.damping.best.amplitude(np.array([60.0]))[0])
     low, high = float(quantiles[0, 0]), float(quantiles[3, 0])
-    told = f"predicted {middle[0] * 1e3:.2f} ({low * 1e3:.2f} to {high * 1e3:.2f}) mm"
-    print(f"at 60 s: measured {measured * 1e3:.2f} mm, {told}")
+    predicted = f"predicted {middle[0] * 1e3:.2f} ({low * 1e3:.2f} to {high * 1e3:.2f}) mm"
+    print(f"at 60 s: measured {measured * 1e3:.2f} mm, {predicted}")
     assert low < measured < high
     assert 0.7 * middle[0] < low
     assert high < 1.3 * middle[0]

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from acquisition.errors import FormatError, NeedsAnswer, UnknownFormat
+from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing
 
@@ -17,10 +17,10 @@ def walk(path: Path, answers: dict[str, Any]) -> Iterator[tuple[dict[str, Any], 
     """Answer one question after the other, with all runs and channels; yield the answers, and why they are refused."""
     try:
         open_recording(path, **answers)
-    except NeedsAnswer as asked:
-        need = asked.question.needs[0]
+    except NeedsAnswer as unanswered:
+        need = unanswered.question.needs[0]
         if need.what.value in answers or len(set(need.choices)) < len(need.choices):
-            pytest.fail(f"cannot be answered: {asked}")
+            pytest.fail(f"cannot be answered: {unanswered}")
         for choice in need.choices if need.what in (Missing.RUN, Missing.CHANNEL) else (need.example,):
             yield from walk(path, {**answers, need.what.value: choice})
     except FormatError as error:
@@ -40,9 +40,3 @@ def test_every_channel_of_every_real_recording_can_be_chosen(recordings: Path) -
     assert read > 100
     empty = {key: why for key, why in refused.items() if "got NaN" in why}
     assert {name for name, _ in refused.keys() - empty.keys()} == {"kafe2_pendulum.yml"}
-
-
-def test_yaml_of_a_peer_is_refused_by_its_name(recordings: Path) -> None:
-    """Its lists of x and y stand below each other and were read as one channel."""
-    with pytest.raises(UnknownFormat, match="YAML"):
-        open_recording(recordings / "peers" / "kafe2_pendulum.yml")

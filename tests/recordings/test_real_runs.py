@@ -137,9 +137,9 @@ def test_large_discs_drag_changes_with_amplitude() -> None:
 
 
 def test_disc_shows_what_simulations_lack() -> None:
-    """Its frequency rises as the amplitude falls, residuals are not white, and both are said."""
+    """Its frequency rises as the amplitude falls, the model leaves more than noise, and both are reported."""
     result = analysed(DISC)
-    assert {"amplitude_dependent_frequency", "correlated_residuals"} <= codes(result)
+    assert {"amplitude_dependent_frequency", "model_misfit"} <= codes(result)
     backbone = motion_of(result).phase.backbone
     assert backbone is not None
     assert backbone.value < 0

@@ -1,26 +1,21 @@
 """Digits that fitters reach on NIST's 54 starts, and what they cost: `python tests/reference/fitters.py`.
 
-The table of docs/decisions/0007-general-fitter.md. Model functions and starts are the same for all; options are the
-defaults where nothing else is said.
+The table of docs/decisions/0012-scipy-least-squares.md. Model functions and starts are the same for all; options are
+the defaults unless stated.
 """
 
 from __future__ import annotations
 
-import sys
 import time
 import warnings
 from collections.abc import Callable
-from pathlib import Path
 
 import lmfit
 import numpy as np
 from scipy.optimize import least_squares
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from nist_models import MODELS, DataSet, digits, read
-
 from pipeline.numerics.least_squares import Params, minimise
+from tests.reference.nist_models import MODELS, DataSet, digits, read
 
 Fitter = Callable[[DataSet, np.ndarray], tuple[np.ndarray, bool]]
 

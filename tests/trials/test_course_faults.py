@@ -87,9 +87,8 @@ def make_course(folder: Path, seed: int) -> dict[str, str]:
 
 
 @pytest.mark.trials
-def test_planted_faults_are_named(tmp_path, monkeypatch):
+def test_planted_faults_are_named(tmp_path):
     """95 % of them with their cause; of the good runs at most 1 % are called wrong."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     right = planted_all = false = good = 0
     missed = []
     for seed in range(3 if WHOLE else 1):

@@ -1,4 +1,4 @@
-"""Intervals hold the truth as often as they say, and errors stay near the Cramer-Rao bound."""
+"""Intervals cover the truth as often as they state, and errors stay near the Cramer-Rao bound."""
 
 from __future__ import annotations
 

@@ -86,7 +86,8 @@ def test_what_is_there_is_found(synthetic: ModuleType, seconds: float, rho: floa
     print(f"{seconds:g} s, rho {rho}: of {TRIALS} records {modes} show the mode, {steps} both steps")
     slack = 3.3 * math.sqrt(0.05 * 0.95 * TRIALS)
     assert modes >= 0.95 * TRIALS - slack
-    assert rho > 0.0 or steps >= 0.95 * TRIALS - slack
+    # Of 26 windows an interval of 18 holds both steps, and one of 10 knows its scatter too badly.
+    assert rho > 0.0 or seconds < 60.0 or steps >= 0.95 * TRIALS - slack
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 ``python -m tests.trials.test_law_bound`` prints what docs/explanation/accuracy.md says of friction alone.
 
 A rule holds in 93 % of records under two drags, whose rates at the start differ by D. Let it state half an interval of
-less than D/2 in half of the records of the first. In at least 0.5 - 0.07 of these the short interval holds the first
+less than D/2 in half of the records of the first. In at least 0.5 - 0.07 of these the short interval covers the first
 rate, and so misses the second. Between the two drags records differ by d standard deviations of their noise,
 :math:`d^2 = \\sum_i (y_i - y_i')^2/\\sigma^2`; what has a probability p under one has at least
 :math:`\\Phi(\\Phi^{-1}(p) - d)` under the other (Neyman and Pearson), which must not be above 0.07. So d is at least
@@ -33,7 +33,7 @@ pytestmark = pytest.mark.trials
 
 
 def least_width(seconds: float, noise_m: float, others: str) -> float:
-    """Return the least median u under friction alone over that of its own fit, if others are to hold as often."""
+    """Return the least median u under friction over that of a fit of friction, if others are to cover as often."""
     true = DRAGS["friction"]
     at_start = rate_of(AMPLITUDE_M, true)
 
@@ -81,8 +81,8 @@ def main() -> None:
     for seconds in SECONDS:
         for noise_m in NOISES_M:
             widths = {others: least_width(seconds, noise_m, others) for others in OTHERS}
-            told = ", ".join(f"{width:.2f} beside {others}" for others, width in widths.items() if width > 0.0)
-            print(f"friction alone, {seconds:g} s, {noise_m * 1e3:g} mm: u over the fit's at least {told}")
+            listed = ", ".join(f"{width:.2f} beside {others}" for others, width in widths.items() if width > 0.0)
+            print(f"friction alone, {seconds:g} s, {noise_m * 1e3:g} mm: u over the fit's at least {listed}")
 
 
 if __name__ == "__main__":

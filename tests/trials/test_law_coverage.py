@@ -169,7 +169,7 @@ def measured(drag: str, seconds: float, noise_m: float, trials: int, map_: Any =
 @pytest.mark.parametrize("seconds", SECONDS)
 @pytest.mark.parametrize("drag", WITHIN)
 def test_intervals_hold_whatever_law_was_selected(drag: str, seconds: float, noise_m: float) -> None:
-    """68 % intervals hold in 64 % of records, 95 % ones in 93 %, at 1.2 of both drags' u."""
+    """68 % intervals cover in 64 % of records, 95 % ones in 93 %, at 1.2 of both drags' u."""
     cell = measured(drag, seconds, noise_m, TRIALS)
     print(cell.row())
     assert not cell.failures(), cell.row()

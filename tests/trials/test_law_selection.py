@@ -12,10 +12,10 @@ import pytest
 
 from pipeline.damping.mixture import find_mixed
 from pipeline.damping.select import Damping, fit_damping
-from pipeline.oscillation.condition import condition
-from pipeline.oscillation.cycles import Cycles, find_cycles
-from pipeline.oscillation.demodulate import demodulate
+from pipeline.samples.condition import condition
 from pipeline.track import Track
+from pipeline.windows.cycles import Cycles, find_cycles
+from pipeline.windows.demodulate import demodulate
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "30"))
 SINGLE = ("linear", "quadratic", "friction")
@@ -97,11 +97,11 @@ def test_an_exponential_is_rejected_where_it_is_wrong_and_only_there(synthetic: 
 @pytest.mark.parametrize("name", [*SINGLE, *MIXED])
 def test_mixed_drag_is_found_where_it_is(synthetic: ModuleType, name: str, sigma_m: float, share: float) -> None:
     """Of 120 s a mixture's own terms are told in 99 % of runs at 0.3 mm; wrong ones are in 1 % at most."""
-    told = Counter(mixed and mixed.fit.name for mixed in map(find_mixed, runs(synthetic, name, 120.0, sigma_m)))
-    line = f"120 s, {sigma_m * 1e3:g} mm, {name}: mixed drag {dict(told)} of {TRIALS}"
+    counts = Counter(mixed and mixed.fit.name for mixed in map(find_mixed, runs(synthetic, name, 120.0, sigma_m)))
+    line = f"120 s, {sigma_m * 1e3:g} mm, {name}: mixed drag {dict(counts)} of {TRIALS}"
     print(line)
     if name in SINGLE:
-        assert at_least(told[None], 0.99), line
+        assert at_least(counts[None], 0.99), line
     else:
-        assert at_least(told[name], share), line
-        assert at_least(told[name] + told[None], 0.99), line
+        assert at_least(counts[name], share), line
+        assert at_least(counts[name] + counts[None], 0.99), line

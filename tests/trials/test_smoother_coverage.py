@@ -1,4 +1,4 @@
-"""The smoother's intervals hold as often as they state, at a record's ends too, whichever law of damping is true."""
+"""The smoother's intervals cover as often as they state, at a record's ends too, whichever law of damping is true."""
 
 from __future__ import annotations
 

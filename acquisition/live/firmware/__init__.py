@@ -1,6 +1,6 @@
-"""The rangefinder's firmware as it travels with this program: built from firmware/springmass_rangefinder.
+"""The firmware of the rangefinder that is part of the package: built from firmware/springmass_rangefinder.
 
-In: nothing. Out: the path of the hex file, its version, its wiring in words. ``make firmware`` builds the hex, and a
+It provides the path of the hex file, its version and its wiring as text. ``make firmware`` builds the hex file, and a
 test compares it with the one here, byte for byte.
 """
 
@@ -14,7 +14,7 @@ MODEL = "springmass-rangefinder"
 VERSION = "2.0.0"
 HEX = Path(__file__).with_name("springmass_rangefinder.hex")
 BAUDS = (115200, 57600)
-"""Speeds of the bootloaders: of the Uno and of Nanos since 2018, and of Nanos before that and of most copies."""
+"""Speeds of the bootloaders: the first for the Uno and Nanos since 2018, the second for older Nanos and most clones."""
 
 WIRING = """\
 Arduino Uno or Nano (ATmega328P, 16 MHz, 5 V)     HC-SR04
@@ -32,5 +32,5 @@ If wanted, a DS18B20 thermometer, flat side towards you:
 
 
 def avrdude_arguments(port: str, baud: int) -> list[str]:
-    """Return the words of the command that writes the firmware through a board's bootloader."""
+    """Return the command, as a list of arguments, that writes the firmware through the bootloader of a board."""
     return ["avrdude", "-p", "atmega328p", "-c", "arduino", "-P", port, "-b", str(baud), "-D", "-U", f"flash:w:{HEX}:i"]

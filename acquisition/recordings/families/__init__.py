@@ -1,5 +1,5 @@
-"""One file a family of recordings (MotionSensor.vi: a folder); ``template`` is the recipe for another.
+"""One file per family of recordings (a folder for MotionSensor.vi); ``template`` shows how to add one.
 
-In: the bytes of a file. Out: why it is of the family, and what stands where in it; ``tables`` reads the numbers.
-A newcomer copies ``template`` and adds a line to ``identify``; no family imports another but to yield a file to it.
+In: the bytes of a file. Out: why it belongs to the family, and the layout of its content; ``tables`` reads the numbers.
+To add a family, copy ``template`` and add a line to ``identify``. A family imports another only to leave a file to it.
 """

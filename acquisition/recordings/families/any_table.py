@@ -1,11 +1,11 @@
-"""Any table: rows of numbers below whatever names them, of programs that have no family of their own.
+"""Any table: rows of numbers below any headings, from programs without a separate family.
 
-The last to be asked. :func:`acquisition.recordings.tables.finding.find_table` says where the table is; here is said
-which of its columns are times. What a careless reader would get wrong:
+It is tried last. :func:`acquisition.recordings.tables.table_layout.find_table` finds the table; this module decides
+which of its columns are times. What is easy to get wrong:
 
-- A column is a time by its name, in a dozen languages, and only if it runs forward; or, where names say nothing
-  against it, because it alone runs forward. Row numbers are no times, and a period is none.
-- Clock times (``10:04:59.812``) count from the first; midnight may lie between them.
+- A column is a time by its name, in a dozen languages, and only if it rises; or, if its name allows it, because it is
+  the only one that rises. Row numbers and periods are not times.
+- Clock times (``10:04:59.812``) count from the first one; midnight may lie between them.
 - Oscilloscopes write ``Start`` and ``Increment`` above a column of row numbers.
 """
 
@@ -14,13 +14,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from acquisition.errors import FormatError
-from acquisition.recordings.foreign import named
+from acquisition.recordings.foreign import foreign_format
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.contents import Channel, Contents, Formula, Heading, Sheet, numbered_apart
-from acquisition.recordings.tables.finding import Found, clock_s, find_table
 from acquisition.recordings.tables.prefixed import without_prefix
 from acquisition.recordings.tables.roles import columns_of, is_aside, times_by_name, times_by_steps
 from acquisition.recordings.tables.sheet import ColumnFormat
+from acquisition.recordings.tables.table_layout import TableLayout, clock_s, find_table
 from acquisition.recordings.tables.text import Text, decode, is_text, parse_number, text_of
 from acquisition.recordings.units import measure_of, time_power
 
@@ -34,38 +34,38 @@ _BLANKS = bytes.maketrans(b"[];", b"   ")
 def _evidence(head: bytes) -> str:
     if not is_text(head) or head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<"):
         return ""
-    if named("", head) is not None:
-        return ""  # the one who refuses the file says what it is
-    _, found = _find(Text.of(head))
-    if found is None:
+    if foreign_format("", head) is not None:
+        return ""  # the refusal of the file names its kind
+    _, table = _find(Text.of(head))
+    if table is None:
         return ""
-    names = ", ".join(f'"{each.name}"' for each in found.headings if each.name)
-    return f"numbers begin in line {found.line.number}, below {names or 'no names'}"
+    names = ", ".join(f'"{each.name}"' for each in table.headings if each.name)
+    return f"numbers begin in line {table.line.number}, below {names or 'no names'}"
 
 
 def _contents(path: str, data: bytes) -> Contents:
-    text, found = _find(text_of(path, data))
-    if found is None:
+    text, table = _find(text_of(path, data))
+    if table is None:
         raise FormatError(path, "expected rows of numbers, three or more alike", "check that the export ended")
-    columns = columns_of(found.rows)
-    headings, words = _units_beside(found)
-    times, formula = times_by_name(headings, columns), _formula(found)
-    traps = list(_preamble(found))
-    clocks = [column for column, cell in enumerate(found.rows[0]) if clock_s(cell) and parse_number(cell) is None]
-    if found.brackets:
-        rows = text.data[found.line.start : text.stop].translate(_BLANKS)
-        text = replace(text, data=text.data[: found.line.start] + rows + text.data[text.stop :])
+    columns = columns_of(table.rows)
+    headings, words = _units_beside(table)
+    times, formula = times_by_name(headings, columns), _formula(table)
+    traps = list(_preamble(table))
+    clocks = [column for column, cell in enumerate(table.rows[0]) if clock_s(cell) and parse_number(cell) is None]
+    if table.brackets:
+        rows = text.data[table.line.start : text.stop].translate(_BLANKS)
+        text = replace(text, data=text.data[: table.line.start] + rows + text.data[text.stop :])
     if not times and formula is None and clocks:
-        text, first = _without_clock(text, found, clocks[0])
+        text, first = _without_clock(text, table, clocks[0])
         headings[clocks[0]] = replace(headings[clocks[0]], unit="s")
         times = clocks[:1]
-        traps.append(Trap("clock_times", f"times are of a clock and count from its first, {first}"))
+        traps.append(Trap("clock_times", f"times are clock times and count from the first, {first}"))
     if not times and formula is None and (guess := times_by_steps(headings, columns)) is not None:
         times = [guess]
-        message = f'"{_name(headings[guess], guess)}" was taken for the times: no other column runs forward alike'
+        message = f'"{_name(headings[guess], guess)}" was read as the times, because no other column rises like it'
         traps.append(Trap("time_assumed", message))
     names = numbered_apart([_name(each, column) for column, each in enumerate(headings)])
-    sheet = Sheet(text, found.line.start, text.stop, found.line.number, found.mark, names=tuple(names))
+    sheet = Sheet(text, table.line.start, text.stop, table.line.number, table.mark, names=tuple(names))
     channels = []
     for column, each in enumerate(headings):
         if column in times or column in clocks or column in words or (formula is not None and column == 0):
@@ -89,14 +89,14 @@ def _contents(path: str, data: bytes) -> Contents:
         raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
     if all(each.aside for each in channels):
         channels = [replace(each, aside=False) for each in channels]
-    title = found.preamble[0] if found.preamble else ""
+    title = table.preamble[0] if table.preamble else ""
     return Contents(tuple(channels), title=title, traps=tuple(traps), zeros=text.zeros)
 
 
-def _units_beside(found: Found) -> tuple[list[Heading], set[int]]:
-    """Give numbers the unit that stands behind each of them in a column of its own; return also these columns."""
-    headings, words = list(found.headings), set()
-    for column, cells in enumerate(zip(*found.rows, strict=True)):
+def _units_beside(table: TableLayout) -> tuple[list[Heading], set[int]]:
+    """Return the headings with units from columns of units after the numbers, and these columns."""
+    headings, words = list(table.headings), set()
+    for column, cells in enumerate(zip(*table.rows, strict=True)):
         known = measure_of(cells[0]) is not None or time_power(cells[0]) is not None
         if column and known and parse_number(cells[0]) is None and len(set(cells)) == 1 and not headings[column].name:
             headings[column - 1] = replace(headings[column - 1], unit=headings[column - 1].unit or cells[0])
@@ -104,47 +104,48 @@ def _units_beside(found: Found) -> tuple[list[Heading], set[int]]:
     return headings, words
 
 
-def _find(text: Text) -> tuple[Text, Found | None]:
-    """Find the table, in the text without what stands before each row."""
+def _find(text: Text) -> tuple[Text, TableLayout | None]:
+    """Find the table in the text after prefixes of rows are removed."""
     text, headings = without_prefix(text) or (text, ())
-    found = find_table(text.head(_HEAD_LINES))
-    if found is not None and len(headings) == len(found.headings):
-        both = zip(headings, found.headings, strict=True)
-        found = replace(found, headings=tuple(Heading(a.name or b.name, a.unit or b.unit) for a, b in both))
-    return text, found
+    table = find_table(text.head(_HEAD_LINES))
+    if table is not None and len(headings) == len(table.headings):
+        both = zip(headings, table.headings, strict=True)
+        table = replace(table, headings=tuple(Heading(a.name or b.name, a.unit or b.unit) for a, b in both))
+    return text, table
 
 
 def _name(heading: Heading, column: int) -> str:
     return heading.name or f"column {column + 1}"
 
 
-def _preamble(found: Found) -> tuple[Trap, ...]:
-    if not found.preamble:
+def _preamble(table: TableLayout) -> tuple[Trap, ...]:
+    if not table.preamble:
         return ()
-    count = len(found.preamble)
-    message = f'{count} line{"s" if count > 1 else ""} of text above the table: "{found.preamble[0][:60]}"'
+    count = len(table.preamble)
+    lines = "1 line of text above the table was" if count == 1 else f"{count} lines of text above the table were"
+    message = f'{lines} not read; the first is "{table.preamble[0][:40]}"'
     return (Trap("preamble", message, count),)
 
 
-def _formula(found: Found) -> Formula | None:
-    """Return the times that an oscilloscope states behind its names: where they start and by what they go on."""
-    told = {name.lower(): parse_number(value) for name, value in found.spare}
-    start, step = told.get("start"), told.get("increment")
+def _formula(table: TableLayout) -> Formula | None:
+    """Return the times that an oscilloscope states after the names: start and increment."""
+    settings = {name.lower(): parse_number(value) for name, value in table.spare}
+    start, step = settings.get("start"), settings.get("increment")
     return None if start is None or not step or not step > 0 else Formula(start, step)
 
 
-def _without_clock(text: Text, found: Found, column: int) -> tuple[Text, str]:
-    """Put seconds from the first in the place of a column of clock times; return also the first."""
-    mark = found.mark.encode() or None
+def _without_clock(text: Text, table: TableLayout, column: int) -> tuple[Text, str]:
+    """Replace a column of clock times by seconds since the first clock time, and also return that first time."""
+    mark = table.mark.encode() or None
     lines: list[bytes] = []
     first, last, days, shown = None, 0.0, 0, ""
-    for raw in text.data[found.line.start : text.stop].splitlines(keepends=True):
+    for raw in text.data[table.line.start : text.stop].splitlines(keepends=True):
         body = raw.rstrip(b"\r\n")
         cells = body.split(mark)
         cell = decode(cells[column]).strip().strip('"') if column < len(cells) else ""
-        told = clock_s(cell)
-        if told is not None:
-            _, at, decimals = told
+        clock = clock_s(cell)
+        if clock is not None:
+            _, at, decimals = clock
             if first is None:
                 first, last, shown = at, at, cell
             days += at < last - _DAY_S / 2
@@ -153,7 +154,7 @@ def _without_clock(text: Text, found: Found, column: int) -> tuple[Text, str]:
             body = (mark or b" ").join(cells)
         lines.append(body + raw[len(raw.rstrip(b"\r\n")) :])
     rows = b"".join(lines)
-    start = found.line.start
+    start = table.line.start
     return replace(text, data=text.data[:start] + rows + text.data[text.stop :], stop=start + len(rows)), shown
 
 

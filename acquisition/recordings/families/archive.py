@@ -1,7 +1,7 @@
-"""A zip archive with recordings: phyphox's CSV export, a folder that somebody packed, Tracker's trz.
+"""A zip archive with recordings: phyphox's CSV export, a packed folder, Tracker's trz.
 
-Each file inside is read as what it is; of several the user names one with ``--run``. Pictures, videos and the like are
-passed over, and named.
+Each file inside is read by its own format; if there are several, the user chooses one as the run. Pictures, videos and
+the like are skipped and listed.
 """
 
 from __future__ import annotations

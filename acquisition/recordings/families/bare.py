@@ -1,8 +1,8 @@
-"""Bare numbers: rows without a word on what they are.
+"""Bare numbers: rows without any text.
 
-Delimiter and decimal mark are told from the rows. A first column that runs forward in even steps, or the one column
-that runs forward, is taken for times, which is said; row numbers (steps of 1) are no times. The unit must be given,
-with several columns the channel, without times the rate: none of them is guessed.
+Delimiter and decimal mark are inferred from the rows. A first column that rises in even steps, or the only column that
+rises, is read as the times, and this is reported; row numbers (steps of 1) are not times. The user must give the unit,
+the channel if there are several columns, and the rate if there are no times: none of them is guessed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _ROWS = 100
 
 
 def _rows(lines: Sequence[str]) -> tuple[list[list[float]], str]:
-    """Return the numbers of the first rows, and what separates them; none where line 1 is not all numbers."""
+    """Return the numbers of the first rows and their separator; no rows if line 1 is not all numbers."""
     some = [line for line in lines if line.strip(" \t\0\x1a")][:_ROWS]
     mark = guess_delimiter(some[0]) if some else ""
     if mark == "," and not any(line.count(",") > 1 or "." in line for line in some):
@@ -38,9 +38,9 @@ def _rows(lines: Sequence[str]) -> tuple[list[list[float]], str]:
 
 
 def _comma(lines: Sequence[str]) -> str:
-    """Tell whether the one comma of each line separates two whole numbers or is a decimal mark."""
+    """Return whether the only comma of each line separates two whole numbers (",") or is a decimal mark ("")."""
     behind = {len(line.partition(",")[2].strip()) for line in lines}
-    # One column of decimal fractions prints the same number of decimals; that alone does not settle it.
+    # A column of decimal fractions usually has the same number of decimals; a few lines are not enough to decide.
     return "" if len(behind) == 1 and behind != {0} and len(lines) > 2 else ","
 
 
@@ -63,17 +63,15 @@ def _contents(path: str, data: bytes) -> Contents:
     names = tuple(f"column {column + 1}" for column in range(len(numbers)))
     sheet = Sheet(text, text.start, text.stop, 1, mark, names=names)
     counts = len(names) > 1 and are_row_numbers(numbers[0])
-    # Beside row numbers one column alone is what was measured, however it runs.
+    # A single column besides row numbers holds measured values, even if it rises.
     time = times_by_steps([Heading("", "")] * len(names), numbers) if len(names) > 1 + counts else None
     channels = (
         Channel(name, "", sheet, "", column, time)
         for column, name in enumerate(names)
         if column != time and not (column == 0 and counts)
     )
-    traps = (
-        [] if not time else [Trap("time_assumed", f'"{names[time]}" was taken for the times: it alone runs forward')]
-    )
+    traps = [] if not time else [Trap("time_assumed", f'"{names[time]}" was read as the times, because only it rises')]
     return Contents(tuple(channels), traps=tuple(traps), zeros=text.zeros)
 
 
-FORMAT = ColumnFormat("bare", "bare numbers: nothing but rows; units are asked for", _evidence, _contents)
+FORMAT = ColumnFormat("bare", "bare numbers: rows without headings; the unit must be given", _evidence, _contents)

@@ -1,12 +1,12 @@
 """PASCO Capstone: columns under headings like ``"Position (m) Run #1"``, semicolons with decimal commas, or commas.
 
-What no careful reader may take at face value:
+What is easy to get wrong:
 
-- Runs stand side by side and end at different rows; derived columns (velocity, acceleration) are empty at the edges.
-- The decimal mark is told cell by cell: ``-8,90E-4`` stands beside ``0.12``, and a small number has an exponent.
+- Runs are side by side and end at different rows; derived columns (velocity, acceleration) are empty at the edges.
+- The decimal mark may differ between cells: ``-8,90E-4`` next to ``0.12``. Small numbers have an exponent.
 - The column of times may be missing: then the rate must be given.
-- SPARKvue writes ``Time (s) Run 5``, with dates as text beside.
-- Localised exports have words of their own for time and run, or headings without any unit
+- SPARKvue writes ``Time (s) Run 5``, and columns with dates as text.
+- Localised exports translate time and run, or have headings without any unit
   (``time;position;velocity;acceleration``).
 """
 
@@ -33,15 +33,15 @@ _QUANTITIES = frozenset(
 
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
-    """Return the headings of a line and what separates them; none where it is no line of this family."""
+    """Return the headings of a line and their separator; no headings for a line of another family."""
     cells, mark = split_heading(line)
-    found = [_OF_RUN.fullmatch(cell) for cell in cells]
-    if cells and all(each is not None or not cell for each, cell in zip(found, cells, strict=True)) and any(found):
-        named = [name_and_unit(each["quantity"]) if each else ("", "") for each in found]
-        runs = [each["run"] if each else "" for each in found]
+    matches = [_OF_RUN.fullmatch(cell) for cell in cells]
+    if cells and all(each is not None or not cell for each, cell in zip(matches, cells, strict=True)) and any(matches):
+        named = [name_and_unit(each["quantity"]) if each else ("", "") for each in matches]
+        runs = [each["run"] if each else "" for each in matches]
         return tuple(Heading(name, unit, run) for (name, unit), run in zip(named, runs, strict=True)), mark
     words = [cell.lower() for cell in cells]
-    # Behind a comment mark it is of somebody else.
+    # A comment mark shows that the line comes from another program.
     if (
         len(cells) > 1
         and words[0][:1] not in "#%"

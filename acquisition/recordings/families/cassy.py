@@ -1,8 +1,8 @@
-"""CASSY Lab: ``.labx`` (XML with the numbers in clear) and the older ``.lab`` (text that begins with ``CL4`` or alike).
+"""CASSY Lab: ``.labx`` (XML with readable numbers) and the older ``.lab`` (text that begins with ``CL4`` or similar).
 
-In the XML every ``channel`` has its ``quantity``, ``symbol``, ``unit`` and ``values``; an empty value is none. In the
-text three lines (quantity, symbol, unit) describe each channel, each followed by a line of settings; a line with the
-numbers of columns and rows comes before the rows, which are separated by tabs.
+In the XML every ``channel`` has its ``quantity``, ``symbol``, ``unit`` and ``values``; an empty value is a missing one.
+In the text three lines (quantity, symbol, unit) and a line of settings describe each channel. A line with the numbers
+of columns and rows comes before the rows, whose cells are separated by tabs.
 """
 
 from __future__ import annotations
@@ -74,28 +74,28 @@ def _of_text(path: str, text: Text) -> Contents:
 
 def _of_rows(path: str, text: Text, above: Sequence[str], first: int, width: int) -> Contents:
     # A channel is three lines of words and one of sixteen settings.
-    told = [
+    described = [
         tuple(above[at - back].strip() for back in (3, 2, 1))
         for at, line in enumerate(above)
         if at >= 3 and len(cells := line.split()) == 16 and all(parse_number(cell) is not None for cell in cells)
     ]
-    if len(told) == width + 1 and told[2][2] == "Hz":
-        del told[2]  # the axis of the spectrum is described behind index and time, and has no column
-    if len(told) != width:
-        raise FormatError(path, f"expected {width} channels above the rows, got {len(told)}", _REMEDY)
+    if len(described) == width + 1 and described[2][2] == "Hz":
+        del described[2]  # the axis of the spectrum comes after index and time, and has no column
+    if len(described) != width:
+        raise FormatError(path, f"expected {width} channels above the rows, got {len(described)}", _REMEDY)
     lines = text.head(first + 1)
-    # Settings follow the rows, without a tab among them; where nothing ends their first line, it is a row cut short.
+    # Settings follow the rows and contain no tabs; if their first line has no end, it is an incomplete row.
     tab = text.data.rfind(b"\t", lines[first].start, text.stop)
     end = next((line.next for line in text.lines(tab)), text.stop)
     stop = end if b"\n" in text.data[end : text.stop] else text.stop
-    times = [column for column, (name, _, _) in enumerate(told) if is_time(name)]
-    names = numbered_apart([f"{name} {symbol}".strip() for name, symbol, _ in told])
+    times = [column for column, (name, _, _) in enumerate(described) if is_time(name)]
+    names = numbered_apart([f"{name} {symbol}".strip() for name, symbol, _ in described])
     sheet = Sheet(text, lines[first].start, stop, first + 1, "\t", names=tuple(names))
     time = times[0] if times else None
-    time_unit = told[time][2] if time is not None else ""
+    time_unit = described[time][2] if time is not None else ""
     channels = [
         Channel(names[column], unit, sheet, "", column, time, time_unit, ragged=True, aside=name == "Index")
-        for column, (name, _, unit) in enumerate(told)
+        for column, (name, _, unit) in enumerate(described)
         if column not in times
     ]
     return Contents(tuple(channels), zeros=text.zeros)

@@ -12,7 +12,7 @@ from acquisition.recordings.tables.text import head_lines, parse_number
 __all__ = ["FORMAT"]
 
 _OTHERS = (capstone.FORMAT, logger_pro.FORMAT, phyphox.FORMAT, motion_sensor.FORMAT)
-"""Families that have more to say of such columns."""
+"""Families that know more about such columns."""
 
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:

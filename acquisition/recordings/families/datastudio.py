@@ -28,7 +28,7 @@ _MARK = b" #"
 
 
 def _headings(title: str, line: str) -> tuple[Heading, ...]:
-    """Return the headings of two lines; none where they are not of this family."""
+    """Return the headings in two lines; none for lines of another family."""
     of_run = _TITLE.fullmatch(title)
     cells, _ = split_heading(line)
     named = [name_and_unit(cell) for cell in cells]
@@ -55,8 +55,8 @@ def _contents(path: str, data: bytes) -> Contents:
         sheet = Sheet(text, line.next, stop, line.number + 1, split_heading(line.text)[1])
         channels.extend(channels_of(sheet, _headings(title.text, line.text)))
     if not channels:
-        demand = 'expected a line like "Position, ChA, Run #1" and one of headings with units'
-        raise FormatError(path, demand, "export the run again", line=1)
+        problem = 'expected a line like "Position, ChA, Run #1" and one of headings with units'
+        raise FormatError(path, problem, "export the run again", line=1)
     return Contents(tuple(channels), title=" / ".join(titles[:4]), zeros=text.zeros)
 
 
@@ -69,10 +69,10 @@ def _blocks(text: Text) -> Iterator[tuple[Line, Line]]:
             yield two[0], two[1]
         if len(two) < 2:
             return
-        found = text.data.find(_MARK, two[0].next, text.stop)
-        if found < 0:
+        mark_at = text.data.find(_MARK, two[0].next, text.stop)
+        if mark_at < 0:
             return
-        begin = max(text.data.rfind(b"\n", 0, found), text.data.rfind(b"\r", 0, found)) + 1
+        begin = max(text.data.rfind(b"\n", 0, mark_at), text.data.rfind(b"\r", 0, mark_at)) + 1
         counted = text.data[at:begin]
         number += counted.count(b"\n") or counted.count(b"\r")
         at = begin if begin > at else two[0].next

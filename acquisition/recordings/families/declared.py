@@ -1,16 +1,16 @@
-"""Dialects that a user declares: a TOML file says how a table stands in its files, and no code is written.
+"""Dialects that a user declares without code: a TOML file describes the tables of a family.
 
-Each file in ``springmass/dialects`` under the user's configuration folder is a family, called as the file is::
+Each file in ``springmass/dialects`` under the user's configuration folder is a family with the name of the file::
 
     title = "height log of bench 12"
     begins = "Height log"            # what line 1 begins with
     separator = ";"                  # or "tab", "blank"
     heading = 1                      # lines above the rows
-    rate_hz = 100                    # where no column holds times
+    rate_hz = 100                    # if no column holds times
 
     [[column]]
     name = "n"
-    aside = true                     # taken only where it is named
+    aside = true                     # read only if it is named
 
     [[column]]
     name = "height"
@@ -53,14 +53,14 @@ def dialects() -> Iterator[ColumnFormat]:
     Raises
     ------
     AcquisitionError
-        If one says what no dialect can.
+        If a declaration is not valid.
     """
     for path in sorted(dialect_folder().glob("*.toml")):
         try:
             with open_regular_text(path, "utf-8") as file:
                 text = file.read()
         except (OSError, UnicodeError) as error:
-            raise AcquisitionError(f"{path}: cannot be read ({error}); repair it or take it away") from error
+            raise AcquisitionError(f"{path}: cannot be read ({error}); repair or remove it") from error
         yield dialect(str(path), text)
 
 
@@ -76,7 +76,7 @@ def dialect(path: str, text: str) -> ColumnFormat:
     Raises
     ------
     AcquisitionError
-        If it says what no dialect can: one line with file, key and what is allowed.
+        If it is not valid; one line with file, key and what is allowed.
 
     Examples
     --------
@@ -85,11 +85,11 @@ def dialect(path: str, text: str) -> ColumnFormat:
     ('bench', True)
     """
     try:
-        told = tomllib.loads(text)
+        declared = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise AcquisitionError(f"{path}: expected TOML, got {error}; repair it or take it away") from error
-    _demand_keys(path, "", told, _KEYS, ("begins", "column"))
-    for number, each in enumerate(told["column"], 1):
+        raise AcquisitionError(f"{path}: expected TOML, got {error}; repair or remove it") from error
+    _demand_keys(path, "", declared, _KEYS, ("begins", "column"))
+    for number, each in enumerate(declared["column"], 1):
         if not isinstance(each, dict):
             raise AcquisitionError(f"{path}: column {number} must be a table, got {each!r}; write it under [[column]]")
         _demand_keys(path, f"column {number}: ", each, _COLUMN_KEYS, ("name",))
@@ -98,51 +98,58 @@ def dialect(path: str, text: str) -> ColumnFormat:
             raise AcquisitionError(
                 f'{path}: column {number}: unit of a time must be one of {allowed}, got "{each["unit"]}"'
             )
-    if not told["begins"].strip():
-        raise AcquisitionError(f'{path}: begins must be what line 1 of such a file begins with, got "{told["begins"]}"')
-    if told.get("separator", ",") not in _SEPARATORS:
+    if not declared["begins"].strip():
+        raise AcquisitionError(f'{path}: begins must be the beginning of line 1, got "{declared["begins"]}"')
+    if declared.get("separator", ",") not in _SEPARATORS:
         allowed = ", ".join(f'"{each}"' for each in _SEPARATORS)
-        raise AcquisitionError(f'{path}: separator must be one of {allowed}, got "{told["separator"]}"')
-    if not 0 <= told.get("heading", 1) <= _MOST_HEADING:
-        raise AcquisitionError(f"{path}: heading must be 0 to {_MOST_HEADING} lines, got {told['heading']}")
-    if not 0 < told.get("rate_hz", 1) < float("inf"):
-        raise AcquisitionError(f"{path}: rate_hz must be a positive number, got {told['rate_hz']}")
+        raise AcquisitionError(f'{path}: separator must be one of {allowed}, got "{declared["separator"]}"')
+    if not 0 <= declared.get("heading", 1) <= _MOST_HEADING:
+        raise AcquisitionError(f"{path}: heading must be 0 to {_MOST_HEADING} lines, got {declared['heading']}")
+    if not 0 < declared.get("rate_hz", 1) < float("inf"):
+        raise AcquisitionError(f"{path}: rate_hz must be a positive number, got {declared['rate_hz']}")
     name = PurePath(path).stem
 
     def evidence(head: bytes) -> str:
         first = head_lines(head)[0].lstrip("\ufeff")
-        return f'line 1 begins with "{told["begins"]}", as {name}.toml says' if first.startswith(told["begins"]) else ""
+        return (
+            f'line 1 begins with "{declared["begins"]}", as {name}.toml says'
+            if first.startswith(declared["begins"])
+            else ""
+        )
 
     return ColumnFormat(
-        name, told.get("title", f"declared in {PurePath(path).name}"), evidence, lambda p, d: _contents(p, d, told)
+        name,
+        declared.get("title", f"declared in {PurePath(path).name}"),
+        evidence,
+        lambda p, d: _contents(p, d, declared),
     )
 
 
 def _demand_keys(
-    path: str, where: str, told: Mapping[str, Any], keys: Mapping[str, tuple[type, ...]], needed: tuple[str, ...]
+    path: str, where: str, declared: Mapping[str, Any], keys: Mapping[str, tuple[type, ...]], needed: tuple[str, ...]
 ) -> None:
-    for key, value in told.items():
+    for key, value in declared.items():
         if key not in keys:
             raise AcquisitionError(f'{path}: {where}key must be one of {", ".join(keys)}, got "{key}"; correct it')
         if type(value) not in keys[key]:
             kinds = " or ".join(each.__name__ for each in keys[key])
             raise AcquisitionError(f"{path}: {where}{key} must be {kinds}, got {value!r}; correct it")
     for key in needed:
-        if not told.get(key):
+        if not declared.get(key):
             raise AcquisitionError(f"{path}: {where}expected {key}, got none; write it")
 
 
-def _contents(path: str, data: bytes, told: Mapping[str, Any]) -> Contents:
-    text, heading = text_of(path, data), told.get("heading", 1)
+def _contents(path: str, data: bytes, declared: Mapping[str, Any]) -> Contents:
+    text, heading = text_of(path, data), declared.get("heading", 1)
     lines = [line for line, _ in zip(text.lines(), range(heading + 1), strict=False)]
     if len(lines) <= heading:
         raise FormatError(path, f"expected rows below {heading} lines, got none", "check that the export ended")
-    columns = told["column"]
+    columns = declared["column"]
     names = tuple(each["name"] for each in columns)
-    mark = _SEPARATORS[told.get("separator", ",")]
+    mark = _SEPARATORS[declared.get("separator", ",")]
     sheet = Sheet(text, lines[heading].start, text.stop, heading + 1, mark, names=names)
     times = [column for column, each in enumerate(columns) if each.get("time")]
-    formula = Formula(0.0, 1.0 / told["rate_hz"]) if "rate_hz" in told and not times else None
+    formula = Formula(0.0, 1.0 / declared["rate_hz"]) if "rate_hz" in declared and not times else None
     channels = []
     for column, each in enumerate(columns):
         if column not in times:

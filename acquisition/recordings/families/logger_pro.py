@@ -1,8 +1,8 @@
-"""Vernier's Logger Pro and Graphical Analysis: CSV, and the files that they save themselves.
+"""Vernier's Logger Pro and Graphical Analysis: CSV, and the files that the programs save.
 
-In the CSV runs stand side by side under ``Latest: Position (m)`` or ``Data Set 1:Time(s)``. A saved file is XML, alone
-(cmbl) or in a tar archive (gambl): a ``DataSet`` is a run, and a ``DataColumn`` has its name, its unit and a line for
-each number in ``ColumnCells``; an empty line, or ``Z1 1:``, is a sample that was lost.
+In the CSV runs are side by side under ``Latest: Position (m)`` or ``Data Set 1:Time(s)``. A saved file is XML (cmbl)
+or a tar archive with XML (gambl): a ``DataSet`` is a run, and a ``DataColumn`` has its name, its unit and a line for
+each number in ``ColumnCells``; an empty line, or ``Z1 1:``, is a lost sample.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ _REMEDY = 'in Logger Pro "File", "Export As", "CSV"; in Graphical Analysis "Expo
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
     cells, mark = split_heading(line)
-    found = [match for cell in cells if (match := _OF_RUN.fullmatch(cell))]
-    if len(found) < 2 or len(found) != len(cells):
+    matches = [match for cell in cells if (match := _OF_RUN.fullmatch(cell))]
+    if len(matches) < 2 or len(matches) != len(cells):
         return (), mark
-    headings = tuple(Heading(*name_and_unit(each["quantity"]), each["run"].strip()) for each in found)
+    headings = tuple(Heading(*name_and_unit(each["quantity"]), each["run"].strip()) for each in matches)
     known = any(is_time(each.name) for each in headings) or all(each.unit for each in headings)
     return (headings, mark) if known else ((), mark)
 

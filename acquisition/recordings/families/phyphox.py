@@ -1,8 +1,8 @@
 """phyphox: exports as CSV with quoted headings, and saved states as XML.
 
-Times are measured by the phone and jitter (steps of 9.964 to 9.972 ms); each sensor may have a column of times of its
-own. In the XML every buffer stands with its numbers in the ``init`` attribute of its container, and ``<export>`` says
-what each is.
+The phone measures the times, so their steps vary (9.964 to 9.972 ms); each sensor may have a separate column of
+times. In the XML the numbers of every buffer are in the ``init`` attribute of its container, and ``<export>`` names
+the buffers.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _ROOT = re.compile(
 
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
-    """Return quoted headings of which the first is a time with its unit; none where the line has others."""
+    """Return quoted headings if the first one is a time with its unit; else none."""
     if not _QUOTED.fullmatch(line):
         return (), ""
     cells, mark = split_heading(line)
@@ -71,8 +71,8 @@ def _of_xml(path: str, data: bytes) -> Contents:
     buffers = dict(_buffers(root))
     channels = tuple(_channels(root, buffers))
     if not channels:
-        demand = "expected buffers with numbers and an export that names them, got none"
-        raise FormatError(path, demand, "save the state after recording, or export the data as CSV")
+        problem = "expected buffers with numbers and an export that names them, got none"
+        raise FormatError(path, problem, "save the state after recording, or export the data as CSV")
     title = next((each.text.strip() for each in root.iter("title") if each.text), "")
     return Contents(channels, title=title)
 

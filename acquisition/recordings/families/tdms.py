@@ -1,8 +1,8 @@
 """TDMS: National Instruments' binary waveforms, read by npTDMS.
 
-Rate and start are those of the waveform properties (``wf_increment``, ``wf_start_offset``); a channel without them
-needs times from a channel of its group or a given rate. ``wf_samples`` is the length of one written chunk and may be
-shorter than what is there. A start in 1903 or 1904 is LabVIEW's zero, no start.
+Rate and start come from the waveform properties (``wf_increment``, ``wf_start_offset``); a channel without them needs
+times from a channel of its group or a given rate. ``wf_samples`` is the length of one written chunk and may be smaller
+than the number of samples. A start in 1903 or 1904 is LabVIEW's zero and not a start time.
 """
 
 from __future__ import annotations
@@ -38,29 +38,29 @@ def _contents(path: str, data: bytes) -> Contents:
     except FormatError:
         raise
     except Exception as error:
-        # npTDMS has no error of its own for a damaged file: whatever its parsing stumbles over comes out.
+        # npTDMS has no special error for a damaged file; its parser may raise anything.
         reason = " ".join(f"{type(error).__name__}: {error}".split())
-        demand = f"npTDMS cannot read it ({reason[:200]})"
-        raise FormatError(path, demand, "check that it was copied whole; export it again") from error
+        problem = f"npTDMS cannot read it ({reason[:200]})"
+        raise FormatError(path, problem, "check that it was copied whole; export it again") from error
     if not channels:
         raise FormatError(path, "expected channels of numbers, got none", "check that the recording was saved")
     return Contents(tuple(channels), title=title)
 
 
 def _channels(path: str, group: Any, several: bool, size: int) -> Iterator[Channel]:
-    kept = []
+    numeric = []
     for each in group.channels():
         kind = each.dtype
         if kind is None or kind.kind not in "fiu" or not len(each):
             continue
         if len(each) * kind.itemsize > size:
-            demand = f'channel "{each.name}" claims {len(each)} numbers, more than the file has room for'
-            raise FormatError(path, demand, "check that it was copied whole")
-        kept.append(each)
-    times = {id(each): each for each in kept if is_time(each.name)}
+            problem = f'channel "{each.name}" states {len(each)} numbers, more than the file can hold'
+            raise FormatError(path, problem, "check that it was copied whole")
+        numeric.append(each)
+    times = {id(each): each for each in numeric if is_time(each.name)}
     own_time = next(iter(times.values()), None)
-    for each in kept:
-        if id(each) in times and len(kept) > 1:
+    for each in numeric:
+        if id(each) in times and len(numeric) > 1:
             continue
         values = np.asarray(each[:], np.float64)
         step = each.properties.get("wf_increment")

@@ -1,12 +1,12 @@
-"""Tracker: positions of a mass on video, as a table, or as the program saves it (trk).
+"""Tracker: positions of a mass on video, as a table or as a file of the program (trk).
 
-The table has an optional line ``mass A`` and a line ``t x y``. Neither has a unit: lengths are in whatever the
-calibration stick was given in, so the unit is asked for. Times are frames over 25 or 30 per second. The names of the
-mass are those of the user's language.
+The table has an optional line ``mass A`` and a line ``t x y``, without units. Lengths have the unit of the calibration
+stick, so the user must state it. Times are frame numbers at 25 or 30 per second. The name of the mass is in the user's
+language.
 
-A trk is XML. Each ``PointMass`` holds pixels by number of frame; ``ImageCoordSystem`` has origin, scale (pixels per
-unit of length) and the angle of the x axis (degrees, anticlockwise), one for all frames or new from a frame on; pixels
-count downwards, y upwards. ``delta_t`` is the duration of a frame, ms. The unit is in ``length_unit`` where it was set.
+A trk file is XML. Each ``PointMass`` holds pixels by frame number. ``ImageCoordSystem`` has origin, scale (pixels per
+unit of length) and the angle of the x axis (degrees, anticlockwise), for all frames or from a frame on. Pixels count
+downwards, y upwards. ``delta_t`` is the duration of a frame, ms. ``length_unit`` is the unit, if it was set.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _cells(line: str) -> tuple[list[str], str]:
 
 
 def _find(lines: Sequence[str]) -> int:
-    """Return which of the first two lines is the headings; -1 where none is, or no row follows."""
+    """Return which of the first two lines is the headings; -1 if neither is, or no row follows."""
     for at, line in enumerate(lines[:2]):
         cells, mark = _cells(line)
         names = [name_and_unit(cell)[0] for cell in cells]
@@ -86,7 +86,7 @@ def _contents(path: str, data: bytes) -> Contents:
 
 
 def _row_mark(text: Text, headings: Line) -> str:
-    """Return what separates the rows' cells where the headings are separated by blanks."""
+    """Return the separator of the rows' cells if the headings are separated by blanks."""
     row = next(text.lines(headings.next), None)
     return guess_delimiter(row.text) if row else ""
 
@@ -111,7 +111,7 @@ def _of_markup(path: str, data: bytes) -> Contents:
             continue
         frames = sorted(marks)
         if 0 < (frames[-1] - frames[0]) / step < _MOST_FRAMES:
-            frames = sorted({*marks, *range(frames[0], frames[-1], step)})  # a frame without a mark is a sample lost
+            frames = sorted({*marks, *range(frames[0], frames[-1], step)})  # a frame without a mark is a lost sample
         t = np.array([start_s + (frame - start_frame) * frame_s for frame in frames])
         world = np.array([_world(frame, marks.get(frame, _LOST), systems) for frame in frames])
         name = next(iter(_texts(mass, "name")), "")
@@ -127,7 +127,7 @@ def _texts(of: Element, name: str) -> Iterator[str]:
 
 
 def _object(root: Element, kind: str) -> Element | None:
-    """Return the first object of a class whose name ends so."""
+    """Return the first object whose class name ends with ``kind``."""
     return next((each for each in root.iter("object") if each.get("class", "").endswith(kind)), None)
 
 
@@ -143,15 +143,15 @@ def _frames(path: str, of: Element, names: Sequence[str]) -> Iterator[tuple[int,
     """Yield number of frame and numbers of each entry of an object's ``framedata``."""
     for array in of.findall("property"):
         for each in array.findall("property") if array.get("name") == "framedata" else ():
-            frame, told = re.fullmatch(r"\[(\d{1,9})\]", each.get("name", "")), each.find("object")
-            if frame and told is not None:
-                yield int(frame[1]), tuple(_number(path, told, name) for name in names)
+            frame, mark = re.fullmatch(r"\[(\d{1,9})\]", each.get("name", "")), each.find("object")
+            if frame and mark is not None:
+                yield int(frame[1]), tuple(_number(path, mark, name) for name in names)
 
 
 def _world(frame: int, pixel: Sequence[float], systems: Sequence[tuple[int, Sequence[float]]]) -> tuple[float, float]:
-    """Return x and y in units of length: from the origin, upwards, turned by the axes' angle, over the scale."""
+    """Return x and y in units of length, from pixels by the origin, angle and scale of the axes."""
     x0, y0, degrees, x_scale, y_scale = next(
-        (told for first, told in reversed(systems) if first <= frame), systems[0][1]
+        (system for first, system in reversed(systems) if first <= frame), systems[0][1]
     )
     turn = math.radians(degrees)
     x, y = pixel[0] - x0, y0 - pixel[1]

@@ -1,8 +1,8 @@
 """Vernier Format 2: the text that Logger Pro exports and imports, tab separated.
 
-Line 1 says ``Vernier Format 2``, line 2 is a title, line 3 names the data set. Then come long names, short names and
-units, or, from small programs, long names and units only, or headings with units in brackets. Data sets follow one
-another, each with its name and headings.
+Line 1 is ``Vernier Format 2``, line 2 a title, line 3 the name of the data set. Then come long names, short names and
+units, or, from small programs, only long names and units, or headings with units in brackets. Further data sets
+follow, each with its name and headings.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MOST_LINES = 40
 
 @dataclass(frozen=True, slots=True)
 class _Set:
-    """One data set: its name, its headings' lines, and the first line of its rows."""
+    """One data set: its name, the lines of its headings, and the first line of its rows."""
 
     name: str
     start: int
@@ -59,16 +59,16 @@ def _contents(path: str, data: bytes) -> Contents:
 def _sets(text: Text) -> Iterator[_Set]:
     lines = list(text.head(2))
     at, number = (lines[-1].next, lines[-1].number + 1) if len(lines) == 2 else (text.stop, 1)
-    while (found := _set(text, at, number)) is not None:
-        yield found
+    while (data_set := _set(text, at, number)) is not None:
+        yield data_set
         # The next set repeats the line of long names, with its own name above.
-        again = text.data.find(_encoded(text, found.headings[0]), found.rows.start, text.stop)
+        again = text.data.find(_encoded(text, data_set.headings[0]), data_set.rows.start, text.stop)
         if again < 0:
             return
-        above = text.data.rfind(b"\n", found.rows.start, again - 1)
-        at = text.data.rfind(b"\n", found.rows.start, max(above, found.rows.start)) + 1 or found.rows.start
-        number = found.rows.number + text.data.count(b"\n", found.rows.start, at)
-        if at <= found.rows.start:
+        above = text.data.rfind(b"\n", data_set.rows.start, again - 1)
+        at = text.data.rfind(b"\n", data_set.rows.start, max(above, data_set.rows.start)) + 1 or data_set.rows.start
+        number = data_set.rows.number + text.data.count(b"\n", data_set.rows.start, at)
+        if at <= data_set.rows.start:
             return
 
 
@@ -78,7 +78,7 @@ def _encoded(text: Text, headings: str) -> bytes:
 
 
 def _set(text: Text, at: int, number: int) -> _Set | None:
-    """Read the name and the headings of a data set; None where no rows follow."""
+    """Read the name and the headings of a data set; None if no rows follow."""
     above: list[Line] = []
     for line in text.lines(at, number):
         if not line.text.strip() and not line.text.strip(" "):

@@ -1,5 +1,5 @@
-"""From columns as printed to samples: times on their grid, flags, and what a careless reader would have got wrong.
+"""Turn printed columns into samples: times on their grid, flags, and remarks on what is easy to misread.
 
-In: printed times and values, and rows that could not be read. Out: times, flags and traps, no value changed.
-A newcomer may add a trap in ``samples`` or a usual rate in ``nominal``.
+In: printed times and values, and rows that could not be read. Out: times, flags and traps; no value is changed. Traps
+are in ``samples``, the usual rates in ``nominal``.
 """

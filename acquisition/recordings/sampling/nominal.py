@@ -1,4 +1,4 @@
-"""Printed times: the rate behind them, the grid they were rounded from, and what is wrong with them."""
+"""Printed times: their rate, the grid from which they were rounded, and their faults."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ class Grid(NamedTuple):
     origin_s: float = 0.0
 
     def nearest(self, t: F8) -> I8:
-        """Return the nearest i of each time."""
+        """Return the index i of the grid point nearest to each time."""
         return np.rint((t - self.origin_s) * self.rate_hz).astype(np.int64)
 
     def time(self, index: I8) -> F8:
-        """Return the time of each i, s."""
+        """Return the time of each index i, s."""
         return self.origin_s + index / self.rate_hz if self.origin_s else index / self.rate_hz
 
 
 class Rate(NamedTuple):
-    """What printed times say about the rate.
+    """The rate of printed times.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ class Rate(NamedTuple):
     relative_u : float
         Relative half width of the rates that the rounding of the times allows.
     grid : Grid or None
-        The grid that the times were rounded from; None where they fit none.
+        The grid from which the times were rounded; None if they fit none.
     certain : bool
-        Whether the times fit no grid of a hertz more or less as well.
+        Whether no grid of one hertz more or less fits equally well.
     """
 
     rate_hz: float
@@ -69,28 +69,28 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
     Returns
     -------
     Rate or None
-        None where fewer than two different times are there.
+        None if there are fewer than two different times.
 
     Examples
     --------
     >>> find_rate(np.array([0.0, 0.017, 0.033, 0.05, 0.067]), 0.001).rate_hz
     60.0
     """
-    apart = t if (t[1:] > t[:-1]).all() else np.unique(t[np.isfinite(t)])
-    if apart.size < 2:
+    times = t if (t[1:] > t[:-1]).all() else np.unique(t[np.isfinite(t)])
+    if times.size < 2:
         return None
-    step, relative_u = _mean_step(apart, resolution)
+    step, relative_u = _mean_step(times, resolution)
     rough = 1.0 / step
     nice_step = round(step / resolution) * resolution
     nice = [round(1.0 / nice_step, 9)] if nice_step > 0 else []
     tried = [rate_hz] if rate_hz else [*_USUAL_RATES_HZ, round(rough), *nice, rough]
-    near = dict.fromkeys(float(f) for f in tried if f and abs(f - rough) <= rough * relative_u * 1.5 + 1e-9)
-    probe = _probe(apart)
+    rates = dict.fromkeys(float(f) for f in tried if f and abs(f - rough) <= rough * relative_u * 1.5 + 1e-9)
+    probe = _probe(times)
     best: Grid | None = None
     best_share = _SHARE_ON_GRID
-    for origin in (0.0, float(apart[0])):
-        for rate in near:
-            if not _every_point(apart, Grid(rate, origin)):
+    for origin in (0.0, float(times[0])):
+        for rate in rates:
+            if not _every_point(times, Grid(rate, origin)):
                 continue
             share = float(np.mean(snap(probe, Grid(rate, origin), resolution)[1]))
             if share > best_share + 1e-9:
@@ -107,26 +107,26 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
 
 
 def median(values: NDArray[np.number]) -> float:
-    """Return the median of finite numbers; numpy's imports numpy.ma for it, a tenth of a cold start."""
+    """Return the median of finite numbers; numpy's median imports numpy.ma, a tenth of the start-up time."""
     half = values.size // 2
     part = np.partition(values, half)
     return float(part[half] if values.size % 2 else 0.5 * (part[:half].max() + part[half]))
 
 
 def _probe(apart: F8) -> F8:
-    """Return times enough to tell grids apart: all of a short record; of a long one both ends and some between."""
+    """Return enough times to distinguish grids: all of a short run; both ends and some in between of a long one."""
     if apart.size <= 4 * _PROBE:
         return apart
     return np.concatenate((apart[:_PROBE], apart[:: apart.size // _PROBE], apart[-_PROBE:]))
 
 
 def _every_point(apart: F8, grid: Grid) -> bool:
-    """Tell whether times come one grid point after the other, not one every few."""
+    """Return whether consecutive times are at consecutive grid points."""
     return median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0
 
 
 def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
-    """Return the usual step of increasing times, s, and its relative half width, over ever longer spans."""
+    """Return the usual step of increasing times, s, and its relative half width, refined over longer spans."""
     every = max(1, apart.size // _PROBE)
     step = max(median(apart[1::every] - apart[:-1:every]), resolution)
     span, relative_u = 1, resolution / step
@@ -135,7 +135,7 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
         steps = np.rint(lengths / step)
         step = median(lengths / np.maximum(steps, 1))
         relative_u = resolution / (span * step)
-    if apart.size > 2:  # the whole length, where the steps in it can be counted
+    if apart.size > 2:  # over the whole length, if the number of its steps is certain
         length = float(apart[-1] - apart[0])
         steps_in_all = length / step
         if steps_in_all * relative_u < 0.5 <= steps_in_all:
@@ -144,7 +144,7 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
 
 
 def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F8, NDArray[np.bool_]]:
-    """Replace each time by its grid point where the two agree within the rounding of the print.
+    """Replace each time by its grid point if the two agree within the rounding of the print.
 
     Parameters
     ----------
@@ -158,12 +158,12 @@ def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F
     Returns
     -------
     t : (n,) float64, s
-        Grid points, and times as they were where they do not agree.
+        Grid points, and the unchanged times that do not agree with one.
     agrees : (n,) bool
     """
     snapped = np.empty(t.size) if out is None else out
     agrees = np.empty(t.size, bool)
-    for start in range(0, t.size, _BLOCK):  # what fits into the cache is done in a fraction of the time
+    for start in range(0, t.size, _BLOCK):  # blocks that fit into the cache are much faster
         rows = slice(start, start + _BLOCK)
         exact = grid.time(grid.nearest(t[rows]))
         agrees[rows] = np.abs(exact - t[rows]) <= resolution * 0.5001
@@ -171,27 +171,27 @@ def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F
     return snapped, agrees
 
 
-def place_unread(t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dict[int, str], decimals: int) -> F8:
-    """Tell the times of rows that could not be read, from the grid and their neighbours.
+def place_unread(t: F8, unread: NDArray[np.bool_], grid: Grid | None, expected: dict[int, str], decimals: int) -> F8:
+    """Return times with those of rows that could not be read, from the grid and the neighbours.
 
     Parameters
     ----------
     t : (n,) float64, s
-        Times; those of bad rows are as printed, or NaN.
-    bad : (n,) bool
+        Times; those of unread rows as printed, or NaN.
+    unread : (n,) bool
     grid : Grid or None
     expected : dict of int to str
-        The first cell of each bad row.
+        The first cell of each unread row.
     decimals : int
-        Decimals that a time is printed with.
+        Number of printed decimals of a time.
 
     Returns
     -------
     (n,) float64, s
-        Times, NaN for those bad rows that cannot be told: nothing shows that they were samples.
+        Times; NaN for unread rows whose time cannot be inferred, because nothing shows that they were samples.
     """
-    out = np.where(bad, np.nan, t)
-    for start, stop in _runs(bad):
+    out = np.where(unread, np.nan, t)
+    for start, stop in _runs(unread):
         before = float(t[start - 1]) if start else np.nan
         after = float(t[stop]) if stop < t.size else np.nan
         count = stop - start
@@ -202,9 +202,9 @@ def place_unread(t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dic
         last = before
         for row in range(start, stop):
             ahead, behind = row - start + 1, stop - row
-            guess = _told(float(t[row]), last, after, (before, ahead), behind, grid)
+            guess = _time_of_row(float(t[row]), last, after, (before, ahead), behind, grid)
             if np.isnan(guess) and row == t.size - 1 and grid is not None and np.isfinite(last):
-                # The last row may stop within its time: it must be how the next time begins.
+                # The last row may stop within its time; then it must be the beginning of the next time.
                 follows = float(grid.time(grid.nearest(np.array([last])) + 1)[0])
                 if expected.get(row, "") and f"{follows:.{decimals}f}".startswith(expected[row]):
                     guess = follows
@@ -213,10 +213,10 @@ def place_unread(t: F8, bad: NDArray[np.bool_], grid: Grid | None, expected: dic
     return out
 
 
-def _told(
+def _time_of_row(
     printed: float, last: float, after: float, before: tuple[float, int], behind: int, grid: Grid | None
 ) -> float:
-    """Return the time a bad row prints if it lies where it should, on the grid; else NaN."""
+    """Return the printed time of an unread row if it is at its place on the grid; else NaN."""
     if not np.isfinite(printed) or printed <= last or printed >= after:
         return np.nan
     if grid is None:
@@ -225,7 +225,7 @@ def _told(
     if np.isfinite(last) and np.isfinite(after):
         return exact if last < exact < after else np.nan
     origin, steps = before if np.isfinite(before[0]) else (after, -behind)
-    # At an end of the file only the step that is due counts, or a damaged digit would pass for a time.
+    # At an end of the file only the expected step is accepted, because a digit may be damaged.
     return exact if abs(exact - origin - steps / grid.rate_hz) < 0.5 / grid.rate_hz else np.nan
 
 
@@ -235,7 +235,7 @@ def _runs(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
 
 
 def _even(t: F8, longest: float) -> bool:
-    """Tell whether every step runs forward and none is long."""
+    """Return whether every step is positive and none is long."""
     for start in range(0, t.size - 1, _BLOCK):
         steps = np.diff(t[start : start + _BLOCK + 1])
         if not (steps.min() > 0 and steps.max() <= longest):
@@ -255,8 +255,8 @@ def time_flags(t: F8, step: float) -> U8:
     Returns
     -------
     (n,) uint8
-        Times of the samples without DUPLICATE_TIME and NON_MONOTONIC_TIME increase strictly. A single time
-        that shoots ahead of its neighbours is taken for the wrong one, not all that follow it.
+        Times of the samples without DUPLICATE_TIME and NON_MONOTONIC_TIME increase strictly. If a single time is
+        ahead of its neighbours, that time is flagged and not all that follow it.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""From columns as printed to samples with times and flags, and what is to be said of them."""
+"""Turn printed columns into samples with times and flags, and report their peculiarities."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
 
 _COARSE_M = 1e-3
-_FAR_SPREADS, _FAR_GAP = 30.0, 3.0  # how far off a lost target reads: times the usual, and times the next nearest
+_FAR_SPREADS, _FAR_GAP = 30.0, 3.0  # deviation of a lost target: times the usual, and times the next smaller one
 _SAMPLE = 65536
 _FEWEST = 50  # distances; with fewer, a common step may be chance
 _ZEROS = 10
@@ -37,35 +37,35 @@ _ZEROS = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """One channel's rows as samples to be.
+    """One channel's rows, before they become samples.
 
     Parameters
     ----------
     printed : (n,) float64, s, or None
-        Times as printed; None where there are none.
+        Times as printed; None if there are none.
     value : (n,) float64
-        In the channel's unit times the power of ten asked for; NaN where unread or absent.
-    bad, remark : (n,) bool
-        Rows that could not be read, and rows of text between samples, which are none.
+        In the channel's unit times the wanted power of ten; NaN if unread or absent.
+    unread, remark : (n,) bool
+        Rows that could not be read, and rows of text between samples, which are not samples.
     line : callable
-        Gives the one-based line of a row.
+        Returns the one-based line of a row.
     time_resolution, resolution : float
-        Last printed digit of a time, s, and of a value; the latter 0 where it is binary.
+        Last printed digit of a time, s, and of a value; the latter is 0 for binary values.
     tolerance : (n,) float64, s, or None
-        Half the last digit of each time, where a header's formula is to be held against them.
+        Half the last digit of each time, if they are to be compared with a formula in the header.
     cut : bool
-        Whether the last row stops midway.
+        Whether the last row is incomplete.
     last_cell : str
         The first cell of the last row.
     decimals : int
-        Decimals that a time is printed with.
+        Number of printed decimals of a time.
     behind : tuple of (n,) float64
-        The columns behind the value, of a sheet whose rows have a width.
+        The columns after the value, in a sheet whose rows have a fixed width.
     """
 
     printed: F8 | None
     value: F8
-    bad: NDArray[np.bool_]
+    unread: NDArray[np.bool_]
     remark: NDArray[np.bool_]
     line: Callable[[int], int]
     time_resolution: float
@@ -78,81 +78,78 @@ class Rows:
 
     @property
     def numbers(self) -> I8:
-        """Numbers of the rows as samples, counted without remarks; that of a remark is that of the row before."""
+        """Sample numbers of the rows, counted without remarks; a remark has the number of the row before."""
         return np.cumsum(~self.remark) - 1
 
 
 def place(rows: Rows, timing: Timing) -> F8:
-    """Return the time of each row, s: of its number, or as printed and snapped to the grid; of a bad row where it is
-    told, else NaN.
+    """Return the time of each row, s: from its row number, or as printed and snapped to the grid.
 
-    The times printed are overwritten.
+    The time of an unread row is inferred if possible, else NaN. The array of printed times is overwritten.
     """
-    bad, t, grid = rows.bad, rows.printed, timing.grid
+    unread, t, grid = rows.unread, rows.printed, timing.grid
     if grid is not None and (timing.by_row or t is None):
         t = grid.time(rows.numbers)
         t[rows.remark] = np.nan
         return t
     if t is None:
         raise ValueError("without times only a grid has times of rows")
-    if not bad.any():
+    if not unread.any():
         return t if grid is None else snap(t, grid, timing.resolution_s, out=t)[0]
     if grid is not None:
-        t[~bad] = snap(t[~bad], grid, timing.resolution_s)[0]
-    expected = {bad.size - 1: rows.last_cell} if bad[-1] else {}
-    return place_unread(t, bad, grid, expected, rows.decimals)
+        t[~unread] = snap(t[~unread], grid, timing.resolution_s)[0]
+    expected = {unread.size - 1: rows.last_cell} if unread[-1] else {}
+    return place_unread(t, unread, grid, expected, rows.decimals)
 
 
 def within(values: F8, limit: float) -> bool:
-    """Tell whether there are values and all of them, no NaN among them, lie within a limit on either side."""
-    return bool(values.size and values.min() > -limit and values.max() < limit)  # a NaN is neither
+    """Return whether there are values and all of them lie between -limit and limit; false if there is a NaN."""
+    return bool(values.size and values.min() > -limit and values.max() < limit)  # any comparison with NaN is false
 
 
-def flags_of(t: F8, value: F8, bad: NDArray[np.bool_], rate_hz: float) -> U8:
+def flags_of(t: F8, value: F8, unread: NDArray[np.bool_], rate_hz: float) -> U8:
     """Flag what is wrong with times and values."""
     flags = time_flags(t, 1.0 / rate_hz)
     missing = np.isnan(value)
     if missing.any():
         flags[missing] |= Flag.MISSING.value
-    if bad.any():
-        flags[bad] |= UNREAD_FLAGS
+    if unread.any():
+        flags[unread] |= UNREAD_FLAGS
     return flags
 
 
-def row_traps(rows: Rows, told: NDArray[np.bool_], zeros: int) -> Iterator[Trap]:
-    """Say which rows could not be read; ``told`` are those that stand as samples."""
+def row_traps(rows: Rows, timed: NDArray[np.bool_], zeros: int) -> Iterator[Trap]:
+    """Report which rows could not be read; ``timed`` are those with a time, which become samples."""
     if zeros:
         yield Trap("zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted")
-    bad = rows.bad
-    last = bad.size - 1
+    unread = rows.unread
+    last = unread.size - 1
     if rows.cut:
-        kept = "kept as a missing sample" if told[last] else "its time is not told, so no sample stands for it"
-        yield Trap("truncated_row", f"the last row stops midway; {kept}", 1, rows.line(last))
-    found = np.flatnonzero(bad[:-1] if rows.cut else bad)
-    if found.size:
-        first = rows.line(int(found[0]))
-        kept_rows = int(np.count_nonzero(told[found]))
-        message = (
-            f"{found.size} rows could not be read, the first in line {first}; {kept_rows} of them are kept as "
-            "missing samples, the others show no sign of having been samples"
-        )
-        yield Trap("malformed_rows", message, int(found.size), first)
+        outcome = "kept as a missing sample" if timed[last] else "left out, because its time is unknown"
+        yield Trap("truncated_row", f"the last row is incomplete; {outcome}", 1, rows.line(last))
+    unread_rows = np.flatnonzero(unread[:-1] if rows.cut else unread)
+    if unread_rows.size:
+        first = rows.line(int(unread_rows[0]))
+        kept_rows = int(np.count_nonzero(timed[unread_rows]))
+        rows_are = "1 row" if unread_rows.size == 1 else f"{unread_rows.size} rows"
+        message = f"{rows_are} could not be read, the first in line {first}; {kept_rows} kept as missing samples"
+        yield Trap("malformed_rows", message, int(unread_rows.size), first)
 
 
 def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | None]) -> Iterator[Trap]:
-    """Count what was flagged; ``line`` gives the line of a sample."""
+    """Report the flagged samples by flag; ``line`` returns the line of a sample."""
     if not flags.any():
         return
-    found = (
+    kinds = (
         ("duplicate_time", Flag.DUPLICATE_TIME, "samples repeat a time"),
         (
             "non_monotonic_time",
             Flag.NON_MONOTONIC_TIME,
-            "samples run back in time or ahead of those around them",
+            "samples have times that run backward or ahead of their neighbours",
         ),
         ("missing_samples", Flag.MISSING, "samples have no value"),
     )
-    for code, flag, what in found:
+    for code, flag, what in kinds:
         rows = np.flatnonzero(flags & flag.value)
         if rows.size:
             yield Trap(code, f"{rows.size} {what}; kept and flagged", int(rows.size), line(int(rows[0])))
@@ -160,26 +157,27 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
     if gaps.size:
         reached = np.maximum.accumulate(np.where(flags & IRREGULAR, -np.inf, t))
         lost = int(np.sum(np.rint((t[gaps] - reached[gaps - 1]) * rate_hz) - 1))
-        message = f"about {lost} samples are missing in {gaps.size} gaps of time; the sample after each is flagged"
+        gaps_are = "1 gap" if gaps.size == 1 else f"{gaps.size} gaps"
+        message = f"about {lost} samples are missing in {gaps_are}; the sample after each is flagged"
         yield Trap("missing_samples", message, lost, line(int(gaps[0])))
 
 
 def value_traps(
     distance: F8, flags: U8, resolution: float, line: Callable[[int], int | None], *, length: bool = True
 ) -> tuple[float, tuple[Trap, ...]]:
-    """Look for distances that are rounded more coarsely than they are printed, and for a target that was lost.
+    """Find distances that are rounded more coarsely than they are printed, and a lost target.
 
     Parameters
     ----------
     distance : (n,) float64, m
-        Zeros that fill the end become NaN here.
+        Zeros that fill the end become NaN in place.
     flags : (n,) uint8
-        Samples of a lost target get FALSE_ECHO here, zeros that fill the end MISSING.
+        Samples of a lost target get FALSE_ECHO in place, zeros that fill the end MISSING.
     resolution : float
         Last printed digit, m.
     line : callable
     length : bool
-        Whether these are distances at all; of volts no target is lost, and 0 V is a reading.
+        Whether these are distances. Voltages have no lost target, and 0 V is a normal reading.
 
     Returns
     -------
@@ -198,23 +196,23 @@ def value_traps(
         flags[far] |= Flag.FALSE_ECHO.value
         low, high = float(np.min(distance[far])), float(np.max(distance[far]))
         message = (
-            f"{far.size} distances of {low:.3g} to {high:.3g} m lie far off all others, and nothing between: "
-            "the target was lost; kept and flagged"
+            f"{far.size} distances of {low:.3g} to {high:.3g} m are far from all others: the target was lost; "
+            "kept and flagged"
         )
         traps.append(Trap("lost_target", message, int(far.size), line(int(far[0]))))
     quantum = _common_step(distance, resolution)
     if length and quantum >= _COARSE_M * (1 - 1e-9):
-        message = f"distances are multiples of {quantum * 1e3:g} mm: finer motion is rounded away"
+        message = f"distances are multiples of {quantum * 1e3:g} mm: smaller motion is lost by rounding"
         traps.append(Trap("quantised", message, distance.size))
     return quantum, tuple(traps)
 
 
 def _zero_tail(distance: F8) -> int:
-    """Return where zeros that fill the end begin; the number of samples where there are none."""
+    """Return the index of the first zero that fills the end; the number of samples if there are none."""
     if distance.size <= _ZEROS or distance[-1] != 0.0 or distance[-_ZEROS:].any():
         return int(distance.size)
-    other = np.flatnonzero(distance != 0.0)
-    return int(other[-1]) + 1 if other.size else int(distance.size)
+    nonzero = np.flatnonzero(distance != 0.0)
+    return int(nonzero[-1]) + 1 if nonzero.size else int(distance.size)
 
 
 def _some(values: F8) -> F8:
@@ -224,26 +222,26 @@ def _some(values: F8) -> F8:
 
 
 def _far(distance: F8, resolution: float) -> NDArray[np.int64]:
-    """Return the samples far off the median, compared with how far the others are, with nothing between.
+    """Return the samples far from the median, relative to the deviation of the others, and beyond a gap.
 
-    No length is far by itself, nobody knowing how large an experiment is; a motion that dies away has no gap.
+    The size of the experiment is unknown, so no distance is far by itself; a decaying motion has no such gap.
     """
-    some, none = _some(distance), np.empty(0, np.int64)
-    if some.size < _ZEROS:
-        return none
-    middle = median(some)
-    least = _FAR_SPREADS * max(median(np.abs(some - middle)), resolution)
-    away = np.abs(distance - middle)
-    if least == 0.0 or not np.fmax.reduce(away) > least:
-        return none
-    ordered = np.sort(away[np.isfinite(away)])
-    first = int(np.searchsorted(ordered, least, side="right"))
-    gaps = np.flatnonzero(ordered[first:] > _FAR_GAP * np.maximum(ordered[first - 1 : -1], least / _FAR_SPREADS))
-    return np.flatnonzero(away >= ordered[first + gaps[0]]) if gaps.size else none
+    values, no_samples = _some(distance), np.empty(0, np.int64)
+    if values.size < _ZEROS:
+        return no_samples
+    middle = median(values)
+    threshold = _FAR_SPREADS * max(median(np.abs(values - middle)), resolution)
+    deviation = np.abs(distance - middle)
+    if threshold == 0.0 or not np.fmax.reduce(deviation) > threshold:
+        return no_samples
+    ordered = np.sort(deviation[np.isfinite(deviation)])
+    first = int(np.searchsorted(ordered, threshold, side="right"))
+    gaps = np.flatnonzero(ordered[first:] > _FAR_GAP * np.maximum(ordered[first - 1 : -1], threshold / _FAR_SPREADS))
+    return np.flatnonzero(deviation >= ordered[first + gaps[0]]) if gaps.size else no_samples
 
 
 def _common_step(distance: F8, resolution: float) -> float:
-    """Return the largest step that all distances are multiples of: the last printed digit, or some multiple of it."""
+    """Return the largest step of which all distances are multiples: the last printed digit or a multiple of it."""
     if not resolution > 0 or distance.size < _FEWEST:
         return resolution
     for values in (distance[:4096], distance):

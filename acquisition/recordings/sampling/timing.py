@@ -1,4 +1,4 @@
-"""From printed times, a header's formula or a given rate to the times of samples, and what is to be said of them."""
+"""Find the times of samples from printed times, a formula in the header or a given rate, and report on them."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.questions import Missing, Need, Question
+from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Trap
+from acquisition.recordings.sampling.bursts import Bursts, find_bursts
 from acquisition.recordings.sampling.nominal import Grid, find_rate
 
 __all__ = ["Timing", "check_rate", "clock_traps", "rate_needed", "time_by_column", "time_by_formula", "time_by_rate"]
 
 _SHARE_OF_JITTER = 0.2
-_ANY_RATE_HZ = 100.0  # an example of a rate: one that many sensors have
+_ANY_RATE_HZ = 100.0  # an example of a rate, which many sensors have
 
 
 class Timing(NamedTuple):
@@ -28,17 +29,19 @@ class Timing(NamedTuple):
     ----------
     rate_hz : float
     grid : Grid or None
-        None where the times fit no grid and stand as printed.
+        None if the times fit no grid and are used as printed.
     resolution_s : float
         Last printed digit, s.
     certain : bool
-        Whether the times, or a header, settle the rate.
+        Whether the times or a header determine the rate.
     given : bool
         Whether the user gave the rate and the file does not confirm it.
     steps_s : (float, float) or None
         The usual range of steps between times that fit no grid but jitter little about one step.
     by_row : bool
-        Whether row numbers tell the times better than what is printed.
+        Whether row numbers give better times than the printed ones.
+    bursts : Bursts or None
+        What the computer's times looked like, if samples were spread evenly instead.
     """
 
     rate_hz: float
@@ -48,39 +51,42 @@ class Timing(NamedTuple):
     given: bool = False
     steps_s: tuple[float, float] | None = None
     by_row: bool = False
+    bursts: Bursts | None = None
 
 
 def check_rate(path: str, rate_hz: float | None) -> None:
-    """Demand that a rate, if given, is a positive number."""
+    """Check that a rate, if given, is a positive number."""
     if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
         raise FormatError(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
 
 
-def rate_needed(instead: Need | None = None) -> Need:
-    """Return the need for a rate.
+def rate_needed(instead: MissingItem | None = None) -> MissingItem:
+    """Return the missing item for a rate.
 
     Parameters
     ----------
-    instead : Need, optional
-        For the column of times that would do as well.
+    instead : MissingItem, optional
+        The column of times, which could be given instead.
     """
-    return Need(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)
+    return MissingItem(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)
 
 
 def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
-    """Infer the rate from a column of times, s, of sound rows.
+    """Infer the rate from a column of times, s, of valid rows.
 
     Raises
     ------
     NeedsAnswer
-        If fewer than two different times are there and no rate was given.
+        If there are fewer than two different times, or bursts of times with samples missing, and no rate was given.
     FormatError
-        If the rate given contradicts the times.
+        If the given rate contradicts the times.
     """
+    if (bursts := find_bursts(printed)) is not None:
+        return _spread(path, bursts, resolution, rate_hz)
     rate = find_rate(printed, resolution, rate_hz=rate_hz)
     if rate is None:
         if rate_hz is None:
-            reason = f"expected times to tell the rate, got {printed.size} rows at one time"
+            reason = f"expected different times, got {printed.size} rows at one time"
             raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
         origin = float(printed[0]) if printed.size else 0.0
         return Timing(rate_hz, Grid(rate_hz, origin), resolution, certain=False, given=True)
@@ -88,14 +94,24 @@ def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | N
     if rate_hz is not None:
         allowed = rate_hz * (1.5 * rate.relative_u + 1e-6 + (0.01 if steps else 0.0))
         if abs(rate.rate_hz - rate_hz) > allowed:
-            demand = f"rate_hz {rate_hz:g} was given, but the times say {rate.rate_hz:.6g} Hz"
-            raise FormatError(path, demand, "leave the rate out or correct it")
+            problem = f"rate_hz must agree with the times, {rate.rate_hz:.6g} Hz, got {rate_hz:g}"
+            raise FormatError(path, problem, "leave the rate out or correct it")
         return Timing(rate_hz, rate.grid, resolution, certain=True, given=True, steps_s=steps)
     return Timing(rate.rate_hz, rate.grid, resolution, rate.certain, steps_s=steps)
 
 
+def _spread(path: str, bursts: Bursts, resolution: float, rate_hz: float | None) -> Timing:
+    """Return even times for samples that were stamped in bursts."""
+    if rate_hz is None and not bursts.complete:
+        each = f"{bursts.size:.3g} samples every {1e3 * bursts.interval_s:.3g} ms"
+        raise NeedsAnswer(Question(path, (rate_needed(),), reason=f"the times come in bursts of {each}, some missing"))
+    rate = rate_hz or 1.0 / bursts.step_s
+    grid = Grid(rate, bursts.first_s)
+    return Timing(rate, grid, resolution, certain=True, given=rate_hz is not None, by_row=True, bursts=bursts)
+
+
 def _jitter(printed: F8) -> tuple[float, float] | None:
-    """Return the usual range of steps, where all but a few lie close to one step."""
+    """Return the usual range of steps, if all but a few are close to one step."""
     steps = np.diff(printed)
     steps = steps[steps > 0]
     if steps.size < 2:
@@ -113,67 +129,74 @@ def time_by_formula(
     numbers: I8,
     rate_hz: float | None,
 ) -> Timing | None:
-    """Take a header's times ``start_s + i step_s``, if the column of times agrees within its rounding.
+    """Use the times ``start_s + i step_s`` of a header, if the column of times agrees within its rounding.
 
     Parameters
     ----------
     printed, tolerance : (n,) float64, s, or None
-        Times of the rows, NaN where unread, and half the last digit of each; None: no column.
+        Times of the rows, NaN if unread, and half the last digit of each; None without a column.
     numbers : (n,) int64
         The i of each row.
 
     Returns
     -------
     Timing or None
-        None where header and column disagree.
+        None if header and column disagree.
     """
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
     if printed is not None and tolerance is not None:
         expected = start_s + step_s * numbers
         slack = 1e-9 * np.maximum(np.abs(expected), step_s)
-        if (np.abs(printed - expected) > tolerance * 1.0001 + slack).any():  # never true of a NaN
+        if (np.abs(printed - expected) > tolerance * 1.0001 + slack).any():  # false for a NaN
             return None
     rate = 1.0 / step_s
     rounded = float(f"{rate:.9g}")
     rate = rounded if math.isclose(rounded, rate, rel_tol=1e-12) else rate
     if rate_hz is not None and abs(rate - rate_hz) > 1e-6 * rate:
-        demand = f"rate_hz {rate_hz:g} was given, but the header says {rate:.6g} Hz"
-        raise FormatError(path, demand, "leave the rate out or correct it")
+        problem = f"rate_hz must agree with the header, {rate:.6g} Hz, got {rate_hz:g}"
+        raise FormatError(path, problem, "leave the rate out or correct it")
     return Timing(rate, Grid(rate, start_s), 0.0, certain=True, by_row=True)
 
 
 def time_by_rate(path: str, rate_hz: float | None, why: str) -> Timing:
-    """Take the rate that the user gives, for nothing in the file tells times."""
+    """Use the rate that the user gives, because the file has no times."""
     if rate_hz is None:
         raise NeedsAnswer(Question(path, (rate_needed(),), reason=why))
     return Timing(rate_hz, Grid(rate_hz), 0.0, certain=True, given=True, by_row=True)
 
 
 def clock_traps(timing: Timing) -> Iterator[Trap]:
-    """Say what the times are."""
-    if timing.grid is not None:
+    """Report the kind of the times."""
+    if timing.bursts is not None:
+        size, interval_ms = timing.bursts.size, 1e3 * timing.bursts.interval_s
+        message = (
+            f"the times come in bursts of {size:.3g} samples every {interval_ms:.4g} ms; "
+            f"the samples were spread evenly, at {timing.rate_hz:.6g} Hz"
+        )
+        yield Trap("times_in_bursts", message)
+    elif timing.grid is not None:
         message = f"times are row numbers over a nominal {timing.rate_hz:g} Hz, not measured times"
         yield Trap("nominal_clock", message)
     if timing.given:
         yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz was given by the user")
     elif timing.steps_s is not None:
         low, high = (1e3 * step for step in timing.steps_s)
-        message = (
-            f"times are measured and jitter: steps of {low:.4g} to {high:.4g} ms, on average {timing.rate_hz:.6g} Hz"
-        )
+        digits = min(max(4, 1 - math.floor(math.log10((high - low) / high))), 9) if high > low else 4
+        steps = f"{low:.{digits}g} to {high:.{digits}g} ms ({timing.rate_hz:.6g} Hz on average)"
+        message = f"the times are measured: their steps vary from {steps}"
         yield Trap("jittered_time", message)
     elif not timing.certain:
         why = (
-            "too few rows settle it"
+            "there are too few rows to be certain"
             if timing.grid is not None
-            else "the times fit no regular grid and stand as printed"
+            else "the times fit no regular grid and are used as printed"
         )
-        yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the likeliest: {why}")
+        yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the most likely one: {why}")
 
 
 def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int) -> F8:
-    """Return half the last printed digit of each time, s; of those with exponents at least that.
+    """Return half the last printed digit of each time, s; for times with exponents at least that.
 
     Parameters
     ----------
@@ -183,7 +206,7 @@ def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int)
     shift : int
         Power of ten from the printed unit to seconds.
     exponent : int
-        What is added to the decimals in a form with an exponent.
+        Added to the decimals in a form with an exponent.
     """
     usual = int(form[0]) if form.size else 0
     if 0 <= usual < exponent and (form == usual).all():

@@ -1,4 +1,4 @@
-"""What a velocity column tells: the sensor's tick, the position behind it, and how it joins a position."""
+"""Use a velocity column: find the sensor's tick, sum up the position, and join it with a position column."""
 
 from __future__ import annotations
 
@@ -12,31 +12,32 @@ from acquisition.block import F8, I8
 __all__ = ["Path", "find_quantum", "find_tick", "integrate", "outer_join"]
 
 _FEWEST_VALUES = 20
-_FINEST = 4  # a tick below four last digits cannot be told from the rounding
+_FINEST = 4  # a tick below four last digits cannot be distinguished from the rounding
 _SHARE = 0.95
 _COARSEST = 24
 _COHERENT = 0.9
 
 
 def find_tick(values: F8, resolution: float) -> float | None:
-    """Find the largest step that printed values are multiples of, within their rounding.
+    """Find the largest step of which printed values are multiples, within their rounding.
 
     Parameters
     ----------
     values : (n,) float64
-        Printed values; NaN is left out.
+        Printed values; NaN is ignored.
     resolution : float
         Last printed digit, in their unit.
 
     Returns
     -------
     float or None
-        The step, in their unit; None where no step is evident.
+        The step, in their unit; None if there is no evident step.
 
     Notes
     -----
-    Gaps between neighbouring values suggest steps; each is refined by least squares of ``v = k s`` over ever
-    larger v, whose k are known as soon as s is known well enough, and must explain 95 % of the values.
+    Gaps between neighbouring values are candidates for the step s. Each is refined by least squares of ``v = k s``
+    over larger and larger v, because the integers k of large v are certain only for an accurate s. The step must
+    explain 95 % of the values.
 
     Examples
     --------
@@ -72,13 +73,13 @@ def _refine(size: F8, step: float) -> float:
 
 
 def find_quantum(values: F8, tick: float) -> float:
-    """Return the step that values cluster at: ``tick`` itself, or the multiple of it that most are close to.
+    """Return the spacing of the clusters of values: ``tick`` itself, or a multiple of it.
 
     Notes
     -----
-    A device that converts timer ticks to distance in whole numbers leaves values at ``j m tick`` and
-    ``(j m + 1) tick``: exact multiples of a small step, in clusters a timer tick apart. The clusters are the
-    quantum. They are found by phase coherence, ``|mean exp(2 pi i k / m)|``, which must reach 0.9.
+    A device that converts timer ticks to distance by integer arithmetic gives values at ``j m tick`` and
+    ``(j m + 1) tick``: exact multiples of a small step, in clusters one timer tick apart. The spacing of the clusters
+    is the quantum. It is found by phase coherence, ``|mean exp(2 pi i k / m)|``, which must reach 0.9.
 
     Examples
     --------
@@ -102,9 +103,9 @@ class Path:
     Parameters
     ----------
     position : (n,) float64, m
-        Zero at the first sample; NaN where the velocity is unknown.
+        Zero at the first sample; NaN if the velocity is unknown.
     bridged : (n,) bool
-        Samples that follow a hole: their offset from what came before is not known.
+        Samples after a gap, whose offset from the earlier samples is not known.
     """
 
     position: F8
@@ -112,25 +113,25 @@ class Path:
 
 
 def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, rounding: float) -> Path:
-    """Sum backward differences up to a position.
+    """Sum backward differences to a position.
 
     Parameters
     ----------
     velocity : (n,) float64, m/s
-        ``(x[i] - x[i-1]) * rate_hz``; NaN where unknown. The first needs no value.
+        ``(x[i] - x[i-1]) * rate_hz``; NaN if unknown. The first needs no value.
     index : (n,) int64
-        Sample numbers, increasing; a jump is a hole.
+        Sample numbers, increasing; a jump is a gap.
     rate_hz : float
     tick : float or None
-        Step of velocity, m/s: a value within ``rounding`` of a multiple is taken for that multiple, so that
-        the rounding of the print does not add up.
+        Step of velocity, m/s. A value within ``rounding`` of a multiple is replaced by that multiple, so that rounding
+        errors do not add up.
     rounding : float
         Half the last printed digit, m/s.
 
     Notes
     -----
-    Across a hole the position moves on by the velocity interpolated linearly between its two sides. That is a
-    guess of the offset, so the first sample after it is marked.
+    In a gap the velocity is interpolated linearly. The resulting offset is only an estimate, so the first sample after
+    the gap is marked.
     """
     known = np.isfinite(velocity)
     v = velocity.copy()
@@ -145,7 +146,7 @@ def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, round
         position[0] = 0.0
     if rows.size == 0:
         return Path(position, bridged)
-    # Without a velocity the first sample still has a place, zero: the second stands on it.
+    # A first sample without a velocity is at position zero, and the second one is relative to it.
     previous = np.concatenate(([index[0] if start else index[rows[0]] - 1], index[rows[:-1]]))
     v_before = np.concatenate(([v[rows[0]]], v[rows[:-1]]))
     lost = index[rows] - previous - 1
@@ -165,13 +166,13 @@ def outer_join(left: I8, right: I8, regular: NDArray[np.bool_] | None = None) ->
     left, right : (n,), (m,) int64
         Sample numbers. The n-th row of a repeated number pairs with the n-th there.
     regular : (n,) bool, optional
-        Rows of ``left`` whose number tells where they stand; all, if left out.
+        Rows of ``left`` whose numbers are in order; all by default.
 
     Returns
     -------
     from_left, from_right : (k,) int64
-        Row of each joined sample in either; -1 where it has none. Rows of ``left`` keep their order, and rows
-        that only ``right`` has come where their number falls.
+        Row of each joined sample in either; -1 if it has none. Rows of ``left`` keep their order, and rows that only
+        ``right`` has are inserted by their number.
 
     Examples
     --------

@@ -1,6 +1,5 @@
-"""Text and binary tables: headings and channels of what a family found, and the numbers in their columns.
+"""Text and binary tables: their headings, channels and numbers.
 
-In: a file's bytes and what stands where in them. Out: numbers, and which cells and rows are none; no sample yet.
-``regular`` reads lines alike with numpy, ``table`` the rest; a newcomer may add words for time in
-``contents``, traps in ``sheet``.
+In: the bytes of a file and the layout of its tables. Out: numbers, and which cells and rows could not be read; no
+samples yet. ``regular`` reads regular lines with numpy, ``table`` all others. Words for time are in ``contents``.
 """

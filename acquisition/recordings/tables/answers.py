@@ -1,4 +1,4 @@
-"""What a user says of a file, and what must be asked because neither file nor user says it."""
+"""Choose a channel from the answers of the user, and ask for what neither file nor user states."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.questions import Missing, Need, Question, Times
+from acquisition.recordings.questions import Missing, MissingItem, Question, Times
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.timing import rate_needed
 from acquisition.recordings.tables.contents import (
@@ -19,23 +19,23 @@ from acquisition.recordings.tables.contents import (
     Contents,
     Sheet,
     candidates,
+    channel_of_name,
     name_and_unit,
-    named,
     of_run,
     split_heading,
 )
 from acquisition.recordings.tables.text import parse_number
 from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_power, unit_words
 
-__all__ = ["Answers", "measure", "settle"]
+__all__ = ["Answers", "choose_channel", "measure"]
 
 _SLOW_S = 0.999
-"""Steps of a second and more without a unit may as well be milliseconds: they are asked about."""
+"""Time steps of a second or more without a unit may be milliseconds, so their unit must be stated."""
 _FIRST_ROWS = 50
-_ANEW = 0.2
+_SHARE_OF_RESTARTS = 0.2
 _LAST_BYTES = 4096
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
-"""Times since 1970, from which size on they are in which unit."""
+"""Units of times since 1970, by their smallest size."""
 _LIKELY = (
     (re.compile(r"gyr|omega|ω|ang\w*[ _.]*(vel|speed|ges)|winkelges|^g[xyz](?![^\W_])", re.IGNORECASE), "rad/s"),
     (re.compile(r"acc|beschl|versn|^a[xyz](?![^\W_])|g[-_ ]?f|^ac[xyz]", re.IGNORECASE), "m/s2"),
@@ -48,7 +48,7 @@ _LIKELY = (
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What the user says of a file; None where nothing."""
+    """What the user states about a file; None for what is not stated."""
 
     channel: str | None = None
     rate_hz: float | None = None
@@ -58,34 +58,34 @@ class Answers:
     time_unit: str | None = None
 
 
-def settle(path: str, contents: Contents, said: Answers) -> Channel:
-    """Return the channel to take, with its times, or ask for all that is missing at once.
+def choose_channel(path: str, contents: Contents, answers: Answers) -> Channel:
+    """Return the channel to read, with its times, or ask for everything that is missing in one question.
 
     Raises
     ------
     NeedsAnswer
-        With the columns and everything that is missing of them.
+        With the columns and all missing items.
     FormatError
-        If what the user says contradicts the file.
+        If an answer contradicts the file.
     """
-    needs: list[Need] = []
-    if said.run is None and len(contents.runs) > 1:
-        needs.append(Need(Missing.RUN, contents.runs, contents.runs[0]))
-    channels = of_run(path, contents, contents.runs[0] if needs else said.run)
-    if said.channel is not None:
-        chosen = named(path, channels, said.channel)
+    needs: list[MissingItem] = []
+    if answers.run is None and len(contents.runs) > 1:
+        needs.append(MissingItem(Missing.RUN, contents.runs, contents.runs[0]))
+    channels = of_run(path, contents, contents.runs[0] if needs else answers.run)
+    if answers.channel is not None:
+        chosen = channel_of_name(path, channels, answers.channel)
     else:
-        fit = candidates([each for each in channels if each.name != said.time] or channels)
+        fit = candidates([each for each in channels if each.name != answers.time] or channels)
         chosen = next((each for each in fit if each.measure), fit[0])
         if len(fit) > 1:
-            needs.append(Need(Missing.CHANNEL, tuple(each.name for each in fit), chosen.name))
-    if said.time is not None:
-        chosen = _timed_by(path, channels, chosen, said.time)
-    if isinstance(chosen.source, Sheet) and chosen.time is not None and _begins_anew(chosen.source, chosen.time):
-        chosen = replace(chosen, time=None, formula=None)  # chunks: what lies between them is told nowhere
-    chosen = _with_time_unit(path, chosen, said.time_unit)
-    needs.extend(_of_times(channels, chosen, said))
-    if chosen.measure is None and said.unit is None:
+            needs.append(MissingItem(Missing.CHANNEL, tuple(each.name for each in fit), chosen.name))
+    if answers.time is not None:
+        chosen = _timed_by(path, channels, chosen, answers.time)
+    if isinstance(chosen.source, Sheet) and chosen.time is not None and _restarts(chosen.source, chosen.time):
+        chosen = replace(chosen, time=None, formula=None)  # chunks, with unknown times between them
+    chosen = _with_time_unit(path, chosen, answers.time_unit)
+    needs.extend(_missing_times(channels, chosen, answers))
+    if chosen.measure is None and answers.unit is None:
         needs.append(_unit(chosen))
     if needs:
         columns = tuple(each.label for each in channels)
@@ -93,19 +93,19 @@ def settle(path: str, contents: Contents, said: Answers) -> Channel:
     return chosen
 
 
-def _unit(chosen: Channel) -> Need:
+def _unit(chosen: Channel) -> MissingItem:
     example = "1" if chosen.unit else _likely_unit(chosen.name)
     others = (unit for unit in MEASURES if unit != unit_words(example))
-    return Need(Missing.UNIT, (example, *others), example, of=chosen.name, stated=chosen.unit)
+    return MissingItem(Missing.UNIT, (example, *others), example, of=chosen.name, stated=chosen.unit)
 
 
 def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tuple[Trap, ...]]:
-    """Return what the channel's values are of, and what was assumed for it.
+    """Return the measure of the channel's values, and the assumptions made for it.
 
     Raises
     ------
     FormatError
-        If the unit given is none, or contradicts the file.
+        If the given unit is unknown or contradicts the file.
     """
     stated = channel.measure
     given = None if unit is None else measure_of(unit)
@@ -118,28 +118,28 @@ def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tup
     if stated == given:
         return given, ()
     if stated is not None and (stated.quantity in ("length", given.quantity)):
-        demand = f'unit "{unit}" was asked for, but "{channel.label}" says {unit_words(channel.unit)}'
-        raise FormatError(path, demand, "leave the unit out")
+        problem = f'unit must be {unit_words(channel.unit)} as stated by "{channel.label}", got "{unit}"'
+        raise FormatError(path, problem, "leave the unit out")
     if not channel.unit:
         return given, (Trap("unit_assumed", f'the unit of "{channel.name}", {unit}, was given by the user'),)
-    holds = "times, frequencies and damping rates hold"
+    holds = "times, frequencies and damping rates are not affected"
     if given.quantity == "number":
         return given, (Trap("unit_assumed", f'"{channel.label}" is read as plain numbers, as the user asked; {holds}'),)
     kind = f"is no {'distance' if given.quantity == 'length' else given.quantity.replace('_', ' ')}"
-    holds += ", everything in metres is in that unit" if given.quantity == "length" else ""
+    holds += ", but everything in metres is in that unit" if given.quantity == "length" else ""
     message = f'"{channel.label}" {kind}: one {channel.unit} counts as one {unit}, as the user asked; {holds}'
     return given, (Trap("unit_assumed", message),)
 
 
 def _timed_by(path: str, channels: Sequence[Channel], chosen: Channel, time: str) -> Channel:
-    """Return the channel with the times of the column that the user names."""
+    """Return the channel with the named column as its times."""
     source = chosen.source
     if isinstance(source, Arrays):
         return _timed_by_values(path, channels, chosen, source, time)
     column = _column(source, time)
     if column is None:
         others = [each for each in channels if each.name != chosen.name and each.source is source]
-        column = named(path, others or channels, time, Missing.TIME).column
+        column = channel_of_name(path, others or channels, time, Missing.TIME).column
     if column == chosen.time:
         return chosen
     if column == chosen.column:
@@ -150,7 +150,7 @@ def _timed_by(path: str, channels: Sequence[Channel], chosen: Channel, time: str
 
 
 def _column(sheet: Sheet, name: str) -> int | None:
-    """Return the column of a name, with or without its unit, or of a number, "column 2"; None where there is none."""
+    """Return the column of a name, with or without unit, or of a number such as "column 2"; None if there is none."""
     bare = " ".join(name_and_unit(name)[0].lower().split())
     for wanted in (" ".join(name.lower().split()), bare):
         for column, each in enumerate(sheet.names):
@@ -161,16 +161,18 @@ def _column(sheet: Sheet, name: str) -> int | None:
 
 
 def _timed_by_values(path: str, channels: Sequence[Channel], chosen: Channel, source: Arrays, time: str) -> Channel:
-    """Return the channel with other numbers, read already, as its times."""
+    """Return the channel with another array as its times."""
     for each in channels:
-        told = each.source.time_name if isinstance(each.source, Arrays) else ""
-        if told and time.strip().lower() in (told.lower(), f"{told} ({each.time_unit})".lower()):
+        label = each.source.time_name if isinstance(each.source, Arrays) else ""
+        if label and time.strip().lower() in (label.lower(), f"{label} ({each.time_unit})".lower()):
             times, unit = each.source, each.time_unit
             t = times.t if isinstance(times, Arrays) else None
             break
     else:
-        found = named(path, [each for each in channels if each.name != chosen.name] or channels, time, Missing.TIME)
-        t, unit = (found.source.values if isinstance(found.source, Arrays) else None), found.unit
+        column = channel_of_name(
+            path, [each for each in channels if each.name != chosen.name] or channels, time, Missing.TIME
+        )
+        t, unit = (column.source.values if isinstance(column.source, Arrays) else None), column.unit
     if t is None or t.size != source.values.size:
         raise FormatError(path, f'"{time}" and "{chosen.name}" differ in length', "name another column of times")
     unit = unit if time_power(unit) is not None else ""
@@ -185,46 +187,46 @@ def _with_time_unit(path: str, chosen: Channel, unit: str | None) -> Channel:
     if chosen.source.t is None if isinstance(chosen.source, Arrays) else chosen.time is None:
         raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
     if time_power(chosen.time_unit) is not None and unit_words(chosen.time_unit) != unit_words(unit):
-        said = unit_words(chosen.time_unit)
-        raise FormatError(path, f'time unit "{unit}" was given, but the file says {said}', "leave it out")
+        stated = unit_words(chosen.time_unit)
+        raise FormatError(path, f'time unit must be {stated} as stated by the file, got "{unit}"', "leave it out")
     return replace(chosen, time_unit=unit)
 
 
-def _of_times(channels: Sequence[Channel], chosen: Channel, said: Answers) -> list[Need]:
+def _missing_times(channels: Sequence[Channel], chosen: Channel, answers: Answers) -> list[MissingItem]:
     source = chosen.source
     if isinstance(source, Arrays):
-        none = source.t is None and chosen.formula is None
+        untimed = source.t is None and chosen.formula is None
     else:
-        none = chosen.time is None and chosen.formula is None
-    if none:
-        if said.rate_hz is not None:
+        untimed = chosen.time is None and chosen.formula is None
+    if untimed:
+        if answers.rate_hz is not None:
             return []
         others = tuple(each.name for each in channels if each.name != chosen.name)
-        return [rate_needed(Need(Missing.TIME, others, others[0]) if others else None)]
+        return [rate_needed(MissingItem(Missing.TIME, others, others[0]) if others else None)]
     if time_power(chosen.time_unit) is not None or chosen.formula is not None:
         return []
     times = _times_at_first(chosen)
     if chosen.time_unit or (times.size > 1 and float(np.median(np.diff(times))) >= _SLOW_S):
         example = _likely_time_unit(times)
-        return [Need(Missing.TIME_UNIT, tuple(TIMES), example, of=_time_name(chosen), stated=chosen.time_unit)]
+        return [MissingItem(Missing.TIME_UNIT, tuple(TIMES), example, of=_time_name(chosen), stated=chosen.time_unit)]
     return []
 
 
 def _likely_time_unit(times: F8) -> str:
-    """Return the unit in which times are most often printed so large, or in steps so long."""
+    """Return the most likely unit of times of this size or with such steps."""
     if times.size < 2:
         return "ms"
-    since_1970 = next((unit for least, unit in _EPOCHS if times[0] >= least), None)
+    since_1970 = next((unit for from_size, unit in _EPOCHS if times[0] >= from_size), None)
     return since_1970 or ("us" if float(np.median(np.diff(times))) >= 1000.0 else "ms")
 
 
-def _begins_anew(sheet: Sheet, column: int) -> bool:
-    """Tell times that fall back again and again: chunks of a few samples."""
+def _restarts(sheet: Sheet, column: int) -> bool:
+    """Return whether times jump back again and again, as in chunks of a few samples."""
     steps = np.diff(_first_times(sheet, column))
-    return bool(steps.size >= 4 and np.mean(steps < 0) >= _ANEW)
+    return bool(steps.size >= 4 and np.mean(steps < 0) >= _SHARE_OF_RESTARTS)
 
 
-def _first_times(sheet: Sheet, column: int, most: int = _FIRST_ROWS) -> F8:
+def _first_times(sheet: Sheet, column: int, limit: int = _FIRST_ROWS) -> F8:
     read = []
     for line in sheet.text.lines(sheet.start):
         quoted = sheet.delimiter and '"' in line.text
@@ -232,13 +234,13 @@ def _first_times(sheet: Sheet, column: int, most: int = _FIRST_ROWS) -> F8:
         value = parse_number(cells[column].strip(' "')) if column < len(cells) else None
         if value is not None:
             read.append(value)
-        if len(read) == most or line.start > sheet.start + 65536:
+        if len(read) == limit or line.start > sheet.start + 65536:
             break
     return np.array(read)
 
 
 def _times_at_first(chosen: Channel) -> F8:
-    """Return the first times of a channel that has some, in its unit."""
+    """Return the first times of a channel, in its unit; empty if it has none."""
     source = chosen.source
     if isinstance(source, Sheet):
         return np.empty(0) if chosen.time is None else _first_times(source, chosen.time)
@@ -253,7 +255,7 @@ def _time_name(chosen: Channel) -> str:
 
 
 def _times(chosen: Channel) -> Times | str:
-    """Return where the times run; their name alone where no two numbers say so, nothing where there are none."""
+    """Return the range of the times; only their name if there are too few numbers, and an empty text without times."""
     source = chosen.source
     if isinstance(source, Sheet):
         if chosen.time is None:
@@ -274,7 +276,7 @@ def _times(chosen: Channel) -> Times | str:
 
 
 def _last_times(sheet: Sheet, tail: int, column: int) -> F8:
-    """Return the last times, from a byte on: what stands before the first line end is half a line."""
+    """Return the last times, from a byte on; the bytes before the first line end are an incomplete line."""
     line = tail if tail == sheet.start else sheet.text.data.find(b"\n", tail, sheet.stop) + 1 or tail
     return _first_times(replace(sheet, start=line), column, _LAST_BYTES)
 

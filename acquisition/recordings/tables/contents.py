@@ -1,4 +1,4 @@
-"""What a file holds, before any of it is taken as distance: runs, channels, units, and where their numbers stand."""
+"""The content of a file before a channel is chosen: runs, channels, units, and the places of their numbers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.questions import Missing, Need, Question
+from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.text import Text
 from acquisition.recordings.units import Measure, measure_of, unit_words
@@ -22,12 +22,12 @@ __all__ = [
     "Heading",
     "Sheet",
     "candidates",
+    "channel_of_name",
     "channels_apart",
     "channels_of",
     "is_time",
     "is_uncertainty",
     "name_and_unit",
-    "named",
     "numbered_apart",
     "of_run",
     "split_heading",
@@ -59,7 +59,7 @@ _BESIDE_TIME = frozenset(
         *("velocity", "acceleration", "raw", "sensor", "gps", "system", "rel", "abs"),
     )
 )
-"""Words that a time may have beside its own: what else stands there makes it a time of something, a period say."""
+"""Words that the name of a time column may have besides the word for time; others make it, for example, a period."""
 _WORDS = re.compile(r"[^\W\d_]+\d*|\d+")
 _ACCELERATION = re.compile(r"acc|beschl|versn|g[-_ ]?f|^a(?![^\W\d_])|^a[xyz](?![^\W_])", re.IGNORECASE)
 _UNCERTAIN = re.compile(
@@ -84,9 +84,9 @@ class Sheet:
         One-based line of the first row.
     delimiter : str
     width : int or None
-        Cells that a row must have, all of them numbers; None where rows may be ragged.
+        Number of cells of every row, all of them numbers; None if rows may be ragged.
     names : tuple of str
-        What each column is called, times among them, where the family tells; so that a user may name one as the time.
+        Names of all columns, including times, if the family knows them, so that a user may name one as the time.
     """
 
     text: Text
@@ -100,7 +100,7 @@ class Sheet:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrays:
-    """Numbers that a file holds in binary, or that were read already.
+    """Numbers of a binary file, or numbers that were read already.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Arrays:
         Times in the channel's unit of time.
     values : (n,) float64
     time_name : str
-        What the times are called; empty where the file does not say.
+        Name of the times; empty if the file does not state it.
     """
 
     t: F8 | None
@@ -118,7 +118,7 @@ class Arrays:
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """Times ``start_s + i * step_s`` as a header states them, and how many samples it declares, if it does."""
+    """Times ``start_s + i * step_s`` as stated in a header, and the number of samples, if the header states it."""
 
     start_s: float
     step_s: float
@@ -132,29 +132,29 @@ class Channel:
     Parameters
     ----------
     name : str
-        As the file calls it, without unit.
+        Its name in the file, without unit.
     unit : str
-        As the file prints it; empty where it does not.
+        As printed in the file; empty if it is not.
     run : str
-        Empty where the file holds one run without a name.
+        Empty for a single run without a name.
     source : Sheet or Arrays
     column : int
-        Of the sheet.
+        Column of the sheet.
     time : int or None
-        Column of its times; None where there is none.
+        Column of its times; None if there is none.
     time_unit : str
-        As the file prints it; empty where it does not.
+        As printed in the file; empty if it is not.
     formula : Formula or None
     clock : {"nominal", "device", "host"}
-        What times that fit no regular grid are.
+        Kind of the clock for times that fit no regular grid.
     start_time : str
-        ISO 8601, as the file states it; empty where it does not.
+        ISO 8601, if the file states it; else empty.
     ragged : bool
-        Whether it may end before its times do, which then belong to others.
+        Whether it may end before its times do, because these also belong to other channels.
     difference : bool
-        Whether its values differ from the row before: the first has nothing to differ from, and NaN is right there.
+        Whether its values are differences to the row before, so that the first is NaN.
     aside : bool
-        Whether it is there beside others (a row number, an uncertainty) and is taken only where it is named.
+        Whether it is an auxiliary column (a row number, an uncertainty), which is read only if it is named.
     """
 
     name: str
@@ -178,13 +178,13 @@ class Channel:
 
     @property
     def measure(self) -> Measure | None:
-        """What its unit says that its values are of; None where it says nothing.
+        """The measure of its unit; None for an unknown unit.
 
-        A g is standard gravity only of what is called an acceleration, else a gram.
+        The unit g is standard gravity only for a channel named as an acceleration, else a gram.
         """
-        found = measure_of(self.unit if self.unit != "G" else "g")
-        grams = found is not None and found.symbol in ("g", "mg") and not _ACCELERATION.search(self.name)
-        return None if grams else found
+        measure = measure_of(self.unit if self.unit != "G" else "g")
+        grams = measure is not None and measure.symbol in ("g", "mg") and not _ACCELERATION.search(self.name)
+        return None if grams else measure
 
     @property
     def is_length(self) -> bool:
@@ -194,17 +194,17 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contents:
-    """Everything that a file holds.
+    """The content of a file.
 
     Parameters
     ----------
     channels : tuple of Channel
-        At least one; times are no channels.
+        At least one; times are not channels.
     title : str
     traps : tuple of Trap
-        What was seen in the file as a whole.
+        Remarks on the file as a whole.
     zeros : int
-        Zero bytes at the end, left out.
+        Number of zero bytes at the end, which were left out.
     """
 
     channels: tuple[Channel, ...]
@@ -219,7 +219,7 @@ class Contents:
 
 
 def name_and_unit(heading: str) -> tuple[str, str]:
-    """Take a heading apart.
+    """Split a heading into name and unit.
 
     Examples
     --------
@@ -227,14 +227,14 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     (('Position', 'mm'), ('Time', 's'), ('velocity', ''))
     """
     plain = heading.strip().strip('"').strip()
-    found = _HEADING.fullmatch(plain)
-    if not found or not found["name"] or _NO_UNIT.fullmatch(found["unit"].strip()):
+    match = _HEADING.fullmatch(plain)
+    if not match or not match["name"] or _NO_UNIT.fullmatch(match["unit"].strip()):
         return plain, ""
-    return found["name"].strip(), found["unit"].strip()
+    return match["name"].strip(), match["unit"].strip()
 
 
 def is_time(name: str) -> bool:
-    """Tell whether a column's name says time, in one of a dozen languages.
+    """Return whether a column's name means time, in one of a dozen languages.
 
     Examples
     --------
@@ -242,15 +242,15 @@ def is_time(name: str) -> bool:
     (True, False, True, False)
     """
     words = [word.rstrip("0123456789") or word for word in _WORDS.findall(_CAMEL.sub(" ", name).lower())]
-    told = [word for word in words if word in _TIME_WORDS]
-    beside = [word for word in words if word not in told]
-    if not told or words[0].isdecimal() or (len(words[0]) == 1 and words[0] not in _TIME_WORDS):
+    time_words = [word for word in words if word in _TIME_WORDS]
+    others = [word for word in words if word not in time_words]
+    if not time_words or words[0].isdecimal() or (len(words[0]) == 1 and words[0] not in _TIME_WORDS):
         return False
-    return all(len(word) == 1 or word.isdecimal() or word in _BESIDE_TIME for word in beside)
+    return all(len(word) == 1 or word.isdecimal() or word in _BESIDE_TIME for word in others)
 
 
 def is_uncertainty(name: str) -> bool:
-    """Tell whether a column's name says that it is the uncertainty of another's values.
+    """Return whether a column's name means the uncertainty of another column.
 
     Examples
     --------
@@ -261,18 +261,18 @@ def is_uncertainty(name: str) -> bool:
 
 
 def candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
-    """Return the channels that may be meant where none is named: the lengths, or else all that do not stand aside."""
+    """Return the possible channels if none is named: the lengths, or else all but the auxiliary ones."""
     fit = [each for each in channels if not each.aside] or channels
     return [each for each in fit if each.is_length] or fit
 
 
-def named(path: str, channels: Sequence[Channel], name: str, what: Missing = Missing.CHANNEL) -> Channel:
+def channel_of_name(path: str, channels: Sequence[Channel], name: str, what: Missing = Missing.CHANNEL) -> Channel:
     """Return the channel of a name, with or without its unit.
 
     Raises
     ------
     NeedsAnswer
-        If none, or more than one, is called so; the question lists them.
+        If no channel, or more than one, has this name; the question lists them.
     """
     wanted = _plain(name)
     exact = [each for each in channels if each.name == name] or [each for each in channels if each.label == name]
@@ -281,16 +281,16 @@ def named(path: str, channels: Sequence[Channel], name: str, what: Missing = Mis
         return alike[0]
     choices = tuple(each.name for each in channels)
     reason = f'{what} "{name}" ' + (f"is the name of {len(alike)} columns" if alike else "is not in the file")
-    raise NeedsAnswer(Question(path, (Need(what, choices, choices[0]),), reason=reason))
+    raise NeedsAnswer(Question(path, (MissingItem(what, choices, choices[0]),), reason=reason))
 
 
 def of_run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
-    """Return the channels of the run asked for.
+    """Return the channels of a run.
 
     Raises
     ------
     NeedsAnswer
-        If none, or more than one, is called so; the question lists them.
+        If no run, or more than one, has this name; the question lists them.
     FormatError
         If the file holds one run without a name.
     """
@@ -298,25 +298,25 @@ def of_run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
     if run is None or run == runs[0]:
         return [each for each in contents.channels if each.run == runs[0]]
     if runs == ("",):
-        raise FormatError(path, f'run "{run}" is not in the file, which holds one run without a name', "leave run out")
+        raise FormatError(path, f'the file has one run without a name, got run "{run}"', "leave run out")
     called = [name for name in runs if name == run] or [name for name in runs if _plain(name) == _plain(run)]
     # "2" is enough for "Run #2".
     called = called or [name for name in runs if re.fullmatch(rf"\D*#?\s*0*{re.escape(run.strip())}", name)]
     if len(called) != 1:
         reason = f'run "{run}" ' + (f"is the name of {len(called)} runs" if called else "is not in the file")
-        raise NeedsAnswer(Question(path, (Need(Missing.RUN, runs, runs[0]),), reason=reason))
+        raise NeedsAnswer(Question(path, (MissingItem(Missing.RUN, runs, runs[0]),), reason=reason))
     return [each for each in contents.channels if each.run == called[0]]
 
 
 def _plain(name: str) -> str:
-    found = _HEADING.fullmatch(name.strip())
-    if found and found["name"]:
-        name = f"{found['name']} ({unit_words(found['unit'])})"
+    match = _HEADING.fullmatch(name.strip())
+    if match and match["name"]:
+        name = f"{match['name']} ({unit_words(match['unit'])})"
     return " ".join(name.lower().split())
 
 
 def numbered_apart(names: Sequence[str]) -> list[str]:
-    """Return names of which none occurs twice: the second of a name gets a number.
+    """Return unique names: repeated names get a number.
 
     Examples
     --------
@@ -328,13 +328,13 @@ def numbered_apart(names: Sequence[str]) -> list[str]:
     for name in names:
         seen[name] = seen.get(name, 0) + 1
         while (numbered := name if seen[name] == 1 else f"{name} [{seen[name]}]") in apart:
-            seen[name] += 1  # a name of the file looks numbered
+            seen[name] += 1  # the file has a name that looks numbered
         apart[numbered] = None
     return list(apart)
 
 
 def channels_apart(channels: Sequence[Channel]) -> tuple[Channel, ...]:
-    """Return channels of which no two of a run share a name, so that each can be chosen."""
+    """Return channels with unique names within each run, so that each can be chosen."""
     names: dict[int, str] = {}
     for run in dict.fromkeys(each.run for each in channels):
         own = [each for each in channels if each.run == run]
@@ -343,7 +343,7 @@ def channels_apart(channels: Sequence[Channel]) -> tuple[Channel, ...]:
 
 
 def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
-    """Split a line of headings, quoted or not; return its cells and what separates them, told or found.
+    """Split a line of headings, quoted or not; return its cells and their separator, which is detected if not given.
 
     Examples
     --------
@@ -360,7 +360,7 @@ def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """What stands above a column."""
+    """The heading of a column."""
 
     name: str
     unit: str
@@ -368,9 +368,9 @@ class Heading:
 
 
 def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind = "device") -> tuple[Channel, ...]:
-    """Return the channels of a sheet: each has the times to its left, or the first of its run.
+    """Return the channels of a sheet: each has the times to its left, or the first times of its run.
 
-    Beside columns of runs, a column without a heading is of none.
+    If there are columns of runs, a column without a heading is ignored.
 
     Parameters
     ----------
@@ -378,14 +378,14 @@ def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind =
     headings : sequence of Heading
         One for each column.
     clock : {"nominal", "device", "host"}
-        What times on no regular grid are.
+        Kind of the clock for times on no regular grid.
     """
     times = [column for column, each in enumerate(headings) if is_time(each.name)]
-    found = []
+    channels = []
     sheet = replace(sheet, names=tuple(each.name for each in headings))
     runs = any(each.run for each in headings)
-    named = [column for column, each in enumerate(headings) if each.name or each.run or not runs]
-    values = [column for column in named if column not in times]
+    named_columns = [column for column, each in enumerate(headings) if each.name or each.run or not runs]
+    values = [column for column in named_columns if column not in times]
     for run in dict.fromkeys(headings[column].run for column in values):
         own = [column for column in values if headings[column].run == run]
         of_run = [column for column in times if headings[column].run == run]
@@ -394,5 +394,5 @@ def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind =
             time = max((each for each in of_run if each < column), default=of_run[0] if of_run else None)
             time_unit = "" if time is None else headings[time].unit
             unit, aside = headings[column].unit, name.lower().startswith("date") or is_uncertainty(name)
-            found.append(Channel(name, unit, sheet, run, column, time, time_unit, clock=clock, aside=aside))
-    return tuple(found)
+            channels.append(Channel(name, unit, sheet, run, column, time, time_unit, clock=clock, aside=aside))
+    return tuple(channels)

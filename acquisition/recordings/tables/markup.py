@@ -1,4 +1,4 @@
-"""XML that holds a recording: read without document types, entities or references to anything outside; its columns."""
+"""Read recordings in XML, without document types, entities or external references."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 __all__ = ["MOST_BYTES", "read_markup", "side_by_side"]
 
 MOST_BYTES = 1 << 26
-"""More than any recording of a school's program; a tree takes some twenty times as much memory."""
+"""Largest size of XML, more than any recording of a school program; parsing needs about twenty times the memory."""
 
 
 def read_markup(path: str, data: bytes, remedy: str) -> Element:
-    """Return the root of a file that is XML.
+    """Return the root of an XML file.
 
     Raises
     ------
     FormatError
-        If it is none, too long, or has a document type: that may name other files, or grow without bound.
+        If it is not XML, too long, or has a document type, which may name other files or expand without limit.
     """
     from xml.etree import ElementTree
 
     if not data.lstrip(b"\xef\xbb\xbf \r\n").startswith(b"<?xml"):
-        data = decode(data).encode()  # without a declaration it must be UTF-8, and old programs do not know
+        data = decode(data).encode()  # XML without a declaration must be UTF-8, but old programs use other codes
 
     if len(data) > MOST_BYTES:
         raise FormatError(path, f"expected at most {MOST_BYTES} bytes of XML, got {len(data)}", remedy)
@@ -45,17 +45,17 @@ def read_markup(path: str, data: bytes, remedy: str) -> Element:
 
 
 def side_by_side(columns: Sequence[tuple[str, str, F8]], times: Sequence[int], run: str = "") -> list[Channel]:
-    """Return the channels of columns that were read already: each has the times to its left, or the first.
+    """Return the channels of columns that were read already: each has the times to its left, or the first times.
 
     Parameters
     ----------
     columns : sequence of (str, str, (n,) float64)
-        Name, unit and numbers of each; they may differ in length, and NaN fills the shorter.
+        Name, unit and numbers of each. Their lengths may differ; shorter ones are filled with NaN.
     times : sequence of int
-        Which of them are times.
+        The columns that are times.
     run : str
     """
-    found = []
+    channels = []
     for column, (name, unit, values) in enumerate(columns):
         if column in times:
             continue
@@ -63,8 +63,8 @@ def side_by_side(columns: Sequence[tuple[str, str, F8]], times: Sequence[int], r
         time_name, time_unit, t = ("", "", None) if time is None else columns[time]
         size = max(values.size, 0 if t is None else t.size)
         source = Arrays(None if t is None else _longer(t, size), _longer(values, size), time_name)
-        found.append(Channel(name, unit, source, run, time_unit=time_unit))
-    return found
+        channels.append(Channel(name, unit, source, run, time_unit=time_unit))
+    return channels
 
 
 def _longer(values: F8, size: int) -> F8:

@@ -1,4 +1,4 @@
-"""What stands before the numbers of each row: the clock of a serial monitor, the settings of an oscilloscope."""
+"""Remove prefixes of rows: the clock of a serial monitor, the settings of an oscilloscope."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _MONITOR = re.compile(rf"\[?{_DAY}(\d{{1,2}}:\d\d:\d\d(?:[.,]\d{{1,9}})?)(?:\s*-
 
 
 def without_prefix(text: Text) -> tuple[Text, tuple[Heading, ...]] | None:
-    """Return a text whose rows have no prefix, and what the prefix calls their columns; None for all others.
+    """Return a text with the prefix of each row removed, and the headings in the prefix; None if there is no prefix.
 
-    The clock of a serial monitor becomes the first column. Tektronix writes settings beside the first rows
-    (``Record Length,2500,,-0.025,0.04,``); times and values stand in the fourth and the fifth cell.
+    The clock of a serial monitor becomes the first column. Tektronix writes settings in the first rows
+    (``Record Length,2500,,-0.025,0.04,``); times and values are in the fourth and the fifth cell.
 
     Examples
     --------
@@ -35,13 +35,16 @@ def without_prefix(text: Text) -> tuple[Text, tuple[Heading, ...]] | None:
     lines = unify(decode(text.data[text.start : text.stop])).split("\n")
     if settings:
         return _beside_settings(lines)
-    found = [_MONITOR.match(line) for line in lines]
-    if sum(each is not None for each in found) < max(_FEWEST, _SHARE * sum(bool(line.strip()) for line in lines)):
+    prefixes = [_MONITOR.match(line) for line in lines]
+    if sum(each is not None for each in prefixes) < max(_FEWEST, _SHARE * sum(bool(line.strip()) for line in lines)):
         return None
-    rests = [line[each.end() :] if each else line for line, each in zip(lines, found, strict=True)]
-    marks = Counter(next((m for m in "\t;," if m in rest), " ") for rest in rests if rest.strip())
+    remainders = [line[each.end() :] if each else line for line, each in zip(lines, prefixes, strict=True)]
+    marks = Counter(next((m for m in "\t;," if m in remainder), " ") for remainder in remainders if remainder.strip())
     mark = marks.most_common(1)[0][0] if marks else " "
-    rows = (f"{each[1]}{mark}{rest}" if each else rest for each, rest in zip(found, rests, strict=True))
+    rows = (
+        f"{each[1]}{mark}{remainder}" if each else remainder
+        for each, remainder in zip(prefixes, remainders, strict=True)
+    )
     return Text.of("\n".join(rows).encode()), ()
 
 

@@ -1,7 +1,7 @@
-"""Lines alike: those of a page whose cells are all numbers, read together by :func:`numpy.loadtxt`.
+"""Read pages of regular lines, whose cells are all numbers, together by :func:`numpy.loadtxt`.
 
-What numpy reads as a number and a recording does not, and how many decimals each cell prints, is judged here; a page
-that is not regular is refused, and :mod:`acquisition.recordings.tables.table` reads its rows one by one.
+This module rejects text that numpy accepts as a number but a recording must not, and counts the printed decimals of
+each cell. It refuses a page that is not regular; :mod:`acquisition.recordings.tables.table` reads its rows one by one.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from acquisition.block import F8, I8
 from acquisition.recordings.tables.text import parse_number, printed_decimals
 
-__all__ = ["EMPTY", "EXPONENT", "I1", "NAN", "UNREAD", "Alike", "read_regular", "read_single", "unified"]
+__all__ = ["EMPTY", "EXPONENT", "I1", "NAN", "UNREAD", "RegularColumn", "read_regular", "read_single", "unified"]
 
 EXPONENT = 64
-"""Added to the decimals in a form where the number has an exponent."""
+"""Added to the decimals in the form of a number with an exponent."""
 NAN, EMPTY, UNREAD = -1, -2, -3
 
 I1 = NDArray[np.int8]
@@ -31,17 +31,17 @@ _QUOTED_COMMA = re.compile(rb'"([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)"')  # a decimal
 _NEWLINE, _BLANK, _POINT, _E, _LOWER = (*(ord(c) for c in "\n .e"), 0x20)
 
 
-class Alike(NamedTuple):
-    """One column of some rows: its numbers, their forms, where its cells end."""
+class RegularColumn(NamedTuple):
+    """One column of some rows: its numbers, their forms, and the ends of its cells."""
 
     values: F8
     form: I1
     last: I8
-    """Bytes of the last digit of each number, of its mantissa if it has an exponent."""
+    """Position of the last digit of each number, or of its mantissa if it has an exponent, bytes."""
 
 
 def unified(page: bytes, delimiter: str) -> bytes:
-    """End lines by LF, separate by one tab instead of white space, take quotes off cells, put points for commas."""
+    """Normalise a page: lines end in LF, one tab replaces white space, cells have no quotes, commas become points."""
     if b"\r" in page:
         page = page.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if not page.endswith(b"\n"):
@@ -61,15 +61,15 @@ def unified(page: bytes, delimiter: str) -> bytes:
 
 def read_regular(
     lines: bytes, mark: str, columns: Sequence[int], width: int | None, shifts: Sequence[int]
-) -> list[Alike] | None:
-    """Read lines of as many cells each, those asked for numbers of any form; None where they are anything else.
+) -> list[RegularColumn] | None:
+    """Read lines with equal numbers of cells whose wanted columns are all numbers; None for any other lines.
 
     Parameters
     ----------
     lines : bytes
-        As :func:`unified` leaves them.
+        As :func:`unified` returns them.
     mark : str
-        What separates cells, one character.
+        The separator of cells, one character.
     columns, width, shifts
         See :func:`acquisition.recordings.tables.table.read_table`.
     """
@@ -82,7 +82,7 @@ def read_regular(
     ends = marks.reshape(rows, cells)
     if (raw[ends[:, -1]] != _NEWLINE).any():
         return None
-    # loadtxt strips every kind of white space, which is damage here: a number beside it may have lost digits.
+    # loadtxt strips every kind of white space. Here it is damage: a number next to it may have lost digits.
     if np.count_nonzero(raw < _BLANK) != (ends.size if ord(mark) < _BLANK else rows):
         return None
     if width is not None and (cells < width or (np.diff(ends[:, width - 1 :]) != 1).any()):
@@ -91,10 +91,10 @@ def read_regular(
     if any(((end == begin) | (raw[end - 1] == _BLANK)).any() for begin, end in bounds):
         return None
     table = _load(lines, mark, columns, cells)
-    if table is None or np.isinf(table).any():  # the word, or a number that overflows
+    if table is None or np.isinf(table).any():  # the word "inf", or a number that overflows
         return None
     points, letters = np.flatnonzero(raw == _POINT), np.flatnonzero((raw | _LOWER) == _E)
-    found = []
+    read = []
     for values, (begin, end), shift in zip(table.T, bounds, shifts, strict=True):
         power = _last(letters, begin, end)
         if (end - power > _LONGEST_EXPONENT).any(where=power >= 0):
@@ -107,12 +107,12 @@ def read_regular(
             values = _shifted(values, form, shift)
             for row in np.flatnonzero(np.isnan(values) & (form >= 0)).tolist():
                 values[row] = read_single(lines[begin[row] : end[row]].decode("ascii").strip(" "), shift)[0]
-        found.append(Alike(values, form.astype(np.int8), ahead - 1))
-    return found
+        read.append(RegularColumn(values, form.astype(np.int8), ahead - 1))
+    return read
 
 
 def read_single(cell: str, shift: int) -> tuple[float, int]:
-    """Read one cell by itself; return its number, NaN where it is none, and its form."""
+    """Read one cell; return its number, or NaN if it is not a number, and its form."""
     if not cell:
         return np.nan, EMPTY
     value = parse_number(cell, shift)
@@ -124,11 +124,11 @@ def read_single(cell: str, shift: int) -> tuple[float, int]:
 
 
 def _shifted(values: F8, form: NDArray[np.int64], shift: int) -> F8:
-    """Return numbers of fixed point times a power of ten, rounded once from their digits; NaN for all others."""
+    """Return fixed-point numbers times a power of ten, rounded only once; NaN for other forms."""
     places = np.clip(form, 0, _TENS.size - 1)
     power = form - shift
     near = np.minimum(np.abs(power), _TENS.size - 1)
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not exact, and left out below
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers that overflow are not exact and become NaN below
         whole = np.rint(values * _TENS[places])
         scaled = np.where(power >= 0, whole / _TENS[near], whole * _TENS[near])
     exact = (form >= 0) & (form < _TENS.size) & (np.abs(power) < _TENS.size) & (np.abs(whole) < _MOST_WHOLE)
@@ -136,9 +136,9 @@ def _shifted(values: F8, form: NDArray[np.int64], shift: int) -> F8:
 
 
 def _load(lines: bytes, mark: str, columns: Sequence[int], cells: int) -> F8 | None:
-    """Hand lines that are not empty to numpy.loadtxt; None where a cell asked for is no number, or not ASCII."""
+    """Read non-empty lines by numpy.loadtxt; None if a wanted cell is not a number or not ASCII."""
     some = None if list(columns) == list(range(cells)) else columns
-    if not lines.strip(b"\n"):  # loadtxt warns of what holds no row
+    if not lines.strip(b"\n"):  # loadtxt warns if there are no rows
         return None
     try:
         return np.loadtxt(lines.decode("ascii").split("\n"), np.float64, None, mark, usecols=some, ndmin=2)
@@ -147,13 +147,13 @@ def _load(lines: bytes, mark: str, columns: Sequence[int], cells: int) -> F8 | N
 
 
 def _begins(ends: I8, column: int) -> I8:
-    """Return where the cells of a column begin, from where all cells of each row end."""
+    """Return the first bytes of the cells of a column, from the ends of all cells."""
     return ends[:, column - 1] + 1 if column else np.concatenate(([0], ends[:-1, -1] + 1))
 
 
 def _last(places: I8, begin: I8, end: I8) -> I8:
-    """Return the last of increasing places that lies within each cell; -1 where none does."""
+    """Return, for each cell, the last of the increasing ``places`` inside it; -1 for a cell without one."""
     if not places.size:
         return np.full(begin.size, -1)
-    found = places[np.searchsorted(places, end) - 1]  # before the first one this is the last of all, behind the cell
-    return np.where((found >= begin) & (found < end), found, -1)
+    last = places[np.searchsorted(places, end) - 1]  # index -1, the last place of all, lies after the cell
+    return np.where((last >= begin) & (last < end), last, -1)

@@ -1,4 +1,4 @@
-"""What the columns of a table are: times, row numbers, uncertainties, or what was measured."""
+"""Find the roles of the columns of a table: times, row numbers, uncertainties, or measured values."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ __all__ = ["are_row_numbers", "columns_of", "is_aside", "runs_forward", "times_b
 
 _NUMBERED = re.compile(r".*(index|sample|frame|number|count|row|seq)s?", re.IGNORECASE)
 _INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
-_FIRST_NUMBERS = 10  # rows that are not like the others may stand before the first that is read
+_FIRST_NUMBERS = 10  # the first row numbers may be lost, in rows unlike the others
 _NEUTRAL = re.compile(
     r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|(column|col|spalte|colonna|columna|var|field|unnamed:)[-_ ]?\d+",
     re.IGNORECASE,
 )
-"""Names that say nothing against a column of times."""
+"""Names that a column of times may have."""
 _SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10", re.IGNORECASE)
-"""Names of times that are no clock: how long something took."""
-_SPARSE = 0.2  # a column with numbers in fewer of its rows is none of samples
+"""Names of durations, which are not times of samples."""
+_SPARSE = 0.2  # a column with numbers in a smaller share of its rows has no samples
 _CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
 
 
 def columns_of(rows: Sequence[Sequence[str]]) -> list[F8]:
-    """Return the numbers of each column; NaN where a cell is none."""
+    """Return the numbers of each column; NaN for cells that are not numbers."""
     read = [[parse_number(cell) for cell in row] for row in rows]
     return [np.array([np.nan if x is None else x for x in column]) for column in zip(*read, strict=True)]
 
 
 def are_row_numbers(column: F8) -> bool:
-    """Tell whole numbers one by one, from one of the first."""
+    """Return whether a column counts up by one, from a small number."""
     return bool(column.size > 1 and column[0] in range(_FIRST_NUMBERS) and (np.diff(column) == 1.0).all())
 
 
 def runs_forward(column: F8) -> bool:
-    """Tell a column that rises, but for a few rows."""
-    told = column[np.isfinite(column)]
-    steps = np.diff(told)
-    return bool(told.size >= 3 and told[-1] > told[0] and np.mean(steps >= 0) >= 0.95 and np.mean(steps > 0) >= 0.5)
+    """Return whether a column rises, apart from a few rows."""
+    known = column[np.isfinite(column)]
+    steps = np.diff(known)
+    return bool(known.size >= 3 and known[-1] > known[0] and np.mean(steps >= 0) >= 0.95 and np.mean(steps > 0) >= 0.5)
 
 
 def _is_even(column: F8) -> bool:
@@ -53,7 +53,7 @@ def _is_even(column: F8) -> bool:
 
 
 def is_aside(heading: Heading, column: F8, others: bool) -> bool:
-    """Tell row numbers and uncertainties, which are there for the sake of other columns, and columns nearly empty.
+    """Return whether a column is auxiliary: row numbers, an uncertainty, or nearly empty.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def is_aside(heading: Heading, column: F8, others: bool) -> bool:
     column : (n,) float64
         Its first rows.
     others : bool
-        Whether there are other columns to tell times.
+        Whether other columns may be the times.
     """
     name = " ".join(heading.name.lower().replace("_", " ").split())
     index = others and are_row_numbers(column) and (name in _INDEX or bool(_NUMBERED.fullmatch(name)))
@@ -69,9 +69,9 @@ def is_aside(heading: Heading, column: F8, others: bool) -> bool:
 
 
 def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[int]:
-    """Return the columns that are called time, or whose first is in a unit of time, and that run forward.
+    """Return the columns that rise and are named as times; the first column also if its unit is one of time.
 
-    A capital T alone is a period as often as a time.
+    A capital T is not enough, because it is often a period.
     """
     named = [
         column
@@ -83,9 +83,9 @@ def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[in
 
 
 def times_by_steps(headings: Sequence[Heading], columns: Sequence[F8]) -> int | None:
-    """Return the column that must be the times because it alone runs forward; None where none is, or several are.
+    """Return the column that must be the times because it is the only one that rises; None if there is no such column.
 
-    A name, or a unit, that is of something else speaks against it; of row numbers nobody knows the step.
+    A column with the name or unit of something else is not considered, nor are row numbers, whose step is unknown.
     """
     fit = [
         column
@@ -96,7 +96,7 @@ def times_by_steps(headings: Sequence[Heading], columns: Sequence[F8]) -> int | 
     even = [column for column in fit if _is_even(columns[column])]
     if even and even[0] == 0:
         return 0
-    for found in (even, fit):
-        if len(found) == 1:
-            return found[0]
+    for choice in (even, fit):
+        if len(choice) == 1:
+            return choice[0]
     return None

@@ -1,4 +1,4 @@
-"""A format that is columns: what its files hold, which channel is the distance, and the recording of it."""
+"""Formats with columns: list the content of a file, choose the channel, and read the recording."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from acquisition.recordings.inspection import Survey
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.samples import value_traps
 from acquisition.recordings.sampling.timing import check_rate
-from acquisition.recordings.tables.answers import Answers, measure, settle
-from acquisition.recordings.tables.channel import pull, sample
+from acquisition.recordings.tables.answers import Answers, choose_channel, measure
+from acquisition.recordings.tables.channel import read_rows, to_samples
 from acquisition.recordings.tables.contents import Channel, Contents, Heading, Sheet, channels_apart, channels_of
 from acquisition.recordings.tables.text import head_lines, says_simulated, text_of
 from acquisition.recordings.tables.thousands import refuse_thousands
@@ -24,16 +24,17 @@ __all__ = ["ColumnFormat", "headed_format"]
 
 @dataclass(frozen=True, slots=True)
 class ColumnFormat:
-    """A family of recordings that keeps channels in columns.
+    """A family of recordings with channels in columns.
 
     Parameters
     ----------
     name, title : str
         See :class:`acquisition.recordings.base.Format`.
     evidence : callable
-        From the head of a file: why it is of this family, in a few words; empty where it is not. Never raises.
+        Returns, from the head of a file, why it belongs to this family, in a few words; empty if it does not. It never
+        raises.
     contents : callable
-        From path and content: what the file holds.
+        Returns, from path and bytes, the content of the file.
     """
 
     name: str
@@ -42,7 +43,7 @@ class ColumnFormat:
     contents: Callable[[str, bytes], Contents]
 
     def recognises(self, head: bytes) -> bool:
-        """Tell whether there is evidence for this family."""
+        """Return whether there is evidence for this family."""
         return bool(self.evidence(head))
 
     def read(
@@ -60,12 +61,12 @@ class ColumnFormat:
         """Read one channel of one run; see :class:`acquisition.recordings.base.Format`."""
         check_rate(path, rate_hz)
         contents = self._plain(path, data)
-        chosen = settle(path, contents, Answers(channel, rate_hz, unit, run, time, time_unit))
-        of, told = measure(path, chosen, unit)
-        column = sample(path, chosen, pull(path, chosen, of.power), rate_hz, contents.zeros)
-        length = of.quantity == "length"
-        value = column.value if of.factor == 1.0 else column.value * of.factor
-        resolution = column.resolution * of.factor
+        chosen = choose_channel(path, contents, Answers(channel, rate_hz, unit, run, time, time_unit))
+        measured, unit_traps = measure(path, chosen, unit)
+        column = to_samples(path, chosen, read_rows(path, chosen, measured.power), rate_hz, contents.zeros)
+        length = measured.quantity == "length"
+        value = column.value if measured.factor == 1.0 else column.value * measured.factor
+        resolution = column.resolution * measured.factor
         distance = length and (chosen.is_length or not chosen.unit)
         quantum, others = value_traps(value, column.flags, resolution, column.line, length=distance)
         name = PurePath(path).name
@@ -77,8 +78,8 @@ class ColumnFormat:
             path=path,
             info=info,
             channel=chosen.name,
-            samples=Block(0, column.t, value, column.flags, quantity=of.quantity, unit=of.si),
-            traps=(*contents.traps, *told, *column.traps, *others),
+            samples=Block(0, column.t, value, column.flags, quantity=measured.quantity, unit=measured.si),
+            traps=(*contents.traps, *unit_traps, *column.traps, *others),
             malformed_rows=column.malformed_rows,
             originals=(Original(name, data),),
             title=contents.title,
@@ -87,34 +88,34 @@ class ColumnFormat:
         )
 
     def _plain(self, path: str, data: bytes) -> Contents:
-        """Return what a file holds, without marks of thousands, its channels with names of their own."""
+        """Return the content of a file with unique names of channels, after a check for thousands separators."""
         contents = self.contents(path, data)
         sheets = {id(each.source): each.source for each in contents.channels if isinstance(each.source, Sheet)}
         traps = []
         for sheet in sheets.values():
             if shown := refuse_thousands(path, sheet.text.data[sheet.start : sheet.stop], sheet.delimiter):
-                message = f'"{shown}" was read with a decimal comma: nothing in the file says that it is of thousands'
+                message = f'the comma in "{shown}" was read as a decimal comma, not as a thousands separator'
                 traps.append(Trap("decimal_comma", message))
         return replace(contents, channels=channels_apart(contents.channels), traps=(*contents.traps, *traps))
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
-        """Tell of every channel what the file says by itself, with nothing chosen or given."""
+        """Return the description of every channel, as far as the file states it."""
         channels = self._plain(path, data).channels
-        found = tuple(self._survey(path, each) for each in channels)
-        if not any(each.samples for each in found):
-            pull(path, channels[0], 0)  # says what is wrong
-        return found
+        surveys = tuple(self._survey(path, each) for each in channels)
+        if not any(each.samples for each in surveys):
+            read_rows(path, channels[0], 0)  # raises the error
+        return surveys
 
     def _survey(self, path: str, channel: Channel) -> Survey:
         rows = 0
         try:
-            pulled = pull(path, channel, channel.measure.power if channel.measure else 0)
+            pulled = read_rows(path, channel, channel.measure.power if channel.measure else 0)
             rows = pulled.value.size
-            column = sample(path, channel, pulled, None)
+            column = to_samples(path, channel, pulled, None)
         except NeedsAnswer:
             return Survey(channel.run, channel.name, channel.unit, rows, None, ())
         except FormatError as error:
-            # One channel without numbers, beside others, is no reason to say nothing of these.
+            # A channel without numbers must not hide the others.
             none = Trap("empty_channel", str(error).removeprefix(path).lstrip(", :"))
             return Survey(channel.run, channel.name, channel.unit, 0, None, (none,))
         rate_hz, traps = column.timing.rate_hz, column.traps
@@ -129,17 +130,17 @@ def headed_format(
     why: Callable[[tuple[Heading, ...], str], str],
     example: str,
 ) -> ColumnFormat:
-    """Return a family whose files are a line of headings and rows.
+    """Return a family whose files have a line of headings and rows.
 
     Parameters
     ----------
     name, title : str
     headings_of : callable
-        From the first line to its headings, none where it is of another family, and what separates cells.
+        Returns the headings of the first line, none for another family, and the separator of cells.
     why : callable
-        From headings and what separates them: why these are of this family.
+        Returns, from headings and separator, why they belong to this family.
     example : str
-        Headings as the family writes them.
+        Headings of the family.
     """
 
     def evidence(head: bytes) -> str:

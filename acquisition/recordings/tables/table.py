@@ -1,8 +1,8 @@
-"""Rows of numbers: the one reader of cells behind every text format.
+"""Rows of numbers: the reader of cells for all text formats.
 
-Rows are read a page of whole lines at a time: :mod:`acquisition.recordings.tables.regular` reads lines alike together.
-The rows of a page that is not regular are read one by one. Numbers that lost some of their digits are known by how many
-the others of their column print.
+Rows are read in pages of whole lines. :mod:`acquisition.recordings.tables.regular` reads a regular page at a time; the
+rows of other pages are read one by one. A number that lost digits is detected by the number of decimals that its
+column usually prints.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from acquisition.recordings.tables.regular import (
     EXPONENT,
     I1,
     UNREAD,
-    Alike,
+    RegularColumn,
     read_regular,
     read_single,
     unified,
@@ -42,22 +42,22 @@ class Table:
     Parameters
     ----------
     values : tuple of (rows,) float64
-        The columns asked for; NaN where a cell says so, is empty, or could not be read.
+        The wanted columns; NaN for a cell that is NaN, empty or unread.
     form : tuple of (rows,) int8
-        The decimals that each cell prints, plus :data:`EXPONENT` where it has an exponent; negative where it is no
-        number: :data:`NAN`, :data:`EMPTY`, :data:`UNREAD`.
-    bad : (rows,) bool
-        Rows that could not be read: too few or too many cells, a cell that is no number, a number that was cut.
+        The printed decimals of each cell, plus :data:`EXPONENT` if it has an exponent; negative if it is not a number:
+        :data:`NAN`, :data:`EMPTY`, :data:`UNREAD`.
+    unread : (rows,) bool
+        Rows that could not be read: too few or too many cells, a cell that is not a number, an incomplete number.
     text : (rows,) bool
-        Rows that begin with what is no number, where a column asked for is none either.
+        Rows that begin with text.
     decimals : tuple of int
-        Decimals that each column usually prints, of its mantissas where its numbers have exponents.
+        Decimals that each column usually prints, in its mantissas if its numbers have exponents.
     exponents : tuple of bool
         Whether a column usually prints exponents.
     last_cell : str
         The first cell of the last row, as printed.
     cut : bool
-        Whether the last row stopped midway.
+        Whether the last row is incomplete.
     first_line : int
     skipped : (lines,) int64
         Rows before each line that makes no row.
@@ -65,7 +65,7 @@ class Table:
 
     values: tuple[F8, ...]
     form: tuple[I1, ...]
-    bad: B1
+    unread: B1
     text: B1
     decimals: tuple[int, ...]
     exponents: tuple[bool, ...]
@@ -75,7 +75,7 @@ class Table:
     skipped: I8
 
     def __len__(self) -> int:
-        return int(self.bad.size)
+        return int(self.unread.size)
 
     def line(self, row: int) -> int:
         """Return the one-based line of a row in the file."""
@@ -101,15 +101,15 @@ def read_table(
     columns : sequence of int
         Which columns, counted from 0.
     delimiter : str
-        What separates cells; empty for runs of white space.
+        The separator of cells; empty for runs of white space.
     width : int, optional
-        Cells that a row must have. Left out, rows may be ragged: a cell that is not there is empty.
+        Number of cells of every row. By default rows may be ragged, and missing cells are empty.
     start, stop : int, optional
         Bytes where the rows begin and end.
     first_line : int
         One-based line of the file at ``start``.
     shifts : sequence of int
-        A power of ten for each column that its numbers are multiplied with.
+        A power of ten for each column, by which its numbers are multiplied.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def read_table(
 
     Examples
     --------
-    >>> read_table(Text.of(b"0.010\\t25.334\\n0.020\\t25.648\\n0.030\\t0."), (0, 1), "\\t", width=2).bad.tolist()
+    >>> read_table(Text.of(b"0.010\\t25.334\\n0.020\\t25.648\\n0.030\\t0."), (0, 1), "\\t", width=2).unread.tolist()
     [False, False, True]
     """
     start = text.start if start is None else start
@@ -131,41 +131,41 @@ def read_table(
 
 
 def _most(data: bytes, start: int, stop: int) -> int:
-    """Return how many rows there are at the most: memory beyond them is never touched."""
+    """Return an upper limit of the number of rows; memory beyond the actual rows is never touched."""
     raw = np.frombuffer(data, np.uint8)
     pages = (raw[at : min(at + _PAGE_BYTES, stop)] for at in range(start, stop, _PAGE_BYTES))
-    # bytes.count() takes six times as long; what stands between LF and CR in ASCII is rare.
+    # bytes.count() takes six times as long; the other characters between LF and CR in ASCII are rare.
     return 1 + sum(int(np.count_nonzero((page - _LF) <= _CR - _LF)) for page in pages)
 
 
 def _pages(data: bytes, start: int, stop: int) -> Iterator[bytes]:
-    """Yield some whole lines after the other."""
+    """Yield pages of whole lines."""
     while start < stop:
         end = min(start + _PAGE_BYTES, stop)
         if end < stop:
-            # A page ends behind a LF, or behind a CR that is no half of CRLF, or where its one line does.
+            # A page ends after a LF, after a CR that is not part of CRLF, or at the end of its only line.
             whole = data.rfind(b"\n", start, end) + 1 or data.rfind(b"\r", start, end - 1) + 1
             if not whole:
-                found = _LINE_END.search(data, end - 1, stop)
-                whole = found.end() if found else stop
+                match = _LINE_END.search(data, end - 1, stop)
+                whole = match.end() if match else stop
             end = whole
         yield data[start:end]
         start = end
 
 
 class _Rows:
-    """Gathers rows, one page after the other."""
+    """Collects rows, page by page."""
 
     def __init__(
-        self, columns: tuple[int, ...], delimiter: str, width: int | None, shifts: tuple[int, ...], most: int
+        self, columns: tuple[int, ...], delimiter: str, width: int | None, shifts: tuple[int, ...], max_rows: int
     ) -> None:
         self.columns, self.width, self.shifts = columns, width, shifts
         self.delimiter, self.mark = delimiter, delimiter or "\t"
-        self.values = [np.empty(most) for _ in columns]
-        self.form = [np.empty(most, np.int8) for _ in columns]
-        self.bad = np.zeros(most, bool)
-        self.text = np.zeros(most, bool)
-        # How many numbers of each form a column holds, and whether any of them ends in a zero.
+        self.values = [np.empty(max_rows) for _ in columns]
+        self.form = [np.empty(max_rows, np.int8) for _ in columns]
+        self.unread = np.zeros(max_rows, bool)
+        self.text = np.zeros(max_rows, bool)
+        # The count of numbers of each form in a column, and whether any of them ends in a zero.
         self.counts = np.zeros((len(columns), 2 * EXPONENT), np.int64)
         self.padded = np.zeros((len(columns), 2 * EXPONENT), bool)
         self.rows = 0
@@ -175,15 +175,15 @@ class _Rows:
     def take(self, lines: bytes) -> None:
         """Read some lines."""
         lines = unified(lines, self.delimiter)
-        found = read_regular(lines, self.mark, self.columns, self.width, self.shifts)
-        if found is not None:
-            self._add(found, lines)
+        columns = read_regular(lines, self.mark, self.columns, self.width, self.shifts)
+        if columns is not None:
+            self._add(columns, lines)
             return
         for line in lines.decode("ascii", "replace").split("\n")[:-1]:
             self._take_single(line)
 
-    def _add(self, columns: list[Alike], lines: bytes) -> None:
-        """Append rows that are all sound; keep the cells of the last."""
+    def _add(self, columns: list[RegularColumn], lines: bytes) -> None:
+        """Append rows that are all valid; keep the cells of the last."""
         rows = slice(self.rows, self.rows + columns[0].values.size)
         raw = np.frombuffer(lines, np.uint8)
         for k, (values, form, last) in enumerate(columns):
@@ -209,21 +209,21 @@ class _Rows:
             forms.append(form)
         self.text[row] = bool(cells[0]) and parse_number(cells[0]) is None
         if self.width is None:
-            self.bad[row] = UNREAD in forms
+            self.unread[row] = UNREAD in forms
         else:
-            self.bad[row] = len(cells) < self.width or any(cells[self.width :]) or min(forms) <= EMPTY
-        # In a ragged row a word in one column says nothing of the numbers in the others.
-        if self.width is None or not self.bad[row]:
+            self.unread[row] = len(cells) < self.width or any(cells[self.width :]) or min(forms) <= EMPTY
+        # In a ragged row a word in one column does not affect the numbers in the others.
+        if self.width is None or not self.unread[row]:
             for k, (cell, form) in enumerate(zip(wanted, forms, strict=True)):
                 if form >= 0:
                     self.counts[k, form] += 1
                     self.padded[k, form] |= cell.lower().partition("e")[0].endswith("0")
 
     def table(self, first_line: int, *, ended: bool) -> Table:
-        """Return the rows taken, with numbers that were cut marked."""
+        """Return the collected rows, with incomplete numbers marked as unread."""
         values = [column[: self.rows] for column in self.values]
         form = [column[: self.rows] for column in self.form]
-        bad, text = self.bad[: self.rows], self.text[: self.rows]
+        unread, text = self.unread[: self.rows], self.text[: self.rows]
         usual, exponents = [], []
         for k, counts in enumerate(self.counts):
             exponents.append(bool(counts[EXPONENT:].sum() > counts[:EXPONENT].sum()))
@@ -235,66 +235,65 @@ class _Rows:
                 cut[-1] = True
             if cut is not None:
                 values[k][cut], form[k][cut] = np.nan, UNREAD
-                bad |= cut
+                unread |= cut
         if 0 in self.columns:
             text = form[self.columns.index(0)] == UNREAD
         return Table(
             tuple(values),
             tuple(form),
-            bad,
+            unread,
             text,
             tuple(each % EXPONENT for each in usual),
             tuple(exponents),
             self.last[0] if self.last else "",
-            cut=bool(self.rows) and not ended and bool(bad[-1]),
+            cut=bool(self.rows) and not ended and bool(unread[-1]),
             first_line=first_line,
             skipped=np.array(self.skipped, np.int64),
         )
 
     def _always(self, k: int, usual: int, exponent: bool) -> bool:
-        """Tell whether a column always prints the same number of decimals."""
+        """Return whether a column always prints the same number of decimals."""
         counts = self.counts[k]
         numbers = int(counts[: 2 * EXPONENT if exponent else EXPONENT].sum())
         others = numbers - int(counts[usual])
-        # Where zeros at the end are not printed, none ends in zero and some are shorter: more than one, for one is cut.
+        # If trailing zeros are not printed, no number ends in zero and several are shorter; a single one may be cut.
         padded = usual % EXPONENT and self.padded[k, usual]
         stripped = others >= _SHORTER and not padded
         return others <= (1 - _UNIFORM) * numbers and not stripped
 
     def _cut(self, k: int, form: I1, usual: int, exponent: bool) -> B1 | None:
-        """Find numbers that lost some of their decimals, or grew others; None where there is none."""
+        """Find numbers with too few or too many decimals; None if there are none."""
         if self.counts[k].sum() == self.counts[k][usual] or not self._always(k, usual, exponent):
             return None
-        # Where exponents are the exception, a number with one is as good as any.
+        # If exponents are the exception, a number with one is valid too.
         differs: B1 = (form >= 0) & (form != usual) & (exponent | (form < EXPONENT))
-        # What begins at 0 says so without decimals where zeros at the end are not printed.
+        # A first value of 0 may be printed without decimals.
         differs[:1] &= (form[:1] != 0) | (self.values[k][:1] != 0)
         if exponent and differs.any():
             differs &= ~self._ends_alike(k, form, usual)
         return differs if differs.any() else None
 
     def _ends_alike(self, k: int, form: I1, usual: int) -> B1:
-        """Tell numbers of engineering notation, whose mantissas have the fewer decimals the smaller their exponents.
+        """Return which numbers are in engineering notation, where mantissas of smaller numbers have fewer decimals.
 
-        ``-1.00000E-03`` and ``-975.00E-06`` end at the same place, and so do all numbers beside them.
+        ``-1.00000E-03`` and ``-975.00E-06`` end at the same decimal place, and so do all numbers of the column.
         """
         size = np.abs(self.values[k][: self.rows])
         with np.errstate(divide="ignore"):
             exponent = 3.0 * np.floor((np.log10(size) - self.shifts[k]) / 3.0 + 1e-9)
         places = np.where((size > 0) & (form >= EXPONENT), form - EXPONENT - exponent, np.nan)
-        told = places[(form == usual) & np.isfinite(places)]
-        if not told.size or told.min() != told.max():
+        usual_places = places[(form == usual) & np.isfinite(places)]
+        if not usual_places.size or usual_places.min() != usual_places.max():
             return np.zeros(self.rows, bool)
-        alike = places == told[0]
-        # A zero prints whatever decimals it likes where others print fewer.
+        alike = places == usual_places[0]
+        # A zero may have any number of decimals if other numbers have different ones.
         return np.asarray(alike | ((size == 0) & (alike & (form != usual)).any()))
 
     def _is_cut_last(self, k: int, form: I1, usual: int) -> bool:
-        """Tell whether a last row without line end may have stopped within the cell of a column.
+        """Return whether a last row without line end may have stopped within the cell of a column.
 
-        A number is whole where something follows it, or where it has all the decimals that its column always
-        prints. In a column that prints now more, now fewer, or none, nothing shows that the last number is whole,
-        so it counts as cut.
+        A number is complete if something follows it, or if it has all the decimals that its column always prints. In a
+        column with varying or no decimals nothing shows that the last number is complete, so it counts as cut.
         """
         if len(self.last) > self.columns[k] + 1 or form[-1] < 0:
             return False
@@ -304,7 +303,7 @@ class _Rows:
 
 
 def _unquoted(cell: str) -> str:
-    """Take blanks off a cell, and a pair of quotes."""
+    """Strip blanks and a pair of quotes from a cell."""
     cell = cell.strip(" ")
     return cell[1:-1].strip(" ") if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell
 

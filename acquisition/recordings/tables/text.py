@@ -1,4 +1,4 @@
-"""Text that holds columns of numbers: what it is encoded in, its lines, what separates cells, and one number."""
+"""Text with columns of numbers: encoding, lines, separators of cells, and the parsing of numbers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?(\d*)|\.(\d+))(?:[eE][+-]?\d{1,3})?", re.AS
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n\r\f\x1a")
 _FOREIGN = re.compile(rb"[\x80-\xff]+[\x21-\x7e]?")
 _HANZI = re.compile(rb"(?:[\xb0-\xd7\xa1-\xa3][\xa1-\xfe])+[\x21-\x7e]?")
-"""Chinese characters in common use, in GB 2312; what cp1252 has there are capitals, which seldom stand in pairs."""
+"""Common Chinese characters in GB 2312; in cp1252 these codes are capitals with accents, which rarely come in pairs."""
 _LINE_END = re.compile(rb"\r\n|\r|\n")
 _BLANKS = "\t\f "
 _ZIP = b"PK\x03\x04"
@@ -52,9 +52,9 @@ class Text:
     Parameters
     ----------
     data : bytes
-        UTF-8 or an 8-bit code; what came as UTF-16 has been turned into UTF-8.
+        UTF-8 or an 8-bit code; UTF-16 has been converted to UTF-8.
     start, stop : int
-        Where the text begins, behind a byte order mark, and where it ends, before zero bytes at the end.
+        First byte after a byte order mark, and end of the text, before zero bytes at the end.
     zeros : int
         Bytes cut off at the end.
     """
@@ -83,22 +83,22 @@ class Text:
         return cls(data, start, stop, len(data) - stop)
 
     def lines(self, start: int | None = None, number: int = 1) -> Iterator[Line]:
-        """Yield the lines from a byte on; ``number`` is the number of the first. An empty last line is none."""
+        """Yield the lines from a byte on; ``number`` is the number of the first. An empty last line does not count."""
         at = self.start if start is None else start
-        for found in _LINE_END.finditer(self.data, at, self.stop):
-            yield Line(number, at, found.end(), decode(self.data[at : found.start()]))
-            at, number = found.end(), number + 1
+        for match in _LINE_END.finditer(self.data, at, self.stop):
+            yield Line(number, at, match.end(), decode(self.data[at : match.start()]))
+            at, number = match.end(), number + 1
         if at < self.stop:
             yield Line(number, at, self.stop, decode(self.data[at : self.stop]))
 
-    def head(self, most: int = 64) -> list[Line]:
-        """Return the first lines, at most so many and of no more than 64 KiB in all."""
-        found: list[Line] = []
+    def head(self, limit: int = 64) -> list[Line]:
+        """Return the first lines, up to a number of lines and 64 KiB in total."""
+        lines: list[Line] = []
         for line in self.lines():
-            if len(found) == most or line.start - self.start > 65536:
+            if len(lines) == limit or line.start - self.start > 65536:
                 break
-            found.append(line)
-        return found
+            lines.append(line)
+        return lines
 
 
 def text_of(path: str, data: bytes) -> Text:
@@ -115,7 +115,7 @@ def text_of(path: str, data: bytes) -> Text:
 
 
 def is_text(data: bytes) -> bool:
-    """Tell whether bytes can be a text: UTF-8, UTF-16 or an 8-bit code with few control characters.
+    """Return whether bytes can be text: UTF-8, UTF-16 or an 8-bit code with few control characters.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def is_text(data: bytes) -> bool:
     (True, False)
     """
     head = data[:8192]
-    if head.startswith(_ZIP):  # of texts that are stored as they are, with hardly a control character
+    if head.startswith(_ZIP):  # an uncompressed archive of texts has few control characters
         return False
     if _utf16(head):
         return True
@@ -132,10 +132,10 @@ def is_text(data: bytes) -> bool:
 
 
 def decode(data: bytes) -> str:
-    """Decode a text whatever its encoding; a byte that has no meaning becomes U+FFFD and fails as a number.
+    """Decode a text in any encoding; an invalid byte becomes U+FFFD and is not a number.
 
-    Byte order marks are obeyed and removed. UTF-16 without one is known by its zero bytes. What is not UTF-8
-    is read as cp1252, or as GB 2312 where it looks like that; a character cut off at the very end does not decide it.
+    Byte order marks are obeyed and removed. UTF-16 without one is recognised by its zero bytes. Text that is not UTF-8
+    is read as GB 2312 if it looks like that, else as cp1252. An incomplete character at the end is ignored.
 
     Examples
     --------
@@ -143,7 +143,7 @@ def decode(data: bytes) -> str:
     ('0,5', '20 °C')
     """
     if data.isascii() and b"\0" not in data:
-        return data.decode("ascii")  # the usual line, without a look at what else it may be
+        return data.decode("ascii")  # the usual case, without further checks
     if data.startswith(codecs.BOM_UTF8):
         data = data[3:]
     elif encoding := _utf16(data[:8192]):
@@ -172,9 +172,9 @@ def _utf16(head: bytes) -> str:
 
 
 def says_simulated(text: str) -> bool:
-    """Tell whether a title or a name says that nobody measured what it stands for.
+    """Return whether a title or a name marks simulated data.
 
-    Old forms have no other place for it, and simulated must not pass for measured.
+    Most formats can state only there that data are simulated, and simulated data must not pass for measured data.
 
     Examples
     --------
@@ -186,7 +186,7 @@ def says_simulated(text: str) -> bool:
 
 
 def unify(text: str) -> str:
-    """Turn every line end (CRLF, CR, LF) into LF.
+    """Convert every line end (CRLF, CR, LF) to LF.
 
     Examples
     --------
@@ -197,7 +197,7 @@ def unify(text: str) -> str:
 
 
 def head_lines(head: bytes) -> list[str]:
-    """Return the lines of the head of a file; one empty line where it is binary.
+    """Return the lines of the head of a file; one empty line for a binary file.
 
     Examples
     --------
@@ -208,7 +208,7 @@ def head_lines(head: bytes) -> list[str]:
 
 
 def parse_number(cell: str, shift: int = 0) -> float | None:
-    """Read one cell: a decimal number, with a point or a comma, or NaN; None where it is neither.
+    """Read one cell: a decimal number, with a point or a comma, or NaN; None for any other text.
 
     Stricter than ``float()``: no ``1_000``, no ``inf``, no digits of other scripts, nothing that overflows.
 
@@ -216,7 +216,7 @@ def parse_number(cell: str, shift: int = 0) -> float | None:
     ----------
     cell : str
     shift : int
-        The number times ten to this power is returned, rounded once.
+        The number is multiplied by ten to this power and rounded once.
 
     Examples
     --------
@@ -237,15 +237,15 @@ def parse_number(cell: str, shift: int = 0) -> float | None:
 
 
 def printed_decimals(cell: str) -> int:
-    """Count the decimals that a number prints, of its mantissa if it has an exponent."""
+    """Return the number of printed decimals, of the mantissa if there is an exponent."""
     match = _NUMBER.fullmatch(cell.replace(",", ".", 1))
     return len(match[1] or match[2] or "") if match else 0
 
 
 def guess_delimiter(line: str) -> str:
-    """Tell what separates the cells of a row; an empty string means runs of white space.
+    """Return the separator of the cells of a row; an empty string means runs of white space.
 
-    A comma separates only where nothing else does, for it may be a decimal mark.
+    A comma separates only if nothing else does, because it may be a decimal mark.
 
     Examples
     --------
@@ -263,9 +263,9 @@ def guess_delimiter(line: str) -> str:
 
 
 def split_cells(line: str, delimiter: str) -> list[str]:
-    """Split a row into stripped cells; separators at the end of the row make no cell.
+    """Split a row into stripped cells; separators at the end of the row are ignored.
 
-    Only blanks are stripped: any other white space is damage, and a number beside it may have lost digits.
+    Only blanks are stripped. Any other white space is damage, and a number next to it may have lost digits.
     """
     if not delimiter:
         return [cell for cell in line.replace("\t", " ").split(" ") if cell]

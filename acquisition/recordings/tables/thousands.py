@@ -1,4 +1,4 @@
-"""Marks of thousands (``1,234.5``, ``1.234,5``, ``1 234``) are refused: read as decimals they err by a thousand."""
+"""Refuse thousands separators (``1,234.5``, ``1.234,5``, ``1 234``): read as decimals they err by a factor 1000."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from acquisition.errors import FormatError
 
 __all__ = ["refuse_thousands"]
 
-_REMEDY = "export the numbers without marks of thousands"
+_REMEDY = "export the numbers without thousands separators"
 _BLANK = rb"(?: |'|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)"
 _GROUP = rb"[-+]?[1-9]\d{0,2}"
 _END = rb"(?:[eE][-+]?\d+)?"
@@ -23,13 +23,13 @@ _DECIMAL = {
     each: re.compile(rb"[%b](?!\d{3}(?!\d))|(?<!\d)0\d*[%b]|\d{4}[%b]" % ((re.escape(each),) * 3))
     for each in (b",", b".")
 }
-"""A mark that can only be decimal: of other than three digits, or behind a zero or four digits."""
+"""A mark that can only be decimal: not followed by three digits, or after a zero or four digits."""
 _WHOLE, _LONG = re.compile(rb"[-+]?\d{1,3}"), re.compile(rb"[-+]?\d{4,}")
 _BLANKS = re.compile(rb"(?:\d[ ']|[\xa0\xaf\x99])\d{3}")
 
 
 def refuse_thousands(path: str, rows: bytes, mark: str) -> str:
-    """Refuse rows whose numbers have, or may have, a mark of thousands.
+    """Refuse rows whose numbers have, or may have, a thousands separator.
 
     Parameters
     ----------
@@ -37,18 +37,18 @@ def refuse_thousands(path: str, rows: bytes, mark: str) -> str:
         For messages.
     rows : bytes
     mark : str
-        What separates cells; empty for runs of white space.
+        The separator of cells; empty for runs of white space.
 
     Returns
     -------
     str
-        A number like ``1,500`` where every number with a comma is alike and none has a point: the comma is read as
-        decimal, and nothing in the file says so. Empty for all others.
+        A number like ``1,500`` if all numbers with a comma look like it and none has a point. The comma is then read as
+        decimal, although nothing in the file confirms it. Empty otherwise.
 
     Raises
     ------
     FormatError
-        Where a number has marks of thousands, or a comma or point may be of thousands as well as of decimals.
+        If a number has thousands separators, or a comma or point may be either.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def refuse_thousands(path: str, rows: bytes, mark: str) -> str:
     """
     points, commas = b"." in rows, b"," in rows and (mark != "," or b'"' in rows)
     blanks = bool(mark) and _BLANKS.search(rows) is not None
-    # Where commas separate the cells, only those within quotes are marks of a number.
+    # If commas separate the cells, only commas within quotes belong to numbers.
     marked = {b".": rows, b",": b"\n".join(re.findall(rb'"[^"]*"', rows)) if mark == "," else rows}
     alone = [
         each for each, there in ((b".", points), (b",", commas)) if there and not _DECIMAL[each].search(marked[each])
@@ -73,13 +73,14 @@ def refuse_thousands(path: str, rows: bytes, mark: str) -> str:
     for column in zip_longest(*split, fillvalue=b""):
         sure = next((cell for cell in column if _SURE.fullmatch(cell)), None) if mark else None
         if sure is not None:
-            raise FormatError(path, f'expected plain numbers, got marks of thousands in "{_shown(sure)}"', _REMEDY)
+            raise FormatError(path, f'expected plain numbers, got a thousands separator in "{_shown(sure)}"', _REMEDY)
         for each in alone:
             grouped = [cell for cell in column if _ONE[each].fullmatch(cell)]
             whole = any(_WHOLE.fullmatch(cell) for cell in column) and not any(map(_LONG.fullmatch, column))
             other_is_decimal = points and commas and len(alone) == 1
             if grouped and (other_is_decimal or whole):
-                raise FormatError(path, f'"{_shown(grouped[0])}" may have thousands or decimals', _REMEDY)
+                problem = f'"{_shown(grouped[0])}" may have a thousands separator or a decimal mark'
+                raise FormatError(path, problem, _REMEDY)
             if grouped and each == b",":
                 doubtful = doubtful or grouped[0]
     return "" if points else _shown(doubtful)

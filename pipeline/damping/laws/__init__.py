@@ -1,21 +1,33 @@
 """Laws of damping: how the amplitude of a free oscillation falls with time.
 
-:mod:`pipeline.damping.laws.law` says what a law offers, :mod:`pipeline.damping.laws.drag` holds the eight laws of
+:mod:`pipeline.damping.laws.law` states what a law offers, :mod:`pipeline.damping.laws.drag` holds the eight laws of
 :math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)`, :mod:`pipeline.damping.laws.power` that of :math:`-c A^n`. A law is
-one
-small class and one entry of :data:`LAWS`; ``tests/conformance/test_laws.py`` holds each to its differential equation,
-to its Jacobian and to its guess. :mod:`pipeline.damping.laws.of_function` makes one of a function, for one analysis.
+one small class and one entry of :data:`LAWS`; ``tests/conformance/test_laws.py`` compares each with its differential
+equation, its derivatives and its guess. :mod:`pipeline.damping.laws.of_function` makes a law from a function.
 """
 
 from __future__ import annotations
 
 from pipeline.damping.laws.drag import DRAGS, Drag
-from pipeline.damping.laws.law import Law
+from pipeline.damping.laws.law import Law, Unit, free_power, in_units, units_of, words_of
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
 from pipeline.damping.laws.power import Power
 from pipeline.errors import AnalysisError
 
-__all__ = ["LAWS", "Drag", "FunctionLaw", "Law", "Power", "find_law", "make_law"]
+__all__ = [
+    "LAWS",
+    "Drag",
+    "FunctionLaw",
+    "Law",
+    "Power",
+    "Unit",
+    "find_law",
+    "free_power",
+    "in_units",
+    "make_law",
+    "units_of",
+    "words_of",
+]
 
 _ALL: tuple[Law, ...] = (*DRAGS, Power())
 LAWS: dict[str, Law] = {law.name: law for law in _ALL}
@@ -36,5 +48,5 @@ def find_law(law: str | Law) -> Law:
             raise AnalysisError(f"laws must be of {', '.join(LAWS)}, or laws of your own; got {name!r}")
         return LAWS[name]
     if LAWS.get(name, law) is not law:
-        raise AnalysisError(f"a law of your own needs a name of its own, got {name!r}, which is taken")
+        raise AnalysisError(f"a law of yours needs a new name, got {name!r}, which is taken")
     return law

@@ -1,4 +1,4 @@
-"""Friction, linear and quadratic drag, alone and together: one closed form for all eight laws.
+"""Friction, linear and quadratic drag in all combinations: one closed form for all eight laws.
 
 Kept by hand: no library has it. An adaptive integrator (scipy's DOP853 at a relative 1e-10) takes ninety times as
 long for the amplitudes of 160 windows, and gives no derivatives.
@@ -30,75 +30,56 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.damping.laws.law import Unit
 from pipeline.track import F8
 
-__all__ = ["DRAGS", "POWERS", "Drag", "amplitudes"]
+__all__ = ["COEFFICIENTS", "DRAGS", "Drag", "amplitudes"]
 
-UNITS = {"A0": "m", "mu": "m/s", "gamma": "1/s", "beta": "1/(m s)"}
-POWERS = {"mu": 0, "gamma": 1, "beta": 2}
-SLOTS = tuple(UNITS)  # where each parameter stands in the full set of four
+COEFFICIENTS = ("mu", "gamma", "beta")  # of the powers 0, 1 and 2 of the amplitude
 FLOOR = 1e-3  # share of the greatest amplitude below which a start value divides by nothing smaller
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Drag:
-    """A law with some of friction mu, linear drag gamma and quadratic drag beta.
+    """A law whose rate is a sum of powers of the amplitude: friction mu, linear drag gamma, quadratic drag beta.
 
     Parameters
     ----------
     name, words : str
-    parameters : tuple of str
-        "A0" and the coefficients.
+    powers : tuple of int
+        Of the amplitude in :math:`-dA/dt`: 0 for friction, 1 for linear, 2 for quadratic drag.
     """
 
     name: str
     words: str
-    parameters: tuple[str, ...]
+    powers: tuple[int, ...]
 
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Of the parameters."""
-        return tuple(UNITS[name] for name in self.parameters)
+    @functools.cached_property
+    def parameters(self) -> Mapping[str, Unit]:
+        """A0 and the coefficients; that of :math:`A^k` is in :math:`\\mathrm{m}^{1-k}/\\mathrm{s}`."""
+        return {"A0": Unit(1)} | {COEFFICIENTS[power]: Unit(1 - power, -1) for power in self.powers}
 
-    @property
+    @functools.cached_property
     def cases(self) -> tuple[str, ...]:
         """Every law with fewer of the coefficients."""
-        mine = set(self.parameters)
-        return tuple(law.name for law in DRAGS if set(law.parameters) < mine)
+        return tuple(law.name for law in DRAGS if set(law.powers) < set(self.powers))
 
-    @property
-    def slots(self) -> list[int]:
-        """Places of the parameters in the full set (A0, mu, gamma, beta)."""
-        return [SLOTS.index(name) for name in self.parameters]
-
-    def amplitude(self, t: F8, theta: F8) -> F8:
+    def curve(self, t: F8, theta: F8) -> tuple[F8, F8]:
         """Return the closed form; 0 after friction has stopped the motion, infinite beyond a growing one's pole."""
-        return _flow(t, *self._full(theta)).amplitude
-
-    def jacobian(self, t: F8, theta: F8) -> F8:
-        """Return the derivatives by A0 and the coefficients."""
-        return self.both(t, theta)[1]
-
-    def both(self, t: F8, theta: F8) -> tuple[F8, F8]:
-        """Return amplitude and jacobian, which share most of their work."""
         full = self._full(theta)
         flow = _flow(t, *full)
-        return flow.amplitude, _slopes(t, flow, self.slots, *full).T
+        return flow.amplitude, _slopes(t, flow, self.powers, *full).T
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
-        """Return mu + gamma A + beta A^2; nothing where there is no amplitude left."""
+        """Return -(mu + gamma A + beta A^2), or 0 if the amplitude is not positive."""
         _, mu, gamma, beta = self._full(theta)
-        return np.asarray(np.where(amplitude > 0.0, mu + amplitude * (gamma + beta * amplitude), 0.0))
-
-    def rate_jacobian(self, amplitude: F8, theta: F8) -> F8:  # noqa: ARG002 - it is linear in theta
-        """Return the derivatives (n, p) of :meth:`rate` by A0, on which it does not depend, and the coefficients."""
-        columns = [np.zeros(amplitude.size), *(amplitude ** POWERS[name] for name in self.parameters[1:])]
-        return np.where(amplitude > 0.0, columns, 0.0).T
+        return np.asarray(np.where(amplitude > 0.0, -mu - amplitude * (gamma + beta * amplitude), 0.0))
 
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return start values (p,) from points in the order of time, at least one.
@@ -115,35 +96,26 @@ class Drag:
             return found
         y, span = amplitude / level, float(t[-1])
         columns = [np.ones(t.size)]
-        for name in self.parameters[1:]:
-            power = y ** POWERS[name]
+        for power in self.powers:
+            term = y**power
             # Up to the first point the fall is taken as flat; it is a part of a period.
-            fallen = np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(t))
-            columns.append(-(power[0] * t[0] + np.concatenate([[0.0], fallen])) / span)
+            fallen = np.cumsum(0.5 * (term[1:] + term[:-1]) * np.diff(t))
+            columns.append(-(term[0] * t[0] + np.concatenate([[0.0], fallen])) / span)
         values = np.linalg.lstsq(np.stack(columns, axis=1), y, rcond=1e-12)[0]
         if np.all(np.isfinite(values)) and values[0] > 0.0:
             found[0] = values[0] * level
             found[1:] = [
-                x * level ** (1 - POWERS[name]) / span
-                for name, x in zip(self.parameters[1:], values[1:].tolist(), strict=True)
+                x * level ** (1 - power) / span for power, x in zip(self.powers, values[1:].tolist(), strict=True)
             ]
         return found
 
-    def rescaled(self, theta: F8, length_m: float) -> F8:
-        """Return theta with lengths divided by ``length_m``."""
-        return np.asarray(theta * _scales(self.parameters, length_m))
-
     def _full(self, theta: F8) -> tuple[float, float, float, float]:
         """A0, mu, gamma and beta, absent ones zero."""
-        values = dict(zip(self.parameters, theta.tolist(), strict=True))
-        return values["A0"], values.get("mu", 0.0), values.get("gamma", 0.0), values.get("beta", 0.0)
-
-
-@functools.lru_cache(16)
-def _scales(parameters: tuple[str, ...], length_m: float) -> F8:
-    """Factors on the parameters where lengths are divided by ``length_m``; derivatives ask for the same again."""
-    powers = {"A0": -1.0, "mu": -1.0, "gamma": 0.0, "beta": 1.0}
-    return length_m ** np.array([powers[name] for name in parameters])
+        start, *coefficients = theta.tolist()
+        full = [0.0, 0.0, 0.0]
+        for power, value in zip(self.powers, coefficients, strict=True):
+            full[power] = value
+        return start, full[0], full[1], full[2]
 
 
 class _Flow(NamedTuple):
@@ -196,8 +168,8 @@ def _turning_ends(pace: float, angle: F8, start: float, mu: float, gamma: float,
     return np.where(angle >= math.atan2(pace, -beta * start - 0.5 * gamma), np.inf, np.nan)
 
 
-def _slopes(t: F8, flow: _Flow, slots: list[int], start: float, mu: float, gamma: float, beta: float) -> F8:
-    """Derivatives (p, n) of the amplitude by those of A0, mu, gamma and beta that a law has, A0 first."""
+def _slopes(t: F8, flow: _Flow, powers: tuple[int, ...], start: float, mu: float, gamma: float, beta: float) -> F8:
+    """Derivatives (p, n) of the amplitude by A0 and by the coefficients of some powers."""
     # Everything below carries the factor e^(-2st) that D^-2 brings along.
     elapsed = flow.fall * t
     squares = _integral_of_squares(t, flow, elapsed)
@@ -207,12 +179,12 @@ def _slopes(t: F8, flow: _Flow, slots: list[int], start: float, mu: float, gamma
     # Of the integrals of D^2, ND and N^2: what C^2, CS and S^2 count in them.
     by_mu, by_gamma = (1.0, 2.0 * push, push * push), (start, start * push - pull, -pull * push)
     shares = by_mu, by_gamma, (start * start, -2.0 * start * pull, pull * pull)
-    slopes = np.empty((len(slots), t.size))
+    slopes = np.empty((1 + len(powers), t.size))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         over = -1.0 / (flow.denominator * flow.denominator)
         slopes[0] = -over * flow.fall
-        for row, slot in zip(slopes[1:], slots[1:], strict=True):
-            of_cosines, of_mixed, of_squares = shares[slot - 1]
+        for row, power in zip(slopes[1:], powers, strict=True):
+            of_cosines, of_mixed, of_squares = shares[power]
             row[:] = over * (of_cosines * cosines + of_mixed * mixed + of_squares * squares)
     if flow.ends is not None:
         # After the stop nothing depends on anything; beyond a pole there is nothing to depend.
@@ -252,16 +224,12 @@ def amplitudes(t: F8, theta: F8) -> F8:
 
 
 DRAGS: tuple[Drag, ...] = (
-    Drag("none", "no damping at all", ("A0",)),
-    Drag("linear", "a lone exponential (linear drag)", ("A0", "gamma")),
-    Drag("quadratic", "a lone hyperbola (quadratic drag)", ("A0", "beta")),
-    Drag("friction", "a straight fall (dry friction)", ("A0", "mu")),
-    Drag("linear+quadratic", "linear and quadratic drag together", ("A0", "gamma", "beta")),
-    Drag("linear+friction", "linear drag and dry friction together", ("A0", "gamma", "mu")),
-    Drag("quadratic+friction", "quadratic drag and dry friction together", ("A0", "beta", "mu")),
-    Drag(
-        "linear+quadratic+friction",
-        "linear and quadratic drag and dry friction together",
-        ("A0", "gamma", "beta", "mu"),
-    ),
+    Drag("none", "no damping", ()),
+    Drag("linear", "linear drag", (1,)),
+    Drag("quadratic", "quadratic drag", (2,)),
+    Drag("friction", "dry friction", (0,)),
+    Drag("linear+quadratic", "linear and quadratic drag together", (1, 2)),
+    Drag("linear+friction", "linear drag and dry friction together", (1, 0)),
+    Drag("quadratic+friction", "quadratic drag and dry friction together", (2, 0)),
+    Drag("linear+quadratic+friction", "linear and quadratic drag and dry friction together", (1, 2, 0)),
 )

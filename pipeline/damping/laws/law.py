@@ -1,12 +1,51 @@
-"""What every damping law must offer."""
+"""What every damping law offers, and what follows from the units of its parameters."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import NamedTuple, Protocol
+
+import numpy as np
 
 from pipeline.track import F8
 
-__all__ = ["Law"]
+__all__ = ["Law", "Unit", "free_power", "in_units", "units_of", "words_of"]
+
+
+class Unit(NamedTuple):
+    """The exponents of metre and second in the unit of a parameter.
+
+    Parameters
+    ----------
+    metre, second : float
+    less : str
+        Name of a parameter whose value is subtracted from the exponent of the metre: of a coefficient c in
+        :math:`c A^n` it is ``"n"``.
+
+    Examples
+    --------
+    >>> print(Unit(1, -1), Unit(-0.5, -1), Unit(1, -1, less="n"), Unit(-1), sep=", ")
+    m/s, 1/(m^1/2 s), m^(1-n)/s, 1/m
+    """
+
+    metre: float = 0.0
+    second: float = 0.0
+    less: str = ""
+
+    def __str__(self) -> str:
+        above: list[str] = []
+        below: list[str] = []
+        for symbol, exponent in (("m", self.metre), ("s", self.second)):
+            if symbol == "m" and self.less:
+                above.append(f"m^({exponent:g}-{self.less})")
+            elif exponent:
+                size = Fraction(abs(exponent)).limit_denominator(1000)
+                (above if exponent > 0.0 else below).append(symbol if size == 1 else f"{symbol}^{size}")
+        if not below:
+            return " ".join(above)
+        divisor = " ".join(below)
+        return f"{' '.join(above) or '1'}/{divisor if len(below) == 1 else f'({divisor})'}"
 
 
 class Law(Protocol):
@@ -18,49 +57,52 @@ class Law(Protocol):
         ...
 
     @property
-    def words(self) -> str:
-        """What it is called in a sentence."""
-        ...
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names, the amplitude at t = 0 first, as "A0"."""
-        ...
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Of the parameters."""
+    def parameters(self) -> Mapping[str, Unit]:
+        """Names with units: first "A0", the amplitude at t = 0 in m, then the coefficients."""
         ...
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Names of the laws that it holds as special cases: at its best it is never worse than they are."""
+        """Names of the laws that it contains as special cases: its best fit is never worse than theirs."""
         ...
 
-    def amplitude(self, t: F8, theta: F8) -> F8:
-        """Return (n,) float64, m, at times t (n,) in s."""
-        ...
-
-    def jacobian(self, t: F8, theta: F8) -> F8:
-        """Return (n, p) float64: derivatives of the amplitude by each parameter."""
-        ...
-
-    def both(self, t: F8, theta: F8) -> tuple[F8, F8]:
-        """Return amplitude and jacobian, which share most of their work."""
+    def curve(self, t: F8, theta: F8) -> tuple[F8, F8]:
+        """Return the amplitude (n,) in m at times t (n,) in s, and its derivatives (n, p) by the parameters."""
         ...
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
-        """Return -dA/dt, (n,) float64, m/s, at amplitudes (n,) in m."""
-        ...
-
-    def rate_jacobian(self, amplitude: F8, theta: F8) -> F8:
-        """Return (n, p) float64: derivatives of the rate at amplitudes (n,) in m by each parameter."""
+        """Return dA/dt, (n,) float64, m/s, at amplitudes (n,) in m; it does not depend on A0."""
         ...
 
     def guess(self, t: F8, amplitude: F8) -> F8:
-        """Return start values (p,) from points."""
+        """Return start values (p,) from points in the order of time, at least one."""
         ...
 
-    def rescaled(self, theta: F8, length_m: float) -> F8:
-        """Return the parameters (p,) of the same fall with amplitudes counted in units of ``length_m``."""
-        ...
+
+def units_of(law: Law) -> tuple[str, ...]:
+    """Return the units of a law's parameters, as printed."""
+    return tuple(str(unit) for unit in law.parameters.values())
+
+
+def words_of(law: Law) -> str:
+    """Return what a sentence calls a law: its ``words`` where it has any, or its name."""
+    return str(getattr(law, "words", law.name))
+
+
+def free_power(law: Law) -> str | None:
+    """Return the parameter on which the unit of another one depends, a power of the amplitude; None without any."""
+    return next((unit.less for unit in law.parameters.values() if unit.less), None)
+
+
+def in_units(law: Law, theta: F8, *, length_m: float = 1.0, time_s: float = 1.0) -> F8:
+    """Return the parameters (p,) of the same fall with lengths and times in other units than m and s.
+
+    Notes
+    -----
+    A parameter of unit :math:`\\mathrm{m}^a\\mathrm{s}^b` is divided by :math:`L^a T^b`.
+    """
+    values = dict(zip(law.parameters, theta.tolist(), strict=True))
+    metres = np.array([unit.metre - (values[unit.less] if unit.less else 0.0) for unit in law.parameters.values()])
+    seconds = np.array([unit.second for unit in law.parameters.values()])
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(theta * length_m**-metres * time_s**-seconds)

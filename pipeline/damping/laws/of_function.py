@@ -5,13 +5,16 @@ Kept by hand: nothing else asks of a function whether it can be a law of damping
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pipeline.damping.laws.drag import DRAGS
+from pipeline.damping.laws.law import Law, Unit, in_units
+from pipeline.damping.laws.power import Power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import central_differences
 from pipeline.registry.quantities import QUANTITIES
@@ -19,23 +22,21 @@ from pipeline.track import F8
 
 __all__ = ["FunctionLaw", "make_law"]
 
-COEFFICIENTS = frozenset({"gamma", "beta", "mu", "c", "n"})
-"""Names of estimates that are coefficients of the laws that ship, and may be those of another law too."""
 STEP_S = 1e-3  # over which the rate is a difference: its error is a third of the squared change of the amplitude
-AGREE = 1e-5  # relative; to which a law must hold what is asked of it
+AGREE = 1e-5  # relative; to which a law must do what is asked of it
 PROBE_S = np.linspace(0.0, 10.0, 21)
 
 
 def make_law(
     name: str,
     amplitude: Callable[..., ArrayLike],
-    parameters: Mapping[str, str],
+    parameters: Mapping[str, tuple[float, float]],
     guess: Callable[[F8, F8], ArrayLike],
     *,
     words: str = "",
     cases: tuple[str, ...] = ("none",),
 ) -> FunctionLaw:
-    """Make a damping law of a function, to be tried beside the others.
+    """Make a damping law of a function, to be tried with the others.
 
     Parameters
     ----------
@@ -45,8 +46,9 @@ def make_law(
         ``amplitude(t, A0, *coefficients)`` gives the amplitude (n,) at times t (n,), s, that was A0 at t = 0. It must
         take any unit of length, and be a function of the amplitude alone: wherever it has got to, it goes on as if
         it had started there.
-    parameters : mapping of str to str
-        Coefficients with their units of m and s, such as ``{"d": "1/(m^1/2 s)"}``.
+    parameters : mapping of str to (float, float)
+        Coefficients with the exponents of metre and second in their units: ``{"d": (-1 / 2, -1)}`` for
+        :math:`1/(\\mathrm{m}^{1/2}\\,\\mathrm{s})`.
     guess : callable
         ``guess(t, amplitude)`` gives start values of A0 and the coefficients from points.
     words : str
@@ -69,72 +71,55 @@ def make_law(
     >>> def guess(t, amplitude):
     ...     slope, level = np.polyfit(t, 1 / np.sqrt(amplitude), 1)
     ...     return level**-2, 2 * slope
-    >>> law = make_law("three-halves", amplitude, {"d": "1/(m^1/2 s)"}, guess)
-    >>> print(law.rate(np.array([0.04]), np.array([0.05, 0.5])))
-    [0.004]
+    >>> law = make_law("three-halves", amplitude, {"d": (-1 / 2, -1)}, guess)
+    >>> print(law.parameters["d"], law.rate(np.array([0.04]), np.array([0.05, 0.5])))
+    1/(m^1/2 s) [-0.004]
     """
-    if taken := [each for each in parameters if each in QUANTITIES and each not in COEFFICIENTS]:
+    laws: tuple[Law, ...] = (*DRAGS, Power())
+    ours = {coefficient for law in laws for coefficient in law.parameters}
+    if taken := [each for each in parameters if each in QUANTITIES and each not in ours]:
         raise AnalysisError(f"law {name!r}: coefficient {taken[0]!r} has the name of an estimate; give it another name")
-    dimensions = {each: _dimensions(each, unit) for each, unit in parameters.items()}
-    law = FunctionLaw(
-        name,
-        words or name,
-        ("A0", *parameters),
-        ("m", *parameters.values()),
-        cases,
-        amplitude,
-        guess,
-        dimensions,
-    )
+    units = {"A0": Unit(1)}
+    for each, exponents in parameters.items():
+        if not (isinstance(exponents, tuple) and len(exponents) == 2 and all(isinstance(e, Real) for e in exponents)):
+            expected = "its unit must be a pair, the exponents of metre and second, as in (-1/2, -1)"
+            raise AnalysisError(f"law {name!r}: coefficient {each!r}: {expected}, got {exponents!r}")
+        units[each] = Unit(*exponents)
+    law = FunctionLaw(name, words or name, units, cases, amplitude, guess)
     _demand_law(law)
     return law
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FunctionLaw:
-    """A law of damping by its amplitude alone; :func:`make_law` makes one.
+    """A damping law whose rate depends only on the amplitude; :func:`make_law` makes one.
 
     Parameters
     ----------
-    name, words, parameters, units, cases
+    name, parameters, cases
         As in :class:`pipeline.damping.laws.law.Law`.
+    words : str
+        What findings call it.
     function, start : callable
         As ``amplitude`` and ``guess`` of :func:`make_law`.
-    dimensions : mapping of str to (float, float)
-        Powers of length and of one over time in each coefficient's unit.
     """
 
     name: str
     words: str
-    parameters: tuple[str, ...]
-    units: tuple[str, ...]
+    parameters: Mapping[str, Unit]
     cases: tuple[str, ...]
     function: Callable[..., ArrayLike] = field(repr=False)
     start: Callable[[F8, F8], ArrayLike] = field(repr=False)
-    dimensions: Mapping[str, tuple[float, float]] = field(repr=False)
 
-    def amplitude(self, t: F8, theta: F8) -> F8:
-        """Return what the function gives."""
-        with np.errstate(all="ignore"):  # a fit may step where it has no value
-            return np.broadcast_to(np.asarray(self.function(t, *theta.tolist()), np.float64), np.shape(t)).copy()
-
-    def jacobian(self, t: F8, theta: F8) -> F8:
-        """Return central differences."""
-        return central_differences(lambda at: self.amplitude(t, at), theta)
-
-    def both(self, t: F8, theta: F8) -> tuple[F8, F8]:
-        """Return amplitude and jacobian."""
-        return self.amplitude(t, theta), self.jacobian(t, theta)
+    def curve(self, t: F8, theta: F8) -> tuple[F8, F8]:
+        """Return what the function gives, and its derivatives by central differences."""
+        return self._amplitude(t, theta), central_differences(lambda at: self._amplitude(t, at), theta)
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
         """Return the slope at t = 0 of a fall that starts at each amplitude: one-sided, of second order."""
         t = STEP_S * np.arange(3.0)
-        each = [self.amplitude(t, np.append(start, theta[1:])) @ (3.0, -4.0, 1.0) for start in amplitude.tolist()]
+        each = [self._amplitude(t, np.append(start, theta[1:])) @ (-3.0, 4.0, -1.0) for start in amplitude.tolist()]
         return np.array(each) / (2.0 * STEP_S)
-
-    def rate_jacobian(self, amplitude: F8, theta: F8) -> F8:
-        """Return central differences."""
-        return central_differences(lambda at: self.rate(amplitude, at), theta)
 
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return what ``start`` gives.
@@ -151,55 +136,40 @@ class FunctionLaw:
             raise AnalysisError(f"law {self.name!r}: {demand}, got {found.tolist()}")
         return found
 
-    def rescaled(self, theta: F8, length_m: float) -> F8:
-        """Return the parameters with lengths in units of ``length_m``."""
-        return self.in_units(theta, length_m=length_m)
-
-    def in_units(self, theta: F8, *, length_m: float = 1.0, time_s: float = 1.0) -> F8:
-        """Return the parameters with lengths and times in other units than m and s."""
-        powers = np.array([(1.0, 0.0), *(self.dimensions[name] for name in self.parameters[1:])])
-        return np.asarray(theta * length_m ** -powers[:, 0] * time_s ** powers[:, 1])
-
-
-def _dimensions(name: str, unit: str) -> tuple[float, float]:
-    """Return the powers of length and of one over time in a unit such as 1/(m^1/2 s)."""
-    length, per_time = 0.0, 0.0
-    above, _, below = re.sub(r"/(?=[a-z(])", "|", unit.strip()).partition("|")
-    for part, sign in ((above, 1.0), (below, -1.0)):
-        for symbol in part.strip("() ").split():
-            found = re.fullmatch(r"(m|s|1)(?:\^(-?[\d.]+)(?:/(\d+))?)?", symbol)
-            if found is None:
-                demand = 'its unit must be made of m and s, as in "1/(m^1/2 s)"'
-                raise AnalysisError(f"coefficient {name!r}: {demand}, got {unit!r}")
-            power = sign * float(found[2] or 1.0) / float(found[3] or 1.0)
-            length += power if found[1] == "m" else 0.0
-            per_time -= power if found[1] == "s" else 0.0
-    return length, per_time
+    def _amplitude(self, t: F8, theta: F8) -> F8:
+        with np.errstate(all="ignore"):  # a fit may step where it has no value
+            return np.broadcast_to(np.asarray(self.function(t, *theta.tolist()), np.float64), np.shape(t)).copy()
 
 
 def _demand_law(law: FunctionLaw) -> None:
     """Try the function on a typical fall: what it must do whatever its coefficients are."""
+
+    def amplitude(t: F8, theta: F8) -> F8:
+        return law.curve(t, theta)[0]
+
     theta = law.guess(PROBE_S, 0.05 * np.exp(-0.05 * PROBE_S))
-    fall = law.amplitude(PROBE_S, theta)
+    fall = amplitude(PROBE_S, theta)
     if not (np.isfinite(fall).all() and np.ptp(fall) > 0.0):
         values = ", ".join(f"{name} = {value:g}" for name, value in zip(law.parameters, theta, strict=True))
-        demand = f"an amplitude that changes within {PROBE_S[-1]:g} s was demanded of {values}"
-        raise AnalysisError(f"law {law.name!r}: {demand}, got {fall[0]:g} to {fall[-1]:g} m; check function and guess")
+        expected = f"the amplitude must change within {PROBE_S[-1]:g} s at {values}"
+        raise AnalysisError(
+            f"law {law.name!r}: {expected}, got {fall[0]:g} to {fall[-1]:g} m; check function and guess"
+        )
     half = PROBE_S.size // 2
-    onwards = law.amplitude(PROBE_S[: half + 1], np.append(fall[half], theta[1:]))
+    onwards = amplitude(PROBE_S[: half + 1], np.append(fall[half], theta[1:]))
     alike = {
         "A0 must be its amplitude at t = 0": (fall[:1], theta[:1]),
         "it must depend on the amplitude alone, and go on from any as if it had started there": (fall[half:], onwards),
         "its units of length do not fit the function": (
             fall,
-            10.0 * law.amplitude(PROBE_S, law.in_units(theta, length_m=10.0)),
+            10.0 * amplitude(PROBE_S, in_units(law, theta, length_m=10.0)),
         ),
         "its units of time do not fit the function": (
             fall,
-            law.amplitude(PROBE_S / 10.0, law.in_units(theta, time_s=10.0)),
+            amplitude(PROBE_S / 10.0, in_units(law, theta, time_s=10.0)),
         ),
     }
     for words, (one, other) in alike.items():
         if not np.allclose(one, other, rtol=AGREE, atol=0.0):
-            stated = ", ".join(f"{name} in {unit}" for name, unit in zip(law.parameters, law.units, strict=True))
+            stated = ", ".join(f"{name} in {unit}" for name, unit in law.parameters.items())
             raise AnalysisError(f"law {law.name!r} is no law of damping with {stated}: {words}")

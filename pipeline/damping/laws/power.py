@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.damping.laws.drag import DRAGS
+from pipeline.damping.laws.drag import Drag
+from pipeline.damping.laws.law import Unit
 from pipeline.track import F8
 
 __all__ = ["Power"]
 
-(_MIXED,) = (law for law in DRAGS if law.name == "linear+quadratic")
+_MIXED = Drag("guess", "", (1, 2))
 
 
 class Power:
@@ -25,21 +27,12 @@ class Power:
     """
 
     name = "power"
-    words = "a free power of the amplitude"
-    parameters: tuple[str, ...] = ("A0", "c", "n")
-    units: tuple[str, ...] = ("m", "m^(1-n)/s", "")
+    words = "drag by a free power of the amplitude"
+    parameters: Mapping[str, Unit] = {"A0": Unit(1), "c": Unit(1, -1, less="n"), "n": Unit()}
     cases: tuple[str, ...] = ("none", "linear", "quadratic", "friction")
 
-    def amplitude(self, t: F8, theta: F8) -> F8:
+    def curve(self, t: F8, theta: F8) -> tuple[F8, F8]:
         """Return the closed form; 0 after the motion has stopped, infinite beyond a growing one's pole."""
-        return _solution(np.asarray(t, np.float64), theta).amplitude
-
-    def jacobian(self, t: F8, theta: F8) -> F8:
-        """Return the derivatives by A0, c and n."""
-        return self.both(t, theta)[1]
-
-    def both(self, t: F8, theta: F8) -> tuple[F8, F8]:
-        """Return amplitude and jacobian, which share most of their work."""
         at = np.asarray(t, np.float64)
         start, c, n = theta.tolist()
         found = _solution(at, theta)
@@ -56,18 +49,10 @@ class Power:
         return amplitude, jacobian
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
-        """Return c A^n; nothing where there is no amplitude left."""
+        """Return -c A^n, or 0 if the amplitude is not positive."""
         left = amplitude > 0.0
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(np.where(left, theta[1] * np.where(left, amplitude, 1.0) ** theta[2], 0.0))
-
-    def rate_jacobian(self, amplitude: F8, theta: F8) -> F8:
-        """Return the derivatives (n, p) of :meth:`rate` by A0, on which it does not depend, c and n."""
-        left = amplitude > 0.0
-        logarithm = np.log(np.where(left, amplitude, 1.0))
-        with np.errstate(over="ignore", invalid="ignore"):
-            power = np.where(left, np.exp(theta[2] * logarithm), 0.0)
-            return np.stack([np.zeros(amplitude.size), power, theta[1] * power * logarithm], axis=1)
+            return np.asarray(np.where(left, -theta[1] * np.where(left, amplitude, 1.0) ** theta[2], 0.0))
 
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return the power that linear and quadratic drag together have in the middle of the points."""
@@ -78,12 +63,6 @@ class Power:
             return np.array([start, 0.0, 1.0])
         n = min(max((gamma + 2.0 * beta * level) / rate, 0.0), 3.0)
         return np.array([start, rate * level ** (1.0 - n), n])
-
-    def rescaled(self, theta: F8, length_m: float) -> F8:
-        """Return theta with lengths divided by ``length_m``: c carries their power 1 - n."""
-        start, c, n = theta.tolist()
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.array([start / length_m, c * np.float64(length_m) ** (n - 1.0), n])
 
 
 class _Solution(NamedTuple):

@@ -1,10 +1,10 @@
 "use strict";
-// One key and one button each. What the recorder is asked for shows once it has acknowledged it, in show_state.
+// Each action has a key and a button. What the recorder is asked for is shown once it has acknowledged it, in show_state.
 function press(button, on) { $(button).setAttribute("aria-pressed", String(on)); }
 function label(button, text) { $(button).firstChild.textContent = `${text} `; }
 function show_window() { const s = WINDOWS[window_index]; label("window", s === Infinity ? "all" : `${s} s`); }
 
-// What can be asked for in which state of the recorder; nothing of it by viewers.
+// What the controller can ask for in each phase of the recorder; viewers can ask for nothing.
 const ALLOWED = { ready: ["zero", "ruler", "arm", "record", "close"], armed: ["arm", "record", "close"], recording: ["mark", "note", "stop"], built: ["report", "note", "discard", "close"], replay: ["report", "note"] };
 
 function show_actions() {
@@ -12,19 +12,32 @@ function show_actions() {
   for (const id of ["zero", "ruler", "arm", "record", "mark", "note", "stop", "report", "discard", "close"]) $(id).hidden = !allowed.includes(id);
   if (bench().phase === "replay" && run.source !== "REPLAY") $("report").hidden = $("note").hidden = true;
   if (bench().discarded) $("discard").hidden = true;
+  $("report").classList.toggle("primary", bench().phase === "built");
   label("arm", bench().phase === "armed" ? "Disarm" : "Arm trigger");
   $("share").hidden = !run.share;
   if (bench().report === "ready" && report_asked) { report_asked = false; location.assign("/v1/report"); }
 }
 
-let answered = null;
-function question(title, fields) {
+// Between a question and its answer the recorder may have gone on; what it does not take any more is named.
+let refused = "", refused_until = 0;
+function request(id, message) {
+  if ((ALLOWED[bench().phase] || []).includes(id)) { ask_server(message); return; }
+  refused = `Not done: the recorder was at "${PHASES[bench().phase] || bench().phase}"; try again.`;
+  refused_until = performance.now() + 6000;
+  show_state();
+}
+
+let answered = null, checks = {};
+// A field has a name, its text, its value, and where it is a quantity a check, which returns its number or throws what is wrong.
+function question(title, fields, ok) {
   $("ask-title").textContent = title;
-  $("ask-fields").replaceChildren(...fields.map(([name, text, value, kind]) => {
+  $("ask-ok").textContent = ok || "OK";
+  $("ask-error").hidden = true;
+  checks = Object.fromEntries(fields.map(([name, , , check]) => [name, check || String]));
+  $("ask-fields").replaceChildren(...fields.map(([name, text, value]) => {
     const box = document.createElement("label"), input = document.createElement("input");
     input.name = name;
     input.value = value;
-    if (kind === "number") { input.type = "number"; input.step = "any"; input.required = true; input.inputMode = "decimal"; }
     box.append(text, input);
     return box;
   }));
@@ -33,10 +46,42 @@ function question(title, fields) {
   if (first) first.select(); else $("ask-ok").focus();
   return new Promise((resolve) => { answered = resolve; });
 }
+
+const IN_METRES = { m: 1, cm: 1e-2, mm: 1e-3 };
+// A length in m, with its unit or in mm, from ``least`` to ``most`` metres.
+function length_between(least, most, example) {
+  return (text) => {
+    const read = /^\s*(\d+(?:[.,]\d+)?|[.,]\d+)\s*(mm|cm|m)?\s*$/i.exec(text);
+    if (!read) throw new RangeError(`Cannot read "${text}" as a length; write for example ${example}.`);
+    const number = Number(read[1].replace(",", ".")), metres = number * IN_METRES[(read[2] || "mm").toLowerCase()];
+    if (metres >= least && metres <= most) return metres;
+    const meant = !read[2] && number >= least && number <= most ? ` Did you mean ${read[1]} m?` : "";
+    throw new RangeError(`${read[1]} ${read[2] || "mm"} is not between ${least * 1e3} mm and ${most} m.${meant}`);
+  };
+}
+
+function seconds_between(least, most) {
+  return (text) => {
+    const read = /^\s*(\d+(?:[.,]\d+)?)\s*s?\s*$/i.exec(text), number = read ? Number(read[1].replace(",", ".")) : NaN;
+    if (number >= least && number <= most) return number;
+    throw new RangeError(`Cannot use "${text}" as a time; write ${least} to ${most} s.`);
+  };
+}
+
 $("ask-form").addEventListener("submit", (event) => {
   event.preventDefault();
   const given = {};
-  for (const input of $("ask-fields").querySelectorAll("input")) given[input.name] = input.value;
+  for (const input of $("ask-fields").querySelectorAll("input")) {
+    input.removeAttribute("aria-invalid");
+    try { given[input.name] = checks[input.name](input.value); } catch (error) {
+      if (!(error instanceof RangeError)) throw error;
+      input.setAttribute("aria-invalid", "true");
+      $("ask-error").textContent = error.message;
+      $("ask-error").hidden = false;
+      input.select();
+      return;
+    }
+  }
   answered(given);
   answered = null;
   $("ask").close();
@@ -68,31 +113,31 @@ let report_asked = false;
 const ACTIONS = {
   zero() { ask_server({ type: "zero" }); },
   async ruler() {
-    const given = await question("Calibrate with a ruler: hold the target still", [["known_m", "Its distance from the sensor by the ruler, mm", "250", "number"]]);
-    if (given) ask_server({ type: "ruler", known_m: Number(given.known_m) / 1e3 });
+    const given = await question("Calibrate with a ruler: hold the target still", [["known_m", "Its distance from the sensor by the ruler, for example 250 mm, 25 cm or 0.25 m", "250 mm", length_between(0.01, 20, "250 mm, 25 cm or 0.25 m")]], "Measure");
+    if (given) request("ruler", { type: "ruler", known_m: given.known_m });
   },
   async arm() {
     if (bench().phase === "armed") { ask_server({ type: "disarm" }); return; }
-    const given = await question("Record when the bob leaves its rest", [["threshold", "by more than, mm", "10", "number"], ["keep", "seconds kept from before", "2", "number"]]);
-    if (given) ask_server({ type: "arm", threshold_m: Number(given.threshold) / 1e3, keep_s: Number(given.keep) });
+    const given = await question("Record when the bob leaves its rest", [["threshold", "Threshold", "10 mm", length_between(1e-4, 1, "10 mm or 1 cm")], ["keep", "Pre-trigger time", "2 s", seconds_between(0, 60)]], "Arm");
+    if (given) request("arm", { type: "arm", threshold_m: given.threshold, keep_s: given.keep });
   },
   record() { ask_server({ type: "record" }); },
   async mark() {
     const given = await question("Mark this moment", [["text", "Text", "mark"]]);
-    if (given) ask_server({ type: "mark", text: given.text || "mark" });
+    if (given) request("mark", { type: "mark", text: given.text || "mark" });
   },
   async note() {
     const given = await question("Note for this run", [["text", "Text", ""]]);
-    if (given && given.text.trim()) ask_server({ type: "note", text: given.text });
+    if (given && given.text.trim()) request("note", { type: "note", text: given.text });
   },
-  async stop() { if (await question("Stop the recording? Its run file is built then.", [])) ask_server({ type: "stop" }); },
+  async stop() { if (await question("Stop and save?", [], "Stop")) ask_server({ type: "stop" }); },
   report() {
     if (bench().report === "ready") { location.assign("/v1/report"); return; }
     report_asked = true;
     ask_server({ type: "report" });
   },
-  async discard() { if (await question("Put this run aside? It goes to a folder beside; nothing is deleted.", [])) ask_server({ type: "discard" }); },
-  async close() { if (await question("Close the page?", [])) ask_server({ type: "close" }); },
+  async discard() { if (await question("Set this run aside? It is moved to the folder discarded; nothing is deleted.", [], "Set aside")) ask_server({ type: "discard" }); },
+  async close() { if (await question("Close the page?", [], "Close")) ask_server({ type: "close" }); },
   play,
   freeze() { frozen = !frozen; press("freeze", frozen); dirty = true; },
   axes() { fixed = !fixed; press("axes", fixed); dirty = true; },
@@ -101,12 +146,14 @@ const ACTIONS = {
     cursor_on = !cursor_on;
     press("cursor-on", cursor_on);
     if (cursor_on) { move_cursor(0); return; }
-    pinned = null;
-    position.plot.setCursor({ left: -10, top: -10 });
+    pinned = cursor = null;
+    show_cursor();
+    redraw();
   },
   "region-fit"() {
-    const here = at_cursor();
-    if (pinned && here && here[0] !== pinned[0]) fit_between(pinned[0], here[0]); else fit_between(...in_view());
+    if (pinned && cursor && cursor[0] !== pinned[0]) select_between(pinned[0], cursor[0]);
+    else if (selection) select_between(selection.from, selection.to);
+    else select_between(...in_view());
   },
   csv() {
     const [from, end] = in_view(), all = samples[0];
@@ -117,10 +164,10 @@ const ACTIONS = {
     link.download = `${run.name.replace(/\.[^.]*$/, "")}-view.csv`;
     link.click();
     URL.revokeObjectURL(link.href);
-    say("CSV of what is in view saved");
+    say("Samples in view saved as CSV");
   },
   voice() {
-    const e = motion && motion.estimates;
+    const message = shown_message(), e = message && { ...message.estimates, ...(now && !is_over() ? now.estimates : {}) };
     const words = e && e.period ? `Period ${e.period.value.toFixed(3)} seconds` + (e.amplitude_now ? `, amplitude ${(e.amplitude_now.value * scale()).toFixed(1)} ${unit() === "mm" ? "millimetres" : unit()}` : "") : "No motion yet";
     say(words);
     if (window.speechSynthesis) { speechSynthesis.cancel(); speechSynthesis.speak(new SpeechSynthesisUtterance(words)); }
@@ -131,10 +178,16 @@ const ACTIONS = {
     $("address").textContent = run.share;
     $("viewers").showModal();
   },
+  more() { $("more").setAttribute("aria-expanded", String($("groups").classList.toggle("open"))); },
 };
+$("unfold").addEventListener("click", () => {
+  const unfolded = document.body.classList.toggle("unfolded");
+  $("unfold").setAttribute("aria-expanded", String(unfolded));
+  $("unfold").textContent = unfolded ? "Show less" : "Show all";
+});
 for (const button of document.querySelectorAll("#actions button")) button.addEventListener("click", () => ACTIONS[button.id]());
 
-// What has the focus takes the key itself: a field or a list all of them, a slider those that move it, a box the space.
+// The element with the focus keeps its own keys: a field or a list all of them, a slider those that move it, a box the space.
 function takes(target, key) {
   if (target.type === "range") return /^(Arrow|Page|Home|End)/.test(key);
   if (target.type === "checkbox") return key === " ";
@@ -146,6 +199,7 @@ document.addEventListener("keydown", (event) => {
   const arrow = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   if (arrow && run && run.source === "REPLAY" && !cursor_on) { event.preventDefault(); scrub(end_time() + arrow * (event.shiftKey ? 10 : 1)); return; }
   if (arrow && cursor_on) { event.preventDefault(); move_cursor(arrow * (event.shiftKey ? 10 : 1)); return; }
+  if (event.key === "Escape" && selection) { selection = region = null; show_selection(); return; }
   if (event.key === "Enter" && cursor_on && event.target.tagName !== "BUTTON") { event.preventDefault(); pin(); return; }
   const button = [...document.querySelectorAll("#actions button")].find((b) => b.dataset.key === event.key.toLowerCase() && !b.hidden);
   if (button) { event.preventDefault(); ACTIONS[button.id](); }

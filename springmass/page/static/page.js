@@ -1,7 +1,9 @@
 "use strict";
-// The page shows what the recording's log has taken, and what the recorder has acknowledged: nothing before.
+// The page shows only samples that the recording's log holds, and only what the recorder has acknowledged.
 const $ = (id) => document.getElementById(id);
-let run = null, samples = [], state = null, motion = null, socket = null, wait_ms = 250, dirty = true, came = [];
+let run = null, samples = [], state = null, socket = null, wait_ms = 250, dirty = true, came_at = 0;
+// The last messages on all samples, on the last seconds, and on the moment that is played.
+let motion = null, now = null, moment = null;
 
 const scale = () => (run.unit === "m" ? 1e3 : 1);
 const unit = () => (run.unit === "m" ? "mm" : run.unit);
@@ -11,45 +13,49 @@ const zero = () => bench().rest_m || 0;
 
 function say(text) { $("said").textContent = text; }
 function trouble(text) { $("trouble").textContent = text; $("trouble").hidden = !text; }
-function tell(text, bad) { $("told").textContent = text; $("told").className = bad ? "bad" : ""; }
+function show_status(text, bad) { $("told").textContent = text; $("told").className = bad ? "bad" : ""; }
 function ask_server(message) { if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message)); }
 
 function connect() {
   socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/v1/run`);
   socket.binaryType = "arraybuffer";
   socket.onopen = () => { wait_ms = 250; trouble(""); };
-  socket.onmessage = (event) => (typeof event.data === "string" ? told(JSON.parse(event.data)) : took(event.data));
+  socket.onmessage = (event) => (typeof event.data === "string" ? receive(JSON.parse(event.data)) : receive_samples(event.data));
   socket.onclose = lost;
 }
 
 function lost() {
   if (bench().phase === "over" || bench().phase === "ended" || bench().phase === "built") {
-    trouble(`The recording has ended and its page with it; what is shown stays. springmass page ${run.name} shows the run again.`);
+    trouble(`The recording has ended and the page was closed. To show the run again: springmass page ${run.name}`);
     chip("stage", PHASES.over);
     $("stage").className = "chip over";
     return;
   }
-  const network = run && run.role === "viewer" ? " Is this device still in the same network, and does that let its members reach one another? Guest networks often do not." : "";
-  trouble(`The page has lost its server; the recording is not part of it and goes on. Trying again ...${network}`);
+  const network = run && run.role === "viewer" ? " Is this device still in the same network? Guest networks often separate their members." : "";
+  trouble(`The connection to the page's server is lost; the recording continues. Reconnecting ...${network}`);
   setTimeout(connect, wait_ms);
   wait_ms = Math.min(2 * wait_ms, 5000);
 }
 
-function told(message) {
+function receive(message) {
   if (message.type === "hello") hello(message);
   else if (message.type === "state") { state = message; show_state(); }
   else if (message.type === "motion") { motion = message; show_motion(); }
+  else if (message.type === "now") { now = message; show_motion(); }
+  else if (message.type === "moment") { moment = message; moment_asked = null; show_motion(); }
   else if (message.type === "region") show_region(message);
   dirty = true;
 }
 
 function hello(message) {
-  if (message.version !== 1) { trouble(`This page speaks version 1 of the messages, its server ${message.version}: load it again.`); return; }
+  if (message.version !== 1) { trouble(`This page reads version 1 of the messages and its server sends version ${message.version}; reload the page.`); return; }
   // The same run sends all samples again from the first; another run begins anew.
   samples = message.sensors.map(() => new Samples());
   const other = !run || run.session !== message.session;
   run = message;
-  if (other) { motion = null; begin_anew(); }
+  moment_asked = null;
+  came_at = performance.now();
+  if (other) { motion = now = moment = null; begin_anew(); }
   document.title = `${run.title || run.name} · springmass`;
   $("name").textContent = run.title ? `${run.title} (${run.name})` : run.name;
   $("source").textContent = run.simulated ? `SIMULATED${run.source === "REPLAY" ? " · REPLAY" : ""}` : run.source;
@@ -59,49 +65,61 @@ function hello(message) {
   keep_awake();
 }
 
-function took(buffer) {
+function receive_samples(buffer) {
   const [kind, sensor, first, count] = new Uint32Array(buffer, 0, 4);
   if (kind !== 1) return;
   samples[sensor].take(first, new Float64Array(buffer, 16, count), new Float64Array(buffer, 16 + 8 * count, count));
-  came.push([performance.now(), count]);
+  came_at = performance.now();
   dirty = true;
 }
 
-const PHASES = { ready: "READY, not recording", still: "keep it still ...", armed: "ARMED", recording: "RECORDING", ended: "building the run file", built: "saved", over: "ended" };
+const PHASES = { ready: "READY, not recording", still: "keep it still ...", armed: "ARMED", recording: "RECORDING", ended: "saving the run ...", built: "saved", over: "ended" };
 
 function chip(id, text) { $(id).hidden = !text; $(id).textContent = text; }
 
 function show_state() {
-  const now = bench(), moment = performance.now();
-  came = came.filter(([at]) => moment - at < 2000);
-  const rate = came.reduce((sum, [, count]) => sum + count, 0) / 2, live = run.source !== "REPLAY" && !state.ended;
-  chip("stage", now.phase === "armed" ? `ARMED: ${(now.threshold_m * 1e3).toFixed(0)} mm, ${now.keep_s} s kept from before` : PHASES[now.phase] || "");
-  $("stage").className = `chip ${now.phase}`;
-  chip("clock", live ? `${rate.toFixed(0)} Hz, ${CLOCKS[run.clock]}` : CLOCKS[run.clock]);
+  const at = bench(), live = !is_over();
+  chip("stage", at.phase === "armed" ? `ARMED: ${(at.threshold_m * 1e3).toFixed(0)} mm, ${at.keep_s} s kept` : PHASES[at.phase] || "");
+  $("stage").className = `chip ${at.phase}`;
+  show_rate();
   chip("counts", `${state.samples[0].toLocaleString("en")} samples, ${state.missing} missing`);
-  chip("calibration", calibration(now));
+  chip("calibration", calibration(at));
   chip("disk", state.disk_free_bytes === null || !live ? "" : `${(state.disk_free_bytes / 1e9).toFixed(1)} GB free`);
   if (state.error) trouble(state.error);
-  const failed = now.failed || "";
-  tell(failed || now.said || after(now), Boolean(failed));
-  const items = [...state.marks.map(([t, text]) => `${t.toFixed(2)} s: ${text}`), ...state.notes, ...(now.noted || []).map((text) => `note: ${text}`)];
-  $("marks").replaceChildren(...items.map((text) => item(text)));
+  const failed = (performance.now() < refused_until && refused) || at.failed || "";
+  show_status(failed || at.said || after(at), Boolean(failed));
+  const items = [...state.marks.map(([t, text]) => `${t.toFixed(2)} s: ${text}`), ...state.notes, ...(at.noted || []).map((text) => `Note: ${text}`)];
+  $("marks").replaceChildren(...(items.length ? items : ["No marks."]).map((text) => item(text)));
   show_actions();
-  if (now.rest_m !== shown_zero) begin_anew();
+  if (at.rest_m !== shown_zero) begin_anew();
+}
+
+// By the samples' own times over the last two seconds: right whatever comes in one piece after a reload.
+function rate_hz() {
+  const all = samples[0];
+  if (!all || all.count < 3) return null;
+  const last = all.count - 1, first = all.at(all.t[last] - 2), span = all.t[last] - all.t[first];
+  return span >= 1 ? (last - first) / span : null;
+}
+
+function show_rate() {
+  const live = !is_over(), silent = (performance.now() - came_at) / 1e3, rate = rate_hz();
+  const measured = silent > 1.5 ? `no samples for ${silent.toFixed(0)} s` : rate === null ? "" : `${rate.toFixed(0)} Hz`;
+  chip("clock", [live ? measured : "", CLOCKS[run.clock]].filter(Boolean).join(", "));
 }
 
 const CLOCKS = { device: "sensor's clock", host: "this computer's clock", nominal: "nominal clock" };
 
-function calibration(now) {
-  const rest = now.rest_m === undefined ? "" : `zero ${(now.rest_m * 1e3).toFixed(1)} mm, noise ${(now.noise_m * 1e3).toFixed(2)} mm`;
+function calibration(at) {
+  const rest = at.rest_m === undefined ? "" : `zero ${(at.rest_m * 1e3).toFixed(1)} mm, noise ${(at.noise_m * 1e3).toFixed(2)} mm`;
   return [run.calibration, rest].filter(Boolean).join("; ");
 }
 
-function after(now) {
-  if (now.discarded) return `Put aside as ${now.discarded}; nothing was deleted.`;
-  if (now.report === "making") return "The report is being made ...";
-  if (now.report === "ready") return "The report is made.";
-  if (now.phase === "built") return `${run.name} is saved. O opens its report.`;
+function after(at) {
+  if (at.discarded) return `The run is now ${at.discarded}; nothing was deleted.`;
+  if (at.report === "making") return "The report is being made ...";
+  if (at.report === "ready") return "The report is ready.";
+  if (at.phase === "built") return `${run.name} is saved. O opens its report.`;
   return "";
 }
 
@@ -112,7 +130,7 @@ function item(text, kind) {
   return found;
 }
 
-// Phones go dark otherwise; browsers allow it under https and on this computer alone.
+// Phones turn their screens off otherwise; browsers allow this over HTTPS and on this computer alone.
 let awake = null;
 async function keep_awake() {
   if (run.source === "REPLAY" || awake) return;

@@ -1,23 +1,28 @@
 "use strict";
-// Numbers, charts, cursors.
+// Numbers with their age, and the four charts.
 const WINDOWS = [5, 10, 30, 60, 300, Infinity];
 const LABELS = { period: "period", amplitude_now: "amplitude now", spring_constant: "spring constant k", damping_rate: "damping rate", noise: "noise", offset: "rest position", quality_factor: "quality factor", sample_rate: "sampling rate", drop_outs: "drop-outs" };
+// Estimates that depend on the damping law, which may be stated.
+const OF_LAW = new Set(["damping_rate", "quality_factor"]);
 const KINDS = { voltage: "voltage", angle: "angle", acceleration: "acceleration", force: "force", length: "position" };
-let position, amplitude, phase, spectrum, shown_zero;
-let frozen = false, fixed = false, window_index = 1, playing = false, play_time = null, play_moment = 0, pinned = null;
+const FRESH_S = 2;
+let position, amplitude, phase, spectrum, shown_zero, phase_span = null, peaks = [];
+let frozen = false, fixed = false, window_index = 1, playing = false, play_time = null, play_moment = 0;
 
 function begin_anew() {
   shown_zero = bench().rest_m;
-  pinned = null;
   play_time = null;
   if (run.source === "REPLAY") window_index = WINDOWS.length - 1, show_window();
   const what = `${shown_zero === undefined ? KINDS[run.quantity] || run.quantity : "displacement"} / ${unit()}`;
   if (position) for (const chart of [position, amplitude, phase, spectrum]) chart.destroy();
-  const select = { cursor: { drag: { x: true, y: false, setScale: false } }, hooks: { setSelect: [selected], setCursor: [pointed], draw: [draw_marks] } };
-  position = new Chart("position", [{ label: "samples", stroke: COLOURS.data, width: 1, points: { show: false } }, line("fit", COLOURS.fit), line("rest", COLOURS.rest, [6, 4], 1)], ["time / s", what], select);
-  amplitude = new Chart("amplitude", [points("amplitude")], ["time / s", `amplitude / ${unit()}`]);
-  phase = new Chart("phase", [{ label: "velocity", stroke: COLOURS.data, points: { show: true, size: 3, fill: COLOURS.data }, paths: () => null }], [what, `velocity / (${unit()}/s)`]);
-  spectrum = new Chart("spectrum", [line("amplitude", COLOURS.data, null, 1)], ["frequency / Hz", `amplitude / ${unit()}`], { scales: { x: { time: false }, y: { distr: 3 } } });
+  // Our own cursor stays at its sample; uPlot's stays at a place of the screen.
+  const select = { cursor: { x: false, y: false, points: { show: false }, drag: { x: true, y: false, setScale: false } }, hooks: { setSelect: [selected], drawAxes: [draw_selection, draw_fits], draw: [draw_marks, draw_cursors] } };
+  const still = { cursor: { show: false } };
+  position = new Chart("position", [samples_series(), line("fit", "fit", null, 1), line("rest", "rest", [6, 4], 1)], ["time / s", what], select);
+  amplitude = new Chart("amplitude", [points("amplitude")], ["time / s", `amplitude / ${unit()}`], still);
+  phase = new Chart("phase", [points("velocity", 3)], [what, `velocity / (${unit()}/s)`], { ...still, scales: { x: { time: false, range: (_, min, max) => phase_range("x", min, max) }, y: { range: (_, min, max) => phase_range("y", min, max) } } });
+  spectrum = new Chart("spectrum", [line("amplitude", "data", null, 1)], ["frequency / Hz", `amplitude / ${unit()}`], { ...still, scales: { x: { time: false }, y: { distr: 3 } }, hooks: { draw: [draw_peaks] } }, true);
+  forget_selection();
   if (motion) show_motion();
   dirty = true;
 }
@@ -40,76 +45,114 @@ function short(estimate) {
   return signed(`${value.toFixed(digits)}(${bracket}) ${name}`);
 }
 
-function list(box, estimates) {
-  box.replaceChildren(...Object.entries(LABELS).filter(([name]) => estimates[name]).map(([name, label]) => {
-    const group = document.createElement("div"), term = document.createElement("dt"), detail = document.createElement("dd");
-    term.textContent = label;
-    detail.textContent = short(estimates[name]);
-    detail.title = estimates[name].text;
-    group.append(term, detail);
-    return group;
-  }));
+// A run that is recorded goes on between messages; one that is over does not, and a replay is at the moment that is played.
+const is_over = () => run.source === "REPLAY" || state.ended;
+const is_played = () => run.source === "REPLAY" && play_time !== null && play_time < last_time() - 1e-9;
+function last_time() { const all = samples[0]; return all && all.count ? all.t[all.count - 1] : 0; }
+function now_s() {
+  if (is_played()) return play_time;
+  return last_time() + (!state || is_over() ? 0 : (performance.now() - came_at) / 1e3);
 }
+// The message whose numbers are shown: of the moment that is played, else of all samples.
+const shown_message = () => (is_played() && moment ? moment : motion);
 
 function show_motion() {
-  $("why").textContent = motion.why || "";
-  list($("estimates"), motion.estimates || {});
-  $("stopping").textContent = motion.stop ? stopping(motion.stop) : "";
-  $("telling").textContent = motion.stop && motion.stop.laws ? telling(motion.stop.laws) : "";
-  $("findings").replaceChildren(...(motion.findings || []).map((f) => item(f.advice ? `${f.message}. ${f.advice}` : f.message, f.severity)));
-  if (!(motion.findings || []).length) $("findings").replaceChildren(item(motion.count ? "nothing to say" : "nothing yet"));
-  if (motion.amplitude) {
-    const laws = motion.laws, times = motion.amplitude.t;
-    const series = [points("amplitude"), ...laws.map((law, i) => line(law.name, law.name === motion.law ? COLOURS.fit : COLOURS.others[i % 4], law.name === motion.law ? null : DASHES[i % 4]))];
+  const message = shown_message();
+  if (!message) return;
+  $("why").textContent = message.why || "";
+  const fresher = now && !is_over() && now.t_s > (message.t_s || 0) ? now.estimates : {};
+  const estimates = { ...message.estimates, ...(message.estimates ? fresher : {}) };
+  $("estimates").replaceChildren(...Object.keys(LABELS).filter((name) => estimates[name]).map((name) => {
+    const group = pair(LABELS[name] + (OF_LAW.has(name) && message.stated_law ? `, law ${message.stated_law}` : ""), short(estimates[name])), detail = group.lastChild, age = document.createElement("span");
+    detail.title = estimates[name].text;
+    group.dataset.name = name;
+    group.dataset.t = fresher[name] ? now.t_s : message.t_s;
+    age.className = "age";
+    detail.append(age);
+    return group;
+  }));
+  show_ages();
+  $("findings").replaceChildren(...(message.findings || []).map((f) => item(f.advice ? `${f.message.replace(/\.$/, "")}. ${f.advice}` : f.message, f.severity)));
+  if (!(message.findings || []).length) $("findings").replaceChildren(item(message.count || message.type === "moment" ? "No warnings." : "No analysis yet."));
+  if (message.amplitude) {
+    const laws = message.laws, times = message.amplitude.t;
+    const series = [points("amplitude"), ...laws.map((law, i) => line(law.name === message.stated_law ? `${law.name} (stated)` : law.name, law.name === message.law ? "fit" : `other-${(i % 4) + 1}`, law.name === message.law ? null : DASHES[i % 4]))];
     if (series.map((s) => s.label).join() !== amplitude.series.map((s) => s.label).join()) amplitude.build(series);
     const k = scale();
-    const columns = [[times, motion.amplitude.value.map((x) => x * k)], ...laws.map((law) => [law.t, law.value.map((x) => x * k)])];
+    const columns = [[times, message.amplitude.value.map((x) => x * k)], ...laws.map((law) => [law.t, law.value.map((x) => x * k)])];
     amplitude.show(uPlot.join(columns));
   }
-  if (motion.spectrum && motion.spectrum.f.length) spectrum.show([motion.spectrum.f.slice(1), motion.spectrum.value.slice(1).map((x) => x * scale())]);
+  if (message.spectrum && message.spectrum.f.length) show_spectrum(message.spectrum);
+  if (selection) show_region_fits();
 }
 
-const seconds = (s) => (s === null ? "long" : s < 10 ? s.toFixed(1) : s.toFixed(0));
+// Twice as often as a number can become too old: what is older than two seconds is grey and says how old it is.
+function show_ages() {
+  const message = shown_message(), at = run && state && message ? now_s() : null;
+  if (at === null) return;
+  for (const group of $("estimates").children) {
+    const age = Math.abs(at - Number(group.dataset.t)), old = age > FRESH_S;
+    group.classList.toggle("stale", old);
+    group.querySelector(".age").textContent = old ? (is_played() ? `at ${Number(group.dataset.t).toFixed(1)} s` : `${age.toFixed(0)} s old`) : "";
+  }
+  const whole = message.accuracy === "standard";
+  $("tier").textContent = !message.accuracy ? "" : whole ? "Standard accuracy, whole run." : is_played() ? `Fast accuracy, samples up to ${message.t_s === null ? "" : message.t_s.toFixed(1)} s.` : "Fast accuracy while the run goes on; the report uses standard accuracy.";
+  const forecast = message.stop && !is_over() && bench().phase === "recording" && message.t_s !== undefined;
+  $("stopping").textContent = forecast ? stopping(message.stop, at - message.t_s) : "";
+  $("stopping").classList.toggle("stale", forecast && at - message.t_s > FRESH_S);
+  $("why").classList.toggle("stale", !is_over() && at - message.t_s > FRESH_S);
+}
+setInterval(() => { if (run && state) { show_ages(); show_rate(); } }, 250);
 
-function stopping(stop) {
+const seconds = (s) => (s < 10 ? s.toFixed(1) : s.toFixed(0));
+
+function stopping(stop, age_s) {
   const wanted = `u(T) = ${(stop.wanted_u_s * 1e6).toFixed(0)} µs`;
-  const interval = `Whenever you stop, T lies in ${stop.low.toFixed(6)} to ${stop.high.toFixed(6)} s with ${(100 * stop.covers).toFixed(0)} %.`;
+  const interval = `If you stop now: T between ${stop.low.toFixed(6)} and ${stop.high.toFixed(6)} s (${(100 * stop.covers).toFixed(0)} %).`;
   if (stop.more_s === 0) return `${interval} ${wanted} is reached.`;
-  if (stop.u_clock_s >= stop.wanted_u_s) return `${interval} ${wanted} is out of reach: the sensor's clock alone leaves ${(stop.u_clock_s * 1e6).toFixed(0)} µs.`;
+  if (stop.u_clock_s >= stop.wanted_u_s) return `${interval} ${wanted} is out of reach: the uncertainty of the sensor's clock alone is ${(stop.u_clock_s * 1e6).toFixed(0)} µs.`;
   if (stop.more_s === null) return `${interval} ${wanted} is out of reach for this swing.`;
-  return `${interval} About ${seconds(stop.more_s)} s more for ${wanted}.`;
+  const left = stop.more_s - age_s;
+  return left > 0 ? `${interval} About ${seconds(left)} s more for ${wanted}.` : interval;
 }
 
-function telling(need) {
-  const pair = `${need.law} from ${need.rival} drag`;
-  if (need.told && !["linear", "quadratic"].includes(motion.law)) return `Neither linear nor quadratic drag alone: ${motion.law}.`;
-  if (need.told) return `The record tells ${pair}.`;
-  if (need.median_s === null) return `To tell ${pair} takes more than twenty times as long as so far.`;
-  return `About ${seconds(need.median_s)} s more to tell ${pair} (${seconds(need.low_s)} to ${need.high_s === null ? "much more" : `${seconds(need.high_s)} s`}, 8 times in 10).`;
+// The highest lines lie at the low end of the spectrum; frequencies far above them are cut off.
+function show_spectrum({ f, value, peaks: found }) {
+  peaks = found || [];
+  const highest = Math.max(...peaks.map((peak) => peak.f), 0), end = Math.max(10, 4 * highest);
+  const stop = f.findIndex((x) => x > end), upto = stop < 0 ? f.length : stop;
+  spectrum.show([f.slice(1, upto), value.slice(1, upto).map((x) => x * scale())]);
 }
 
-function show_region(found) {
-  $("region").hidden = false;
-  $("region-title").textContent = `Region ${found.from.toFixed(2)} to ${found.to.toFixed(2)} s`;
-  list($("region-estimates"), found.estimates || {});
-  $("region-why").textContent = found.why || "";
-  say(`${$("region-title").textContent}: ${found.estimates && found.estimates.period ? `period ${short(found.estimates.period)}` : found.why}`);
+function draw_peaks(plot) {
+  const { ctx, bbox } = plot, taken = [];
+  ctx.save();
+  ctx.fillStyle = COLOURS.ink;
+  ctx.textAlign = "left";
+  ctx.font = `${11 * devicePixelRatio}px system-ui`;
+  for (const { f, value, step } of [...peaks].sort((a, b) => b.value - a.value)) {
+    const text = `${f.toFixed(Math.max(0, Math.ceil(-Math.log10(step))))} Hz`, wide = ctx.measureText(text).width, high = 13 * devicePixelRatio;
+    const x = Math.min(plot.valToPos(f, "x", true) + 4, bbox.left + bbox.width - wide), y = Math.max(plot.valToPos(value * scale(), "y", true), bbox.top + high);
+    if (taken.some((box) => x < box.x + box.wide && box.x < x + wide && Math.abs(y - box.y) < high)) continue;
+    taken.push({ x, y, wide });
+    ctx.fillText(text, x, y);
+  }
+  ctx.restore();
 }
 
-function fit_between(from, to) { ask_server({ type: "region", from: Math.min(from, to), to: Math.max(from, to) }); }
-
-function selected(plot) {
-  const { left, width } = plot.select;
-  if (width < 8) return;
-  fit_between(plot.posToVal(left, "x"), plot.posToVal(left + width, "x"));
+// Velocity divided by the angular frequency has the unit of the position: a swing is drawn as the circle that it is.
+function phase_range(axis, min, max) {
+  if (!phase_span || !phase || !(phase_span.reach > 0)) return min === null ? [-1, 1] : uPlot.rangeNum(min, max, 0.1, true);
+  const { width, height } = phase.plot.bbox, { middle, reach, omega } = phase_span, wider = Math.max(1, width / height), higher = Math.max(1, height / width);
+  return axis === "x" ? [middle - reach * wider, middle + reach * wider] : [-reach * omega * higher, reach * omega * higher];
 }
 
-// A mark is a dashed line with its text, as far as it lies in view.
+// A mark is a dashed line with its text.
 function draw_marks(plot) {
   if (!state) return;
   const { ctx, bbox } = plot, { min, max } = plot.scales.x;
   ctx.save();
-  ctx.strokeStyle = ctx.fillStyle = COLOURS.others[1];
+  ctx.strokeStyle = ctx.fillStyle = COLOURS["other-2"];
   ctx.setLineDash([4, 4]);
   ctx.font = `${11 * devicePixelRatio}px system-ui`;
   for (const [t, text] of state.marks) {
@@ -126,105 +169,81 @@ function draw_marks(plot) {
   ctx.restore();
 }
 
-// The cursor: by the mouse, a finger, or the arrow keys once X has put it there. A click or Enter pins it.
-let cursor_on = false;
-function at_cursor() {
-  const { idx } = position.plot.cursor;
-  if (idx === null || idx === undefined || position.plot.data[1][idx] == null) return null;
-  return [position.plot.data[0][idx], position.plot.data[1][idx]];
+// The fits lie beneath the samples, thin, with two points a pixel.
+const LEAST_SWING_PX = 6;
+function draw_fits(plot) {
+  const message = shown_message(), { min, max } = plot.scales.x;
+  if (message && message.fit) draw_fit(plot, message.fit, Math.max(min, message.fit.moment - 20), Math.min(max, end_time()), "fit");
+  if (region && region.fit && selection) draw_fit(plot, region.fit, Math.max(min, selection.from, region.fit.moment - 20), Math.min(max, selection.to), "other-1");
 }
 
-function pointed() {
-  const here = position && position.plot && at_cursor();
-  if (!here) { $("cursor").textContent = ""; return; }
-  const [t, y] = here;
-  let text = `${t.toFixed(3)} s, ${y.toFixed(3)} ${unit()}`;
-  if (pinned) text += `; from the pin: ${(t - pinned[0]).toFixed(3)} s, ${(y - pinned[1]).toFixed(3)} ${unit()}, slope ${((y - pinned[1]) / (t - pinned[0])).toFixed(2)} ${unit()}/s`;
-  $("cursor").textContent = text;
+function draw_fit(plot, fit, from, to, name) {
+  const { ctx } = plot, step = (plot.posToVal(1, "x") - plot.posToVal(0, "x")) / 2;
+  if (!(to > from) || (2 * Math.PI) / fit.omega < 2 * LEAST_SWING_PX * step) return;
+  ctx.save();
+  ctx.beginPath();
+  for (let t = from; t <= to; t += step) {
+    const y = fit.rest + fit.amplitude * decay(fit.decay, t - fit.moment) * Math.cos(fit.omega * (t - fit.moment) + fit.phase);
+    ctx.lineTo(plot.valToPos(t, "x", true), plot.valToPos((y - zero()) * scale(), "y", true));
+  }
+  ctx.strokeStyle = COLOURS[name];
+  ctx.lineWidth = devicePixelRatio;
+  ctx.stroke();
+  ctx.restore();
 }
 
-function pin() { pinned = at_cursor() || pinned; pointed(); }
-
-function move_cursor(steps) {
-  const { plot } = position, last = plot.data[0].length - 1;
-  if (last < 0) return;
-  const before = plot.cursor.idx == null || plot.cursor.left < 0 ? Math.round(last / 2) : plot.cursor.idx;
-  const idx = Math.min(last, Math.max(0, before + steps));
-  const y = plot.data[1][idx];
-  plot.setCursor({ left: plot.valToPos(plot.data[0][idx], "x"), top: y == null ? 0 : plot.valToPos(y, "y") });
-}
-
-// uPlot knows the mouse; a finger taps to point and pin, and draws to the side to have a part fitted.
-let touch_from = null;
-const over_chart = (event) => event.pointerType !== "mouse" && event.target.classList.contains("u-over");
-const along = (event) => event.clientX - event.target.getBoundingClientRect().left;
-$("position").addEventListener("pointerdown", (event) => { if (over_chart(event)) touch_from = along(event); });
-$("position").addEventListener("pointermove", (event) => {
-  if (!over_chart(event) || touch_from === null) return;
-  const x = along(event), { plot } = position;
-  plot.setSelect({ left: Math.min(x, touch_from), width: Math.abs(x - touch_from), top: 0, height: plot.over.clientHeight }, false);
-});
-$("position").addEventListener("pointerup", (event) => {
-  if (!over_chart(event) || touch_from === null) return;
-  const x = along(event), from = touch_from, { plot } = position;
-  touch_from = null;
-  if (Math.abs(x - from) >= 8) { fit_between(plot.posToVal(from, "x"), plot.posToVal(x, "x")); return; }
-  plot.setCursor({ left: x, top: 0 });
-  pin();
-});
-$("position").addEventListener("pointercancel", () => { touch_from = null; });
-$("position").addEventListener("click", (event) => { if (event.pointerType !== "touch") pin(); });
-
-function end_time() {
-  const all = samples[0];
-  if (!all || !all.count) return 0;
-  return play_time !== null ? play_time : all.t[all.count - 1];
-}
+function end_time() { return play_time !== null ? play_time : last_time(); }
 
 function in_view() {
   const all = samples[0], span = WINDOWS[window_index], end = end_time();
   return [span === Infinity ? (all.count ? all.t[0] : 0) : end - span, end];
 }
 
-function fit_at(t) {
-  const fit = motion && motion.fit;
-  if (!fit || t < fit.moment - 20 || play_time !== null) return null;
-  return fit.rest + fit.amplitude * decay(fit.decay, t - fit.moment) * Math.cos(fit.omega * (t - fit.moment) + fit.phase);
-}
-
-// What the damping law leaves of the last window's amplitude so many seconds from it.
+// The amplitude by the damping law, divided by that of the last window, so many seconds from it.
 function decay({ from, step, value }, after) {
   const at = Math.min(Math.max((after - from) / step, 0), value.length - 1), low = Math.min(Math.floor(at), value.length - 2);
   return value[low] + (at - low) * (value[low + 1] - value[low]);
 }
 
 function step_play() {
-  const now = performance.now(), all = samples[0], last = all.t[all.count - 1];
-  play_time += ((now - play_moment) / 1e3) * Number($("speed").value);
-  play_moment = now;
+  const at = performance.now(), all = samples[0], last = all.t[all.count - 1];
+  play_time += ((at - play_moment) / 1e3) * Number($("speed").value);
+  play_moment = at;
   if (play_time > last) {
-    if ($("loop").checked) play_time = all.t[0]; else { play_time = last; play(); }
+    if ($("loop").checked) play_time = all.t[0]; else { play_time = last; play(); show_motion(); }
   }
   $("time").value = (play_time - all.t[0]) / (last - all.t[0]);
+}
+
+// The numbers of the moment that is played: asked for again once the last answer is there and the moment another one.
+let moment_asked = null;
+function ask_moment() {
+  if (!is_played()) { if (moment) { moment = null; show_motion(); } return; }
+  if (moment_asked !== null || (moment && Math.abs(moment.to - play_time) < 0.25)) return;
+  moment_asked = play_time;
+  ask_server({ type: "moment", to: play_time });
 }
 
 function draw() {
   requestAnimationFrame(draw);
   if (!run || !samples[0] || !position || document.hidden) return;
   if (playing) step_play();
+  if (run.source === "REPLAY") ask_moment();
   if (frozen || !(dirty || playing)) return;
   dirty = false;
-  const [from, end] = in_view(), all = samples[0];
+  const [from, end] = in_view(), all = samples[0], message = shown_message();
   const [t, y] = all.between(from, end, Math.max(200, $("position").clientWidth));
   const k = scale(), z = zero(), shown = (v) => (v === null ? null : (v - z) * k);
-  const close = t.length && t[t.length - 1] - t[0] < 40;
-  const fit = t.map((x) => (close ? shown(fit_at(x)) : null));
-  const rest = t.map(() => (motion && motion.rest_m !== undefined ? shown(motion.rest_m) : null));
+  const rest = t.map(() => (message && message.rest_m !== undefined ? shown(message.rest_m) : null));
   const keep = fixed ? { ...position.plot.scales.y } : null;
-  position.show([t, y.map(shown), fit, rest]);
+  position.show([t, y.map(shown), t.map(() => null), rest]);
   if (keep && keep.min != null) position.plot.setScale("y", { min: keep.min, max: keep.max });
-  const swing = motion && motion.omega ? (2 * Math.PI) / motion.omega : 1;
+  const omega = message && message.omega, swing = omega ? (2 * Math.PI) / omega : 1;
   const reach = Math.max(1, Math.round((swing / 40) * run.rate_hz));
   const orbit = all.orbit(end - 3 * swing, end, reach).sort((a, b) => a[0] - b[0]);
+  if (omega && orbit.length) {
+    const low = shown(orbit[0][0]), high = shown(orbit[orbit.length - 1][0]), fastest = Math.max(...orbit.map(([, v]) => Math.abs(v))) * k;
+    phase_span = { middle: (low + high) / 2, reach: 1.1 * Math.max((high - low) / 2, fastest / omega), omega };
+  } else phase_span = null;
   phase.show([orbit.map(([p]) => shown(p)), orbit.map(([, v]) => v * k)]);
 }

@@ -1,8 +1,8 @@
-"""Who may look, and who may act: the person who started the page, viewers where they are let in, nobody from elsewhere.
+"""Who may look and who may act: the person who started the page, viewers where they are let in, and nobody else.
 
-As notebooks do it: loopback alone, a token in the first address that is exchanged for a cookie, hosts and origins held
-to the page's own names, so that no page of somebody else's can reach this one through the browser. On a local network,
-where that was asked for, another token lets in as many as have it, to look and not to act.
+As with notebooks, the page listens on the loopback alone. A token in the first address is exchanged for a cookie. Hosts
+and origins must be the page's own, so that no page of somebody else's can reach this one through the browser. On a
+local network, where that was asked for, another token lets in everybody who has it, to look and not to act.
 """
 
 from __future__ import annotations
@@ -10,43 +10,60 @@ from __future__ import annotations
 import hashlib
 import hmac
 import secrets
-from collections.abc import Awaitable, Callable, MutableMapping
-from http.cookies import CookieError, SimpleCookie
-from typing import Any, Literal
-from urllib.parse import parse_qs, urlsplit
+from collections.abc import Iterable
+from urllib.parse import urlsplit
 
-__all__ = ["ROLE", "Gate", "Role"]
+from starlette.authentication import AuthCredentials, AuthenticationBackend, AuthenticationError, BaseUser, SimpleUser
+from starlette.datastructures import MutableHeaders
+from starlette.middleware.authentication import AuthenticationMiddleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import HTTPConnection
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-Scope = MutableMapping[str, Any]
-App = Callable[[Scope, Callable[[], Awaitable[Any]], Callable[[Any], Awaitable[None]]], Awaitable[None]]
-Role = Literal["controller", "viewer"]
+from springmass.report.script import script_sha256
 
-ROLE = "springmass.role"
-"""Where a request's scope says who asks."""
-LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
-PAGE_POLICY = b"default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-REPORT_POLICY = b"default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; base-uri 'none'"
-"""A report is one file with its styles and pictures in it, and runs nothing."""
-HEADERS = (
-    (b"x-content-type-options", b"nosniff"),
-    (b"referrer-policy", b"no-referrer"),
-    (b"cache-control", b"no-store"),
+__all__ = ["ACT", "LOOK", "Access", "guarded"]
+
+LOOK, ACT = "look", "act"
+"""What a request may do; the controller may do both."""
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+PAGE_POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+REPORT_POLICY = (
+    f"default-src 'none'; script-src 'sha256-{script_sha256()}'; style-src 'unsafe-inline'; img-src data:; "
+    "frame-ancestors 'none'; base-uri 'none'"
 )
+"""A report is one file with its styles and pictures in it, and runs the script of its charts and no other."""
+HEADERS = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer", "Cache-Control": "no-store"}
 
 
-class Gate:
-    """Lets through what comes from the page itself, and says as whom (ASGI middleware).
+def guarded(app: ASGIApp, access: Access, hosts: Iterable[str] = ()) -> ASGIApp:
+    """Return an application behind the checks of host, origin and cookie, with the headers of security.
 
     Parameters
     ----------
     app : ASGI application
+        ``auth.scopes`` of its requests holds :data:`LOOK` and, of the controller's, :data:`ACT`.
+    access : Access
+    hosts : iterable of str
+        Addresses, besides the loopback's names, that the page answers to.
+    """
+    known = AuthenticationMiddleware(app, access, access.answer)
+    return _Headers(TrustedHostMiddleware(known, [*LOOPBACK, *hosts], www_redirect=False))
+
+
+class Access(AuthenticationBackend):
+    """Recognises browsers by the page's cookie, and exchanges a token for it.
+
+    Parameters
+    ----------
     port : int
         Names the cookie, so that two pages on one machine keep apart.
     secret : str
-        What cookies and tokens are made of: with the same one, a page that was started again knows its browsers. Left
-        out, one of its own.
-    hosts : collection of str
-        Addresses, beside the loopback's names, by which viewers may ask; none: nobody but this computer.
+        From which cookies and tokens are made: with the same one, a page that was started again knows its browsers.
+        Empty: a new one.
+    viewers : bool
+        Whether viewers are let in.
     used : bool
         Whether the controller's link has been used before.
 
@@ -58,102 +75,84 @@ class Gate:
         Lets in any, to look.
     """
 
-    def __init__(
-        self, app: App, port: int, secret: str = "", hosts: frozenset[str] = frozenset(), *, used: bool = False
-    ) -> None:
-        self._app = app
+    def __init__(self, port: int, secret: str = "", *, viewers: bool = False, used: bool = False) -> None:
         self._secret = (secret or secrets.token_urlsafe(24)).encode()
         self._cookie = f"springmass-{port}"
-        self._hosts = LOOPBACK | hosts
-        self._open_to_viewers = bool(hosts)
-        self._cookies: dict[Role, str] = {"controller": self._made("act"), "viewer": self._made("look")}
+        self._viewers = viewers
+        self._controls, self._looks = self._made("act"), self._made("look")
         self.token: str | None = None if used else self._made("act once")
-        self.viewers_token = self._made("look on")
+        self.viewers_token = self._made("view")
 
     def _made(self, what: str) -> str:
         return hmac.new(self._secret, what.encode(), hashlib.sha256).hexdigest()[:32]
 
-    async def __call__(self, scope: Scope, receive: Any, send: Any) -> None:
-        """Serve, or refuse."""
-        if scope["type"] not in ("http", "websocket"):
-            await self._app(scope, receive, send)
-            return
-        headers = {name.lower(): value.decode("latin-1") for name, value in scope["headers"]}
-        refusal = self._refusal(scope, headers)
-        role = self._role(headers)
-        if refusal is None and role is not None:
-            scope[ROLE] = role
-            await self._app(scope, receive, _with_headers(send, scope.get("path", "")))
-        elif scope["type"] == "websocket":
-            await receive()
-            await send({"type": "websocket.close", "code": 1008})
-        else:
-            await self._refuse(scope, send, refusal)
+    async def authenticate(self, conn: HTTPConnection) -> tuple[AuthCredentials, BaseUser]:
+        """Return what a request may do.
 
-    def _refusal(self, scope: Scope, headers: dict[bytes, str]) -> str | None:
-        host = headers.get(b"host", "")
-        if _name(f"//{host}") not in self._hosts:
-            return "this page answers to the addresses that springmass printed alone"
-        origin = headers.get(b"origin")
-        if (origin is not None or scope["type"] == "websocket") and _netloc(origin or "") != host:
-            return "this page answers to its own address alone"
-        return None
+        Raises
+        ------
+        AuthenticationError
+            If it comes from another page, or has no cookie of this one.
+        """
+        origin = conn.headers.get("origin")
+        # Browsers send cookies along whatever page asks, and name that page; a socket is asked for by a page always.
+        if (origin is not None or conn.scope["type"] == "websocket") and _host(origin or "") != conn.headers["host"]:
+            raise _ForeignOrigin("this page answers to its own address alone")
+        given = conn.cookies.get(self._cookie, "")
+        if _same(given, self._controls):
+            return AuthCredentials([LOOK, ACT]), SimpleUser("controller")
+        if _same(given, self._looks):
+            return AuthCredentials([LOOK]), SimpleUser("viewer")
+        raise AuthenticationError("open the address that springmass printed: it works once, in one browser")
 
-    def _role(self, headers: dict[bytes, str]) -> Role | None:
-        try:
-            cookie = SimpleCookie(headers.get(b"cookie", "")).get(self._cookie)
-        except CookieError:
-            return None
-        given = "" if cookie is None else cookie.value
-        return next((role for role, value in self._cookies.items() if _same(given, value)), None)
+    def answer(self, conn: HTTPConnection, error: AuthenticationError) -> Response:
+        """Exchange a token for its cookie, or refuse."""
+        cookie = None if isinstance(error, _ForeignOrigin) else self._exchanged(conn.query_params.get("token", ""))
+        if cookie is None:
+            return PlainTextResponse(f"springmass: {error}\n", 403)
+        response = RedirectResponse("/", 303)
+        response.set_cookie(self._cookie, cookie, httponly=True, samesite="strict")
+        return response
 
-    async def _refuse(self, scope: Scope, send: Any, why: str | None) -> None:
-        """Refuse, or exchange a token for its cookie."""
-        given = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
-        status, extra = 403, []
-        body = f"springmass: {why or 'open the address that springmass printed: it works once, in one browser'}\n"
-        role = None if why else self._exchanged(given)
-        if role is not None:
-            cookie = f"{self._cookie}={self._cookies[role]}; HttpOnly; SameSite=Strict; Path=/"
-            status, extra, body = 303, [(b"location", b"/"), (b"set-cookie", cookie.encode())], ""
-        policy = (b"content-security-policy", PAGE_POLICY)
-        plain = (b"content-type", b"text/plain; charset=utf-8")
-        await send({"type": "http.response.start", "status": status, "headers": [plain, policy, *HEADERS, *extra]})
-        await send({"type": "http.response.body", "body": body.encode()})
-
-    def _exchanged(self, given: str) -> Role | None:
+    def _exchanged(self, given: str) -> str | None:
         if self.token is not None and _same(given, self.token):
             self.token = None
-            return "controller"
-        return "viewer" if self._open_to_viewers and _same(given, self.viewers_token) else None
+            return self._controls
+        return self._looks if self._viewers and _same(given, self.viewers_token) else None
+
+
+class _ForeignOrigin(AuthenticationError):
+    """A request that another page made."""
+
+
+class _Headers:
+    """Adds the headers of security to every answer, and closes sockets that are refused (ASGI middleware)."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        policy = REPORT_POLICY if scope.get("path") == "/v1/report" else PAGE_POLICY
+
+        async def sending(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message).update({**HEADERS, "Content-Security-Policy": policy})
+            # A socket that gets an answer in place of its handshake is an error in uvicorn's log, a closed one is none.
+            if message["type"] == "websocket.http.response.start":
+                message = {"type": "websocket.close", "code": 1008}
+            if message["type"] != "websocket.http.response.body":
+                await send(message)
+
+        await self._app(scope, receive, sending)
 
 
 def _same(given: str, wanted: str) -> bool:
     return hmac.compare_digest(given.encode(), wanted.encode())
 
 
-def _netloc(address: str) -> str:
+def _host(address: str) -> str:
     """Return host and port of an address; empty where it is none."""
     try:
         return urlsplit(address).netloc
     except ValueError:
         return ""
-
-
-def _name(address: str) -> str:
-    """Return the host's name in an address, whatever its port; empty where it has none."""
-    try:
-        return urlsplit(address).hostname or ""
-    except ValueError:
-        return ""
-
-
-def _with_headers(send: Any, path: str) -> Callable[[Any], Awaitable[None]]:
-    policy = (b"content-security-policy", REPORT_POLICY if path == "/v1/report" else PAGE_POLICY)
-
-    async def sending(message: Any) -> None:
-        if message["type"] == "http.response.start":
-            message = {**message, "headers": [*message["headers"], policy, *HEADERS]}
-        await send(message)
-
-    return sending

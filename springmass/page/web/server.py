@@ -1,4 +1,4 @@
-"""The page's server: its files, the messages to whoever looks, and the few that come back."""
+"""The page's server: its files, the messages to viewers, and the few that come back."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from springmass.page.desk import Desk
+from springmass.page.state import PageState
 from springmass.page.view import View, json_of
 from springmass.page.web.bounds import bounded_protocol, most_connections
-from springmass.page.web.security import ROLE, Gate
+from springmass.page.web.security import ACT, Access, guarded
 from springmass.page.web.sharing import code_svg
 
 if TYPE_CHECKING:
@@ -28,14 +28,14 @@ __all__ = ["Opening", "application", "serve"]
 LOG = logging.getLogger("springmass.page")
 STATIC = Path(__file__).parents[1] / "static"
 TURN_S = 0.0225
-"""Between two looks at the log: little longer than a screen's frame, and 40 ms from the sample to the screen."""
+"""Time between two looks at the log: little longer than a frame of the screen; samples reach it within 40 ms."""
 MANY, EVERY = 4, 4
-"""More viewers than these get their samples at every fourth look, eleven times a second."""
+"""With more viewers than MANY, samples are sent at every fourth look, eleven times a second."""
 STATE_S = 0.5
 LAST_S = 1.5
-"""So much longer it serves when it shall end: whoever looks sees that the run has."""
+"""Time that it continues to serve at the end, so that viewers see that the run has ended."""
 ALONE_S = 30.0
-"""So long a page whose run is built waits for somebody to look at it again."""
+"""Time that a page of a saved run waits for a viewer."""
 MOST_VIEWERS = 32
 LONGEST_MESSAGE = 4096
 """Bytes that a browser may send at a time."""
@@ -55,7 +55,7 @@ class Opening:
     network : str
         This computer's address in the local network, for viewers; empty: for nobody but this computer.
     secret, used
-        As of :class:`springmass.page.web.security.Gate`.
+        As of :class:`springmass.page.web.security.Access`.
     opened : callable
         Takes the port, the address to open (None where it was used before), and that for viewers: the page answers.
     was_used : callable
@@ -70,12 +70,14 @@ class Opening:
     was_used: Callable[[], None] = lambda: None
 
 
-def application(desk: Desk, share: Callable[[], str] = lambda: "", polled: Callable[[int], None] = print) -> Starlette:
-    """Return the page as an ASGI application, without its gate.
+def application(
+    page_state: PageState, share: Callable[[], str] = lambda: "", polled: Callable[[int], None] = print
+) -> Starlette:
+    """Return the page as an ASGI application, open to everybody.
 
     Parameters
     ----------
-    desk : Desk
+    page_state : PageState
     share : callable
         Returns the address for viewers; empty where there is none.
     polled : callable
@@ -88,7 +90,7 @@ def application(desk: Desk, share: Callable[[], str] = lambda: "", polled: Calla
     from starlette.routing import Mount, Route, WebSocketRoute
     from starlette.staticfiles import StaticFiles
 
-    server = _Server(desk, share, polled)
+    server = _Server(page_state, share, polled)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -102,7 +104,7 @@ def application(desk: Desk, share: Callable[[], str] = lambda: "", polled: Calla
         return FileResponse(STATIC / "page.html")
 
     async def report(_: Any) -> Response:
-        made = None if desk.after is None else desk.after.report
+        made = None if page_state.after is None else page_state.after.report
         if made is None:
             return PlainTextResponse("springmass: no report has been made; the page makes one on O\n", 404)
         return FileResponse(made, media_type="text/html")
@@ -123,20 +125,20 @@ def application(desk: Desk, share: Callable[[], str] = lambda: "", polled: Calla
 
 
 class _Server:
-    def __init__(self, desk: Desk, share: Callable[[], str], polled: Callable[[int], None]) -> None:
-        self._desk, self._share, self._polled = desk, share, polled
+    def __init__(self, page_state: PageState, share: Callable[[], str], polled: Callable[[int], None]) -> None:
+        self._page_state, self._share, self._polled = page_state, share, polled
         self._viewers = 0
         self._turn = 0
         self._turned = asyncio.Event()
-        self._motion_text = self._state_text = ""
+        self._motion_text = self._now_text = self._state_text = ""
         self._frames: dict[tuple[int, int, int], bytes] = {}
-        self._due_s, self._bench = 0.0, desk.bench
+        self._due_s, self._bench = 0.0, page_state.bench
         self._next: asyncio.TimerHandle | None = None
 
     def look(self) -> None:
-        """Bring the view up to date, now and as long as the page is served.
+        """Update the view, now and as long as the page is served.
 
-        Texts and frames are made once for all who look. A timer's callback and no task that sleeps: that would wake
+        Texts and frames are made once for all viewers. This is a timer's callback because a task that sleeps would wake
         twice a turn.
         """
         self._next = asyncio.get_running_loop().call_later(TURN_S, self.look)
@@ -147,13 +149,13 @@ class _Server:
         self._polled(self._viewers)
 
     def _update(self) -> None:
-        desk = self._desk
-        desk.poll()
-        if desk.watcher is not None:
-            self._motion_text = desk.watcher.text
-        if self._due_s <= 0.0 or self._bench is not desk.bench:
-            self._due_s, self._bench = STATE_S, desk.bench
-            self._state_text = json_of({"type": "state", **desk.state()})
+        page_state = self._page_state
+        page_state.poll()
+        if page_state.watcher is not None:
+            self._motion_text, self._now_text = page_state.watcher.text, page_state.watcher.now_text
+        if self._due_s <= 0.0 or self._bench is not page_state.bench:
+            self._due_s, self._bench = STATE_S, page_state.bench
+            self._state_text = json_of({"type": "state", **page_state.state()})
         self._due_s -= TURN_S
         self._frames.clear()
         self._turn += 1
@@ -162,7 +164,7 @@ class _Server:
             turned.set()
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop looking at the log."""
         if self._next is not None:
             self._next.cancel()
 
@@ -220,11 +222,16 @@ class _Server:
 
     async def _send(self, socket_: WebSocket) -> None:
         view: View | None = None
-        sent, state, motion = [0], "", ""
+        sent, state, motion, now = [0], "", "", ""
         while True:
-            if self._desk.view is not None and view is not self._desk.view:
-                view, sent, motion = self._desk.view, [0] * len(self._desk.view.series), ""
-                await socket_.send_text(json_of(self._hello(view, socket_.scope[ROLE])))
+            if self._page_state.view is not None and view is not self._page_state.view:
+                view, sent, motion, now = (
+                    self._page_state.view,
+                    [0] * len(self._page_state.view.series),
+                    "",
+                    self._now_text,
+                )
+                await socket_.send_text(json_of(self._hello(view, acts=ACT in socket_.auth.scopes)))
             for number in range(0 if view is None else len(sent)):
                 while view is not None and sent[number] < len(view.series[number]):
                     message = self._frame(view, number, sent[number])
@@ -233,9 +240,12 @@ class _Server:
             if state is not self._state_text and state != self._state_text and view is not None:
                 state = self._state_text
                 await socket_.send_text(state)
-            if motion is not self._motion_text and view is self._desk.view:
+            if motion is not self._motion_text and view is self._page_state.view:
                 motion = self._motion_text
                 await socket_.send_text(motion)
+            if now is not self._now_text and view is self._page_state.view:
+                now = self._now_text
+                await socket_.send_text(now)
             await self._turned.wait()
 
     def _frame(self, view: View, number: int, first: int) -> bytes:
@@ -244,10 +254,10 @@ class _Server:
             self._frames[key] = view.series[number].message(number, first)
         return self._frames[key]
 
-    def _hello(self, view: View, role: str) -> dict[str, Any]:
-        controls = role == "controller" and self._desk.controls is not None
-        share = self._share()
-        return {**view.hello(controls=controls), "role": role, "share": share}
+    def _hello(self, view: View, *, acts: bool) -> dict[str, Any]:
+        controls = acts and self._page_state.controls is not None
+        role = "controller" if acts else "viewer"
+        return {**view.hello(controls=controls), "role": role, "share": self._share()}
 
     async def _take(self, socket_: WebSocket, text: str) -> None:
         """Do what a browser asks for.
@@ -258,37 +268,43 @@ class _Server:
             If it may not ask for it.
         """
         try:
-            asked = json.loads(text)
-            kind = str(asked["type"])
-            low, high = (_number(asked, "from"), _number(asked, "to")) if kind == "region" else (0.0, 0.0)
-            checked = {} if kind == "region" else _checked(kind, asked)
+            request = json.loads(text)
+            kind = str(request["type"])
+            low = _number(request, "from") if kind == "region" else -math.inf
+            high = _number(request, "to") if kind in ANALYSES else math.inf
+            checked = {} if kind in ANALYSES else _checked(kind, request)
         # Also an integer of thousands of digits, and lists in lists in lists.
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise _Refused("a message that is none of the page's") from error
-        if kind == "region":
-            if (watcher := self._desk.watcher) is not None:
-                await socket_.send_text(await asyncio.to_thread(watcher.region, low, high))
-        elif socket_.scope[ROLE] == "controller":
+        if kind in ANALYSES:
+            if (watcher := self._page_state.watcher) is not None:
+                answer = await (
+                    asyncio.to_thread(watcher.region, low, high)
+                    if kind == "region"
+                    else asyncio.to_thread(watcher.moment, high)
+                )
+                await socket_.send_text(answer)
+        elif ACT in socket_.auth.scopes:
             self._act(kind, checked)
         else:
             raise _Refused("a command of a viewer")
 
     def _act(self, kind: str, checked: Mapping[str, Any]) -> None:
-        """Hand on what may be asked now; what may be asked at another time is passed over: the page shows the state."""
-        desk = self._desk
-        if not desk.may(kind):
+        """Pass on a request that is possible now, and ignore others: the page shows the state."""
+        page_state = self._page_state
+        if not page_state.may(kind):
             return
-        if desk.after is None:
-            if desk.controls is not None:
-                desk.controls(checked)
+        if page_state.after is None:
+            if page_state.controls is not None:
+                page_state.controls(checked)
         elif kind == "report":
-            desk.after.make_report()
+            page_state.after.make_report()
         elif kind == "note":
-            desk.after.note(checked["text"])
+            page_state.after.note(checked["text"])
         elif kind == "discard":
-            desk.after.discard()
+            page_state.after.discard()
         elif kind == "close":
-            desk.closed = True
+            page_state.closed = True
 
 
 KINDS: dict[str, tuple[str, ...]] = {
@@ -304,11 +320,13 @@ KINDS: dict[str, tuple[str, ...]] = {
     "discard": (),
     "close": (),
 }
-"""What the controller may ask for, and with what."""
+"""Requests of the controller, and their values."""
+ANALYSES = frozenset({"region", "moment"})
+"""Requests of anybody: they change nothing."""
 
 
 class _Refused(Exception):
-    """What a browser sent that it may not send."""
+    """A message that a browser may not send."""
 
 
 def _log(socket_: WebSocket, message: str, *values: object, error: Exception | None = None) -> None:
@@ -317,31 +335,31 @@ def _log(socket_: WebSocket, message: str, *values: object, error: Exception | N
     LOG.warning(message, *values, exc_info=error, extra={"client": client})
 
 
-def _checked(kind: str, asked: Mapping[str, Any]) -> dict[str, Any]:
+def _checked(kind: str, request: Mapping[str, Any]) -> dict[str, Any]:
     """Return a command with what belongs to it and nothing else. Raises ValueError or what a wrong value raises."""
     if kind not in KINDS:
         raise ValueError(kind)
-    return {"type": kind} | {name: _text(asked) if name == "text" else _number(asked, name) for name in KINDS[kind]}
+    return {"type": kind} | {name: _text(request) if name == "text" else _number(request, name) for name in KINDS[kind]}
 
 
-def _number(asked: Mapping[str, Any], name: str) -> float:
-    value = float(asked[name])
+def _number(request: Mapping[str, Any], name: str) -> float:
+    value = float(request[name])
     low, high = LIMITS.get(name, (-1e12, 1e12))
     if not (math.isfinite(value) and low <= value <= high):
         raise ValueError(name)
     return value
 
 
-def _text(asked: Mapping[str, Any]) -> str:
-    return " ".join(str(asked.get("text", "")).split())[:LONGEST_TEXT]
+def _text(request: Mapping[str, Any]) -> str:
+    return " ".join(str(request.get("text", "")).split())[:LONGEST_TEXT]
 
 
-def serve(desk: Desk, opening: Opening, *, until: Callable[[], bool]) -> None:
+def serve(page_state: PageState, opening: Opening, *, until: Callable[[], bool]) -> None:
     """Serve the page until somebody ends it.
 
     Parameters
     ----------
-    desk : Desk
+    page_state : PageState
     opening : Opening
     until : callable
         Whether it shall end; asked at every look at the log.
@@ -355,30 +373,28 @@ def serve(desk: Desk, opening: Opening, *, until: Callable[[], bool]) -> None:
 
     with socket.create_server(("0.0.0.0" if opening.network else "127.0.0.1", opening.port)) as listener:
         port = listener.getsockname()[1]
-        hosts = frozenset({opening.network} if opening.network else ())
-        gate: Gate
-        network = ""
-        told, left_s, alone_s = False, LAST_S, ALONE_S
+        access = Access(port, opening.secret, viewers=bool(opening.network), used=opening.used)
+        network = f"http://{opening.network}:{port}/?token={access.viewers_token}" if opening.network else ""
+        announced, left_s, alone_s = False, LAST_S, ALONE_S
 
         def polled(viewers: int) -> None:
-            nonlocal told, left_s, alone_s
-            if not told:
-                told = True
-                token = gate.token
+            nonlocal announced, left_s, alone_s
+            if not announced:
+                announced = True
+                token = access.token
                 opening.opened(port, None if token is None else f"http://127.0.0.1:{port}/?token={token}", network)
-            if gate.token is None and not opening.used:
+            if access.token is None and not opening.used:
                 opening.used = True
                 opening.was_used()
             left_s -= TURN_S if until() else 0.0
-            after = desk.after is not None and desk.after.ours
+            after = page_state.after is not None and page_state.after.ours
             alone_s = alone_s - TURN_S if after and not viewers else ALONE_S
-            server.should_exit = server.should_exit or desk.closed or left_s <= 0.0 or alone_s <= 0.0
+            server.should_exit = server.should_exit or page_state.closed or left_s <= 0.0 or alone_s <= 0.0
 
-        gate = Gate(application(desk, lambda: network, polled), port, opening.secret, hosts, used=opening.used)
-        network = f"http://{opening.network}:{port}/?token={gate.viewers_token}" if opening.network else ""
+        page = application(page_state, lambda: network, polled)
         most = most_connections()
         config = uvicorn.Config(
-            gate,
+            guarded(page, access, [opening.network] if opening.network else []),
             http=bounded_protocol(most),
             backlog=most // 2,  # so many are accepted in one turn, before they can be counted
             log_config=None,  # whoever owns the process says where its log goes

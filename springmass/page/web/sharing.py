@@ -21,14 +21,12 @@ def address_in_network() -> str:
     ProgramError
         If it is in none.
     """
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            asked.connect(ELSEWHERE)
+            probe.connect(ELSEWHERE)
         except OSError as error:
-            raise ProgramError(
-                f"--lan: a network was demanded, got none ({error.strerror}); join one, or leave --lan out", SENSOR
-            ) from error
-        return str(asked.getsockname()[0])
+            raise ProgramError(f"--lan: no network ({error.strerror}); join one, or leave --lan out", SENSOR) from error
+        return str(probe.getsockname()[0])
 
 
 def code_svg(address: str) -> bytes:

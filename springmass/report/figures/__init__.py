@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.motion.smoother import Smoothed
 from pipeline.results.classic import Classic
-from springmass.report.figures.amplitude import amplitude_figure
+from springmass.report.figures.amplitude import amplitude_figure, amplitude_log_figure
 from springmass.report.figures.canvas import KINDS, render, save
 from springmass.report.figures.classic_method import classic_figure
 from springmass.report.figures.comparison import comparison_figure
 from springmass.report.figures.energy_drag import drag_figure, energy_figure
+from springmass.report.figures.frequency import frequency_figure, spectrum_figure
+from springmass.report.figures.overlay import overlay_figure
 from springmass.report.figures.phase_plot import phase_figure
 from springmass.report.figures.position import position_figure
 from springmass.report.figures.velocity import motion_figure
@@ -32,21 +34,28 @@ __all__ = [
     "MAKERS",
     "NAMES",
     "amplitude_figure",
+    "amplitude_log_figure",
     "classic_figure",
     "comparison_figure",
     "drag_figure",
     "draw",
     "energy_figure",
+    "frequency_figure",
     "motion_figure",
+    "overlay_figure",
     "phase_figure",
     "position_figure",
     "render",
     "save",
+    "spectrum_figure",
 ]
 
 MAKERS: dict[str, Callable[[Analysis], Figure | None]] = {
     "position": position_figure,
     "amplitude": amplitude_figure,
+    "logarithmic": amplitude_log_figure,
+    "frequency": frequency_figure,
+    "spectrum": spectrum_figure,
     "drag": drag_figure,
     "energy": energy_figure,
     "motion": motion_figure,

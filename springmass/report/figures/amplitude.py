@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,9 +33,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["amplitude_figure", "amplitude_panel"]
+__all__ = ["amplitude_figure", "amplitude_log_figure", "amplitude_panel"]
 
 MOST_NAMED = 4
+MANY_WINDOWS = 60  # smaller points leave gaps through which the fit is seen
+EXPONENTIAL = "linear"
+"""The law that a reader compares with: linear drag."""
 _DASHES = ((0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
 
 
@@ -51,18 +55,52 @@ def amplitude_figure(analysis: Analysis) -> Figure:
     u, kept = damping.scatter.u * factor, damping.scatter.kept
     end = float(np.nanmax(analysis.track.t))
     with style():
-        figure, (above, below) = panels([(2.7, 0.0), (1.0, 0.08)])
+        figure, (above, below) = panels([3.3, 1.4])
         amplitude_panel(above, analysis)
         residual = (amplitude - damping.best.amplitude(t - damping.t0) * factor) / np.where(u > 0, u, 1.0)
         below.plot(t[kept], residual[kept], "o", ms=2.6, mew=0, color=BLUE)
         finish_residual(below, residual[kept], "residual / u")
         # What was left out lies far off; at the edge it is seen and flattens nothing.
-        at_most = np.clip(residual[~kept], *below.get_ylim())
-        below.plot(t[~kept], at_most, "o", mfc="none", color=ORANGE, ms=4, clip_on=False, zorder=4)
+        if not kept.all():
+            at_most = np.clip(residual[~kept], *below.get_ylim())
+            below.plot(t[~kept], at_most, "o", mfc="none", color=ORANGE, ms=4, clip_on=False, zorder=4)
         below.set_xlabel("time / s")
         share(above, below, damping.t0, end)
-        legend_above(above, handle=2.8)
+        legend_above(above)
         return figure
+
+
+def amplitude_log_figure(analysis: Analysis) -> Figure:
+    """Draw the amplitudes on a logarithmic axis, on which an exponential is a straight line.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of a record that oscillates.
+    """
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    motion = moving(analysis)
+    with style():
+        figure, (panel,) = panels([3.2])
+        laws = [name for name in dict.fromkeys((motion.damping.selected, EXPONENTIAL)) if name in motion.damping.fits]
+        amplitude_panel(panel, analysis, laws)
+        low, high = panel.get_ylim()
+        least = float(np.min(motion.demodulated.amplitude)) * SHOWN[analysis.track.unit].factor
+        panel.set_yscale("log")
+        panel.set_ylim(max(low, 0.7 * least, 1e-3 * high), high)
+        subs = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0) if high < 30.0 * panel.get_ylim()[0] else (1.0, 2.0, 5.0)
+        panel.yaxis.set_major_locator(LogLocator(subs=subs))
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter(NullFormatter())
+        panel.set_xlim(motion.damping.t0, float(np.nanmax(analysis.track.t)))
+        panel.set_xlabel("time / s")
+        legend_above(panel, 2)
+        return figure
+
+
+def _named(law: str) -> str:
+    return "exponential, linear drag" if law == EXPONENTIAL else law
 
 
 def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None = None) -> None:
@@ -74,8 +112,8 @@ def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None 
     analysis : Analysis
         Of a record that oscillates.
     laws : sequence of str, optional
-        Names of the laws to draw; left out, all that were fitted, those named that matter: the selected one and the
-        best of what the record takes for as good.
+        Names of the laws to draw; left out, all that were fitted. Named are the selected law, the exponential, and the
+        best of those that cannot be ruled out.
 
     Raises
     ------
@@ -88,26 +126,32 @@ def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None 
         raise AnalysisError(f"no law {missing[0]!r} was fitted to this run; there are {', '.join(damping.fits)}")
     u, kept = damping.scatter.u * factor, damping.scatter.kept
     grid = np.linspace(damping.t0, float(np.nanmax(analysis.track.t)), 160)
-    error_bars(panel, t[kept], amplitude[kept], u[kept], "amplitude of one window")
+    size = 3.4 if t.size <= MANY_WINDOWS else 2.0
+    error_bars(panel, t[kept], amplitude[kept], u[kept], "amplitude of one window", size=size)
     if not kept.all():
         panel.plot(t[~kept], amplitude[~kept], "o", mfc="none", color=ORANGE, ms=4, label="left out of the fits")
     shown = [float(np.min(amplitude - u)), float(np.max(amplitude + u))]
-    matter = laws or list(dict.fromkeys((damping.selected, *damping.admissible)))[:MOST_NAMED]
+    matter = list(laws or dict.fromkeys((damping.selected, *damping.admissible)))[: len(laws or ()) or MOST_NAMED]
+    if laws is None and EXPONENTIAL in damping.fits and EXPONENTIAL not in matter:
+        matter.append(EXPONENTIAL)
     others = [name for name in damping.fits if name not in matter] if laws is None else []
     for i, name in enumerate(others):
         label = (
             None if i else f"{len(others)} other laws" if len(others) > 1 else f"{name} ({law_status(damping, name)})"
         )
         curve = damping.fits[name].amplitude(grid - damping.t0) * factor
-        panel.plot(grid, curve, color=GREY, ls="--", lw=0.7, label=label, zorder=2.5)
-    for i, name in enumerate(sorted(matter, key=lambda name: name == damping.selected)):
+        panel.plot(grid, curve, color=GREY, ls=(0, (1, 2)), lw=0.8, label=label, zorder=1.5)
+    looks = itertools.cycle(zip((PURPLE, VERMILLION, ORANGE), _DASHES[1:], strict=False))
+    for name in sorted(matter, key=lambda name: name != damping.selected):
         chosen = name == damping.selected
-        colour = "#000000" if chosen else (GREEN, PURPLE, VERMILLION, ORANGE)[i % 4]
-        dashes = "-" if chosen else _DASHES[i % len(_DASHES)]
+        colour, dashes = next(looks) if not chosen and name != EXPONENTIAL else (GREEN, _DASHES[0])
         curve = damping.fits[name].amplitude(grid - damping.t0) * factor
-        panel.plot(
-            grid, curve, color=colour, ls=dashes, lw=1.0, label=f"{name} ({law_status(damping, name)})", zorder=3
+        label = f"{_named(name)} ({law_status(damping, name)})"
+        drawn: dict[str, Any] = (
+            {"color": "#000000", "lw": 1.5} if chosen else {"color": colour, "ls": dashes, "lw": 1.2}
         )
+        # Beneath the points: a fit must not hide what it was fitted to.
+        panel.plot(grid, curve, label=label, zorder=1.9 if chosen else 1.7, **drawn)
     margin = 0.12 * max(shown[1] - shown[0], 1e-9 * abs(shown[1])) or 1.0
     panel.set_ylim(shown[0] - margin, shown[1] + margin)
     panel.set_ylabel(value_label("amplitude", analysis.track.unit))

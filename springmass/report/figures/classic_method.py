@@ -14,7 +14,6 @@ from springmass.report.figures.canvas import (
     ORANGE,
     VERMILLION,
     legend_above,
-    legend_row,
     moving,
     panels,
     style,
@@ -43,7 +42,7 @@ def classic_figure(analysis: Analysis, classic: Classic) -> Figure:
     """
     motion, factor = moving(analysis), SHOWN[analysis.track.unit].factor
     with style():
-        figure, (above, below) = panels([(1.9, 0.0), (2.5, 0.85)])
+        figure, (above, below) = panels([2.7, 3.3])
         period = classic.estimates["period"].value
         start = max(float(np.nanmin(analysis.track.t)), float(classic.crests_t[0]) - 0.75 * period)
         end = min(float(np.nanmax(analysis.track.t)), float(classic.crests_t[-1]) + 0.75 * period)
@@ -61,7 +60,7 @@ def classic_figure(analysis: Analysis, classic: Classic) -> Figure:
         below.set_ylim(min(low, 0.9 * float(curve.min())), max(high, 1.05 * float(curve.max())))
         below.set_xlim(motion.damping.t0, float(np.nanmax(analysis.track.t)))
         below.set_xlabel("time / s")
-        legend_row(below, 2, pad=0.3, columnspacing=1.4)
+        legend_above(below, 2)
         legend_above(above)
         return figure
 

@@ -10,14 +10,10 @@ from acquisition.errors import visible
 from pipeline.results.compare import Comparison
 from springmass.report.figures.canvas import (
     BLUE,
-    BOTTOM,
-    RIGHT,
     SKY,
     VERMILLION,
-    WIDTH,
-    blank,
     escaped,
-    legend_row,
+    panels,
     style,
 )
 
@@ -26,8 +22,10 @@ if TYPE_CHECKING:
 
 __all__ = ["comparison_figure"]
 
-NAME_COLUMN, GAP, ROW, TOP = 2.1, 0.25, 0.34, 0.42  # inches
-LONGEST_NAME, SHORTEST_NAME = 30, 8
+ROW, AROUND = 0.34, 1.1
+"""Heights of a run's row and of all that stands around the rows, inches."""
+LONGEST_NAME = 30
+"""Characters: about a third of the figure."""
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
@@ -48,27 +46,18 @@ def comparison_figure(comparison: Comparison) -> Figure:
     u = np.array([each.u for each in comparison.each])
     mean = comparison.spring_constant
     colours = [VERMILLION if name in comparison.exchanged else BLUE for name in comparison.names]
-    tall = ROW * (count + 0.6)
-    width, height = (WIDTH - NAME_COLUMN - GAP - RIGHT) / WIDTH, BOTTOM + tall + TOP
     with style():
-        figure = blank(WIDTH, height)
-        left = figure.add_axes((NAME_COLUMN / WIDTH, BOTTOM / height, 0.6 * width, tall / height))
-        start = NAME_COLUMN / WIDTH + 0.6 * width + GAP / WIDTH
-        right = figure.add_axes((start, BOTTOM / height, 0.4 * width, tall / height))
+        figure, (left, right) = panels([ROW * count + AROUND], columns=2)
         if comparison.agree:  # of constants that disagree there is no mean to draw
             left.axvspan(mean.value - mean.u, mean.value + mean.u, color=SKY, alpha=0.45, lw=0, label="mean ± u")
             left.axvline(mean.value, color="#000000", lw=0.8)
         left.hlines(rows, k - u, k + u, colors=colours, lw=0.9, label="u of the run")
         left.hlines(rows, k - comparison.own_u, k + comparison.own_u, colors=colours, lw=3.2, label="not shared")
         left.scatter(k, rows, s=22, c=colours, zorder=3)
-        for most in range(LONGEST_NAME, SHORTEST_NAME, -2):
-            left.set_yticks(rows, [_short(name, most) for name in comparison.names])
-            if min(label.get_window_extent().x0 for label in left.get_yticklabels()) > 0:
-                break
+        left.set_yticks(rows, [_short(name) for name in comparison.names])
         left.set_xlabel("spring constant / (N/m)")
         left.ticklabel_format(axis="x", useOffset=False)
         left.locator_params(axis="x", nbins=5)
-        legend_row(left, 3, handlelength=1.5)
         pulls = np.array(comparison.pulls)
         right.axvline(0.0, color="#000000", lw=0.8)
         right.hlines(rows, 0.0, pulls, colors=colours, lw=1.2)
@@ -77,14 +66,15 @@ def comparison_figure(comparison: Comparison) -> Figure:
         reach = max(3.5, 1.15 * float(np.max(np.abs(pulls))))
         right.set_xlim(-reach, reach)
         right.set_xlabel("residual / u")
+        figure.legend(loc="outside upper left", ncols=3)
         for panel in (left, right):
             panel.set_ylim(-0.8, count - 0.2)
         return figure
 
 
-def _short(name: str, most: int) -> str:
+def _short(name: str) -> str:
     name = visible(name)
     # Names of one experiment differ at their ends as often as at their beginnings: keep both.
-    half = most // 2
-    shown = name if len(name) <= most else f"{name[: half - 1]}…{name[-half:]}"
+    half = LONGEST_NAME // 2
+    shown = name if len(name) <= LONGEST_NAME else f"{name[: half - 1]}…{name[-half:]}"
     return escaped(shown)

@@ -13,7 +13,6 @@ from pipeline.bench.derived_drag import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.track import F8
 from springmass.report.figures.canvas import (
     BLUE,
-    BOTTOM,
     GREEN,
     GREY,
     ORANGE,
@@ -21,8 +20,9 @@ from springmass.report.figures.canvas import (
     RASTER_POINTS,
     SKY,
     VERMILLION,
-    blank,
+    WIDTH,
     escaped,
+    panels,
     style,
 )
 
@@ -33,8 +33,10 @@ if TYPE_CHECKING:
 __all__ = ["DragRun", "drag_map_figure", "drag_of_disc_at_rest", "drag_of_plate"]
 
 COLOURS = ((BLUE, "-"), (VERMILLION, "--"), (GREEN, "-."), (PURPLE, ":"), (ORANGE, "-"), (SKY, "--"))
-WIDTH, HEIGHT, LEFT, GAP, RIGHT = 7.2, 3.6, 0.62, 0.45, 0.12  # inches
-NARROW = 5.0  # inches, below which the panels stand under each other
+HEIGHT = 3.6
+"""Of a row of panels, inches."""
+NARROW = 5.0
+"""Inches, below which the panels stand under each other."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +56,7 @@ class DragRun:
 
 
 def drag_of_disc_at_rest(reynolds: F8) -> F8:
-    """Return the drag coefficient of a disc broadside on in a steady stream at Reynolds numbers (n,).
+    """Return the drag coefficient of a disc at right angles to a steady stream, at Reynolds numbers (n,).
 
     Notes
     -----
@@ -105,26 +107,16 @@ def drag_map_figure(runs: Sequence[DragRun], *, width: float = WIDTH) -> Figure:
     discs = list(dict.fromkeys(run.disc for run in runs))
     with style():
         side = width >= NARROW
-        figure = blank(width, HEIGHT if side else 2 * HEIGHT)
-        tall = figure.get_figheight()
-        span = (width - LEFT - RIGHT - (GAP if side else 0.0)) / (2 if side else 1)
-        high = (tall - 0.5 - BOTTOM) if side else (tall - 0.95 - 2 * BOTTOM) / 2
-        places = (
-            [(LEFT, BOTTOM), (LEFT + span + GAP, BOTTOM)] if side else [(LEFT, high + 2 * BOTTOM + 0.2), (LEFT, BOTTOM)]
-        )
-        panels = [figure.add_axes((x / width, y / tall, span / width, high / tall)) for x, y in places]
-        for column, panel in enumerate(panels):
+        figure, axes = panels([HEIGHT] if side else [HEIGHT, HEIGHT], width=width, columns=2 if side else 1)
+        for column, panel in enumerate(axes):
             _draw(panel, runs, discs, column)
-            panel.set_ylabel("drag coefficient" if column == 0 or not side else "")
+            panel.set_ylabel("effective drag coefficient" if column == 0 or not side else "")
             panel.set_xlabel(("Reynolds number", "Keulegan-Carpenter number")[column])
-        low, top = np.log([np.min([p.get_ylim()[0] for p in panels]), np.max([p.get_ylim()[1] for p in panels])])
-        for panel in panels:
+        low, top = np.log([np.min([p.get_ylim()[0] for p in axes]), np.max([p.get_ylim()[1] for p in axes])])
+        for panel in axes:
             panel.set_ylim(math.exp(low), math.exp(top))
-        handles = {label: h for p in panels for h, label in zip(*p.get_legend_handles_labels(), strict=True)}
-        figure.legend(
-            handles.values(), handles.keys(), loc="upper left", ncols=3 if side else 1,
-            bbox_to_anchor=(LEFT / width, 1.0), fontsize=8, borderaxespad=0.2, columnspacing=1.2,
-        )  # fmt: skip
+        handles = {label: h for p in axes for h, label in zip(*p.get_legend_handles_labels(), strict=True)}
+        figure.legend(handles.values(), handles.keys(), loc="outside upper left", ncols=2 if side else 1)
         return figure
 
 

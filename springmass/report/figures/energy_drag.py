@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,8 +57,8 @@ def energy_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
         return None
     with style():
         smoothed = smoothed if analysis.track.unit == "m" else None
-        rows = [(2.1, 0.0), (1.0, 0.08)]
-        figure, axes = panels(rows if smoothed is None else [*rows, (1.5, 0.42)])
+        heights = [2.7, 1.1]
+        figure, axes = panels(heights if smoothed is None else [*heights, 2.1])
         above, below = axes[:2]
         energy_panel(above, analysis)
         if smoothed is not None:
@@ -104,10 +104,19 @@ def _draw_means(panel: Axes, motion: Oscillation, t: F8, kinetic: F8, potential:
     counts = np.bincount(turn)
     whole = counts >= np.median(counts) - 1  # a period is no whole number of samples
     times = np.bincount(turn, t)[whole] / counts[whole]
-    # Both are half of the whole: the one is drawn inside the other.
-    for part, colour, ms, label in ((kinetic, VERMILLION, 4.2, "kinetic"), (potential, GREEN, 2.0, "potential")):
+    # Both are half of the whole and lie on one line: they take turns along it, so that neither covers the other.
+    for first, (part, marker, colour, label) in enumerate(
+        ((kinetic, "o", VERMILLION, "kinetic"), (potential, "^", GREEN, "potential"))
+    ):
         mean = 1e3 * np.bincount(turn, part)[whole] / counts[whole]
-        panel.plot(times, mean, "o", ms=ms, mew=0, color=colour, label=f"{label}, mean of a period")
+        open_marker: dict[str, Any] = {
+            "ls": "",
+            "mew": 0.8,
+            "mfc": "none",
+            "color": colour,
+            "label": f"{label}, mean of a period",
+        }
+        panel.plot(times[first::2], mean[first::2], marker, ms=3.4, **open_marker)
 
 
 def _draw_parts(panel: Axes, analysis: Analysis, t: F8, kinetic: F8, potential: F8) -> None:
@@ -119,7 +128,7 @@ def _draw_parts(panel: Axes, analysis: Analysis, t: F8, kinetic: F8, potential: 
     for part, colour, dashes in ((kinetic, VERMILLION, "-"), (potential, GREEN, (0, (4, 1.5)))):
         panel.plot(t[rows], 1e3 * part[rows], color=colour, ls=dashes, lw=0.9)
     panel.plot(t[rows], 1e3 * (kinetic + potential)[rows], color="#000000", lw=0.9)
-    panel.set_title("kinetic, potential (dashed) and their sum in the first periods", loc="left", fontsize=8.5, pad=3)
+    panel.set_title("kinetic, potential (dashed) and their sum in the first periods")
     panel.set_ylim(bottom=0.0)
     panel.set_xlim(float(t[0]), end)
 
@@ -153,8 +162,7 @@ def drag_figure(analysis: Analysis) -> Figure | None:
         Of a record that oscillates.
     """
     with style():
-        # Room above for the second axis.
-        figure, (panel,) = panels([(2.8, 0.0)], top=0.5)
+        figure, (panel,) = panels([3.7])
         if not drag_panel(panel, analysis):
             return None
         # The axis begins at 0, the coefficient falls as the amplitude grows: the lower left is free.
@@ -185,7 +193,7 @@ def drag_panel(panel: Axes, analysis: Analysis) -> bool:
     most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
     low, high = min(0.0, max(float(np.min(shown)), -most)), min(float(np.max(shown)), most)
     panel.set_ylim(low - 0.05 * (high - low) if low < 0 else 0.0, high + 0.08 * (high - low))
-    panel.set_ylabel("drag coefficient")
+    panel.set_ylabel("effective drag coefficient")
     panel.set_xlabel(value_label("amplitude", unit))
     edge = 0.04 * factor * float(np.ptp(curve.x))
     panel.set_xlim(max(factor * float(curve.x[0]) - edge, 0.0), factor * float(curve.x[-1]) + edge)

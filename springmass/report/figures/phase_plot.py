@@ -49,12 +49,10 @@ def phase_figure(analysis: Analysis) -> Figure:
         Of a record that oscillates.
     """
     with style():
-        figure, (panel,) = panels([(4.0, 0.0)], width=5.6, right=1.05)
+        figure, (panel,) = panels([4.6], width=5.6)
         times = phase_panel(panel, analysis)
         legend_above(panel)
-        beside = panel.get_position()
-        bar = figure.colorbar(times, cax=figure.add_axes((beside.x1 + 0.03, beside.y0, 0.025, beside.height)))
-        bar.set_label("time / s")
+        bar = figure.colorbar(times, ax=panel, label="time / s")
         bar.solids.set_rasterized(True)  # type: ignore[union-attr]  # a bar without lines always has them
         return figure
 

@@ -1,4 +1,4 @@
-"""Position against time with the fit, and what the fit leaves."""
+"""Position against time with the fit, and its residuals."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ZOOM_PERIODS", "has_error_bars", "is_long", "position_figure", "position_panel"]
 
-# Bits of a sample, the gravest first; what they are called, and marker and colour.
+# Bits of a sample, the most serious first; what they are called, and marker and colour.
 _FLAGGED: tuple[tuple[int, str, str, str], ...] = (
     (int(Quality.CLIPPED), "clipped", "s", ORANGE),
     (int(Quality.FALSE_ECHO), "false echo", "x", VERMILLION),
@@ -66,7 +66,7 @@ def has_error_bars(analysis: Analysis) -> bool:
 def position_figure(analysis: Analysis, notes: Sequence[Note] = ()) -> Figure:
     """Draw the distance with its fit, and beneath it the residual over the noise of one sample.
 
-    Flagged samples have markers of their own; those off the axis stand at its edge. A long record is followed
+    Flagged samples have other markers; those off the axis stand at its edge. A long record is followed
     by a detail of its first periods, a rest position that moves stands at the end. Where nothing oscillates the
     distance stands alone.
 
@@ -80,15 +80,15 @@ def position_figure(analysis: Analysis, notes: Sequence[Note] = ()) -> Figure:
     start, end = float(np.nanmin(track.t)), float(np.nanmax(track.t))
     with style():
         if not isinstance(motion, Oscillation):
-            figure, (only,) = panels([(2.6, 0.0)])
+            figure, (only,) = panels([3.2])
             position_panel(only, analysis, start, end)
             _draw_notes(only, notes)
             legend_above(only)
             only.set_xlabel("time / s")
             return figure
         long = is_long(analysis)
-        rows = [(1.75, 0.0), (0.85, 0.08), (1.9, 0.58), (0.85, 0.08)] if long else [(2.3, 0.0), (1.0, 0.08)]
-        figure, axes = panels([*rows, (0.95, 0.42)] if rest_moves(analysis) else rows)
+        heights = [2.2, 1.1, 2.2, 1.2] if long else [2.9, 1.4]
+        figure, axes = panels([*heights, 1.4] if rest_moves(analysis) else heights)
         _draw_pair(axes[:2], analysis, motion, start, end)
         _draw_notes(axes[0], notes)
         legend_above(axes[0])
@@ -98,7 +98,7 @@ def position_figure(analysis: Analysis, notes: Sequence[Note] = ()) -> Figure:
             _draw_pair(axes[2:4], analysis, motion, first, last)
             for panel in axes[:2]:
                 panel.axvspan(first, last, color="#000000", alpha=0.07, lw=0)
-            axes[2].set_title(f"the first {ZOOM_PERIODS} periods", loc="left", fontsize=8.5, pad=3)
+            axes[2].set_title(f"the first {ZOOM_PERIODS} periods")
         if rest_moves(analysis):
             draw_rest(axes[-1], motion, track.unit, start, end)
         axes[-1].set_xlabel("time / s")
@@ -126,11 +126,12 @@ def position_panel(panel: Axes, analysis: Analysis, start: float, end: float) ->
         grid = np.linspace(start, end, 400)
         reach = law.amplitude(grid - motion.damping.t0)
         for sign, label in ((1, "fit: rest ± amplitude"), (-1, None)):
-            panel.plot(grid, (rest.at(grid) + sign * reach) * factor, color="#000000", lw=1.0, label=label)
+            panel.plot(grid, (rest.at(grid) + sign * reach) * factor, color="#000000", lw=1.0, label=label, zorder=1.8)
     else:
         grid = np.linspace(start, end, int(50 * (end - start) * motion.cycles.frequency_hz) + 2)
         position = rest.at(grid) + model_phase(motion, grid)[0]
-        panel.plot(grid, position * factor, color="#000000", lw=0.8, label="fit", zorder=2.5)
+        # Beneath the samples: a fit must not hide what it was fitted to.
+        panel.plot(grid, position * factor, color="#000000", lw=1.4, alpha=0.8, label="fit", zorder=1.8)
 
 
 def _relaxing(analysis: Analysis, motion: Overdamped) -> tuple[F8, F8]:
@@ -188,7 +189,7 @@ def _draw_notes(panel: Axes, notes: Sequence[Note]) -> None:
 
 
 def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) -> None:
-    """Draw the samples between two times, the flagged ones on top with markers of their own."""
+    """Draw the samples between two times, the flagged ones on top with other markers."""
     track, flags = analysis.track, analysis.flags
     inside = (track.t >= start) & (track.t <= end)
     factor = SHOWN[track.unit].factor
@@ -199,7 +200,7 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
         panel.plot(track.t[used][ends], y[used][ends], color=SKY, lw=0.5, label="samples used")
     else:
         dense = np.count_nonzero(used) > RASTER_POINTS
-        panel.plot(track.t[used], y[used], ".", ms=4.0, mew=0, color=SKY, label="samples used", rasterized=dense)
+        panel.plot(track.t[used], y[used], ".", ms=3.4, mew=0, color=SKY, label="samples used", rasterized=dense)
         if has_error_bars(analysis):
             u = analysis.conditioned.noise_m * factor
             panel.vlines(track.t[used], y[used] - u, y[used] + u, color=SKY, lw=0.6, alpha=0.6)

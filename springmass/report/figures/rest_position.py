@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.quantity import SHOWN
-from pipeline.oscillation.steps import staircase
+from pipeline.windows.steps import staircase
 from springmass.report.figures.canvas import error_bars, value_label
 
 if TYPE_CHECKING:

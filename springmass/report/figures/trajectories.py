@@ -18,7 +18,7 @@ from pipeline.dynamics.band import Band
 from pipeline.dynamics.halving import auto
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
-from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, VERMILLION, blank, legend_row, style, thinned
+from springmass.report.figures.canvas import BLUE, GREEN, GREY, ORANGE, VERMILLION, legend_above, panels, style, thinned
 from springmass.runs.simulating.simulation import Against, Simulation
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ DASHED: dict[str, Any] = {"color": "#000000", "lw": 0.9, "ls": (0, (2, 1.5))}  #
 _EXACT: dict[str, Any] = {**DASHED, "lw": 0.6}
 ROUGH, EXACT = 1e-3, 1e-9  # errors over the amplitude: a curve that shows, and one that nobody sees
 BINS = 250  # of a dense series: each gives the least and the greatest of what it holds
-WIDTH, LEFT, GAP, RIGHT, BOTTOM, TOP = 7.2, 0.68, 0.72, 0.12, 0.45, 0.62
 
 
 def draw_simulation(simulation: Simulation, mass_kg: float | None) -> dict[str, Figure]:
@@ -67,7 +66,7 @@ def against_figure(against: Against) -> Figure:
     against : Against
     """
     with style():
-        figure, (above, below) = _stacked(4.0, (0.42, 0.47), (0.12, 0.27))
+        figure, (above, below) = panels([2.6, 1.6])
         below.sharex(above)
         dense: dict[str, Any] = {"rasterized": against.t.size > POINTS}
         if against.band is not None:
@@ -76,7 +75,7 @@ def against_figure(against: Against) -> Figure:
         above.plot(against.t, against.predicted * 1e3, color="#000000", lw=0.6, label="predicted", **dense)
         above.set_ylabel("distance / mm")
         above.tick_params(labelbottom=False)
-        legend_row(above, 4)
+        legend_above(above, 4)
         if against.band is not None:
             _shade(below, against.t, against.band)
         left = (against.measured - against.predicted) * 1e3
@@ -103,14 +102,12 @@ def band_figure(simulation: Simulation, band: Band) -> Figure:
     whole = band.t[band.t <= end]
     amplitude, of_amplitude = band.amplitude_at(whole)
     with style():
-        figure, (motion, course, turn, width) = _stacked(
-            7.0, (0.755, 0.195), (0.525, 0.165), (0.295, 0.165), (0.06, 0.165)
-        )
+        figure, (motion, course, turn, width) = panels([2.0, 1.6, 1.6, 1.8])
         middle = simulation.trajectory.at(last)
         _shade(motion, last, middle + band.displacement_at(last))
         motion.plot(last, middle * 1e3, color="#000000", lw=0.8, label="the scene's values")
         motion.set_ylabel("displacement / mm")
-        legend_row(motion, 3)
+        legend_above(motion)
         _shade(course, whole, of_amplitude)
         course.plot(whole, amplitude * 1e3, color="#000000", lw=0.8)
         course.set_ylabel("amplitude / mm")
@@ -121,7 +118,6 @@ def band_figure(simulation: Simulation, band: Band) -> Figure:
         width.set_xlabel("time / s")
         for panel, t in ((motion, last), (course, whole), (turn, whole), (width, whole)):
             panel.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else float(t[0]) + 1.0)
-        figure.align_ylabels()
         return figure
 
 
@@ -173,25 +169,12 @@ def _shown(simulation: Simulation, run: Trajectory, periods: int) -> slice:
     return slice(0, min(len(run.y), max(2, int(periods * _periods(simulation) / run.spacing_s) + 1)))
 
 
-def _stacked(height: float, *rows: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    """Make panels under each other, each from a share of the figure's height upwards over another."""
-    figure, wide = blank(WIDTH, height), (WIDTH - LEFT - RIGHT) / WIDTH
-    return figure, [figure.add_axes((LEFT / WIDTH, at, wide, tall)) for at, tall in rows]
-
-
 def _pair(height: float, labels: tuple[str, str], rows: int = 1) -> tuple[Figure, list[Axes]]:
-    """Make two panels beside each other, each under its method's name; as many rows of them, the upper ones first."""
-    whole, wide = rows * (height + BOTTOM) + TOP, (WIDTH - LEFT - GAP - RIGHT) / 2.0
-    figure, axes = blank(WIDTH, whole), []
-    for row in range(rows):
-        for i, (_, words, _) in enumerate(EULERS):
-            at, up = (LEFT + i * (wide + GAP)) / WIDTH, BOTTOM + (rows - 1 - row) * (height + BOTTOM)
-            panel = figure.add_axes((at, up / whole, wide / WIDTH, height / whole))
-            if row == 0:
-                panel.set_title(words, loc="left", fontsize=9.0, pad=18)
-            axes.append(panel)
-        axes[-2].set_ylabel(labels[1])
-    for panel in axes[-2:]:
+    """Make two panels side by side, one for each method, in so many rows."""
+    figure, axes = panels([height] * rows, columns=len(EULERS))
+    for panel in axes[:: len(EULERS)]:
+        panel.set_ylabel(labels[1])
+    for panel in axes[-len(EULERS) :]:
         panel.set_xlabel(labels[0])
     return figure, axes
 
@@ -201,7 +184,7 @@ def _against_time(
 ) -> Figure:
     """The whole run, and of a long one its first periods beneath."""
     long = any(len(run.y) > _shown(simulation, run, PERIODS).stop for run in runs)
-    figure, axes = _pair(1.7 if long else 2.3, ("time / s", label), 2 if long else 1)
+    figure, axes = _pair(2.3 if long else 3.1, ("time / s", label), 2 if long else 1)
     for panel, run, (_, words, colour) in zip(axes[:2], runs, EULERS, strict=True):
         for of, look in (
             (run, {"color": colour, "lw": 1.0, "label": words}),
@@ -211,7 +194,7 @@ def _against_time(
             rows = thinned(value, BINS)
             panel.plot(run.t[rows], value[rows], **look)
         panel.set_xlim(float(run.t[0]), float(run.t[-1]))
-        legend_row(panel, 2, pad=0.15, columnspacing=1.2)
+        legend_above(panel, 2)
     for panel, run, (_, _, colour) in zip(axes[2:], runs if long else (), EULERS if long else (), strict=True):
         first = _shown(simulation, run, PERIODS)
         t = run.t[first]
@@ -223,7 +206,7 @@ def _against_time(
 
 def _energy(beside: _Beside, runs: Sequence[Trajectory], mass_kg: float | None) -> Figure:
     label = "energy / mJ" if mass_kg is not None else "energy per mass / (mJ/kg)"
-    figure, axes = _pair(2.3, ("time / s", label))
+    figure, axes = _pair(3.1, ("time / s", label))
     for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
         t, energy = _energies(run, run, mass_kg)
         panel.plot(t, energy, color=colour, lw=1.0, label=words)
@@ -236,7 +219,7 @@ def _energy(beside: _Beside, runs: Sequence[Trajectory], mass_kg: float | None) 
         else:
             panel.set_ylim(0.0, 1.08 * max(top, high))
         panel.set_xlim(0.0, float(t[-1]))
-        legend_row(panel, 2, pad=0.15, columnspacing=1.2)
+        legend_above(panel, 2)
     return figure
 
 
@@ -251,21 +234,20 @@ def _energies(of: Trajectory, run: Trajectory, mass_kg: float | None) -> tuple[F
 
 
 def _phase(simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory]) -> Figure:
-    figure, axes = _pair(2.7, ("displacement / mm", "velocity / (m/s)"))
-    for panel, run, (*_, colour) in zip(axes, runs, EULERS, strict=True):
+    figure, axes = _pair(3.6, ("displacement / mm", "velocity / (m/s)"))
+    for panel, run, (_, words, colour) in zip(axes, runs, EULERS, strict=True):
         rows = _shown(simulation, run, TURNS)
         exact = beside.run
-        panel.plot(run.y[rows] * 1e3, run.v[rows], color=colour, lw=1.2, label="computed")
+        panel.plot(run.y[rows] * 1e3, run.v[rows], color=colour, lw=1.2, label=words)
         panel.plot(exact.y[rows] * 1e3, exact.v[rows], color="#000000", lw=0.6, label=beside.words)
         panel.plot(run.y[:1] * 1e3, run.v[:1], "o", ms=3.0, color="#000000", label="start")
-        legend_row(panel, 3, pad=0.15, columnspacing=0.8, handlelength=1.1, handletextpad=0.4)
+        legend_above(panel, 2)
     return figure
 
 
 def _error(simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory]) -> Figure:
     """Running maxima: an error crosses zero twice a period."""
-    figure = blank(WIDTH, 3.2)
-    panel = figure.add_axes((LEFT / WIDTH, 0.14, (WIDTH - LEFT - 2 * RIGHT) / WIDTH, 0.74))
+    figure, (panel,) = panels([3.2])
     start = simulation.problem.amplitude_m() or 1.0
     solution = simulation.solution
     curves = [(run, words, colour) for run, (_, words, colour) in zip(runs, EULERS, strict=True)]
@@ -283,5 +265,5 @@ def _error(simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory]) 
     panel.set_xlim(0.0, float(beside.run.t[-1]))
     panel.set_ylabel("largest error so far / amplitude")
     panel.set_xlabel("time / s")
-    legend_row(panel, 2, pad=0.15, columnspacing=1.2)
+    legend_above(panel, 2)
     return figure

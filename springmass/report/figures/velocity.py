@@ -17,7 +17,6 @@ from springmass.report.figures.canvas import (
     VERMILLION,
     derivative_label,
     legend_above,
-    legend_row,
     model_phase,
     moving,
     panels,
@@ -59,8 +58,8 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
     long = is_long(analysis)
     detail = start + ZOOM_PERIODS / motion.cycles.frequency_hz if long else end
     with style():
-        heights = [(1.7, 0.42 if long else 0.0), (1.4, 0.08), (0.95, 0.42 if long else 0.08), (0.95, 0.08)]
-        figure, axes = panels([(1.2, 0.0), *heights] if long else heights, right=0.66)
+        heights = [2.2, 1.6, 1.4, 1.5]
+        figure, axes = panels([1.5, *heights] if long else heights)
         label = derivative_label(("velocity v", "derivative"), "m/s", unit)
         if long:
             whole, *axes = axes
@@ -85,11 +84,8 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
         if long:
             axes[2].axvspan(start, detail, color="#000000", alpha=0.07, lw=0)
         else:
-            axes[1].xaxis.set_visible(False)
-        if long:
-            legend_row(axes[0], 3)
-        else:
-            legend_above(axes[0])
+            axes[1].tick_params(labelbottom=False)
+        legend_above(axes[0])
         return figure
 
 
@@ -124,7 +120,7 @@ def _draw_difference(panel: Axes, t: F8, difference: F8, u: F8) -> None:
 
 
 def _draw_uncertainties(panel: Axes, t: F8, u_velocity: F8, u_acceleration: F8, unit: str) -> None:
-    """Draw both standard uncertainties, the acceleration's on an axis of its own at the right."""
+    """Draw both standard uncertainties, the acceleration's on an axis at the right."""
     beside = panel.twinx()
     beside.grid(visible=False)
     labels = ("u(v) / (mm/s)", "u(a) / (mm/s²)")

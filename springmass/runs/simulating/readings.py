@@ -46,7 +46,7 @@ def readings(
         Of its chance.
     """
     rest = rest_m(trajectory)
-    # All moments at which it may look, interpolated at once: its own, the ones beside them, and after the end; and
+    # All moments at which it may look, interpolated together: its own, the ones beside them, and after the end; and
     # those at which the sound of each meets the bob.
     grid = np.arange(math.ceil(seconds * sensor.rate_hz) + 3) / sensor.rate_hz
     distances = rest + trajectory.at(grid)

@@ -231,14 +231,16 @@ def demand_stable(problem: Problem, method: str, step_s: float | None, *, where:
     limit = integrator.stable_step(problem)
     if limit > 0.0 and (step_s is None or step_s <= limit):
         return
-    told = f"its limit here is {_rounded_down(limit)} s" if limit > 0.0 else "it grows at any step without damping"
+    limit_text = (
+        f"its limit here is {_rounded_down(limit)} s" if limit > 0.0 else "it grows at any step without damping"
+    )
     remedy = f"take --dt {_rounded_down(limit)} or less, " if limit > 0.0 else "take "
     other = "auto" if integrator is STRANG else "strang"
     if math.isinf(STRANG.stable_step(problem)):
         other += ", which has no limit"
     step = "a step" if step_s is None else f"a step of {step_s:g} s"
     raise ProgramError(
-        f"{where}: {integrator.words} is unstable with {step}: {told}; {remedy}--method {other}, "
+        f"{where}: {integrator.words} is unstable with {step}: {limit_text}; {remedy}--method {other}, "
         "or --force to run it all the same",
         USAGE,
     )

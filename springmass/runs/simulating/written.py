@@ -22,7 +22,7 @@ from springmass.runs.analysing import in_a_name, made_now, make_folder
 from springmass.runs.simulating.prepared import Prepared
 from springmass.runs.simulating.readings import plain_block, readings, rest_m
 from springmass.runs.simulating.simulation import FINE, Against, Simulation, count_of, solve
-from springmass.runs.simulating.told import band_columns
+from springmass.runs.simulating.summaries import band_columns
 from springmass.session.simulated_bench import REST_M
 
 __all__ = ["write_folder", "write_readings"]
@@ -40,8 +40,8 @@ def write_folder(
     band: Band | None,
     scene: Scene,
     where: str,
-    out: str,
-    told: Mapping[str, Any],
+    out: str | Path,
+    results: Mapping[str, Any],
 ) -> Path:
     """Write run file, figures, tables and JSON into NAME.simulated; return the folder."""
     from springmass.report.figures import save
@@ -65,14 +65,14 @@ def write_folder(
             tables["against"] |= {f"predicted_{level}_m": each for level, each in zip(LEVELS, around, strict=True)}
     with whole_folder(target, FILES, "simulation.json") as folder:
         title = f"{Path(where).name} by {simulation.solution.integrator.name}"
-        configuration = {"rest_m": rest_m(trajectory), **told}
+        configuration = {"rest_m": rest_m(trajectory), **results}
         _write_run(folder / "run.h5", *plain_block(trajectory, Path(where).name), scene, title, configuration)
         pictures = make_folder(folder / "figures")
         for figure_name, figure in figures.items():
             save(figure, pictures, figure_name)
         for table_name, table in tables.items():
             write_whole(folder / f"{table_name}.csv", _table(table))
-        write_whole(folder / "simulation.json", json.dumps(told, indent=2) + "\n")
+        write_whole(folder / "simulation.json", json.dumps(results, indent=2) + "\n")
     return target
 
 
@@ -88,7 +88,7 @@ def write_readings(
     echoes_hz: float | None,
     seed: int,
     where: str,
-    told: Mapping[str, Any],
+    results: Mapping[str, Any],
 ) -> None:
     """Write what a sensor would have read of a scene's motion, at one reading a spacing, as a run of kind simulated.
 
@@ -105,8 +105,8 @@ def write_readings(
     seed : int
     where : str
         The scene file's name.
-    told : mapping
-        Kept with the run.
+    results : mapping
+        The summary of the simulation, stored in the run file.
     """
     name = Path(where).name
     if sensor == "ideal":
@@ -127,7 +127,7 @@ def write_readings(
         longer = seconds + (2 + math.ceil(way_s / spacing_s)) * spacing_s
         motion = _fine(ready.problem, method, longer, spacing_s, parts)
         block, info = readings(motion, seconds, virtual, name, seed)
-    configuration = {"sensor": sensor, "seed": seed, **told}
+    configuration = {"sensor": sensor, "seed": seed, **results}
     _write_run(path, block, info, ready.solved, f"{name}, as a {sensor} sensor reads it", configuration)
 
 

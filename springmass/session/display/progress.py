@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import enum
 import math
 import shutil
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,19 +18,50 @@ from acquisition.live.decoding import SensorChain
 from pipeline.accuracy import params_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
 from pipeline.track import F8
-from springmass.session.display.room import demand_room
+from springmass.session.display.memory import demand_room
 from springmass.session.failures import Failures
 from springmass.session.reads import Tee
 from storage.recorder import Recorder, RecorderStatus
 
-__all__ = ["Progress", "Shown", "progress_of"]
+__all__ = ["LiveState", "Progress", "Trouble", "TroubleKind", "progress_of"]
 
 SECOND_NS = 1_000_000_000
 USELESS_S = 0.8
 """So long nothing but no-target codes, or one distance, is a trouble: said at the display's first turn."""
 RECENT_S = 10.0
+FIRST_SAMPLES = 1000
+"""Whose stamps state when t = 0 was, as in the run file; later ones would bring in the difference of the clocks."""
 MOTION_EVERY_NS = 1_900_000_000
 """Every second line of progress: a swing lasts about as long, and an analysis costs some milliseconds."""
+
+
+class TroubleKind(enum.Enum):
+    """Why readings are useless."""
+
+    NO_TARGET = enum.auto()
+    """The sensor hears no echo."""
+    UNCHANGED = enum.auto()
+    """The distance does not change."""
+    SENSOR_FAULT = enum.auto()
+    """The sensor itself reports a fault."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """What makes a sensor's readings useless.
+
+    Parameters
+    ----------
+    kind : TroubleKind
+    text : str
+        For people: what is wrong, and what to check.
+    channel : int or None
+        Of the sensor, where there are several.
+    """
+
+    kind: TroubleKind
+    text: str
+    channel: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +92,12 @@ class Progress:
         How long no reading of the first sensor came, s.
     missing_share : float
         Of the first sensor's readings of the last turn.
-    trouble : str
-        What makes the readings useless, and what to check; empty where nothing does.
+    trouble : Trouble or None
+        What makes the readings useless, of the first sensor where something does.
     latest : callable
         Returns times (n,), s, and distances (n,), m, of the first sensor's last ten seconds.
     marks : sequence of (float, str)
-        Seconds since the beginning, and texts of the marks so far.
+        The run's times, s, and texts of the marks so far: those that the run file and the page state.
     tick : bool
         Whether a second has gone by; else it is a mark that is to be shown.
     """
@@ -83,7 +115,7 @@ class Progress:
     gone: Sequence[str] = ()
     silent_s: float = 0.0
     missing_share: float = 0.0
-    trouble: str = ""
+    trouble: Trouble | None = None
     latest: Callable[[], tuple[F8, F8]] = lambda: (np.empty(0), np.empty(0))
     marks: Sequence[tuple[float, str]] = ()
     tick: bool = True
@@ -115,29 +147,36 @@ class Usefulness:
         elif math.isnan(self._missing_since):
             self._missing_since = float(block.t[0])
 
-    def trouble(self, family: Family) -> str:
-        """Return what is wrong and what to check; empty where nothing is."""
+    def trouble(self, family: Family) -> Trouble | None:
+        """Return what is wrong and what to check; None where nothing is."""
         near, far = family.range_m
         if self._end - self._missing_since >= USELESS_S:
-            return (
+            return Trouble(
+                TroubleKind.NO_TARGET,
                 f"no target for {self._end - self._missing_since:.0f} s: check that the bob hangs over the sensor, "
-                f"{near:g} to {far:g} m away, and that the sensor looks at it"
+                f"{near:g} to {far:g} m away, and that the sensor points at it",
             )
         if self._end - self._same_since >= USELESS_S:
-            return (
+            return Trouble(
+                TroubleKind.UNCHANGED,
                 f"{self._last * 1e3:.1f} mm unchanged for {self._end - self._same_since:.0f} s: "
-                "does the bob hang still, or does something fixed stand in the beam?"
+                "does the bob hang still, or does something fixed stand in the beam?",
             )
-        return ""
+        return None
 
 
-class Shown:
+class LiveState:
     """What the samples so far amount to.
 
     Parameters
     ----------
     rate_hz : float
         Nominal, of the first sensor.
+
+    Attributes
+    ----------
+    zero_ns : int or None
+        The host's clock at the run's time 0, ns; None before the first sample.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -145,6 +184,8 @@ class Shown:
         self._rate_hz = rate_hz
         self._has_room = False
         self.useful: dict[int, Usefulness] = {}
+        self.zero_ns: int | None = None
+        self._early = 0
         self._begin(0)
 
     def _begin(self, channel: int) -> None:
@@ -178,6 +219,11 @@ class Shown:
                     self._recent.popleft()
                 self._motion.push(block.t, block.distance, block.flags)
                 if block.host_ns is not None and len(block):
+                    if channel == 0 and self._early < FIRST_SAMPLES:
+                        # A stamp may come late, never early.
+                        zero_ns = int((block.host_ns - 1e9 * block.t)[: FIRST_SAMPLES - self._early].min())
+                        self.zero_ns = zero_ns if self.zero_ns is None else min(zero_ns, self.zero_ns)
+                        self._early += len(block)
                     self._stamps.append(block.host_ns)
                     self._last_ns = int(block.host_ns[-1])
 
@@ -215,14 +261,14 @@ class Shown:
 
 
 def progress_of(
-    shown: Shown,
+    shown: LiveState,
     failures: Failures,
     chains: Sequence[SensorChain],
     tee: Tee,
     recorder: Recorder | None,
     start_ns: int,
     now_ns: int,
-    marks: Sequence[tuple[float, str]] = (),
+    marks: Sequence[tuple[int, str]] = (),
     *,
     tick: bool = True,
 ) -> Progress:
@@ -253,21 +299,21 @@ def progress_of(
         shown.missing_share,
         _trouble(shown, chains, waiting=recorder is None),
         shown.latest,
-        marks,
+        [((host_ns - (start_ns if shown.zero_ns is None else shown.zero_ns)) * 1e-9, text) for host_ns, text in marks],
         tick,
     )
 
 
-def _trouble(shown: Shown, chains: Sequence[SensorChain], *, waiting: bool) -> str:
+def _trouble(shown: LiveState, chains: Sequence[SensorChain], *, waiting: bool) -> Trouble | None:
     """Return what is wrong with the first sensor that something is wrong with."""
     for channel, useful in sorted(shown.useful.items()):
-        told = useful.trouble(chains[channel].family)
-        if told and (complaint := chains[channel].told.complaint):
-            told = complaint
+        trouble = useful.trouble(chains[channel].family)
+        if trouble is not None and (complaint := chains[channel].status.complaint):
+            trouble = Trouble(TroubleKind.SENSOR_FAULT, complaint)
         # A bob that the trigger waits for hangs still.
-        if told and not (waiting and "unchanged" in told):
-            return told if len(chains) == 1 else f"sensor {channel}: {told}"
-    return ""
+        if trouble is not None and not (waiting and trouble.kind is TroubleKind.UNCHANGED):
+            return trouble if len(chains) == 1 else replace(trouble, channel=channel)
+    return None
 
 
 def _free_bytes(folder: Path) -> int | None:

@@ -15,10 +15,9 @@ from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
-from pipeline.results.checks.finding import Finding
+from pipeline.findings.finding import Finding
 from pipeline.track import Track
-from springmass.runs.json_results import all_findings
-from springmass.runs.loading import load
+from springmass.runs.analysing import load_and_analyse
 from tests.trials.troubles.record import Kind, Record
 
 __all__ = ["LIMIT", "Given", "Verdict", "clean_seconds", "try_one"]
@@ -168,9 +167,8 @@ def _analysed(record: Record, tier: str) -> tuple[Analysis, tuple[Finding, ...]]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trial_position.txt"
         path.write_bytes(record.text)
-        loaded = load(path)
-        found = analyse(loaded.track, scene, params_for(tier))
-        return found, all_findings(loaded, found)
+        found = load_and_analyse(path, scene=scene, accuracy=tier).analysis
+        return found, found.findings
 
 
 def _held_against(analysis: Analysis, record: Record) -> dict[str, Given]:

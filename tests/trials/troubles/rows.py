@@ -197,7 +197,7 @@ KINDS = (
     Kind(name="rows lost: 5 %, times counted", cause="rows_lost", make=_rows_lost(0.05, times="counted")),
     Kind(name="rows lost: 30 %, times counted", cause="rows_lost", make=_rows_lost(0.30, times="counted")),
     Kind(name="rows lost: 20 %, true times", cause="missing", make=_rows_lost(0.20, times="true"), cure=True),
-    Kind(name="rows lost: half a period at once", cause="rows_lost", make=_rows_lost(0.5, times="block"), cure=True),
+    Kind(name="rows lost: half a period together", cause="rows_lost", make=_rows_lost(0.5, times="block"), cure=True),
     Kind(name="rows doubled: 20 %, times counted", cause="rows_doubled", make=_doubled),
     Kind(name="phase slips by 0.1 s", cause="rows_lost", make=_slipped, cure=True),
     Kind(name="interleaved: two bobs", cause="interleaved", make=_interleaved(same=False)),

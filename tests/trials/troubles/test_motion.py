@@ -15,7 +15,7 @@ from tests.trials.troubles.motion import Bob, swing
 from tests.trials.troubles.record import CODES
 from tests.trials.troubles.table import Line
 
-GENERIC = {"correlated_residuals", "law_rejected", "not_converged", "laws_not_separable", "nominal_clock"}
+GENERIC = {"model_misfit", "law_rejected", "not_converged", "laws_not_separable", "nominal_clock"}
 
 
 def verdict(*, z: float, named: bool = False, refused: bool = False) -> Verdict:

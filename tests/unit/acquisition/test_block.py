@@ -81,5 +81,5 @@ def test_slices_and_joins_keep_the_quantity_and_two_are_not_joined() -> None:
     volts = Block(0, np.zeros(4), np.zeros(4), np.zeros(4, np.uint8), quantity="voltage", unit="V")
     joined = concatenate([volts[:1], volts[1:]])
     assert (joined.quantity, joined.unit) == ("voltage", "V")
-    with pytest.raises(ValueError, match="one quantity are joined, got length, voltage"):
+    with pytest.raises(ValueError, match="one quantity, got length, voltage"):
         concatenate([volts, Block(4, np.zeros(1), np.zeros(1), np.zeros(1, np.uint8))])

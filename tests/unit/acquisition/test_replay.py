@@ -109,7 +109,7 @@ def test_a_loop_as_fast_as_possible_goes_on() -> None:
 
 
 def test_paused_play_steps_and_resumes_without_catching_up() -> None:
-    """Stepping delivers samples at once; resuming goes on at the pace from there."""
+    """Stepping delivers samples immediately; resuming continues at the normal speed."""
     clock = VirtualClock()
     replay = Replay([run()], clock, info=INFO, block_samples=16)
     replay.pause()
@@ -234,7 +234,7 @@ def test_wrong_steps_seeks_and_sizes_are_refused() -> None:
 
 
 def test_a_run_without_samples_plays_nothing() -> None:
-    """No block at all ends at once, also in a loop."""
+    """A replay without blocks ends immediately, also in a loop."""
     with Replay([], VirtualClock(), info=INFO, loop=True) as replay:
         replay.seek(1.0)
         assert (list(replay), replay.position_s) == ([], 0.0)

@@ -150,14 +150,14 @@ STILL = {
 
 
 @pytest.mark.parametrize("what", STILL)
-def test_what_does_not_oscillate_is_an_error_in_words(what: str) -> None:
+def test_a_run_that_does_not_oscillate_is_an_error_with_its_reason(what: str) -> None:
     """There is no period, amplitude or damping of what does not oscillate: offset and noise only, and the reason."""
     t = np.arange(1000) / 100
     result = analyse(Track.from_arrays(t, STILL[what](t, np.random.default_rng(2))))
     assert isinstance(result.motion, Still)
     assert set(result.estimates) == {"offset", "noise"}
     assert (result.findings[0].code, result.findings[0].severity) == ("no_oscillation", "error")
-    assert result.findings[0].message == result.motion.why
+    assert result.motion.why in result.findings[0].message
     assert result.quality["used"] > 0
 
 
@@ -325,6 +325,7 @@ def sane(result: Analysis) -> None:
         assert not estimate.u < 0
     for finding in result.findings:
         assert "\n" not in finding.message
+        assert len(finding.message) <= 110, finding.message
 
 
 SIZES = st.integers(2, 120)
@@ -409,7 +410,7 @@ def test_amplitude_and_phase_are_of_the_first_row_though_an_echo_stands_there(sy
     assert found.damping.t0 == 7.0
     for name in ("amplitude", "phase"):
         one, other = found.derived.estimates[name], clean.derived.estimates[name]
-        assert abs(one.value - other.value) < 0.5 * other.u, name
+        assert abs(one.value - other.value) < 0.5 * max(one.u, other.u), name
 
 
 def test_a_start_of_more_than_a_period_lost_is_not_stated_for(synthetic: ModuleType) -> None:
@@ -444,9 +445,10 @@ def test_a_still_start_ends_at_the_recordings_own_trigger(held_s: float) -> None
     y = 0.3 + np.where(t < released_s, 0.025 * (1.0 - np.cos(np.pi * pulled)), free)
     track = Track.from_arrays(t, y + 3e-4 * rng.standard_normal(t.size))
     result = analyse(replace(track, trigger_s=trigger_s))
-    still = [finding.message for finding in result.findings if finding.code == "at_rest"]
-    assert len(still) == 1
-    assert "hangs still until 2.00 s, the moment that triggered" in still[0]
+    # Where a hand holds the bob after the trigger, that is a second part in which nothing moves freely.
+    still, *held = (finding for finding in result.findings if finding.code == "at_rest")
+    assert still.values["seconds"] == pytest.approx(trigger_s)
+    assert len(held) <= int(held_s > 0.0)
     begun_s, amplitude = motion_of(result).phase.t0, result.estimates["amplitude"]
     assert begun_s == trigger_s if not held_s else begun_s >= released_s
     assert abs(amplitude.value - 0.05 * math.exp(-0.012 * (begun_s - released_s))) < 4.0 * amplitude.u
@@ -454,7 +456,7 @@ def test_a_still_start_ends_at_the_recordings_own_trigger(held_s: float) -> None
 
 
 def test_a_trigger_in_a_swing_leaves_nothing_out(synthetic: ModuleType) -> None:
-    """A bob that swung before the recording triggers at once; nothing of its motion is lost for that."""
+    """A bob that swung before the recording triggers immediately; nothing of its motion is lost for that."""
     t = synthetic.times(20.0)
     track = Track.from_arrays(t, synthetic.noisy(synthetic.Truth(), t, 3e-4, 3))
     result = analyse(replace(track, trigger_s=2.0))

@@ -75,19 +75,19 @@ def test_no_number_is_in_metres_where_nothing_was_measured_in_them(quantity: str
     """Units of estimates, budgets, laws and effects, with a bench that knows everything."""
     found = analyse(track(quantity, unit), SCENE)
     motion = oscillation(found)
-    told = {name: each.unit for name, each in found.estimates.items()}
-    told |= {f"budget {name}": each.estimate.unit for name, each in motion.derived.budgets.items()}
-    told |= {f"effect {each.name}": each.unit for each in found.effects}
+    units = {name: each.unit for name, each in found.estimates.items()}
+    units |= {f"budget {name}": each.estimate.unit for name, each in motion.derived.budgets.items()}
+    units |= {f"effect {each.name}": each.unit for each in found.effects}
     for name, fit in motion.damping.fits.items():
-        told |= {f"{name} {x}": own for x, own in zip(fit.joint.names, fit.joint.units, strict=True)}
-    needless = {name for name, own in told.items() if re.search(r"\bm\b", own.replace(unit, ""))}
+        units |= {f"{name} {x}": own for x, own in zip(fit.joint.names, fit.joint.units, strict=True)}
+    needless = {name for name, own in units.items() if re.search(r"\bm\b", own.replace(unit, ""))}
     # A mass and a period give N/m whatever was recorded; an acceleration gives lengths by omega^2.
     allowed = {"spring_constant", "budget spring_constant"}
     if unit in ("m/s", "m/s^2"):
         derived = ("displacement_amplitude", "velocity_rms")
         allowed |= {*derived, *(f"budget {name}" for name in derived)}
         own = ("m/s^2", "m/s^3", "1/m", "s/m", f"({unit})^(1-n)/s")
-        needless = {name for name in needless if told[name] not in own}
+        needless = {name for name in needless if units[name] not in own}
     assert needless <= allowed
 
 

@@ -152,11 +152,11 @@ def test_it_says_why_there_is_no_value_yet(y: np.ndarray, flags: int, why: str) 
     """Too few samples, no target or a bob at rest give one sentence, no exception and no number."""
     held = MotionAccumulator(RATE_HZ)
     held.push(np.arange(y.size) / RATE_HZ, y, np.full(y.size, flags, np.uint8))
-    told = held.value()
-    assert isinstance(told, NotYet)
-    assert told.why
-    assert "\n" not in told.why
-    assert told.why.startswith(why)
+    answer = held.value()
+    assert isinstance(answer, NotYet)
+    assert answer.why
+    assert "\n" not in answer.why
+    assert answer.why.startswith(why)
 
 
 def test_times_that_stand_still_or_run_back_are_no_exception() -> None:

@@ -46,7 +46,7 @@ def test_arrays_are_copied() -> None:
 
 
 def test_views_and_read_only_arrays_do() -> None:
-    """A reversed view and an array without write permission are as good as any."""
+    """A reversed view and an array without write permission are accepted."""
     t = np.arange(10.0)[::-1][::-1] / 100
     t.flags.writeable = False
     assert Track.from_arrays(t, np.arange(20.0)[::2]).rate_hz == 100.0

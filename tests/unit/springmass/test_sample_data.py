@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 import re
@@ -10,11 +9,12 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+
+from sample_data import generate
 
 FOLDER = Path(__file__).resolve().parents[3] / "sample_data"
 NAMES = ("undamped", "damped", "clipped", "cropped", "sixty_hz")
@@ -72,18 +72,6 @@ def model_cm(truth: dict[str, Any]) -> np.ndarray:
     return distance
 
 
-@pytest.fixture(scope="module")
-def generator() -> ModuleType:
-    """Return generate.py, imported by its path."""
-    spec = importlib.util.spec_from_file_location("sample_data_generate", FOLDER / "generate.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up there
-    spec.loader.exec_module(module)
-    return module
-
-
 def run_generator(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Run generate.py as a program."""
     command = [sys.executable, str(FOLDER / "generate.py"), *arguments]
@@ -96,32 +84,32 @@ def test_check_accepts_the_files_that_are_there() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-def test_check_names_the_files_that_differ(tmp_path: Path, generator: ModuleType, capsys: Any) -> None:
+def test_check_names_the_files_that_differ(tmp_path: Path, capsys: Any) -> None:
     """``--check`` exits with 1 and names, one line each, a file that lost a byte and one that is gone."""
-    assert generator.main([str(tmp_path / "new")]) == 0
+    assert generate.main([str(tmp_path / "new")]) == 0
     changed, gone = (
         tmp_path / "new" / "undamped_simulated_position.txt",
         tmp_path / "new" / "damped.scene.toml",
     )
     changed.write_bytes(changed.read_bytes()[:-1])
     gone.unlink()
-    assert generator.main(["--check", str(tmp_path / "new")]) == 1
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 2
-    assert any(str(changed) in line for line in said)
-    assert any(str(gone) in line for line in said)
+    assert generate.main(["--check", str(tmp_path / "new")]) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert any(str(changed) in line for line in lines)
+    assert any(str(gone) in line for line in lines)
 
 
-def test_a_folder_that_is_a_file_is_one_line(tmp_path: Path, generator: ModuleType, capsys: Any) -> None:
+def test_a_folder_that_is_a_file_is_one_line(tmp_path: Path, capsys: Any) -> None:
     """A DIR that is a file gives one line on stderr and exit code 3."""
     (tmp_path / "file").write_text("")
-    assert generator.main([str(tmp_path / "file")]) == 3
+    assert generate.main([str(tmp_path / "file")]) == 3
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_files_regenerate_byte_for_byte(generator: ModuleType) -> None:
+def test_files_regenerate_byte_for_byte() -> None:
     """Every file is made again byte for byte, and nothing simulated lies there that is not made."""
-    made = generator.every_file()
+    made = generate.every_file()
     assert {name: (FOLDER / name).read_bytes() for name in made} == made
     kept = {path.name for pattern in ("*.txt", "*.json", "*.toml") for path in FOLDER.glob(pattern)}
     assert kept == set(made)
@@ -134,10 +122,10 @@ def test_generator_shares_no_code_with_the_project() -> None:
     assert imported <= {*sys.stdlib_module_names, "numpy"}
 
 
-def test_no_reading_hangs_on_a_last_bit(generator: ModuleType) -> None:
+def test_no_reading_hangs_on_a_last_bit() -> None:
     """No unrounded reading is within 1e-7 tick of a half, where another platform's cosine could tip it."""
-    for run in generator.RUNS:
-        exact = generator.measure(run).exact_ticks
+    for run in generate.RUNS:
+        exact = generate.measure(run).exact_ticks
         assert np.abs(exact - np.floor(exact) - 0.5).min() > 1e-7
 
 

@@ -45,6 +45,19 @@ class Sample:
         mean = np.average((gamma + beta * amplitude) ** 2, weights=amplitude**2)
         return float(self.value("effective_mass") * mean)
 
+    def lag_of_drag(self) -> tuple[float, float]:
+        """By what share the frequency and by how many radians the phase may differ, for these motions are cosines.
+
+        Under quadratic drag a bob's first harmonic is late by (5/6) beta A/omega (Krylov and Bogoliubov), which falls
+        with A. The analysis takes that out of the phase of a bob; the recordings do not hold it. A straight line
+        through a phase that bends has at most 1.5 times the slope between its ends.
+        """
+        if "beta" not in self.truth["truth"]:
+            return 0.0, 0.0
+        lag = 5.0 / 6.0 * self.value("beta") * self.value("amplitude") / self.value("angular_frequency")
+        turned = self.value("angular_frequency") * self.truth["samples"] / self.truth["rate_hz"]
+        return 1.5 * lag / turned, lag
+
     def stiffness_of_spring(self) -> float:
         """What a uniform spring's share, x tan x = m_s/m, adds to k where the recording took a third, N/m."""
         spring = self.truth["scene"]["spring"]["mass_kg"]["value"]
@@ -114,7 +127,13 @@ def test_every_truth_is_within_three_statistical_uncertainties(run: Sample) -> N
     """The record's own scatter, without the shares of clock, scale and masses, holds the truth too."""
     statistical = run.motion.derived.statistical
     assert set(statistical) == set(run.result.estimates)
-    pulls = {n: (e.value - run.value(n)) / e.u for n, e in statistical.items() if n in run.truth["truth"]}
+    share, lag = run.lag_of_drag()
+    bent = {name: share * run.value(name) for name in ("period", "frequency", "angular_frequency")} | {"phase": lag}
+    pulls = {
+        n: max(abs(e.value - run.value(n)) - bent.get(n, 0.0), 0.0) / e.u
+        for n, e in statistical.items()
+        if n in run.truth["truth"]
+    }
     k = statistical["spring_constant"]
     pulls["spring_constant"] = (
         k.value - run.value("spring_constant") - run.stiffness_of_damping() - run.stiffness_of_spring()
@@ -190,12 +209,12 @@ def test_stated_error_is_named_for_what_it_is(run: Sample) -> None:
 
 
 def test_no_error_and_no_false_alarm(run: Sample) -> None:
-    """What the simulation does not hold is not found: no drift, no bend, no correlated residuals."""
+    """What the simulation does not hold is not found: no drift, no bend, no misfit."""
     codes = {finding.code for finding in run.result.findings}
     assert not codes & {
         "rest_drift",
         "amplitude_dependent_frequency",
-        "correlated_residuals",
+        "model_misfit",
         "no_oscillation",
         "quantised",
     }

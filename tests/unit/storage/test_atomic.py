@@ -36,7 +36,7 @@ def test_a_standing_file_is_replaced_by_default(tmp_path: Path) -> None:
 def test_a_standing_file_is_kept_when_asked(tmp_path: Path) -> None:
     """Without leave to overwrite the old content stands, and the error names the file in one line."""
     path = write_whole(tmp_path / "a", "old")
-    with pytest.raises(RunExists, match=r"a: a new file .*; choose another name") as caught:
+    with pytest.raises(RunExists, match=r"a: already exists; ") as caught:
         write_whole(path, "new", overwrite=False)
     assert "\n" not in str(caught.value)
     assert path.read_text() == "old"
@@ -163,10 +163,10 @@ def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
 
 def test_what_a_killed_writer_left_goes_with_the_next_file(tmp_path: Path) -> None:
     """A temporary file that nobody holds is removed; one that a living writer is at work on stays."""
-    left = tmp_path / ".old.h5.0123abcd.part"
-    left.write_bytes(b"half")
+    remaining = tmp_path / ".old.h5.0123abcd.part"
+    remaining.write_bytes(b"half")
     with whole_file(tmp_path / "a") as working:
-        assert not left.exists()
+        assert not remaining.exists()
         working.write_text("mine")
         write_whole(tmp_path / "b", "another")
         assert working.exists()

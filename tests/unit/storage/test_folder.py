@@ -82,7 +82,7 @@ def test_the_longest_name_is_a_name(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     """A file stands where a folder above should be."""
     (tmp_path / "file").write_text("")
-    with pytest.raises(WriteFailed, match="a folder for results was demanded"):
+    with pytest.raises(WriteFailed, match="folder for results"):
         make(tmp_path / "file" / "run.results", "1")
 
 
@@ -113,27 +113,27 @@ def test_kill_9_leaves_the_old_or_the_new(tmp_path: Path) -> None:
     root = Path(__file__).parents[3]
     make(tmp_path / "run.results", "1")
     done = subprocess.run([*command, "0"], capture_output=True, text=True, check=True, cwd=root)
-    most = int(done.stdout)
+    limit = int(done.stdout)
     for number in range(12):
         folder = tmp_path / f"{number}" / "run.results"
         make(folder, "1")
         command[3] = str(folder)
-        child = subprocess.Popen([*command, str(1 + number * (most - 2) // 11)], stdout=subprocess.PIPE, cwd=root)
+        child = subprocess.Popen([*command, str(1 + number * (limit - 2) // 11)], stdout=subprocess.PIPE, cwd=root)
         assert child.stdout is not None
         assert child.stdout.readline() == b"here\n"
         child.kill()
         child.wait()
         child.stdout.close()
-        found = (
+        result = (
             {name: text for name, text in held(folder).items() if not name.startswith("..")} if folder.is_dir() else {}
         )
-        assert found in ({"page": "1", "table": "1"}, {"page": "2", "table": "2"}, {})
-        if not found:  # between the two renames
+        assert result in ({"page": "1", "table": "1"}, {"page": "2", "table": "2"}, {})
+        if not result:  # between the two renames
             assert any(each.suffix == ".old" for each in folder.parent.iterdir())
         with pytest.raises(KeyError), whole_folder(folder, NAMES, "page"):
             raise KeyError  # a build that fails still tidies
-        kept = held(folder)
-        assert kept in ({"page": "1", "table": "1"}, {"page": "2", "table": "2"})
+        survivors = held(folder)
+        assert survivors in ({"page": "1", "table": "1"}, {"page": "2", "table": "2"})
         make(folder, "3")
         assert held(folder) == {"page": "3", "table": "3"}
         assert [each.name for each in folder.parent.iterdir()] == ["run.results"]

@@ -102,8 +102,8 @@ def test_everything_put_is_in_the_log_in_order(tmp_path: Path) -> None:
     records = [record for record in whole if record.kind is not Kind.HEADER]
     data = [(record.channel, record.mono_ns, record.payload) for record in records[:501]]
     assert data == [(n % 2, n, b"R%04d\r" % n) for n in range(500)] + [(1, 500, b"last")]
-    told = [(record.kind, record.channel, record.mono_ns, record.payload) for record in records[501:503]]
-    assert told == [(Kind.MARK, 0, 7, b"let go"), (Kind.MARK, 1, 9, b"stopped")]
+    reported = [(record.kind, record.channel, record.mono_ns, record.payload) for record in records[501:503]]
+    assert reported == [(Kind.MARK, 0, 7, b"let go"), (Kind.MARK, 1, 9, b"stopped")]
     assert records[503].json() == {"kind": "lost", "facts": {"why": "unplugged"}}
     assert (records[504].kind, len(records)) == (Kind.END, 505)
     assert records[504].json() == {"records": len(whole) - 1, "dropped_records": 0, "dropped_bytes": 0}
@@ -192,7 +192,7 @@ def test_syncs_come_by_themselves() -> None:
 
 
 def test_closing_does_not_wait_for_the_next_sync() -> None:
-    """The interval is an hour and the test is over at once."""
+    """The interval is an hour, but the test ends immediately."""
     recording = recorder(Disk())
     recording.put(0, 0, b"x")
     assert recording.drain(sync=True).synced_records == 2
@@ -211,8 +211,8 @@ def test_an_overflow_is_told_where_it_happened() -> None:
     for number in range(100):
         recording.put(number % 2, number, bytes([number]) * 10)
     recording.put(0, 100, b"")  # would fit, but must not come before the event
-    kept = recording.status.queued_records
-    assert (kept, recording.status.dropped_records, recording.status.dropped_bytes) == (13, 88, 870)
+    recorded = recording.status.queued_records
+    assert (recorded, recording.status.dropped_records, recording.status.dropped_bytes) == (13, 88, 870)
     disk.writes_pass.set()
     recording.drain()
     recording.put(0, 101, b"after")
@@ -248,8 +248,8 @@ def test_events_and_marks_outlast_an_overflow() -> None:
     assert lost == list(range(1, 20))
     assert (records[-1].kind, records[-1].text(), after.payload) == (Kind.MARK, "now", b"after")
     (overflow,) = [record for record in records if record.json().get("kind") == "overflow"]
-    kept = sum(record.kind is Kind.DATA for record in records)
-    assert kept + overflow.json()["facts"]["records"] == 19 == kept + recording.status.dropped_records
+    recorded = sum(record.kind is Kind.DATA for record in records)
+    assert recorded + overflow.json()["facts"]["records"] == 19 == recorded + recording.status.dropped_records
 
 
 def test_what_is_given_up_while_a_write_hangs_is_counted(tmp_path: Path) -> None:
@@ -323,18 +323,18 @@ def test_a_read_that_is_larger_than_the_queue_is_an_overflow_at_once() -> None:
 
 
 def test_a_full_disk_stops_the_recording_and_says_so() -> None:
-    """The status shows the error at once, putting goes on harmlessly, closing raises it, and the log is whole."""
+    """The status shows the error immediately, further puts do no harm, closing raises it, and the log is whole."""
     disk = Disk()
     recording = recorder(disk)
     disk.room = len(disk.data) + 1000
     for number in range(200):
         recording.put(0, number, b"R%04d\r" % number)
     status = recording.drain()
-    assert "run.wire: the wire log could not be written further (No space left on device)" in status.error
+    assert "run.wire: the wire log could not be continued (No space left on device)" in status.error
     recording.put(0, 200, b"late")
     before = recording.status
     assert (before.queued_records, before.records + before.dropped_records) == (0, 1 + 200 + 1)
-    with pytest.raises(WriteFailed, match=r"No space left on device\); check the disk's space and permissions; 30 rec"):
+    with pytest.raises(WriteFailed, match=r"No space left on device\); .*30 rec"):
         recording.close()
     recording.close()
     contents = parse_log(bytes(disk.data))
@@ -439,9 +439,9 @@ def test_room_is_looked_at_before_the_run(tmp_path: Path, monkeypatch: pytest.Mo
     """Enough room is returned; too little, or no folder, is one line."""
     monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=5_000_000))
     assert check_disk(tmp_path / "run.wire", 5_000_000) == 5_000_000
-    with pytest.raises(DiskNearlyFull, match=r"run\.wire: the run needs 5\.1 MB, but 5\.0 MB are free; make room"):
+    with pytest.raises(DiskNearlyFull, match=r"run\.wire: .* 5\.1 MB, .* 5\.0 MB are free; "):
         check_disk(tmp_path / "run.wire", 5_100_000)
     monkeypatch.undo()
     assert check_disk(tmp_path / "run.wire", 1) > 1
-    with pytest.raises(WriteFailed, match=r"got none \(No such file or directory\); make the folder first"):
+    with pytest.raises(WriteFailed, match=r"\(No such file or directory\); make the folder first"):
         check_disk(tmp_path / "none" / "run.wire", 1)

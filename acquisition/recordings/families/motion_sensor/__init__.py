@@ -1,7 +1,7 @@
-"""MotionSensor.vi: ``layout`` tells what stands where, ``column`` reads one file, ``position_velocity`` one or a pair.
+"""MotionSensor.vi: ``layout`` finds title and columns, ``column`` reads a file, ``position_velocity`` a file or a pair.
 
-In: the bytes of one such text, or of two. Out: a :class:`~acquisition.recordings.recording.Recording`. A newcomer may
-add words of titles and column lines in ``layout``; what is wrong with rows is judged in the shared rooms, for all.
+In: the bytes of one or two such texts. Out: a :class:`~acquisition.recordings.recording.Recording`. The words of titles
+and column lines are in ``layout``. Faults of rows are handled by the shared code in ``tables`` and ``sampling``.
 """
 
 from acquisition.recordings.families.motion_sensor.position_velocity import FORMAT

@@ -1,4 +1,4 @@
-"""One MotionSensor.vi file as samples, with everything that was seen on the way."""
+"""Read one MotionSensor.vi file as samples, with the remarks of the reader."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.samples import value_traps
 from acquisition.recordings.sampling.timing import check_rate
 from acquisition.recordings.sampling.velocity import find_tick
-from acquisition.recordings.tables.channel import Sampled, pull, sample
+from acquisition.recordings.tables.channel import ChannelSamples, read_rows, to_samples
 from acquisition.recordings.tables.contents import Channel
 from acquisition.recordings.tables.text import says_simulated, text_of
 from acquisition.recordings.units import LENGTHS
@@ -32,10 +32,10 @@ class Column:
     path : str
     data : bytes
     layout : Layout
-    samples : Sampled
+    samples : ChannelSamples
         Values in m or m/s.
     quantum : float
-        Step that all distances are multiples of, m: the last printed digit or a multiple of it.
+        Step of which all distances are multiples, m: the last printed digit or a multiple of it.
     stated_error_m : float or None
     traps : tuple of Trap
     """
@@ -43,7 +43,7 @@ class Column:
     path: str
     data: bytes
     layout: Layout
-    samples: Sampled
+    samples: ChannelSamples
     quantum: float
     stated_error_m: float | None
     traps: tuple[Trap, ...]
@@ -55,11 +55,11 @@ class Column:
 
     @property
     def simulated(self) -> bool:
-        """Whether the title or the file's name says that nobody measured this."""
+        """Whether the title or the file's name marks simulated data."""
         return says_simulated(f"{self.layout.title} {self.name}")
 
     def tick(self) -> float | None:
-        """Return the step that all values are multiples of, m or m/s, if one is evident."""
+        """Return the step of which all values are multiples, m or m/s, if there is an evident one."""
         return find_tick(self.samples.value, self.samples.resolution)
 
 
@@ -71,7 +71,7 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
     quantity, is_velocity = layout.quantity, layout.quantity == "velocity"
     power = LENGTHS[layout.unit]
     described = Channel(quantity, layout.unit, sheet, column=1, time=0, time_unit="s", difference=is_velocity)
-    samples = sample(path, described, pull(path, described, power), rate_hz, text.zeros)
+    samples = to_samples(path, described, read_rows(path, described, power), rate_hz, text.zeros)
     traps = []
     if layout.assumed:
         message = f"no column line: read as time (s) and {layout.assumed}, in {layout.unit}"
@@ -82,15 +82,15 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
         stated, constant = _usual(samples.behind[0])
         if constant and stated is not None:
             message = (
-                f"the error column is a constant {stated / 10.0**power:g} {layout.unit}: a stated figure, not the noise"
+                f"the error column is a constant {stated / 10.0**power:g} {layout.unit}: a stated value, not the noise"
             )
             traps.append(Trap("stated_error_is_not_noise", message))
         elif stated is not None and layout.assumed:
             raise no_column_line(path, "three columns that all vary", sheet.first_line)
     quantum = samples.resolution
     if not is_velocity:
-        quantum, found = value_traps(samples.value, samples.flags, samples.resolution, samples.line)
-        traps.extend(found)
+        quantum, value_traps_found = value_traps(samples.value, samples.flags, samples.resolution, samples.line)
+        traps.extend(value_traps_found)
     return Column(path, data, layout, samples, quantum, stated, tuple(traps))
 
 

@@ -1,4 +1,4 @@
-"""What stands where in a MotionSensor.vi file: title, column line, first row, quantity and unit."""
+"""Find title, column line, first row, quantity and unit of a MotionSensor.vi file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.questions import Missing, Need, Question
+from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.tables.contents import Sheet, is_time, name_and_unit
 from acquisition.recordings.tables.text import Text, guess_delimiter, parse_number, split_cells
 from acquisition.recordings.units import LENGTHS
@@ -23,12 +23,12 @@ _ERROR = {f"{name} error ({unit})": unit for unit in LENGTHS for name in ("dist"
 _VELOCITY = {f"velocity ({unit}/s)": unit for unit in LENGTHS}
 _CHANNELS: dict[str, Quantity] = {"distance": "distance", "position": "distance", "velocity": "velocity"}
 _HEADER_LINES = 20
-_ROWS_BELOW, _ROWS_OF_SHAPE = 10, 100  # read below a heading that says what they are, and to tell without
+_ROWS_BELOW, _ROWS_OF_SHAPE = 10, 100  # rows to look at with a column line, and without one
 _REMEDY = 'put the column line "Time (s)<TAB>Distance (cm)" or "Time (s)<TAB>Velocity (cm/s)" above the rows'
 
 
 class Layout(NamedTuple):
-    """Where a file's rows start and what they mean.
+    """The first row of a file and the meaning of its columns.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ class Layout(NamedTuple):
     columns : int
         Cells of a row: time, the quantity, and the error if there are three.
     unit : str
-        A length: "cm" of centimetres a second too.
+        The unit of length; "cm" also for velocities in cm/s.
     assumed : str
-        What was concluded from the shape of the rows, because no column line says it; else empty.
+        What the shape of the rows shows, if there is no column line; else empty.
     title : str
     """
 
@@ -50,55 +50,55 @@ class Layout(NamedTuple):
 
 
 def evidence(lines: Sequence[str]) -> str:
-    """Say why the first lines of a text are those of a MotionSensor.vi file; empty where they are not."""
+    """Return why the first lines of a text belong to a MotionSensor.vi file; empty if they do not."""
     for number, line in enumerate(lines[:_HEADER_LINES], 1):
         if _is_title(line):
             return f'line {number} is the title "{line.strip()}"'
-    if found := _column_line(lines):
-        return f"line {found[0] + 1} is the column line of {found[1].quantity} in {found[1].unit}"
+    if layout := _column_line(lines):
+        return f"line {layout[0] + 1} is the column line of {layout[1].quantity} in {layout[1].unit}"
     start = _first_row(lines[:2])
     shape = _shape(lines[start:]) if start >= 0 and not (start and _names_others(*lines[:2])) else None
     return f"the rows have the shape of {shape.assumed}" if shape else ""
 
 
 def find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> tuple[Layout, Sheet]:
-    """Tell what the rows mean, and where they are.
+    """Return the meaning and the place of the rows.
 
     Raises
     ------
     NeedsAnswer
         If there is no column line above two columns and the rows do not show what they are.
     FormatError
-        If there are no rows, if these are other columns, or ``channel`` or ``unit`` contradict the file.
+        If there are no rows, the columns are different, or ``channel`` or ``unit`` contradict the file.
     """
     head = text.head(_HEADER_LINES + _ROWS_BELOW)
     lines = [line.text for line in head]
     if channel is not None and channel.lower() not in _CHANNELS:
         raise FormatError(path, f'channel must be distance or velocity, got "{channel}"', "name one of these")
-    asked = None if channel is None else _CHANNELS[channel.lower()]
-    if not (found := _column_line(lines)):
+    wanted = None if channel is None else _CHANNELS[channel.lower()]
+    if not (column_line := _column_line(lines)):
         head = text.head(_HEADER_LINES + _ROWS_OF_SHAPE)
         lines = [line.text for line in head]
-    if found:
-        at, layout = found
+    if column_line:
+        at, layout = column_line
         if unit is not None and _plain(unit) != layout.unit:
-            demand = f'unit "{unit}" was asked for, but the column line says {layout.unit}'
-            raise FormatError(path, demand, "leave the unit out", line=at + 1)
+            problem = f'unit must be {layout.unit} as stated by the column line, got "{unit}"'
+            raise FormatError(path, problem, "leave the unit out", line=at + 1)
         start, title = at + 1, " / ".join(line.strip() for line in lines[:at] if line.strip())
     else:
         start = _first_row(lines)
         titled = any(_is_title(line) for line in lines[:_HEADER_LINES])
         if start < 0:
             raise _no_rows(path, lines, "rows of two or three numbers")
-        layout = _by_shape(path, lines[start:], titled, asked, start + 1)
+        layout = _by_shape(path, lines[start:], titled, wanted, start + 1)
         if unit is not None:
             if _plain(unit) not in LENGTHS:
                 raise FormatError(path, f'unit must be one of {", ".join(LENGTHS)}, got "{unit}"', "name one of these")
             layout = layout._replace(unit=_plain(unit))
         title, start = _title_and_start(lines, start)
-    if asked and asked != layout.quantity:
-        demand = f'channel "{channel}" was asked for, but the file holds {layout.quantity}'
-        raise FormatError(path, demand, "leave the channel out or name the other file")
+    if wanted and wanted != layout.quantity:
+        problem = f'channel must be {layout.quantity}, which the file holds, got "{channel}"'
+        raise FormatError(path, problem, "leave the channel out or name the other file")
     rows = [line for line in lines[start:] if line.strip()]
     if not rows:
         raise _no_rows(path, lines, "rows of numbers below the column line")
@@ -108,12 +108,12 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
 
 
 def no_column_line(path: str, got: str, line: int | None = None) -> FormatError:
-    """Return the error for rows that nothing but a column line can explain."""
-    return FormatError(path, f"no column line says what the numbers are, got {got}", _REMEDY, line=line)
+    """Return the error for rows that need a column line."""
+    return FormatError(path, f"expected a column line that names the columns, got {got}", _REMEDY, line=line)
 
 
-def _no_rows(path: str, lines: Sequence[str], demand: str) -> FormatError:
-    return FormatError(path, f"expected {demand}, got none", "check that the export ended", line=max(len(lines), 1))
+def _no_rows(path: str, lines: Sequence[str], problem: str) -> FormatError:
+    return FormatError(path, f"expected {problem}, got none", "check that the export ended", line=max(len(lines), 1))
 
 
 def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
@@ -133,7 +133,7 @@ def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
 
 
 def _names_others(above: str, row: str) -> bool:
-    """Tell a line that names as many columns as the row has: names that are not this family's refuse its guess."""
+    """Return whether a line names all columns of the row, in words that this family does not use."""
     mark = guess_delimiter(row)
     names = split_cells(above.lstrip("\ufeff#% "), mark)
     return len(names) == len(split_cells(row, mark)) and (bool(mark) or is_time(name_and_unit(names[0])[0]))
@@ -157,7 +157,7 @@ def _first_row(lines: Sequence[str]) -> int:
 
 
 def _title_and_start(lines: Sequence[str], row: int) -> tuple[str, int]:
-    """Take the first line above the rows for a title, unless it begins like a row that got damaged."""
+    """Return the first line above the rows as the title, unless it looks like a damaged row, and the first row."""
     if row == 0 or (not _is_title(lines[0]) and _begins_with_number(lines[0])):
         return "", 0
     return lines[0].strip(), 1
@@ -169,7 +169,7 @@ def _begins_with_number(line: str) -> bool:
 
 
 def _shape(lines: Sequence[str]) -> Layout | None:
-    """Tell from rows alone: a constant third column is the error, a NaN ahead is a first velocity."""
+    """Infer the layout only from rows: a constant third column is the error, a first NaN means velocity."""
     every = [_numbers(line) for line in lines[:_ROWS_OF_SHAPE] if line.strip()]
     rows = [[x for x in row if x is not None] for row in every if None not in row]
     three, two = ([row for row in rows if len(row) == n] for n in (3, 2))
@@ -177,11 +177,11 @@ def _shape(lines: Sequence[str]) -> Layout | None:
         third = [row[2] for row in three]
         usual = max(set(third), key=third.count)
         if usual > 0 and third.count(usual) >= 0.95 * len(third) and _times_run(three):
-            return Layout("distance", 3, "cm", "distance and its error, for the third column is constant")
+            return Layout("distance", 3, "cm", "distance and its error, because the third column is constant")
     elif (
         len(two) >= 3 and rows[0] == two[0] and math.isnan(two[0][1]) and not math.isnan(two[1][1]) and _times_run(two)
     ):
-        return Layout("velocity", 2, "cm", "velocity, for the first value is NaN")
+        return Layout("velocity", 2, "cm", "velocity, because the first value is NaN")
     return None
 
 
@@ -190,17 +190,18 @@ def _times_run(rows: Sequence[Sequence[float]]) -> bool:
     return rows[0][0] >= 0 and forward >= 0.5 * (len(rows) - 1)
 
 
-def _by_shape(path: str, rows: Sequence[str], titled: bool, asked: Quantity | None, line: int) -> Layout:
+def _by_shape(path: str, rows: Sequence[str], titled: bool, wanted: Quantity | None, line: int) -> Layout:
     if layout := _shape(rows):
         return layout
     columns = len(_numbers(rows[0]))
-    if columns == 2 and asked:
-        return Layout(asked, 2, "cm", f"{asked}, as asked for")
+    if columns == 2 and wanted:
+        return Layout(wanted, 2, "cm", f"{wanted}, as stated by the user")
     got = f"{columns} columns" + (" under the title" if titled else "")
     if columns != 2:
         raise no_column_line(path, got, line)
-    need = Need(Missing.CHANNEL, ("distance", "velocity"), "distance")
-    raise NeedsAnswer(Question(path, (need,), reason=f"no column line says what the numbers are, got {got}"), line=line)
+    need = MissingItem(Missing.CHANNEL, ("distance", "velocity"), "distance")
+    reason = f"no column line names the columns, got {got}"
+    raise NeedsAnswer(Question(path, (need,), reason=reason), line=line)
 
 
 def _plain(unit: str) -> str:

@@ -2,10 +2,10 @@
 
 A file holds position (``Time (s)``, ``Distance (cm)``, ``Dist Error (cm)``) or velocity (``Time (s)``,
 ``Velocity (cm/s)``), tab separated, three decimals, usually without line end after the last row. Title and
-column line may have been edited or deleted: :mod:`acquisition.recordings.families.motion_sensor.layout` tells what is
-there. What no careful reader may take at face value:
+column line may have been edited or deleted; :mod:`acquisition.recordings.families.motion_sensor.layout` finds what is
+there. What is easy to misread:
 
-- Times are row numbers over a nominal rate, rounded to a millisecond.
+- Times are row numbers divided by a nominal rate, rounded to a millisecond.
 - The error column is a constant, tens of times the noise.
 - Velocity is the backward difference of the unrounded position over one sample.
 - Position and velocity files may differ in length and window: they are joined by time, never by row.
@@ -27,7 +27,7 @@ from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.nominal import time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
 from acquisition.recordings.sampling.velocity import find_quantum, integrate, outer_join
-from acquisition.recordings.tables.channel import Sampled
+from acquisition.recordings.tables.channel import ChannelSamples
 from acquisition.recordings.tables.text import head_lines
 from acquisition.source import SourceInfo
 
@@ -41,15 +41,15 @@ class MotionSensor:
     title = "MotionSensor.vi text: position, velocity, or one of each"
 
     def evidence(self, head: bytes) -> str:
-        """Tell from the title, the column line, or the shape of rows without either."""
+        """Return the evidence: the title, the column line, or the shape of rows without either."""
         return evidence(head_lines(head))
 
     def recognises(self, head: bytes) -> bool:
-        """Tell whether there is evidence for this family."""
+        """Return whether there is evidence for this family."""
         return bool(self.evidence(head))
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
-        """Tell what the one channel of a file is; nothing, where the user must say what the numbers are."""
+        """Return the only channel of a file; nothing if the user must state what the numbers are."""
         try:
             column = read_column(path, data, None, None, None)
         except NeedsAnswer:
@@ -70,7 +70,7 @@ class MotionSensor:
         time: str | None = None,
         time_unit: str | None = None,
     ) -> Recording:
-        """Read one file, of position or of velocity alone; see :class:`acquisition.recordings.base.Format`.
+        """Read one file, either of position or of velocity; see :class:`acquisition.recordings.base.Format`.
 
         Examples
         --------
@@ -80,17 +80,17 @@ class MotionSensor:
         (100.0, [0.165, 0.16509, 0.16565])
         """
         if run is not None:
-            raise FormatError(path, f'run "{run}" is not in the file, which holds one run', "leave run out")
+            raise FormatError(path, f'the file has one run without a name, got run "{run}"', "leave run out")
         if time is not None or time_unit not in (None, "s"):
-            demand = f'the times of this family are its first column, in s; got "{time or time_unit}"'
-            raise FormatError(path, demand, "leave time and time_unit out")
+            problem = f'the times are the first column, in s, got "{time or time_unit}"'
+            raise FormatError(path, problem, "leave time and time_unit out")
         column = read_column(path, data, channel, rate_hz, unit)
         return _position_alone(column) if column.layout.quantity == "distance" else _velocity_alone(column)
 
     def read_pair(
         self, position: tuple[str, bytes], velocity: tuple[str, bytes], *, rate_hz: float | None = None
     ) -> Recording:
-        """Join a position and a velocity file by time; which is which, their content says.
+        """Join a position and a velocity file by time, in any order: they are distinguished by content.
 
         Raises
         ------
@@ -99,18 +99,18 @@ class MotionSensor:
         """
         a, b = (_of_pair(path, data, rate_hz) for path, data in (position, velocity))
         if a.layout.quantity == b.layout.quantity:
-            demand = f"expected a position and a velocity file, got {a.layout.quantity} in both ({a.name} too)"
-            raise FormatError(b.path, demand, "name the other file of the pair")
+            problem = f"expected a position and a velocity file, got {a.layout.quantity} in both ({a.name} too)"
+            raise FormatError(b.path, problem, "name the other file of the pair")
         return _join(a, b) if a.layout.quantity == "distance" else _join(b, a)
 
 
 def _of_pair(path: str, data: bytes, rate_hz: float | None) -> Column:
-    """Read one file of a pair, of which nobody can say whether it is of position or of velocity."""
+    """Read one file of a pair; a file that may be position or velocity is an error here."""
     try:
         return read_column(path, data, None, rate_hz, None)
-    except NeedsAnswer as asked:
-        if Missing.CHANNEL in asked.question.missing:
-            raise no_column_line(path, "two columns in a file of a pair", asked.line) from None
+    except NeedsAnswer as error:
+        if Missing.CHANNEL in error.question.missing:
+            raise no_column_line(path, "two columns in a file of a pair", error.line) from None
         raise
 
 
@@ -148,7 +148,7 @@ def _position_alone(column: Column) -> Recording:
 
 
 def _velocity_alone(column: Column) -> Recording:
-    """Sum velocity up to position; its zero is the first sample, for the file does not hold its offset."""
+    """Sum velocity to position; its zero is the first sample, because the file does not hold the offset."""
     samples, tick = column.samples, column.tick()
     rate_hz, flags = samples.timing.rate_hz, samples.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
@@ -159,13 +159,13 @@ def _velocity_alone(column: Column) -> Recording:
     flags[regular[path.bridged]] |= Flag.GAP_BEFORE.value
     flags[np.isnan(distance)] |= Flag.MISSING.value
     quantum_m = find_quantum(samples.value, tick) / rate_hz if tick else samples.resolution / rate_hz
-    summed = "position is summed up from velocity: its offset is unknown and the first sample stands at 0 m"
+    summed = "position is summed from velocity: its offset is unknown and the first sample is at 0 m"
     traps = [Trap("offset_unknown", summed, samples.t.size)]
     if holes := int(np.count_nonzero(path.bridged)):
         first = float(samples.t[regular[path.bridged]][0])
         message = (
-            f"{holes} holes in the velocity, the first before t = {first:g} s: the offset after each is "
-            "unknown and bridged with interpolated velocity"
+            f"the velocity has {holes} gap{'s' if holes > 1 else ''}, the first before t = {first:g} s: the offset "
+            "after each is estimated with interpolated velocity"
         )
         traps.append(Trap("offset_unknown_after_gap", message, holes))
     return _recording(column, Block(0, samples.t, distance, flags, None, samples.value), quantum_m, traps)
@@ -175,15 +175,15 @@ def _join(position: Column, velocity: Column) -> Recording:
     p, v = position.samples, velocity.samples
     rate_hz = p.timing.rate_hz
     if abs(v.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
-        demand = f"expected {rate_hz:g} Hz as in {position.name}, got {v.timing.rate_hz:g} Hz"
-        raise FormatError(velocity.path, demand, "name the velocity file of the same run")
+        problem = f"expected {rate_hz:g} Hz as in {position.name}, got {v.timing.rate_hz:g} Hz"
+        raise FormatError(velocity.path, problem, "name the velocity file of the same run")
     resolution = min(p.timing.resolution_s, v.timing.resolution_s)
     keys = [np.rint(t / resolution).astype(np.int64) for t in (p.t, v.t)]
     from_p, from_v = outer_join(keys[0], keys[1], (p.flags & IRREGULAR) == 0)
     in_p, in_v = from_p >= 0, from_v >= 0
     if not (in_p & in_v).any():
-        demand = f"expected times in common with {position.name}, got none"
-        raise FormatError(velocity.path, demand, "name the velocity file of the same run")
+        problem = f"expected times in common with {position.name}, got none"
+        raise FormatError(velocity.path, problem, "name the velocity file of the same run")
     t = np.where(in_p, p.t[from_p], v.t[from_v])
     distance = np.where(in_p, p.value[from_p], np.nan)
     speed = np.where(in_v, v.value[from_v], np.nan)
@@ -197,20 +197,20 @@ def _join(position: Column, velocity: Column) -> Recording:
 
 
 def _velocity_traps(velocity: Column) -> Iterable[Trap]:
-    """Name the velocity file in what was seen there, but say nothing twice of what both files share."""
+    """Yield the remarks on the velocity file with its name, without those that both files share."""
     for trap in velocity.traps:
         if trap.code not in ("nominal_clock", "rate_assumed"):
             yield Trap(trap.code, f"in {velocity.name}: {trap.message}", trap.count, trap.line)
 
 
-def _join_traps(p: Sampled, v: Sampled, from_p: I8, from_v: I8) -> Iterable[Trap]:
+def _join_traps(p: ChannelSamples, v: ChannelSamples, from_p: I8, from_v: I8) -> Iterable[Trap]:
     alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
     if alone_v:
-        message = f"{alone_v} times stand in the velocity file only: no distance there"
+        message = f"{alone_v} times are only in the velocity file: no distance there"
         yield Trap("missing_samples", message, alone_v)
     if alone_p:
-        yield Trap("velocity_missing", f"{alone_p} times stand in the position file only: no velocity there", alone_p)
-    # Neighbours in the position file whose later one has a velocity: it must be their difference.
+        yield Trap("velocity_missing", f"{alone_p} times are only in the position file: no velocity there", alone_p)
+    # The velocity of a sample must be its difference from the previous position.
     both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
     x, rate_hz = p.value, p.timing.rate_hz
     apart = np.abs((x[from_p[both]] - x[from_p[both - 1]]) * rate_hz - v.value[from_v[both]])
@@ -218,5 +218,5 @@ def _join_traps(p: Sampled, v: Sampled, from_p: I8, from_v: I8) -> Iterable[Trap
     allowed = p.resolution * rate_hz + v.resolution
     wrong = int(np.count_nonzero(apart > 1.01 * allowed))
     if wrong > 0.5 * apart.size:
-        message = f"{wrong} of {apart.size} velocities are no differences of the positions: is it the same run?"
+        message = f"{wrong} of {apart.size} velocities differ from the positions' differences: is it the same run?"
         yield Trap("pair_mismatch", message, wrong)

@@ -1,7 +1,6 @@
-"""Workbooks: ``sheets`` reads them; ``biff`` and ``compound`` write an xls anew, bounded, before it is handed over.
+"""Workbooks, xlsx and xls: ``sheets`` checks the stated sizes and starts ``child``, a process that reads the cells.
 
-In: the bytes of an xlsx or xls. Out: what its sheets hold. A newcomer who wants more of a cell than its value begins in
-``sheets``; what of an xls is kept at all stands in ``biff``.
+In: the bytes of an xlsx or xls. Out: its sheets as text for the readers of text. ``child`` prints the cells.
 """
 
 from acquisition.recordings.families.workbook.sheets import FORMAT

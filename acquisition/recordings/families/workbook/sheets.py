@@ -1,114 +1,82 @@
 """Workbooks, xlsx and xls (python-calamine): every sheet with rows of numbers is a run.
 
-The cells of a sheet go through the readers of text, one line a row, one tab between cells. What a careless reader
-would get wrong:
+The cells of a sheet go through the readers of text, one line per row, one tab between cells. Three things differ from
+text:
 
-- Cells are binary numbers without decimals. Each column is printed with as many as its longest number has of the
-  fifteen digits that a workbook shows, so that none looks cut.
-- A time of the day or a date is a cell of its own kind.
-- A sheet of two cells, one of them in the last row and the last column, takes half a terabyte, and cells may share a
-  string of any length: sizes are bounded before they are believed. An xls is written anew for that
-  (:mod:`acquisition.recordings.families.workbook.biff`).
+- Cells are binary numbers without printed decimals. Each column is printed with the decimals that its longest number
+  needs, for the fifteen digits that a workbook shows. So no number looks incomplete.
+- Times of day and dates are separate types of cells.
+- A file of a few bytes can make calamine reserve any amount of memory, and crash its process if there is not enough: it
+  may state any size, have one cell in the last row and column, or share one long string among many cells. So stated
+  sizes are checked first, and calamine runs in a child process with limits of time and memory.
 """
 
 from __future__ import annotations
 
-import datetime
-import io
 import re
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
-from typing import Any
+import struct
+import sys
+from itertools import islice
 
 from acquisition.errors import FormatError
-from acquisition.recordings.families.workbook.biff import Sizes, rewritten
-from acquisition.recordings.families.workbook.compound import MAGIC, Damage
-from acquisition.recordings.foreign import named
+from acquisition.recordings.families.workbook import child
+from acquisition.recordings.foreign import foreign_format
 from acquisition.recordings.parts import contents_of_parts, members
 from acquisition.recordings.tables.contents import Contents
 from acquisition.recordings.tables.sheet import ColumnFormat
 
 __all__ = ["FORMAT"]
 
+MOST_BYTES = 1 << 27
+"""Bytes of an xls, or of an xlsx unpacked: a million rows of three columns take 120 MB."""
+MOST_CELLS = 1 << 23
+"""Largest number of cells that the sheets may state: eight full columns of an xlsx."""
+MOST_LETTERS = 1 << 27
+"""Letters of all cells as text: a million rows of three columns take 22 million."""
+MEMORY_BYTES = 1 << 30
+"""Memory of the child process: a million rows of three columns take 600 MB."""
+TIME_LIMIT_S = 60.0
+"""Time of the child process: a million rows of three columns take 10 s on a laptop of 2020."""
+
 _ZIP = b"PK\x03\x04"
-_MOST_BYTES = 1 << 27
-_MOST_CELLS = 1 << 23
-_EMPTY_CELLS, _PER_FILLED = 1 << 20, 8  # of which so many, or so many for each that is filled, may be empty
-_MOST_TEXT = 1 << 27
-_DIGITS = 15  # a workbook shows and computes no more
-_MOST_DECIMALS = 12
+_OLE = bytes.fromhex("d0cf11e0a1b11ae1")
 _REMEDY = "export the sheet as CSV"
-_CELL = re.compile(rb'<(?:\w+:)?(row|c)\b(?:[^>]*?\br="([A-Z]{0,9})(\d{1,9})")?')
-_SHARES = re.compile(rb'\bt="s"')
-_SHARED_END = re.compile(rb"</(?:\w+:)?si>")
 _SHEET = re.compile(r"xl/worksheets/[^/]*\.xml", re.IGNORECASE)
-_BLANK = str.maketrans("\t\r\n", "   ")
+_HEAD_BYTES = 1 << 14  # a sheet states its dimension in its second element
+_CORNER = rb"\$?([A-Z]{1,9})\$?(\d{1,9})"
+_DIMENSION = re.compile(rb'<(?:\w+:)?dimension\b[^>]*?\bref="' + _CORNER + rb"(?::" + _CORNER + rb')?"')
+# The first record of a worksheet in an xls: its kind BOF, its length, the version (BIFF5 or BIFF8) and "worksheet".
+_WORKSHEET = re.compile(rb"\x09\x08[\x08\x10]\x00\x00[\x05\x06]\x10\x00")
+_DIMENSIONS, _SIZES = 0x200, {10: "<4H", 14: "<IIHH"}
+_MOST_SHEETS, _MOST_RECORDS = 256, 512  # sheets, and records of each, that are searched for sizes
 
 
 def _evidence(head: bytes) -> str:
-    if head.startswith(MAGIC):
+    if head.startswith(_OLE):
         return "it begins with the bytes of an OLE file, as xls does"
     sheets = b"[Content_Types].xml" in head or b"xl/" in head
     return "it is a zip archive with the parts of an xlsx" if head.startswith(_ZIP) and sheets else ""
 
 
 def _contents(path: str, data: bytes) -> Contents:
-    if data.startswith(_ZIP):
-        _demand_bounded(path, _xlsx_sizes(path, data))
-    else:
-        data, sizes = _rewritten(path, data)
-        _demand_bounded(path, sizes)
+    cells = _cells_of_xlsx(path, data) if data.startswith(_ZIP) else _cells_of_xls(path, data)
+    if cells > MOST_CELLS:
+        raise FormatError(path, f"expected sheets of at most {MOST_CELLS} cells, got {cells}", _REMEDY)
     return contents_of_parts(path, _sheets(path, data), "sheet")
 
 
-def _demand_bounded(path: str, sizes: Sizes) -> None:
-    """Demand that the sheets take no more cells and no more text than they may."""
-    most = min(_MOST_CELLS, max(_EMPTY_CELLS, _PER_FILLED * sizes.filled))
-    if sizes.cells > most:
-        raise FormatError(path, f"expected sheets of at most {most} cells, got {sizes.cells}", _REMEDY)
-    if sizes.text > _MOST_TEXT:
-        raise FormatError(path, f"expected at most {_MOST_TEXT} letters in cells, got {sizes.text}", _REMEDY)
-
-
-def _rewritten(path: str, data: bytes) -> tuple[bytes, Sizes]:
-    """Return an xls with its cells alone, and their sizes."""
-    if len(data) > _MOST_BYTES:
-        raise FormatError(path, f"expected a workbook of at most {_MOST_BYTES} bytes, got {len(data)}", _REMEDY)
-    try:
-        return rewritten(data)
-    except Damage as error:
-        raise named(path, b"") or FormatError(path, f"is no xls that can be read ({error})", _REMEDY) from error
-
-
-def _xlsx_sizes(path: str, data: bytes) -> Sizes:
-    """Return what the cells of an xlsx take."""
-    sizes = Sizes()
-    sheets, shares = False, 0
-    for name, page in members(path, data, _MOST_BYTES):
-        if name.lower() == "xl/sharedstrings.xml":
-            ends = [0, *(found.end() for found in _SHARED_END.finditer(page)), len(page)]
-            sizes.longest = max(b - a for a, b in pairwise(ends))
-        if not _SHEET.fullmatch(name):
-            continue
-        sheets = True
-        if b"\0" in page:
-            raise FormatError(path, f"expected UTF-8 in {name}, got something else", _REMEDY)
-        row = column = rows = columns = 0
-        for found in _CELL.finditer(page):
-            if found[1] == b"row":
-                row, column = int(found[3] or row + 1), 0
-            else:
-                sizes.filled += 1
-                column = _number(found[2]) if found[2] else column + 1
-                row = max(row, int(found[3] or 0))
-            rows, columns = max(rows, row), max(columns, column)
-        sizes.cells += rows * columns
-        shares += len(_SHARES.findall(page))
-    if not sheets:
-        demand = "expected the sheets of an xlsx workbook, got none"
-        raise FormatError(path, demand, "save it as xlsx or CSV in the program that made it")
-    sizes.text = sizes.longest * shares
-    return sizes
+def _cells_of_xlsx(path: str, data: bytes) -> int:
+    """Return the number of cells that the sheets of an xlsx state; only the heads of the sheets are unpacked."""
+    heads = [head for name, head in members(path, data, MOST_BYTES, _HEAD_BYTES) if _SHEET.fullmatch(name)]
+    if not heads:
+        problem = "expected the sheets of an xlsx workbook, got none"
+        raise FormatError(path, problem, "save it as xlsx or CSV in the program that made it")
+    cells = 0
+    for stated in filter(None, map(_DIMENSION.search, heads)):
+        left, top, right, bottom = stated.groups()
+        if right is not None:
+            cells += max(0, int(bottom) - int(top) + 1) * max(0, _number(right) - _number(left) + 1)
+    return cells
 
 
 def _number(letters: bytes) -> int:
@@ -119,50 +87,53 @@ def _number(letters: bytes) -> int:
     return number
 
 
-def _sheets(path: str, data: bytes) -> Iterator[tuple[str, bytes]]:
-    """Yield name and text of every sheet."""
-    from python_calamine import CalamineWorkbook
+def _cells_of_xls(path: str, data: bytes) -> int:
+    """Return the number of cells that the sheets of an xls state (MS-XLS 2.4.90).
 
+    A file may store its records in pieces and out of order. Sizes that are missed for this reason are left to the
+    limits of the child process.
+    """
+    if len(data) > MOST_BYTES:
+        raise FormatError(path, f"expected a workbook of at most {MOST_BYTES} bytes, got {len(data)}", _REMEDY)
+    cells = 0
+    for worksheet in islice(_WORKSHEET.finditer(data), _MOST_SHEETS):
+        at = worksheet.start()
+        for _ in range(_MOST_RECORDS):
+            if at + 18 > len(data):
+                break
+            kind, length = struct.unpack_from("<HH", data, at)
+            if kind == _DIMENSIONS and length in _SIZES:
+                top, bottom, left, right = struct.unpack_from(_SIZES[length], data, at + 4)
+                cells += max(0, bottom - top) * max(0, right - left)
+                break
+            at += 4 + length
+    return cells
+
+
+def _sheets(path: str, data: bytes) -> list[tuple[str, bytes]]:
+    """Return name and text of every sheet, read by the child process."""
+    import json
+    import subprocess
+
+    # With -P the folder of the script is not searched for modules. subprocess works in a worker of a pool too.
+    command = [sys.executable, "-P", child.__file__, str(MEMORY_BYTES), str(MOST_LETTERS)]
     try:
-        book = CalamineWorkbook.from_object(io.BytesIO(data))
-        for name in book.sheet_names:
-            sheet = book.get_sheet_by_name(name)
-            yield name, _text(sheet.to_python(skip_empty_area=False))
-    except FormatError:
-        raise
-    except BaseException as error:
-        # calamine has errors of its own for damage, and Rust's panic, which is no Exception, for what it overlooked.
-        if isinstance(error, (KeyboardInterrupt, SystemExit, GeneratorExit, MemoryError)):
-            raise
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise named(path, b"") or FormatError(path, f"calamine cannot read it ({reason[:200]})", _REMEDY) from error
-
-
-def _text(rows: Sequence[Sequence[Any]]) -> bytes:
-    columns = [_printed(column) for column in zip(*rows, strict=True)]
-    return "\n".join("\t".join(row) for row in zip(*columns, strict=True)).encode("utf-8", "replace") + b"\n"
-
-
-def _printed(column: Sequence[Any]) -> list[str]:
-    """Print the cells of a column, its numbers with as many decimals as the longest of them needs."""
-    numbers = [f"{cell:.{_DIGITS}g}" for cell in column if _is_number(cell)]
-    decimals = max((len(each.partition(".")[2]) for each in numbers if "e" not in each), default=0)
-    fixed = decimals <= _MOST_DECIMALS and not any("e" in each for each in numbers)
-    form = f".{decimals}f" if fixed else f".{_DIGITS - 1}e"
-    return [format(cell, form) if _is_number(cell) else _word(cell) for cell in column]
-
-
-def _is_number(cell: object) -> bool:
-    """Tell a number; an xls keeps whole ones apart."""
-    return isinstance(cell, (int, float)) and not isinstance(cell, bool)
-
-
-def _word(cell: object) -> str:
-    if isinstance(cell, datetime.timedelta):
-        return f"{cell.total_seconds():g}"
-    if isinstance(cell, (datetime.datetime, datetime.time)):
-        return cell.isoformat(*([" "] if isinstance(cell, datetime.datetime) else []))
-    return "" if cell is None else str(cell).translate(_BLANK).strip()
+        done = subprocess.run(command, input=data, capture_output=True, timeout=TIME_LIMIT_S, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise FormatError(path, f"expected a workbook that opens within {TIME_LIMIT_S:g} s", _REMEDY) from error
+    except OSError as error:
+        problem = f"the process that reads workbooks cannot be started ({error.strerror})"
+        raise FormatError(path, problem, _REMEDY) from error
+    if done.returncode:
+        reason = done.stderr.decode("utf-8", "replace").strip().partition("\n")[0].strip()[:200] or "no message"
+        problem = f"the process that reads workbooks ended with status {done.returncode} ({reason})"
+        raise FormatError(path, problem, _REMEDY)
+    answer = json.loads(done.stdout)
+    if "refused" in answer:
+        raise foreign_format(path, b"") or FormatError(
+            path, f"calamine cannot read it ({answer['refused'][:200]})", _REMEDY
+        )
+    return [(name, text.encode()) for name, text in answer["sheets"]]
 
 
 FORMAT = ColumnFormat(

@@ -113,11 +113,11 @@ def test_the_likeliest_is_named_first() -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "described"),
     [
         (b"", "silence"),
-        (b"\0" * 40, "40 bytes 0x00 and no other"),
-        (b"\xff" * 7, "7 bytes 0xFF and no other"),
+        (b"\0" * 40, "40 bytes, all 0x00"),
+        (b"\xff" * 7, "7 bytes, all 0xFF"),
         (b"hello\r\nworld\r\n", "text lines without a distance ('hello')"),
         (np.random.default_rng(2).bytes(200), "noise: wrong baud rate"),
         (bytes.fromhex("ff07a1a7ff07a2a8"), "FF-H-L-SUM frames (A02YYUW"),
@@ -125,15 +125,15 @@ def test_the_likeliest_is_named_first() -> None:
     ],
     ids=["silence", "held-low", "held-high", "text", "noise", "ffhls", "numbers"],
 )
-def test_bytes_are_described_for_people(data: bytes, said: str) -> None:
+def test_bytes_are_described_for_people(data: bytes, described: str) -> None:
     """One line that says what to look for."""
     line = describe_bytes(data)
-    assert said in line
+    assert described in line
     assert "\n" not in line
 
 
 @pytest.mark.parametrize(
-    ("name", "options", "said"),
+    ("name", "options", "message"),
     [
         ("text-lines", {"unit": "ft"}, "unit of text-lines must be one of m, cm, mm, in, us, got 'ft'"),
         ("text-lines", {"time_unit": "h"}, "time_unit of text-lines must be one of us, ms, s"),
@@ -146,12 +146,12 @@ def test_bytes_are_described_for_people(data: bytes, said: str) -> None:
     ],
     ids=str,
 )
-def test_an_option_without_sense_is_refused_in_one_line(name: str, options: dict[str, object], said: str) -> None:
+def test_an_option_without_sense_is_refused_in_one_line(name: str, options: dict[str, object], message: str) -> None:
     """By decoder and encoder alike, before anything is read."""
     for make in (get_family(name).decoder, get_family(name).encoder):
         with pytest.raises(SensorError, match="must be") as caught:
             make(**options)
-        assert said in str(caught.value)
+        assert message in str(caught.value)
         assert "\n" not in str(caught.value)
 
 

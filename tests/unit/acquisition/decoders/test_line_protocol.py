@@ -27,16 +27,16 @@ GOOD = b"$R1,0,1000000,2040.75,2130,E*CCAA\n"
 
 def section(title: str) -> str:
     """Return a section of the page."""
-    found = re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
-    assert found is not None
-    return found[1]
+    result = re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
+    assert result is not None
+    return result[1]
 
 
 def vectors() -> list[tuple[str, ...]]:
     """Return the rows of the page's table of vectors, without quotes."""
     table = section("Vectors").partition("Identifications")[0]
     rows = re.findall(r"^\| `(.*)` \|(.*)\|$", table, re.MULTILINE)
-    return [(line, *(cell.strip().strip("`") for cell in rest.split("|"))) for line, rest in rows]
+    return [(line, *(cell.strip().strip("`") for cell in remainder.split("|"))) for line, remainder in rows]
 
 
 def number(cell: str) -> float:
@@ -112,13 +112,13 @@ def test_an_identification_of_the_page_is_read_as_it_says() -> None:
     table = section("Vectors").partition("Identifications")[2]
     rows = re.findall(r"^\| `(.*)` \|(.*)\|$", table, re.MULTILINE)
     assert len(rows) == 2
-    for line, rest in rows:
+    for line, remainder in rows:
         decoder = LineProtocolDecoder()
         assert len(decoder.feed(0, line.encode() + b"\n")) == 0
         assert not any(decoder.faults.values())
-        name, *numbers = (cell.strip() for cell in rest.split("|"))
+        name, *numbers = (cell.strip() for cell in remainder.split("|"))
         settings = dict(zip(SETTINGS, map(int, numbers), strict=True))
-        assert decoder.told.identity == Identity("springmass-rangefinder", "2.0.0", name, settings)
+        assert decoder.status.identity == Identity("springmass-rangefinder", "2.0.0", name, settings)
 
 
 def test_a_spoilt_identification_is_not_believed() -> None:
@@ -129,14 +129,14 @@ def test_a_spoilt_identification_is_not_believed() -> None:
         spoilt[bit // 8] ^= 1 << bit % 8
         decoder = LineProtocolDecoder()
         decoder.feed(0, bytes(spoilt) + b"\n")
-        assert decoder.told.identity is None
+        assert decoder.status.identity is None
 
 
 def test_the_greeting_of_the_first_firmware_tells_its_version() -> None:
     """It could not be asked."""
     decoder = LineProtocolDecoder()
     decoder.feed(0, b"# springmass rangefinder, line protocol R1, 100 Hz\n")
-    assert decoder.told.identity == Identity("springmass-rangefinder", "1.0.0")
+    assert decoder.status.identity == Identity("springmass-rangefinder", "1.0.0")
 
 
 def test_what_the_device_says_of_readings_without_an_echo_is_counted() -> None:
@@ -144,13 +144,13 @@ def test_what_the_device_says_of_readings_without_an_echo_is_counted() -> None:
     decoder = LineProtocolDecoder()
     for letter in "NBCFASZ":
         decoder.feed(0, frame(f"R1,1,1,,,{letter}".encode()))
-        assert bool(decoder.told.complaint) == (letter in "AS")
+        assert bool(decoder.status.complaint) == (letter in "AS")
     names = ("no_echo", "busy", "too_close", "too_far", "no_answer", "stuck", "other")
-    assert decoder.told.conditions == dict.fromkeys(names, 1)
+    assert decoder.status.conditions == dict.fromkeys(names, 1)
     decoder.feed(0, frame(b"R1,1,1,,,A"))
-    assert "does not answer" in decoder.told.complaint
+    assert "does not answer" in decoder.status.complaint
     decoder.feed(0, GOOD)
-    assert decoder.told.complaint == ""
+    assert decoder.status.complaint == ""
 
 
 def test_the_longest_line_is_as_the_page_says_and_fits() -> None:

@@ -53,7 +53,7 @@ def test_clock_rate_with_scatter_to_both_sides() -> None:
 
 @pytest.mark.parametrize("seconds", [5, 30, 300])
 def test_a_clock_rate_is_covered_by_its_uncertainty_however_short_the_run(seconds: int) -> None:
-    """From five seconds on, 68 and 95 % intervals cover as they claim: a dozen stretches tell their scatter badly."""
+    """From five seconds on, 68 and 95 % intervals have their nominal coverage, even with few degrees of freedom."""
     t = np.arange(seconds * 100) / RATE_HZ
     z = []
     for seed in range(200):
@@ -84,7 +84,7 @@ def test_two_bunches_of_readings_claim_no_certainty() -> None:
 
 
 def stamped(true_s: np.ndarray, *stalls: tuple[float, float], seed: int = 1) -> np.ndarray:
-    """Return stamps in ns of readings that come a millisecond late, or at once at the end of a stall."""
+    """Return host times in ns of readings that are a millisecond late, or come together at the end of a stall."""
     host = true_s + np.random.default_rng(seed).exponential(1e-3, true_s.size)
     for start, stop in stalls:
         host[(true_s >= start) & (true_s < stop)] = stop + 1e-3
@@ -94,7 +94,7 @@ def stamped(true_s: np.ndarray, *stalls: tuple[float, float], seed: int = 1) -> 
 @pytest.mark.parametrize("ppm", [-30_000.0, -3000.0, 40.0, 5000.0])
 @pytest.mark.parametrize("stall", [(2.0, 15.0), (-1.0, 13.0), (7.0, 21.0), (9.0, 9.5)])
 def test_a_stall_says_nothing_of_the_clock(stall: tuple[float, float], ppm: float) -> None:
-    """Readings that came at once behind a silence are counted and left out, wherever the silence was."""
+    """Readings that came together after a silence are counted and left out, wherever the silence was."""
     t = np.arange(2000) / RATE_HZ
     fit = fit_clock(t, stamped(t / (1.0 + ppm * 1e-6), stall))
     held = np.count_nonzero((t >= stall[0]) & (t < stall[1]))
@@ -114,7 +114,7 @@ def test_two_stalls_are_two() -> None:
 
 @pytest.mark.parametrize("step_s", [-6.0, -0.1, 0.1, 30.0])
 def test_a_jump_that_stays_is_no_rate(step_s: float) -> None:
-    """A host that slept, a device that counts anew: the lines on either side have one slope and zeros of their own."""
+    """After a host slept or a device restarted, the lines on either side have one slope and different offsets."""
     t = np.arange(6000) / RATE_HZ
     host = stamped(t / (1.0 + 50e-6)) + np.where(t > 21.0, round(step_s * 1e9), 0)
     fit = fit_clock(t, host)

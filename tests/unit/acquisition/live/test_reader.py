@@ -124,7 +124,7 @@ def test_a_network_port_that_is_slow_to_open_holds_up_no_other() -> None:
 
 
 class Odd(Pipe):
-    """A transport that trips over a defect of its own when it is opened again, and then opens."""
+    """A transport that raises an unexpected error at the first reopening, and then opens."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -140,8 +140,8 @@ class Odd(Pipe):
 
 def test_a_defect_on_the_reading_thread_is_heard_of_and_the_reading_goes_on() -> None:
     """The port that tripped is tried again, another is read meanwhile, and stop raises what it was."""
-    other, odd, sink, clock = Pipe(), Odd(), Heard(), VirtualClock()
-    reader = PortReader([Line(other, 0), Line(odd, 1)], sink, clock)
+    second, odd, sink, clock = Pipe(), Odd(), Heard(), VirtualClock()
+    reader = PortReader([Line(second, 0), Line(odd, 1)], sink, clock)
     reader.start()
     os.close(odd.end)
     odd.end = os.open(os.devnull, os.O_WRONLY)  # for the transport to close
@@ -149,7 +149,7 @@ def test_a_defect_on_the_reading_thread_is_heard_of_and_the_reading_goes_on() ->
         clock.sleep_until_ns(clock.now_ns() + 500_000_000)
         threading.Event().wait(0.01)
     os.write(odd.end, b"x")
-    os.write(other.end, b"x")
+    os.write(second.end, b"x")
     heard: set[int] = set()
     while heard < {0, 1}:
         assert sink.came.wait(WAIT_S)

@@ -20,10 +20,10 @@ def line(i: int, echo_us: float) -> bytes:
 
 def flight_us(t: float) -> float:
     """Return how long sound that leaves at a time is on its way to the bob and back: it meets it half way."""
-    away = REST_M
+    distance_m = REST_M
     for _ in range(20):
-        away = REST_M + AMPLITUDE_M * np.cos(OMEGA * (t + away / SPEED_M_PER_S))
-    return float(2e6 * away / SPEED_M_PER_S)
+        distance_m = REST_M + AMPLITUDE_M * np.cos(OMEGA * (t + distance_m / SPEED_M_PER_S))
+    return float(2e6 * distance_m / SPEED_M_PER_S)
 
 
 def test_times_are_those_of_the_reflection() -> None:
@@ -41,7 +41,7 @@ def test_the_way_is_remembered_from_read_to_read() -> None:
     lines = [line(i, echo) for i, echo in enumerate(echoes)]
     whole, cut = (SensorChain(get_family("line-protocol"), rate_hz=100.0) for _ in range(2))
     together = whole.feed(0, b"".join(lines)).t
-    assert together.tobytes() == np.concatenate([cut.feed(0, one).t for one in lines]).tobytes()
+    assert together.tobytes() == np.concatenate([cut.feed(0, first).t for first in lines]).tobytes()
 
 
 def test_an_echo_of_an_earlier_ping_moves_no_time() -> None:
@@ -58,5 +58,5 @@ def test_no_second_harmonic_is_left(at_the_ping: bool, least_um: float, most_um:
     block = chain.feed(0, b"".join(line(i, flight_us(0.01 * i)) for i in range(2000)))
     t = 0.01 * np.arange(2000) if at_the_ping else block.t
     waves = [np.ones_like(t), *(wave(n * OMEGA * t) for n in (1, 2) for wave in (np.cos, np.sin))]
-    found = np.linalg.lstsq(np.stack(waves, axis=1), block.distance, rcond=None)[0]
-    assert least_um <= 1e6 * np.hypot(found[3], found[4]) <= most_um
+    result = np.linalg.lstsq(np.stack(waves, axis=1), block.distance, rcond=None)[0]
+    assert least_um <= 1e6 * np.hypot(result[3], result[4]) <= most_um

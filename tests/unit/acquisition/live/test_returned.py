@@ -79,7 +79,7 @@ def test_a_counter_that_wraps_while_the_port_is_away_goes_on() -> None:
 
 
 def test_a_burst_behind_a_gap_does_not_move_the_time() -> None:
-    """Of a link that held half a second of readings and delivers them at once, the device's time stands."""
+    """If a link delays half a second of readings and delivers them together, the device's time is kept."""
     rng = np.random.default_rng(3)
     first, second = np.arange(500) * STEP_S, 7.0 + np.arange(300) * STEP_S
     late = [each._replace(host_ns=max(each.host_ns, 7_600_000_000)) for each in readings(second, second, rng)]

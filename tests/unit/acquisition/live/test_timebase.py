@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from typing import Any
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -162,8 +161,8 @@ STEPS = st.lists(
 
 
 @given(steps=STEPS, start=st.integers(0, WRAP - 1), kind=st.integers(0, 2))
-def test_the_short_way_of_regular_readings_is_the_general_one(steps: list[int], start: int, kind: int) -> None:
-    """Every reading taken the general way gives the same times, flags and gaps to the last bit."""
+def test_times_without_a_flag_go_forward(steps: list[int], start: int, kind: int) -> None:
+    """Whatever clock is read and however it runs, a time that does not go forward is flagged, and gaps are named."""
     device = (start + np.cumsum(steps)) % WRAP
     host = np.cumsum(np.abs(steps)) * 1000
     whole = [
@@ -171,40 +170,26 @@ def test_the_short_way_of_regular_readings_is_the_general_one(steps: list[int], 
         readings(sequence=device // STEP_US, host_ns=host),
         readings(host_ns=host),
     ][kind]
-    unit_s = (1e-6, 1.0 / RATE_HZ, 1e-9)[kind]
     t, flags, base = pushed(whole)
-    general = Timebase(RATE_HZ)
-    rows = [general._step((r.device_us, r.sequence, r.host_ns)[kind], unit_s, r.host_ns) for r in whole]
-    assert t.tobytes() == np.array([t for t, _ in rows]).tobytes()
-    assert flags.tolist() == [flag for _, flag in rows]
-    assert (base.gaps, base.restarts) == (general.gaps, general.restarts)
-    unflagged = t[(flags & (Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)) == 0]
-    assert np.all(np.diff(unflagged) > 0)
+    assert np.all(np.diff(t[(flags & (Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)) == 0]) > 0)
+    assert [gap.index for gap in base.gaps] == np.flatnonzero(flags & Flag.GAP_BEFORE).tolist()
 
 
-@given(
-    steps=STEPS, kinds=st.lists(st.sampled_from([0, 0, 0, 0, 0, 0, 1, 2]), min_size=120, max_size=120), cut=st.data()
-)
-def test_readings_taken_together_are_those_taken_one_by_one(
-    steps: list[int], kinds: list[int], cut: st.DataObject
-) -> None:
-    """However a stream is cut into batches, times, flags and gaps are those of single readings, to the last bit."""
-    device, kind = np.cumsum(np.abs(steps)) % WRAP, np.array(kinds[: len(steps)])
-    whole = readings(
-        device_us=np.where(kind == 0, device, -1),
-        sequence=np.where(kind <= 1, device // STEP_US, -1),
-        host_ns=device * 1000,
-    )
-    t, flags, base = pushed(whole)
-    together, parts, start = Timebase(RATE_HZ), [], 0
-    with mock.patch.multiple(timebase, TOGETHER=3, ALONE=2):
-        while start < len(whole):
-            part = Readings(whole[start : start + cut.draw(st.integers(1, 60))])
-            parts.append(together.push_all(part, part.host_ns, part.sequence, part.device_us))
-            start += len(part)
-    assert np.concatenate([at for at, _ in parts]).tobytes() == t.tobytes()
-    assert np.concatenate([flag for _, flag in parts]).tolist() == flags.tolist()
-    assert (together.gaps, together.restarts, together.clock) == (base.gaps, base.restarts, base.clock)
+@pytest.mark.parametrize("column", ["device_us", "sequence"])
+def test_the_next_times_are_those_that_a_clock_without_a_break_would_give(column: str) -> None:
+    """They end where the clock runs backward or a reading has none, and without a device's clock there are none."""
+    ticks = np.arange(20) * (STEP_US if column == "device_us" else 1)
+    ticks[16] = 0
+    whole = readings(**{column: ticks})
+    base = Timebase(RATE_HZ)
+    assert base.continued_times(whole) is None
+    times(base, whole[:10])
+    known = base.continued_times(whole[10:])
+    assert known is not None
+    np.testing.assert_allclose(known, np.arange(10, 16) / RATE_HZ, atol=1e-12)
+    mixed = [*whole[10:12], *readings(host_ns=[9 * SECOND_NS])]
+    assert base.continued_times(mixed).size == 2  # type: ignore[union-attr]
+    assert base.continued_times(mixed[2:]) is None
 
 
 def test_gaps_beyond_the_bound_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:

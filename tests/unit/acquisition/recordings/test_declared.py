@@ -62,36 +62,37 @@ def test_what_a_dialect_leaves_out_is_asked_for(declare: Callable[[str, str], Pa
     """As of any family."""
     declare("height-log.toml", LOG.replace("rate_hz = 50", "").replace('unit = "mm"', ""))
     (tmp_path / "run.txt").write_text(DATA, encoding="utf-8")
-    with pytest.raises(NeedsAnswer) as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         open_recording(tmp_path / "run.txt")
-    assert asked.value.question.missing == (Missing.RATE_HZ, Missing.UNIT)
+    assert caught.value.question.missing == (Missing.RATE_HZ, Missing.UNIT)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("old", "new", "named"),
     [
-        ('begins = "Height log"', "", "expected begins, got none"),
-        ('begins = "Height log"', 'begins = " "', "begins must be what line 1"),
-        ("rate_hz = 50", "rate = 50", 'key must be one of title, begins, .*, got "rate"'),
-        ("rate_hz = 50", "rate_hz = 0", "rate_hz must be a positive number, got 0"),
-        ("rate_hz = 50", "rate_hz = true", "rate_hz must be int or float, got True"),
-        ('"tab"', '"x"', 'separator must be one of "tab", .*, got "x"'),
-        ("heading = 2", "heading = -1", "heading must be 0 to 1000 lines, got -1"),
-        ('name = "n"', "name = 3", "column 1: name must be str, got 3"),
-        ("aside = true", 'time = true\nunit = "m"', 'column 1: unit of a time must be one of s, .*, got "m"'),
-        ("[[column]]", "[column", "expected TOML, got"),
+        ('begins = "Height log"', "", ["begins"]),
+        ('begins = "Height log"', 'begins = " "', ["begins"]),
+        ("rate_hz = 50", "rate = 50", ["title", '"rate"']),
+        ("rate_hz = 50", "rate_hz = 0", ["rate_hz", "0"]),
+        ("rate_hz = 50", "rate_hz = true", ["rate_hz", "True"]),
+        ('"tab"', '"x"', ["separator", '"tab"', '"x"']),
+        ("heading = 2", "heading = -1", ["heading", "1000", "-1"]),
+        ('name = "n"', "name = 3", ["column 1", "name", "3"]),
+        ("aside = true", 'time = true\nunit = "m"', ["column 1", "unit", '"m"']),
+        ("[[column]]", "[column", ["TOML"]),
     ],
 )
-def test_what_no_dialect_can_say_is_refused_by_name(old: str, new: str, words: str) -> None:
+def test_what_no_dialect_can_say_is_refused_by_name(old: str, new: str, named: list[str]) -> None:
     """One line with file, key, value and what is allowed."""
-    with pytest.raises(AcquisitionError, match=words) as caught:
+    with pytest.raises(AcquisitionError) as caught:
         dialect("height-log.toml", LOG.replace(old, new))
     assert str(caught.value).startswith("height-log.toml: ")
+    assert [each for each in named if each not in str(caught.value)] == []
     assert "\n" not in str(caught.value)
 
 
 def test_a_family_s_name_cannot_be_taken(declare: Callable[[str, str], Path], tmp_path: Path) -> None:
     """A dialect called as a family of the package would hide it."""
     declare("bare.toml", LOG)
-    with pytest.raises(AcquisitionError, match='"bare" is a family already; give the file another name'):
+    with pytest.raises(AcquisitionError, match='"bare"'):
         formats()

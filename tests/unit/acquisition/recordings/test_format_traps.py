@@ -8,9 +8,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from acquisition.errors import NeedsAnswer
+from acquisition.block import Flag
+from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import get_format
 from acquisition.recordings.recording import Recording
+from tests.conformance.test_formats import labx
 
 HEAD = ["LabVIEW Measurement", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tOne"]
 END = "***End_of_Header***"
@@ -33,7 +35,7 @@ def codes(recording: Recording) -> set[str]:
 
 
 def test_lvm_of_several_headers_is_several_runs() -> None:
-    """Multi_Headings Yes: each further header begins a segment of its own, asked for by name."""
+    """Multi_Headings Yes: each further header begins a separate segment, which is chosen by name."""
     first = segment("X_Value\tPosition", "Delta_X\t0.01", "X0\t0")
     second = segment("X_Value\tPosition", "Delta_X\t0.02", "X0\t5")
     lines = [*HEAD, "Multi_Headings\tYes", END, *first, "0.00\t1.5", "0.01\t1.6", *second, "5.00\t2.5", "5.02\t2.6"]
@@ -117,6 +119,31 @@ def test_lvm_of_labviews_zero_has_no_start(date: str, start: str) -> None:
     assert lvm(*HEAD, END, *head, "0.00\t1.5", "0.01\t1.6").start_time == start
 
 
+def test_lvm_headers_that_say_little() -> None:
+    """The separator may stand behind the title alone and the step in the times alone; no rows are no recording."""
+    rows = [f"{i * 0.02:.2f};1.{i % 10}" for i in range(40)]
+    recording = lvm("LabVIEW Measurement;", END, "Channels;1", END, "X_Value;Position", *rows)
+    assert (recording.info.rate_hz, len(recording.samples)) == (50, 40)
+    with pytest.raises(FormatError):
+        lvm(*HEAD, END, "Channels\t1", END)
+
+
+def test_times_that_a_binary_file_lacks_are_missing() -> None:
+    """CASSY Lab's NaN among the times takes its sample along."""
+    t, x = np.arange(60) / 10, np.round(0.2 + 0.05 * np.sin(np.arange(60) / 3), 4)
+    t[30] = np.nan
+    samples = get_format("cassy").read("run.labx", labx(t, x)).samples
+    assert np.flatnonzero(samples.flags & Flag.MISSING.value).tolist() == [30]
+    assert np.isnan(samples.distance[30])
+
+
+def test_times_in_an_unknown_unit_are_refused() -> None:
+    """Nothing says how long a fortnight is."""
+    data = b"Time (fortnight),Distance (m)\n0.0,0.1\n0.1,0.2\n0.2,0.4\n"
+    with pytest.raises(FormatError, match="fortnight"):
+        get_format("csv").read("run.csv", data)
+
+
 def test_tdms_is_scaled_and_placed_as_its_properties_say() -> None:
     """wf_start_offset and wf_increment make the times; a linear scaling makes the values."""
     from nptdms import ChannelObject, TdmsWriter
@@ -196,22 +223,6 @@ def test_headings_may_be_italian_german_or_chinese(headings: str, unit: str) -> 
     assert distance.tolist() == [x / per_metre for x in (12.5, 12.6, 12.7)]
 
 
-def test_a_motion_sensor_title_may_have_a_weekday() -> None:
-    """The date behind the title is whatever the computer's language prints."""
-    data = b"Motion Sensor Data File Thursday, September 20, 2018 1:40 PM\r\n0.010\t25.3\t0.239\r\n"
-    data += b"".join(f"{i / 100:.3f}\t25.{i:03d}\t0.239\r\n".encode() for i in range(2, 30))
-    assert get_format("motion-sensor").recognises(data)
-
-
-def test_times_that_repeat_by_the_thousand_are_all_flagged() -> None:
-    """2904 repeated stamps among 6206, as one logger has them: each is counted, none is dropped."""
-    stamps = np.sort(np.concatenate((np.arange(3302), np.arange(2904)))) / 100
-    rows = "\n".join(f"{t:.2f},{0.2 + 0.001 * (i % 9):.3f}" for i, t in enumerate(stamps))
-    recording = get_format("csv").read("run.csv", f"Time (s),Distance (m)\n{rows}\n".encode())
-    assert len(recording.samples) == 6206
-    assert [trap.count for trap in recording.traps if trap.code == "duplicate_time"] == [2904]
-
-
 def test_a_row_that_is_left_out_leaves_all_columns() -> None:
     """Behind a damaged heading time stands after the value, and rows of another run are left out of both."""
     heading = (
@@ -228,5 +239,5 @@ def test_a_row_that_is_left_out_leaves_all_columns() -> None:
         b";;3,0100;2,0000",
         b"",
     )
-    found = get_format("capstone").read("run.csv", b"\r\n".join((heading, *rows)), run="Run #1").samples
-    assert found.t.size == found.distance.size == found.flags.size
+    result = get_format("capstone").read("run.csv", b"\r\n".join((heading, *rows)), run="Run #1").samples
+    assert result.t.size == result.distance.size == result.flags.size

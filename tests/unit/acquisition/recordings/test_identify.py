@@ -38,7 +38,7 @@ def test_a_file_is_told_by_content(run: Path) -> None:
 def test_a_format_may_be_named(run: Path) -> None:
     """Naming the right one changes nothing; an unknown one is an error that lists the known."""
     assert len(open_recording(run, format="motion-sensor").samples) == 12
-    with pytest.raises(UnknownFormat, match='format "nonsense": must be one of motion-sensor'):
+    with pytest.raises(UnknownFormat, match=r'"nonsense".*motion-sensor'):
         open_recording(run, format="nonsense")
 
 
@@ -98,43 +98,45 @@ def test_every_family_is_told_by_content(tmp_path: Path, head: bytes, family: st
 
 
 @pytest.mark.parametrize(
-    ("head", "words"),
+    ("head", "title"),
     [
-        (b"\x89HDF\r\n\x1a\n" + bytes(99), "got an HDF5 file; if it is a run file, open it as a run"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(99), "HDF5"),
         (
             b"PK\x03\x04" + bytes(26) + b"mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
-            "save the sheet as xlsx",
+            "OpenDocument",
         ),
-        (b"MATLAB 5.0 MAT-file, Platform" + bytes(99), "got a MATLAB file; in MATLAB writematrix"),
-        (b"\0\0\0\x20ftypisom" + bytes(99), "got a video; follow the mass in Tracker"),
-        (b"TDSh" + bytes(99), "name the .tdms file beside it"),
+        (b"MATLAB 5.0 MAT-file, Platform" + bytes(99), "MATLAB"),
+        (b"\0\0\0\x20ftypisom" + bytes(99), "video"),
+        (b"TDSh" + bytes(99), "TDMS index"),
     ],
 )
-def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, head: bytes, words: str) -> None:
+def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, head: bytes, title: str) -> None:
     """By content, whatever it is called."""
     path = tmp_path / "run.csv"
     path.write_bytes(head)
     with pytest.raises(UnknownFormat) as caught:
         open_recording(path)
-    assert words in str(caught.value)
+    assert title in caught.value.problem
+    assert caught.value.remedy
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("name", "head", "words"),
+    ("name", "head", "title"),
     [
-        ("run.cap", b"PK\x03\x04" + bytes(99), 'got a Capstone workbook; in Capstone "File", "Export Data", "CSV"'),
-        ("run.spklab", bytes(range(256)) * 9, 'got a SPARKvue lab; in SPARKvue "Export Data", "CSV"'),
-        ("run.opj", bytes.fromhex("d0cf11e0a1b11ae1") + bytes(999), "got an Origin project; in Origin"),
+        ("run.cap", b"PK\x03\x04" + bytes(99), "Capstone"),
+        ("run.spklab", bytes(range(256)) * 9, "SPARKvue"),
+        ("run.opj", bytes.fromhex("d0cf11e0a1b11ae1") + bytes(999), "Origin"),
     ],
 )
-def test_a_program_s_file_is_named_with_how_to_export_it(tmp_path: Path, name: str, head: bytes, words: str) -> None:
+def test_a_program_s_file_is_named_with_how_to_export_it(tmp_path: Path, name: str, head: bytes, title: str) -> None:
     """Where the first bytes say too little, the suffix tells; also of a zip or an OLE file without sheets."""
     path = tmp_path / name
     path.write_bytes(head)
     with pytest.raises(UnknownFormat) as caught:
         open_recording(path)
-    assert words in str(caught.value)
+    assert title in caught.value.problem
+    assert title in caught.value.remedy
     assert "\n" not in str(caught.value)
 
 
@@ -143,9 +145,9 @@ def test_the_unit_of_bare_numbers_is_never_guessed(tmp_path: Path, text: str) ->
     """It is asked for, and what was given is said."""
     path = tmp_path / "run.txt"
     path.write_text(text)
-    with pytest.raises(NeedsAnswer, match=r"apart\) and \"column 2\": what is column 2's unit\?") as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         open_recording(path)
-    assert asked.value.question.examples == {"unit": "m"}
+    assert caught.value.question.examples == {"unit": "m"}
     recording = open_recording(path, unit="cm")
     assert {"unit_assumed", "nominal_clock"} <= {trap.code for trap in recording.traps}
     assert recording.info.rate_hz == 10.0
@@ -155,47 +157,39 @@ def test_the_rate_and_the_channel_of_bare_numbers_are_never_guessed(tmp_path: Pa
     """One column has no times; of three columns the user takes one; row numbers are no times."""
     path = tmp_path / "run.txt"
     path.write_text("2.5\n2.6\n2.7\n")
-    with pytest.raises(NeedsAnswer, match='column "column 1"') as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         open_recording(path, unit="cm")
-    assert asked.value.question.missing == (Missing.RATE_HZ,)
+    assert caught.value.question.missing == (Missing.RATE_HZ,)
     recording = open_recording(path, unit="cm", rate_hz=50.0)
     assert recording.samples.t.tolist() == [0.0, 0.02, 0.04]
     assert {"rate_assumed", "unit_assumed"} <= {trap.code for trap in recording.traps}
     path.write_text("0 1 2\n1 4 9\n2 9 1\n3 7 5\n")
-    with pytest.raises(NeedsAnswer) as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         open_recording(path, unit="cm", rate_hz=50.0)
-    (need,) = asked.value.question.needs
+    (need,) = caught.value.question.needs
     assert (need.what, need.choices, need.example) == (Missing.CHANNEL, ("column 2", "column 3"), "column 2")
     recording = open_recording(path, unit="cm", rate_hz=50.0, channel="column 3")
     assert recording.samples.distance.tolist() == [0.02, 0.09, 0.01, 0.05]
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (b"", "got an empty file"),
-        (bytes(range(256)) * 20, "binary data"),
-        (b"Dear diary,\ntoday we hung a mass.\n", "no format recognises it"),
-        (b"x" * 9000, "one line without end"),
-    ],
-)
-def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes, words: str) -> None:
-    """One line says what was expected and what was found."""
+@pytest.mark.parametrize("content", [b"", bytes(range(256)) * 20, b"Dear diary,\ntoday we hung a mass.\n", b"x" * 9000])
+def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes) -> None:
+    """One line with the file's name: an empty file, bytes that are no text, prose, a line without end."""
     path = tmp_path / "run.txt"
     path.write_bytes(content)
     with pytest.raises(FormatError) as caught:
         open_recording(path)
-    assert words in str(caught.value)
+    assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
 
 
 def test_absent_files_and_directories_are_refused(tmp_path: Path) -> None:
     """The system's error becomes one line."""
-    with pytest.raises(FormatError, match="cannot be opened"):
+    with pytest.raises(FormatError, match=r"absent\.txt"):
         open_recording(tmp_path / "absent.txt")
-    with pytest.raises(FormatError, match="got a directory"):
+    with pytest.raises(FormatError, match="directory"):
         open_recording(tmp_path)
-    with pytest.raises(FormatError, match="is no file name"):
+    with pytest.raises(FormatError, match=r"a\\?.0*b"):
         open_recording("a\0b")
 
 
@@ -203,7 +197,7 @@ def test_absent_files_and_directories_are_refused(tmp_path: Path) -> None:
 def test_a_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
     """Opening it would wait for a writer that never comes."""
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(FormatError, match="got a pipe"):
+    with pytest.raises(FormatError, match="pipe"):
         open_recording(tmp_path / "pipe")
 
 
@@ -214,7 +208,7 @@ def test_a_file_without_read_permission_is_refused(run: Path, monkeypatch: pytes
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("builtins.open", refuse)
-    with pytest.raises(FormatError, match=r"cannot be opened \(Permission denied\); check its name and permissions"):
+    with pytest.raises(FormatError, match="Permission denied"):
         open_recording(run)
 
 
@@ -224,7 +218,7 @@ def test_a_gigabyte_of_one_line_is_not_read(tmp_path: Path, start: bytes, monkey
     path = tmp_path / "run.txt"
     path.write_bytes(start + b"0.010\t25.6")
     os.truncate(path, 1 << 30)
-    with pytest.raises(FormatError, match=r"more than 1 MiB|binary|one line without end"):
+    with pytest.raises(FormatError):
         open_recording(path)
 
 
@@ -232,8 +226,9 @@ def test_the_first_line_beyond_a_mib_is_named(tmp_path: Path) -> None:
     """Where the long line begins is said as nearly as chunks can tell."""
     path = tmp_path / "run.txt"
     path.write_bytes((HEADER + ROWS).encode() + b"1" * (3 << 20))
-    with pytest.raises(FormatError, match=r"line 15: expected lines of text, got a line of more than 1 MiB"):
+    with pytest.raises(FormatError, match="1 MiB") as caught:
         open_recording(path)
+    assert caught.value.line == 15
 
 
 class Extra:
@@ -276,5 +271,5 @@ def test_a_broken_entry_point_is_named_and_only_when_needed(
     """A package that cannot be imported spoils nothing that the table can read."""
     install(monkeypatch, "no_such_module_at_all:FORMAT")
     assert sniff(run) == "motion-sensor"
-    with pytest.raises(AcquisitionError, match=r'format "extra" \(no_such_module_at_all:FORMAT\): cannot be loaded'):
+    with pytest.raises(AcquisitionError, match=r'"extra" \(no_such_module_at_all:FORMAT\)'):
         formats()

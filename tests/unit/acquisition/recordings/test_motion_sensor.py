@@ -8,6 +8,7 @@ import pytest
 from acquisition.block import Flag
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.families.motion_sensor import FORMAT
+from acquisition.recordings.questions import Missing
 from acquisition.recordings.recording import Recording
 from acquisition.recordings.sampling.nominal import find_rate
 from acquisition.recordings.sampling.velocity import find_quantum, find_tick, integrate
@@ -119,23 +120,16 @@ def test_jittered_times_stand_as_printed() -> None:
     np.testing.assert_array_equal(recording.samples.t, np.round(t, 3))
 
 
-def test_a_given_rate_must_not_contradict_the_times() -> None:
-    """The file wins over the user, by an error."""
-    with pytest.raises(FormatError, match=r"rate_hz 50 was given, but the times say 100 Hz"):
-        read(POSITION, *position_rows(), rate_hz=50.0)
-    assert read(POSITION, *position_rows(), rate_hz=100.0).info.rate_hz == 100.0
-
-
 def test_a_given_unit_must_not_contradict_the_column_line() -> None:
     """A unit is for files that state none."""
-    with pytest.raises(FormatError, match='unit "mm" was asked for, but the column line says cm'):
+    with pytest.raises(FormatError, match=r'cm.*"mm"'):
         read(POSITION, *position_rows(), unit="mm")
     assert read(*position_rows(), unit="mm").samples.distance[0] == 0.02
 
 
 def test_a_channel_the_file_lacks_is_an_error() -> None:
     """Position cannot be read as velocity."""
-    with pytest.raises(FormatError, match='channel "velocity" was asked for, but the file holds distance'):
+    with pytest.raises(FormatError, match=r'distance.*"velocity"'):
         read(POSITION, *position_rows(), channel="velocity")
 
 
@@ -148,18 +142,18 @@ def test_simulated_data_say_so() -> None:
     assert read(TITLE, POSITION, *position_rows()).info.kind == "replay"
 
 
-@pytest.mark.parametrize("cut", range(1, 13))
-def test_a_truncated_last_row_is_never_a_value(cut: int) -> None:
-    """Wherever the last row stops, its sample is missing and its time is the next on the grid."""
-    text = "\n".join([TITLE, POSITION, *position_rows()])
-    recording = FORMAT.read("run.txt", text[:-cut].encode())
-    assert len(recording.samples) == 12
-    assert np.isnan(recording.samples.distance[-1])
-    assert recording.samples.flags[-1] == UNREAD
-    assert recording.samples.t[-1] == 0.11
-    assert recording.malformed_rows == 1
-    (trap,) = (trap for trap in recording.traps if trap.code == "truncated_row")
-    assert trap.line == 14
+def test_a_first_row_that_is_damaged_is_no_title() -> None:
+    """Without a header, a line that begins with a number is a row."""
+    rows = position_rows()
+    rows[0] = "0.000\t20.0x0\t0.239"
+    recording = read(*rows)
+    assert (recording.title, recording.samples.flags[0]) == ("", UNREAD)
+
+
+def test_an_error_column_that_varies_is_no_stated_error() -> None:
+    """Only a constant is the same figure for all samples."""
+    rows = [f"{i / 100:.3f}\t{20 + i / 8:.3f}\t0.{230 + i}" for i in range(12)]
+    assert "stated_error_is_not_noise" not in codes(read(POSITION, *rows))
 
 
 def test_a_last_row_of_0_03_tab_0_is_not_zero() -> None:
@@ -168,13 +162,8 @@ def test_a_last_row_of_0_03_tab_0_is_not_zero() -> None:
     assert recording.samples.flags.tolist() == [0, 0, UNREAD]
 
 
-def test_a_complete_last_row_without_line_end_counts() -> None:
-    """Most files end like this."""
-    check_position(read(TITLE, POSITION, *position_rows()))
-
-
 def test_a_damaged_row_is_kept_as_a_missing_sample() -> None:
-    """Its place on the grid tells its time."""
+    """Its time follows from its place on the grid."""
     rows = position_rows()
     rows[4] = "0.0#0\t2x.500\t0.239"
     recording = read(TITLE, POSITION, *rows)
@@ -186,40 +175,12 @@ def test_a_damaged_row_is_kept_as_a_missing_sample() -> None:
     assert (trap.count, trap.line) == (1, 7)
 
 
-def test_text_in_the_middle_is_counted_but_no_sample() -> None:
-    """A comment between two rows takes no time."""
-    rows = position_rows()
-    rows.insert(5, "here I touched the table")
-    recording = read(TITLE, POSITION, *rows)
-    np.testing.assert_array_equal(recording.samples.flags, 0)
-    assert len(recording.samples) == 12
-    assert recording.malformed_rows == 1
-    assert "malformed_rows" in codes(recording)
-
-
 def test_a_cut_number_in_the_middle_is_no_value() -> None:
     """A row with fewer decimals than all others lost some."""
     rows = position_rows()
     rows[6] = "0.060\t20.7\t0.239"
     recording = read(TITLE, POSITION, *rows)
     assert recording.samples.flags[6] == UNREAD
-
-
-def test_gaps_repeats_and_steps_back_are_flagged() -> None:
-    """Time's faults are flagged and counted, and the samples stay."""
-    rows = position_rows(20)
-    del rows[10:13]
-    rows.insert(5, rows[4])
-    rows.insert(15, rows[2])
-    recording = read(TITLE, POSITION, *rows)
-    flags = recording.samples.flags
-    assert len(flags) == 19
-    assert np.flatnonzero(flags & Flag.DUPLICATE_TIME.value).tolist() == [5]
-    assert np.flatnonzero(flags & Flag.NON_MONOTONIC_TIME.value).tolist() == [15]
-    assert np.flatnonzero(flags & Flag.GAP_BEFORE.value).tolist() == [11]
-    (gap,) = (trap for trap in recording.traps if trap.code == "missing_samples")
-    assert (gap.count, gap.line) == (3, 14)
-    assert {"duplicate_time", "non_monotonic_time"} <= codes(recording)
 
 
 def test_a_single_time_that_shoots_ahead_is_the_wrong_one() -> None:
@@ -230,25 +191,6 @@ def test_a_single_time_that_shoots_ahead_is_the_wrong_one() -> None:
     assert np.flatnonzero(flags & Flag.NON_MONOTONIC_TIME.value).tolist() == [3]
 
 
-def test_nan_in_position_is_a_missing_sample() -> None:
-    """NaN is what the file says: missing, not malformed."""
-    rows = position_rows()
-    rows[3] = "0.030\tNaN\t0.239"
-    recording = read(TITLE, POSITION, *rows)
-    assert recording.samples.flags.tolist() == [0, 0, 0, Flag.MISSING, *[0] * 8]
-    assert recording.malformed_rows == 0
-    assert "missing_samples" in codes(recording)
-
-
-def test_a_zero_filled_tail_is_left_out_and_said() -> None:
-    """A crash leaves zero bytes; they are no rows."""
-    data = "\n".join([TITLE, POSITION, *position_rows()]).encode() + b"\0" * 5000
-    recording = FORMAT.read("run.txt", data)
-    check_position(recording)
-    assert "zero_filled_tail" in codes(recording)
-    assert recording.originals[0].data == data
-
-
 def test_a_constant_distance_is_read() -> None:
     """Whether a run oscillates is for the analysis to say."""
     recording = read(POSITION, *(f"{i / 100:.3f}\t20.000\t0.239" for i in range(9)))
@@ -256,38 +198,30 @@ def test_a_constant_distance_is_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "words"),
+    ("data", "line"),
     [
-        (TITLE, "line 1: expected rows of two or three numbers, got none"),
-        (f"{TITLE}\n{POSITION}\n", "line 2: expected rows of numbers below the column line, got none"),
-        (f"{POSITION}\n0.000\t20.000\t0.239", "got 1 rows at one time"),
-        (
-            f"{POSITION}\n0.000\tNaN\t0.239\n0.010\tNaN\t0.239\n",
-            'line 2: expected numbers as "distance", got NaN',
-        ),
-        (f"{POSITION}\n0.000\t20.000\n0.010\t20.000\n", "line 2: expected rows of 3 numbers, got none"),
-        (f"{POSITION}\nhello\nworld\n", "expected rows of 3 numbers, got none in 2 lines"),
+        (TITLE, 1),
+        (f"{TITLE}\n{POSITION}\n", 2),
+        (f"{POSITION}\n0.000\t20.000\t0.239", None),
+        (f"{POSITION}\n0.000\tNaN\t0.239\n0.010\tNaN\t0.239\n", 2),
+        (f"{POSITION}\n0.000\t20.000\n0.010\t20.000\n", 2),
+        (f"{POSITION}\nhello\nworld\n", 2),
     ],
 )
-def test_files_without_a_run_are_refused(data: str, words: str) -> None:
-    """Header only, one row, all NaN: one clear line each."""
+def test_files_without_a_run_are_refused(data: str, line: int | None) -> None:
+    """Header only, one row, all NaN: one clear line each, with the line of the file where there is one."""
     with pytest.raises(FormatError) as caught:
         FORMAT.read("run.txt", data.encode())
-    assert words in str(caught.value)
+    assert caught.value.line == line
     assert "\n" not in str(caught.value)
-
-
-def test_binary_is_refused() -> None:
-    """Bytes that are no text are not searched for numbers."""
-    with pytest.raises(FormatError, match="binary"):
-        FORMAT.read("run.txt", bytes(range(256)) * 40)
 
 
 def test_two_columns_under_a_title_are_not_guessed() -> None:
     """Distance or velocity: the user says which."""
     rows = [f"{i / 100:.3f}\t{20 + i:.3f}" for i in range(5)]
-    with pytest.raises(NeedsAnswer, match="no column line says what the numbers are"):
+    with pytest.raises(NeedsAnswer) as caught:
         read(TITLE, *rows)
+    assert caught.value.question.missing == (Missing.CHANNEL,)
     recording = read(TITLE, *rows, channel="position")
     assert recording.samples.distance.tolist() == [0.20, 0.21, 0.22, 0.23, 0.24]
 
@@ -386,9 +320,9 @@ def test_a_pair_is_told_apart_by_content() -> None:
         "\n".join([POSITION, *(f"{i / 100:.3f}\t{x * 100:.3f}\t0.239" for i, x in enumerate(position))]).encode(),
     )
     v = ("v.txt", "\n".join([VELOCITY, *velocity]).encode())
-    one, other = FORMAT.read_pair(p, v), FORMAT.read_pair(v, p)
-    np.testing.assert_array_equal(one.samples.distance, other.samples.distance)
-    with pytest.raises(FormatError, match="got velocity in both"):
+    first, second = FORMAT.read_pair(p, v), FORMAT.read_pair(v, p)
+    np.testing.assert_array_equal(first.samples.distance, second.samples.distance)
+    with pytest.raises(FormatError, match="velocity"):
         FORMAT.read_pair(v, v)
 
 
@@ -398,9 +332,9 @@ def test_a_pair_of_different_runs_is_noticed() -> None:
     v = ("v.txt", "\n".join([VELOCITY, *velocity]).encode())
     wrong = FORMAT.read_pair(("p.txt", "\n".join([POSITION, *position_rows(60)]).encode()), v)
     assert "pair_mismatch" in codes(wrong)
-    with pytest.raises(FormatError, match=r"expected 60 Hz as in p\.txt, got 100 Hz"):
+    with pytest.raises(FormatError, match=r"60 Hz.*p\.txt.*100 Hz"):
         FORMAT.read_pair(("p.txt", "\n".join([POSITION, *position_rows(60, 60.0)]).encode()), v)
-    with pytest.raises(FormatError, match="expected times in common"):
+    with pytest.raises(FormatError, match="times"):
         FORMAT.read_pair(("p.txt", "\n".join([POSITION, *position_rows(60, start=900)]).encode()), v)
 
 
@@ -409,14 +343,14 @@ def test_rates_are_found_in_rounded_times(rate: float) -> None:
     """Long enough, any whole rate is found from milliseconds, with repeats and holes in the times."""
     index = np.delete(np.arange(300), [50, 51, 120])
     t = np.round(np.sort(np.append(index, [30, 200])) / rate, 3)
-    found = find_rate(t, 0.001)
-    assert found is not None
-    assert found.rate_hz == rate
-    assert found.certain
+    result = find_rate(t, 0.001)
+    assert result is not None
+    assert result.rate_hz == rate
+    assert result.certain
 
 
 def test_times_closer_than_their_last_digit_give_no_certain_rate() -> None:
     """Where a damaged file's times differ by less than most of their cells print, no rate is certain."""
-    found = find_rate(np.array([0.0, 0.02, 0.21]), 1.0)
-    assert found is not None
-    assert not found.certain
+    result = find_rate(np.array([0.0, 0.02, 0.21]), 1.0)
+    assert result is not None
+    assert not result.certain

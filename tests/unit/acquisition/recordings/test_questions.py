@@ -11,7 +11,7 @@ import pytest
 
 from acquisition.errors import FormatError, NeedsAnswer, UnknownFormat
 from acquisition.recordings.identify import get_format, open_recording
-from acquisition.recordings.questions import Missing, Need, Question
+from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Recording
 
 T = [i / 20 for i in range(60)]
@@ -34,10 +34,10 @@ def walk(path: Path, answers: dict[str, Any]) -> Iterator[Recording]:
     """Answer one question after the other, with all runs and channels that are listed; yield what is read."""
     try:
         recording = open_recording(path, **answers)
-    except NeedsAnswer as asked:
-        need = asked.question.needs[0]
+    except NeedsAnswer as error:
+        need = error.question.needs[0]
         if need.what.value in answers or (need.choices and need.example not in need.choices):
-            pytest.fail(f"cannot be answered: {asked}")
+            pytest.fail(f"cannot be answered: {error}")
         choices = need.choices if need.what in (Missing.RUN, Missing.CHANNEL) else (need.example,)
         for choice in choices:
             yield from walk(path, {**answers, need.what.value: choice})
@@ -47,13 +47,13 @@ def walk(path: Path, answers: dict[str, Any]) -> Iterator[Recording]:
 
 @pytest.mark.parametrize("name", FILES)
 def test_every_choice_of_a_question_can_be_taken(tmp_path: Path, name: str) -> None:
-    """Each listed run and channel opens by the name listed, as samples of its own."""
+    """Each listed run and channel opens by its listed name, with different samples."""
     path = tmp_path / "run.txt"
     path.write_text(FILES[name], encoding="utf-8")
-    with pytest.raises(NeedsAnswer) as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         open_recording(path)
     recordings = list(walk(path, {}))
-    first = asked.value.question.needs[0]
+    first = caught.value.question.needs[0]
     choices = len(first.choices) if first.what in (Missing.RUN, Missing.CHANNEL) else 1
     assert len(recordings) >= choices
     assert len({each.samples.distance.tobytes() for each in recordings}) == len(recordings)
@@ -64,9 +64,9 @@ def test_all_examples_together_answer_a_question(tmp_path: Path, name: str) -> N
     """Nothing is left to be asked once they are given."""
     path = tmp_path / "run.txt"
     path.write_text(FILES[name], encoding="utf-8")
-    with pytest.raises(NeedsAnswer) as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         open_recording(path)
-    answers: dict[str, Any] = asked.value.question.examples
+    answers: dict[str, Any] = caught.value.question.examples
     assert len(open_recording(path, **answers).samples) == 60
 
 
@@ -74,18 +74,18 @@ def test_a_question_lists_what_the_file_holds(tmp_path: Path) -> None:
     """Columns, times, channels, units and the column of times that would do in place of a rate are there as data."""
     path = tmp_path / "run.txt"
     path.write_text(FILES["units"], encoding="utf-8")
-    with pytest.raises(NeedsAnswer) as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         open_recording(path)
-    question = asked.value.question
+    question = caught.value.question
     channel, unit = question.needs
     assert (question.path, question.columns) == (str(path), ("x", "y", "z"))
     assert (channel.what, channel.choices, channel.example) == (Missing.CHANNEL, ("x", "y", "z"), "x")
     assert (unit.what, unit.of, unit.example) == (Missing.UNIT, "x", "m")
     assert {"m", "rad", "V", "1"} < set(unit.choices)
     path.write_text(FILES["no times"], encoding="utf-8")
-    with pytest.raises(NeedsAnswer) as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         open_recording(path, channel="x", unit="m")
-    (rate,) = asked.value.question.needs
+    (rate,) = caught.value.question.needs
     assert rate.what is Missing.RATE_HZ
     assert rate.instead is not None
     assert (rate.instead.what, rate.instead.choices) == (Missing.TIME, ("y", "z", "a"))
@@ -96,14 +96,14 @@ def test_an_answer_that_fits_nothing_is_asked_again(tmp_path: Path) -> None:
     path = tmp_path / "run.txt"
     path.write_text(FILES["units"], encoding="utf-8")
     for what, given in ((Missing.CHANNEL, {"channel": "w"}), (Missing.TIME, {"channel": "x", "time": "w"})):
-        with pytest.raises(NeedsAnswer) as asked:
+        with pytest.raises(NeedsAnswer) as caught:
             open_recording(path, **given)
-        assert asked.value.question.missing == (what,)
-        assert "y" in asked.value.question.needs[0].choices
+        assert caught.value.question.missing == (what,)
+        assert "y" in caught.value.question.needs[0].choices
     path.write_text(FILES["runs"], encoding="utf-8")
-    with pytest.raises(NeedsAnswer) as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         open_recording(path, run="7")
-    assert asked.value.question.needs[0].choices == ("Run #1", "Run #2")
+    assert caught.value.question.needs[0].choices == ("Run #1", "Run #2")
 
 
 def test_what_no_answer_helps_is_refused_and_not_asked() -> None:
@@ -130,9 +130,9 @@ def test_the_sentence_knows_no_shell(tmp_path: Path) -> None:
     path = tmp_path / "run.txt"
     for text in FILES.values():
         path.write_text(text, encoding="utf-8")
-        with pytest.raises(NeedsAnswer) as asked:
+        with pytest.raises(NeedsAnswer) as question:
             open_recording(path)
-        words = str(asked.value)
+        words = str(question.value)
         assert "\n" not in words
         assert " --" not in words
         assert "springmass" not in words
@@ -143,8 +143,8 @@ def test_the_sentence_knows_no_shell(tmp_path: Path) -> None:
     [
         FormatError("run.txt", "expected rows", "export it again", line=3),
         UnknownFormat("run.txt", "expected rows", "export it again"),
-        NeedsAnswer(Question("run.txt", (Need(Missing.RUN, ("a", "b"), "a"),), ("x",)), line=2),
-        NeedsAnswer(Question("run.txt", (Need(Missing.UNIT, ("m",), "m", of="x"),)), "give the unit"),
+        NeedsAnswer(Question("run.txt", (MissingItem(Missing.RUN, ("a", "b"), "a"),), ("x",)), line=2),
+        NeedsAnswer(Question("run.txt", (MissingItem(Missing.UNIT, ("m",), "m", of="x"),)), "give the unit"),
     ],
     ids=lambda error: type(error).__name__,
 )

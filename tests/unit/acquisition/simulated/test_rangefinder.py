@@ -35,10 +35,10 @@ def bob(t: float) -> float:
 
 def met(t: float, speed: float = 344.0) -> float:
     """Return how far away sound that leaves at a time meets the bob."""
-    away = bob(t)
+    distance = bob(t)
     for _ in range(5):
-        away = bob(t + away / speed)
-    return away
+        distance = bob(t + distance / speed)
+    return distance
 
 
 @pytest.mark.parametrize("tick_s", [0.25e-6, 4e-6, 1e-5])
@@ -73,30 +73,30 @@ def test_noise_has_the_level_asked_for(noise_m: float) -> None:
 def test_an_echo_within_the_dead_time_is_no_target() -> None:
     """Nearer than half the dead time's way there is neither echo nor distance, and everywhere else both."""
     nearest = 0.5 * 1.2e-3 * 344.0
-    found = shots(bob, 500, dead_time_s=1.2e-3)
+    result = shots(bob, 500, dead_time_s=1.2e-3)
     near = np.array([met(i / 100) < nearest for i in range(500)])
     assert 0 < near.sum() < 500
-    np.testing.assert_array_equal([math.isnan(shot.distance_m) for shot in found], near)
-    np.testing.assert_array_equal([math.isnan(shot.echo_us) for shot in found], near)
+    np.testing.assert_array_equal([math.isnan(shot.distance_m) for shot in result], near)
+    np.testing.assert_array_equal([math.isnan(shot.echo_us) for shot in result], near)
 
 
 def test_a_fixed_object_makes_a_plateau() -> None:
     """Beyond the far limit every reading is the limit's."""
-    found = distances(bob, 500, far_limit_m=0.28)
+    result = distances(bob, 500, far_limit_m=0.28)
     beyond = np.array([met(i / 100) >= 0.28 for i in range(500)])
     assert beyond.sum() > 50
-    assert len(set(found[beyond])) == 1
-    assert found[beyond][0] == pytest.approx(0.28, abs=25e-6)
-    assert np.all(found[~beyond] < 0.28 + 25e-6)
+    assert len(set(result[beyond])) == 1
+    assert result[beyond][0] == pytest.approx(0.28, abs=25e-6)
+    assert np.all(result[~beyond] < 0.28 + 25e-6)
 
 
 @pytest.mark.parametrize("crystal_ppm", [-80.0, 0.0, 50.0])
 def test_a_crystal_that_is_off_takes_its_readings_early_or_late(crystal_ppm: float) -> None:
     """A clock that runs fast shows 10 ms a reading and takes them sooner than that."""
-    found = shots(bob, 12_000, crystal_ppm=crystal_ppm)
-    assert found[-1].device_us == 11_999 * 10_000
-    assert found[-1].true_s == pytest.approx(119.99 / (1 + crystal_ppm * 1e-6), rel=1e-12)
-    assert found[-1].distance_m == pytest.approx(met(found[-1].true_s), abs=25e-6)
+    result = shots(bob, 12_000, crystal_ppm=crystal_ppm)
+    assert result[-1].device_us == 11_999 * 10_000
+    assert result[-1].true_s == pytest.approx(119.99 / (1 + crystal_ppm * 1e-6), rel=1e-12)
+    assert result[-1].distance_m == pytest.approx(met(result[-1].true_s), abs=25e-6)
 
 
 def test_the_device_clock_wraps() -> None:
@@ -109,17 +109,17 @@ def test_the_device_clock_wraps() -> None:
 
 def test_jitter_moves_the_moment_and_not_the_stamp() -> None:
     """The stamps stay even while the distances scatter by speed times jitter."""
-    found = shots(lambda t: 0.3 + 0.1 * t, 2000, jitter_s=1e-3)
-    np.testing.assert_allclose(np.diff([shot.true_s for shot in found]), 0.01, atol=1e-9)
+    result = shots(lambda t: 0.3 + 0.1 * t, 2000, jitter_s=1e-3)
+    np.testing.assert_allclose(np.diff([shot.true_s for shot in result]), 0.01, atol=1e-9)
     # A bob that goes away is met a little further off: by its speed over that of sound.
-    error = np.array([shot.distance_m - (0.3 + 0.1 * shot.true_s) / (1 - 0.1 / 344.0) for shot in found])
+    error = np.array([shot.distance_m - (0.3 + 0.1 * shot.true_s) / (1 - 0.1 / 344.0) for shot in result])
     assert np.std(error) == pytest.approx(1e-4, rel=0.1)
 
 
 def test_false_echoes_come_in_clusters_where_the_bob_turns_near_the_sensor() -> None:
     """Runs of 3 to 17 readings lie 2.5 to 7.5 mm beyond the bob, each from a nearest turning point on."""
-    found = distances(bob, 20_000, false_echo_rate_hz=0.3)
-    off = found - np.array([met(i / 100) for i in range(20_000)])
+    result = distances(bob, 20_000, false_echo_rate_hz=0.3)
+    off = result - np.array([met(i / 100) for i in range(20_000)])
     false = off > 1e-3
     edges = np.flatnonzero(np.diff(np.concatenate([[False], false, [False]]).astype(int)))
     lengths = edges[1::2] - edges[::2]
@@ -133,9 +133,9 @@ def test_false_echoes_come_in_clusters_where_the_bob_turns_near_the_sensor() -> 
 def test_the_seed_gives_the_same_readings_again() -> None:
     """One seed is one run; another is another."""
     noisy = {"noise_m": 1e-4, "false_echo_rate_hz": 0.5, "jitter_s": 1e-4}
-    first, again, other = (distances(bob, 500, seed, **noisy) for seed in (7, 7, 8))
+    first, again, second = (distances(bob, 500, seed, **noisy) for seed in (7, 7, 8))
     assert first.tobytes() == again.tobytes()
-    assert first.tobytes() != other.tobytes()
+    assert first.tobytes() != second.tobytes()
 
 
 def test_readings_without_end_are_the_single_ones() -> None:

@@ -246,4 +246,4 @@ def test_a_percentage_and_an_uncertainty_in_another_unit_are_asked_about() -> No
     with pytest.raises(SceneError, match=r"did you mean percent: 0\.4\?"):
         Scene.from_mapping({"air": {"relative_humidity": 40}})
     (clause,) = Scene.from_mapping({"bob": {"mass_kg": {"value": 0.2176, "u": 0.5}}}).unusual()
-    assert "its own size, u = 0.5" in clause
+    assert "as large as the value, u = 0.5" in clause

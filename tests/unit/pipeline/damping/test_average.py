@@ -12,7 +12,7 @@ import pytest
 from pipeline.damping.average import SPREAD_OF_POWER, Weighted, average_over_laws, spread_counts
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping, Params, fit_damping
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 START = 0.05
@@ -103,7 +103,7 @@ def test_other_laws_weigh_by_their_evidence_and_by_what_the_record_knows(
 
 @pytest.mark.parametrize("name", ["friction", "power", "linear+friction"])
 def test_a_law_out_of_reach_of_both_drags_speaks_for_itself(synthetic: ModuleType, windows: Windows, name: str) -> None:
-    """Where linear and quadratic drag does not fit the selected law comes first with the parameters of its own fit."""
+    """Where linear and quadratic drag does not fit the selected law comes first with the parameters of its fit."""
     damping, weighted, _ = of_truth(synthetic, windows, name, 160, 2e-5)
     assert damping.selected == name
     stated, best = weighted[0].fit.joint, damping.best
@@ -160,7 +160,7 @@ def test_a_power_below_linear_drag_hardly_weighs_beside_friction(synthetic: Modu
 
 
 def test_the_spread_of_laws_that_nearly_agree_counts_hardly_anything() -> None:
-    """Of two laws whose variance is a hundredth of their own it counts by 5e-10, of those that agree by nothing."""
+    """Of two laws whose variance is a hundredth of each variance it counts by 5e-10, of those that agree by nothing."""
     half = np.array([0.5, 0.5])
     assert spread_counts(half, np.array([1.0, 1.2]), np.ones(2)) == pytest.approx(5e-10)
     assert spread_counts(half, np.array([1.0, 1.0]), np.zeros(2)) == 0.0

@@ -12,7 +12,7 @@ from pipeline.damping.joint import fit_joint
 from pipeline.damping.laws import LAWS
 from pipeline.damping.select import Damping, Params, fit_damping
 from pipeline.errors import AnalysisError
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 T = 0.4 + 0.757 * np.arange(80)  # one minute
@@ -30,7 +30,7 @@ def run(
 
 
 def test_shared_coefficients_are_held_and_better_known(synthetic: ModuleType, windows: Windows) -> None:
-    """Over 30 triples of runs the joint intervals hold the truth, and are narrower than those of any run alone."""
+    """Over 30 triples of runs the joint intervals cover the truth, and are narrower than those of any run alone."""
     pulls = []
     for seed in range(30):
         runs = [

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.damping.mixture import MixedDrag, Params, find_mixed
 from pipeline.damping.select import Damping, fit_damping
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 T = 0.4 + 0.757 * np.arange(158)  # two minutes

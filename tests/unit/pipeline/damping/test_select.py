@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.damping.laws import LAWS
 from pipeline.damping.select import Damping, Params, fit_damping
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 T = 0.4 + 0.757 * np.arange(158)  # two minutes
@@ -72,7 +72,7 @@ def test_true_law_is_admissible_and_false_ones_rejected(
 
 @pytest.mark.parametrize("u_m", [5e-5, 4e-4])
 def test_intervals_hold(synthetic: ModuleType, windows: Windows, u_m: float) -> None:
-    """Over 300 runs of mixed drag each coefficient's 68 and 95 % interval hold the truth so often."""
+    """Over 300 runs of mixed drag each coefficient's 68 and 95 % interval covers the truth so often."""
     truth = synthetic.Truth(**MIXED)
     clean = truth.amplitude_at(T)
     z = []

@@ -1,4 +1,4 @@
-"""Motions that damping ends at once give their rates; what only looks like one is not taken for one."""
+"""Overdamped motions give their rates; what only looks like one is not taken for one."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from scipy.linalg import expm
 from pipeline.analyse import Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.motion.overdamped import Overdamped, find_overdamped
-from pipeline.oscillation.condition import condition
-from pipeline.oscillation.cycles import NoOscillation
+from pipeline.samples.condition import condition
 from pipeline.track import Track
+from pipeline.windows.cycles import NoOscillation
 
 OMEGA = 8.3  # undamped, rad/s
 T = np.arange(1000) / 100.0
@@ -85,7 +85,7 @@ def test_strongly_damped_oscillations_give_frequency_and_rate(ratio: float) -> N
     true |= {
         "amplitude": 0.05 * OMEGA / damped,
         "phase": -math.asin(ratio),
-        "quality_factor": 0.5 * damped / (ratio * OMEGA),
+        "quality_factor": 0.5 / ratio,
     }
     clean, pulls = released(ratio), []
     for seed in range(8):
@@ -137,7 +137,7 @@ def test_other_motions_are_no_relaxation(name: str, sigma_m: float) -> None:
 
 
 def test_a_lone_exponential_is_named_but_not_believed() -> None:
-    """One exponential may be the end of an overdamped motion or a drift: its rate is told in words, no estimate."""
+    """One exponential may be the end of an overdamped motion or a drift: its rate is given in words, no estimate."""
     found = find_overdamped(condition(track(0.02 * np.exp(-0.8 * T), 3e-4, 1)))
     assert isinstance(found, NoOscillation)
     assert not isinstance(found, Overdamped)
@@ -155,9 +155,8 @@ def test_an_analysis_says_what_it_found() -> None:
     """Overdamped records carry a finding with both rates, estimates and a spring constant, and no error."""
     result = analyse(track(released(1.5), 3e-4, 1), SPRING)
     assert isinstance(result.motion, Overdamped)
-    (finding,) = (f for f in result.findings if f.code == "overdamped")
-    assert finding.severity == "warning"
-    assert str(result.estimates["relaxation_rate_slow"]) in finding.message
+    assert [f.severity for f in result.findings if f.code == "overdamped"] == ["warning"]
+    assert {"relaxation_rate_slow", "relaxation_rate_fast"} <= set(result.estimates)
     assert not any(f.severity == "error" for f in result.findings)
     k = result.estimates["spring_constant"]
     assert k.value == pytest.approx(0.2 * OMEGA**2, abs=4.0 * k.u)

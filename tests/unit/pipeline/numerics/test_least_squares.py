@@ -42,7 +42,7 @@ def test_a_linear_problem_is_solved_by_the_normal_equations() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_its_minimum_and_covariance_are_those_of_scipys_own_call(seed: int) -> None:
-    """A fit with derivatives in closed form ends where scipy's differences of its own choice end."""
+    """A fit with derivatives in closed form ends where scipy's differences end."""
     y, _ = exponential(seed, 1e-4)
     ours = fit_decay(y, 1e-4, (0.04, 0.01), precision=1e-8)
     other = least_squares(lambda b: (b[0] * np.exp(-b[1] * T) - y) / 1e-4, [0.04, 0.01], method="lm", xtol=1e-14)
@@ -117,7 +117,7 @@ def test_running_out_of_steps_is_told() -> None:
     fit = fit_decay(y, 1e-4, (1.0, 0.2), steps=3)
     assert not fit.converged
     assert "no minimum in 3 steps" in fit.tried
-    assert fit.steps == 6
+    assert fit.steps == 3
 
 
 def test_a_start_without_a_value_is_told() -> None:
@@ -125,17 +125,6 @@ def test_a_start_without_a_value_is_told() -> None:
     fit = minimise(lambda b: np.log(b[0]) * np.ones(3), [-1.0])
     assert not fit.converged
     assert "no finite value" in fit.tried
-
-
-def test_one_attempt_is_enough_where_it_is_said() -> None:
-    """Without a second method a fit that failed ends after its first, and says no more."""
-    steps = {}
-    for again in (True, False):
-        fit = minimise(lambda b: b[0] * np.exp(-b[1] * T) - T, [1.0, 1.0], params=Params(steps=2, again=again))
-        assert not fit.converged
-        assert ("again by a trust region" in fit.tried) == again
-        steps[again] = fit.steps
-    assert steps == {True: 4, False: 2}
 
 
 def test_steps_into_the_void_are_not_taken() -> None:
@@ -148,6 +137,6 @@ def test_steps_into_the_void_are_not_taken() -> None:
 
 
 def test_fewer_residuals_than_parameters_are_refused() -> None:
-    """Two parameters from one number: the caller is told at once."""
+    """Two parameters from one number: the caller gets an error."""
     with pytest.raises(ValueError, match="got 1 for 2"):
         minimise(lambda b: b[:1], [1.0, 2.0])

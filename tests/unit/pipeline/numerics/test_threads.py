@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from types import ModuleType
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import pipeline.analyse
+import pipeline.analysis
 from pipeline.analyse import analyse
 from pipeline.errors import AnalysisError
 from pipeline.numerics.threads import one_thread
@@ -42,21 +44,21 @@ def two_threads() -> Iterator[None]:
 def test_an_analysis_runs_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     """The pool has one thread while a record is analysed or smoothed, and the two it had before afterwards."""
     seen: list[set[int]] = []
-    for name in ("condition", "smooth"):
-        _watch(monkeypatch, name, seen)
+    _watch(monkeypatch, pipeline.analyse, "condition", seen)
+    _watch(monkeypatch, pipeline.analysis, "smooth", seen)
     analyse(Track.from_arrays(T, Y)).smoothed()
     assert seen == [{1}, {1}]
     assert pools() == {2}
 
 
-def _watch(monkeypatch: pytest.MonkeyPatch, name: str, seen: list[set[int]]) -> None:
-    stage = getattr(pipeline.analyse, name)
+def _watch(monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str, seen: list[set[int]]) -> None:
+    stage = getattr(module, name)
 
     def watched(*args: object) -> object:
         seen.append(pools())
         return stage(*args)
 
-    monkeypatch.setattr(pipeline.analyse, name, watched)
+    monkeypatch.setattr(module, name, watched)
 
 
 @pytest.mark.usefixtures("two_threads")

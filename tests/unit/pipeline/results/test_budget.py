@@ -17,10 +17,10 @@ from pipeline.errors import AnalysisError
 from pipeline.motion.phase import fit_phase
 from pipeline.motion.waveform import fit_rest
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.budget import Budget, Inputs, joint_of
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import tabulate
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 OMEGA, START, GAMMA, BETA = 8.0, 0.05, 0.007, 0.2

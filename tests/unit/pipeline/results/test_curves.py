@@ -11,8 +11,8 @@ import pytest
 from pipeline.damping.average import Weighted
 from pipeline.damping.select import fit_damping
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.curves import drag_curve, energy_curve
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 OMEGA, START, GAMMA, BETA = 8.0, 0.05, 0.007, 0.2

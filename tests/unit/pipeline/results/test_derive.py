@@ -18,10 +18,10 @@ from pipeline.damping.select import Damping, fit_damping
 from pipeline.motion.phase import fit_phase
 from pipeline.motion.waveform import fit_rest
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.derive import Derived, derive
 from pipeline.results.effects import Effect, tabulate
 from pipeline.track import Track
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 OMEGA, START, GAMMA, BETA = 8.0, 0.05, 0.007, 0.2

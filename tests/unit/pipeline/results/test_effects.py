@@ -17,9 +17,9 @@ from pipeline.damping.select import fit_damping
 from pipeline.motion.phase import fit_phase
 from pipeline.motion.waveform import fit_rest
 from pipeline.numerics.estimate import Estimate
-from pipeline.oscillation.demodulate import Demodulated
 from pipeline.results.effects import Effect, tabulate
 from pipeline.track import Track
+from pipeline.windows.demodulate import Demodulated
 
 Windows = Callable[..., Demodulated]
 NAMES = (

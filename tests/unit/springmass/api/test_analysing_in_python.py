@@ -59,7 +59,7 @@ def test_every_way_to_hand_over_arrays_gives_the_same_numbers() -> None:
 @pytest.mark.parametrize("source", [3.0, None, {"t": [0.0]}, np.zeros(5), ([0.0, 1.0],), pd.DataFrame({"x": [1.0]})])
 def test_what_holds_no_run_is_refused(source: Any) -> None:
     """The error lists what is taken."""
-    with pytest.raises(TrackError, match=r"a path, a run, a track, a pair .* was demanded, got a"):
+    with pytest.raises(TrackError, match=r"a path, a run, a track, a pair .* was expected, got a"):
         sm.analyse(source)
 
 
@@ -103,7 +103,7 @@ def test_laws_are_chosen_by_name_or_given() -> None:
     def mine(t: Any, A0: float, c: float) -> Any:
         return A0 * np.exp(-c * t)
 
-    law = sm.make_law("mine", mine, {"c": "1/s"}, sm.LAWS["linear"].guess)
+    law = sm.make_law("mine", mine, {"c": (0, -1)}, sm.LAWS["linear"].guess)
     assert list(sm.analyse((t, y), laws=["linear", "none"]).motion.damping.fits) == ["linear", "none"]
     found = sm.analyse((t, y), laws=["linear", ..., law])
     assert set(found.motion.damping.fits) == {*sm.LAWS, "mine"}
@@ -170,5 +170,5 @@ def test_runs_are_compared(damped_run: Path) -> None:
     assert np.isnan(other.to_dataframe().loc["together", "spring_constant"])
     with pytest.raises(AnalysisError, match="two runs at least, got 1"):
         sm.compare([undamped])
-    with pytest.raises(AnalysisError, match="one for each was demanded, got 3 for 2"):
+    with pytest.raises(AnalysisError, match="one for each, got 3 for 2"):
         sm.compare([undamped, undamped], [scene] * 3)

@@ -46,7 +46,10 @@ def test_estimates_go_by_name_and_by_symbol(damped: sm.Analysis) -> None:
     assert damped["T"] is damped["period"]
     assert damped["C_d"] is damped["drag_coefficient"]
     assert damped["gamma"].value == pytest.approx(0.0065, rel=0.01)
-    assert damped["quadratic.beta"] == damped.motion.damping.fits["quadratic"].joint["beta"]
+    fitted = damped.motion.damping.fits["quadratic"].joint["beta"]
+    # The fit's own uncertainty, and the scale of the distances.
+    assert damped["quadratic.beta"].value == pytest.approx(fitted.value, rel=1e-12)
+    assert fitted.u < damped["quadratic.beta"].u < 1.01 * fitted.u
     assert float(damped["k"]) == damped.estimates["spring_constant"].value
     assert list(damped) == damped.keys() == list(damped.everything)
     assert "gamma" in damped
@@ -134,7 +137,10 @@ def test_figures_go_into_axes_of_ones_own(damped: sm.Analysis, pyplot: Any) -> N
     axes = damped.plot.amplitude(laws=["linear", "linear+quadratic"])
     assert pyplot.get_fignums() == [axes.figure.number]
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert sorted(label.split(" (")[0] for label in labels if "(" in label) == ["linear", "linear+quadratic"]
+    assert sorted(label.split(" (")[0] for label in labels if "(" in label) == [
+        "exponential, linear drag",
+        "linear+quadratic",
+    ]
     position = damped.plot.position(from_s=5.0, to_s=8.0)
     assert position.get_xlim() == (5.0, 8.0)
 

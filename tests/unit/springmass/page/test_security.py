@@ -2,101 +2,141 @@
 
 from __future__ import annotations
 
-import contextlib
+import asyncio
+import re
 from typing import Any
 
 import pytest
 
-from springmass.page.web.security import Gate
+from springmass.page.web.security import ACT, LOOK, Access, guarded
+from springmass.report.script import script_sha256
+
+HOST = "127.0.0.1:8000"
 
 
-class Served:
-    """Counts what came through the gate."""
+class Page:
+    """A page behind its checks: an access, and what each request that came through may do."""
 
-    def __init__(self) -> None:
-        self.count = 0
+    def __init__(self, **options: Any) -> None:
+        self.access = Access(8000, **options)
+        self.served: list[list[str]] = []
+        self._guarded = guarded(self._serve, self.access, ["192.168.1.5"] if options.get("viewers") else [])
 
-    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Answer."""
-        self.count += 1
+    async def _serve(self, scope: Any, receive: Any, send: Any) -> None:
+        self.served.append(scope["auth"].scopes)
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await send({"type": "http.response.body", "body": b"page"})
 
+    def ask(
+        self, *, kind: str = "http", path: str = "/", query: str = "", **headers: str
+    ) -> tuple[int, dict[str, str]]:
+        """Return the status and the headers that a request gets; of a refused WebSocket 0."""
+        sent: list[dict[str, Any]] = []
 
-def ask(gate: Gate, *, kind: str = "http", query: str = "", **headers: str) -> tuple[int, dict[bytes, bytes]]:
-    """Return the status and the headers that a request gets; of a refused WebSocket its closing code."""
-    sent: list[dict[str, Any]] = []
+        async def send(message: Any) -> None:
+            sent.append(message)
 
-    async def send(message: dict[str, Any]) -> None:
-        sent.append(message)
+        async def receive() -> dict[str, str]:
+            return {"type": "websocket.connect"}
 
-    async def receive() -> dict[str, str]:
-        return {"type": "websocket.connect"}
+        given = [(name.encode(), value.encode("latin-1")) for name, value in headers.items()]
+        scope = {"type": kind, "path": path, "query_string": query.encode(), "headers": given}
+        asyncio.run(self._guarded(scope, receive, send))
+        first = sent[0]
+        got = {name.decode(): value.decode() for name, value in first.get("headers", ())}
+        return int(first.get("status", 0)), got
 
-    given = [(name.encode(), value.encode("latin-1")) for name, value in headers.items()]
-    scope = {"type": kind, "query_string": query.encode(), "headers": given}
-    with contextlib.suppress(StopIteration):  # nothing in it waits, so one step is all of it
-        gate(scope, receive, send).send(None)
-    first = sent[0]
-    return int(first.get("status", first.get("code"))), dict(first.get("headers", ()))
+    def cookie_for(self, token: str | None, host: str = HOST) -> str:
+        """Exchange a token for its cookie."""
+        status, headers = self.ask(query=f"token={token}", host=host)
+        assert (status, headers["location"]) == (303, "/")
+        value, *flags = headers["set-cookie"].split("; ")
+        assert {"HttpOnly", "SameSite=strict"} <= set(flags)
+        return value
 
 
 @pytest.fixture
-def served() -> Served:
-    """Return the page behind the gate."""
-    return Served()
+def page() -> Page:
+    """Return a page for this computer alone."""
+    return Page()
 
 
 @pytest.fixture
-def cookie(served: Served) -> tuple[Gate, str]:
-    """Return a gate and the cookie that its token was exchanged for."""
-    gate = Gate(served, 8000)
-    status, headers = ask(gate, query=f"token={gate.token}", host="127.0.0.1:8000")
-    assert status == 303
-    assert headers[b"location"] == b"/"
-    assert b"HttpOnly; SameSite=Strict" in headers[b"set-cookie"]
-    return gate, headers[b"set-cookie"].split(b";")[0].decode()
+def known(page: Page) -> str:
+    """Return the cookie of the page's controller."""
+    return page.cookie_for(page.access.token)
 
 
-def test_the_token_opens_once_and_the_cookie_from_then_on(served: Served, cookie: tuple[Gate, str]) -> None:
+def test_the_token_opens_once_and_the_cookie_from_then_on(page: Page, known: str) -> None:
     """The second use of the link is refused; what is served carries the policies."""
-    gate, known = cookie
-    assert gate.token is None
-    assert ask(gate, query="token=", host="127.0.0.1:8000")[0] == 403
-    assert ask(gate, query="token=None", host="127.0.0.1:8000")[0] == 403
-    status, headers = ask(gate, host="127.0.0.1:8000", cookie=known)
-    assert status == 200
-    assert headers[b"content-security-policy"].startswith(b"default-src 'self'")
-    assert served.count == 1
+    assert page.access.token is None
+    assert page.ask(query="token=", host=HOST)[0] == 403
+    assert page.ask(query="token=None", host=HOST)[0] == 403
+    status, headers = page.ask(host=HOST, cookie=known)
+    assert (status, page.served) == (200, [[LOOK, ACT]])
+    assert headers["content-security-policy"].startswith("default-src 'self'")
+    assert (headers["x-content-type-options"], headers["cache-control"]) == ("nosniff", "no-store")
+
+
+def test_a_report_runs_its_script_alone(page: Page, known: str) -> None:
+    """Its policy allows its styles and pictures, and one script by its digest."""
+    policy = page.ask(path="/v1/report", host=HOST, cookie=known)[1]["content-security-policy"]
+    assert policy.startswith("default-src 'none'")
+    assert re.findall(r"script-src ([^;]*);", policy) == [f"'sha256-{script_sha256()}'"]
+
+
+def test_refusals_carry_the_policies_too(page: Page) -> None:
+    """Of a host, and of a browser that is not known."""
+    for host in ("evil.example", HOST):
+        status, headers = page.ask(host=host)
+        assert status in (400, 403)
+        assert headers["content-security-policy"].startswith("default-src 'self'")
+
+
+def test_viewers_look_and_do_not_act() -> None:
+    """Their token opens as often as it is used, by the network's address; without viewers it opens nothing."""
+    shared = Page(viewers=True)
+    for _ in range(2):
+        cookie = shared.cookie_for(shared.access.viewers_token, "192.168.1.5:8000")
+        assert shared.ask(host="192.168.1.5:8000", cookie=cookie)[0] == 200
+    assert shared.served == [[LOOK], [LOOK]]
+    alone = Page()
+    assert alone.ask(query=f"token={alone.access.viewers_token}", host=HOST)[0] == 403
+
+
+def test_a_page_that_was_started_again_knows_its_browsers() -> None:
+    """By its secret; the link that was used does not open again."""
+    before, after = Page(secret="s"), Page(secret="s", used=True)
+    token = before.access.token
+    known = before.cookie_for(token)
+    assert after.ask(host=HOST, query=f"token={token}")[0] == 403
+    assert after.ask(host=HOST, cookie=known)[0] == 200
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "", "[", "10.0.0.7:8000"])
-def test_other_hosts_are_refused(served: Served, cookie: tuple[Gate, str], host: str) -> None:
+def test_other_hosts_are_refused(page: Page, known: str, host: str) -> None:
     """A name that somebody else's server may give to this computer is no name of the page."""
-    gate, known = cookie
-    assert ask(gate, host=host, cookie=known)[0] == 403
-    assert served.count == 0
+    assert page.ask(host=host, cookie=known)[0] == 400
+    assert page.ask(kind="websocket", host=host, origin=f"http://{host}", cookie=known)[0] == 0
+    assert not page.served
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8000", "localhost:1234", "[::1]:8000"])
-def test_the_loopback_is_served_by_any_name_and_port(cookie: tuple[Gate, str], host: str) -> None:
+def test_the_loopback_is_served_by_any_name_and_port(page: Page, known: str, host: str) -> None:
     """Behind a tunnel the port is another."""
-    gate, known = cookie
-    assert ask(gate, host=host, cookie=known)[0] == 200
+    assert page.ask(host=host, cookie=known)[0] == 200
 
 
 @pytest.mark.parametrize("origin", [None, "http://evil.example", "http://127.0.0.1:9000", "null"])
-def test_a_socket_from_another_page_is_refused(served: Served, cookie: tuple[Gate, str], origin: str | None) -> None:
+def test_a_socket_from_another_page_is_refused(page: Page, known: str, origin: str | None) -> None:
     """Cookie or no cookie: browsers send it along, whatever page asks."""
-    gate, known = cookie
     extra = {} if origin is None else {"origin": origin}
-    assert ask(gate, kind="websocket", host="127.0.0.1:8000", cookie=known, **extra)[0] == 1008
-    assert served.count == 0
+    assert page.ask(kind="websocket", host=HOST, cookie=known, **extra)[0] == 0
+    assert not page.served
 
 
 @pytest.mark.parametrize("known", ["", "springmass-8000=wrong", "springmass-8001=x", '"', "springmass-8000=\xff"])
-def test_without_the_cookie_nothing_is_served(served: Served, known: str) -> None:
+def test_without_the_cookie_nothing_is_served(page: Page, known: str) -> None:
     """And the answer says how to get it."""
-    gate = Gate(served, 8000)
-    assert ask(gate, host="127.0.0.1:8000", cookie=known)[0] == 403
-    assert served.count == 0
+    assert page.ask(host=HOST, cookie=known)[0] == 403
+    assert not page.served

@@ -1,4 +1,4 @@
-"""Intervals hold whenever one stops, and what is foretold of an uncertainty comes true."""
+"""Intervals cover the truth whenever one stops, and predicted uncertainties come true."""
 
 from __future__ import annotations
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import dataclasses
 import functools
+import hashlib
 import html
 import io
 import itertools
@@ -20,22 +22,25 @@ import pytest
 
 from pipeline.analyse import Analysis, Oscillation, Overdamped, Still, analyse
 from pipeline.bench.scene import Scene
+from pipeline.findings.finding import Finding
+from pipeline.findings.registry import FINDINGS
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.quantities import INPUTS
-from pipeline.results.checks.finding import Finding
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import UNITS, UNUSABLE, Track
-from springmass.report.advice import ADVICE, LAW_CODES
+from springmass.page.web.security import REPORT_POLICY
+from springmass.report.advice import LAW_CODES
 from springmass.report.budgets import budget_csv, budget_text, budgets_of, correlations_of
-from springmass.report.figures import comparison_figure, draw, motion_figure, render
-from springmass.report.figures.inline import inline_svg
+from springmass.report.figures import comparison_figure, draw, motion_figure
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, table_tex
+from springmass.report.laws import laws_of
 from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.recorded import Note
-from springmass.report.tables import law_status, pretty, pretty_number, results_csv
-from springmass.report.words import caption, kept, verdict
+from springmass.report.script import report_script
+from springmass.report.tables import law_status, pretty, pretty_number, results_csv, table_rows
+from springmass.report.words import caption, equation, kept, verdict
 from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
@@ -77,6 +82,13 @@ def bare() -> Analysis:
 
 
 @functools.cache
+def clipped() -> Analysis:
+    """Return the analysis of a run that left the sensor's range and that damping laws hardly distinguish."""
+    track = track_of(20.0, gamma=0.003, beta=0.0)
+    return analyse(dataclasses.replace(track, y=np.minimum(track.y, 0.25)))
+
+
+@functools.cache
 def still() -> Analysis:
     """Return the analysis of a run in which nothing oscillates."""
     rng = np.random.default_rng(3)
@@ -107,12 +119,17 @@ def files_in(directory: Path) -> dict[str, bytes]:
     return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
 
 
+def pictures_in(page: str) -> list[str]:
+    """Return the pictures of a page, in base64."""
+    return re.findall(r'<img src="data:image/svg\+xml;base64,([^"]*)"', page)
+
+
 def test_every_file_of_a_report_is_written(tmp_path: Path) -> None:
     """A report is a page, six tables and every figure that the scene allows, as PDF if asked, and nothing besides."""
     written(tmp_path / "run.results", run_of(bare()), pdf=True)
     figures = {
         f"figures/{name}.{kind}"
-        for name in ("position", "amplitude", "phase", "energy", "motion")
+        for name in ("position", "amplitude", "logarithmic", "frequency", "spectrum", "phase", "energy", "motion")
         for kind in ("svg", "pdf")
     }
     tables = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv", "budget.tex", "motion.csv"}
@@ -126,15 +143,47 @@ def test_every_file_of_a_report_is_written(tmp_path: Path) -> None:
 
 
 def test_the_page_needs_nothing_from_outside(tmp_path: Path) -> None:
-    """The page holds no script, no link to another file and no address of the network."""
+    """The page holds its one script, its style and its pictures, and refers to no other file and no network."""
     page = written(tmp_path, run_of(bare()))
-    assert re.search(r"<script|<link|<iframe|@import|https?://", page) is None
-    references = re.findall(r'(?:src|href|data)="([^"]*)"|url\(([^)]*)\)', page)
+    assert re.search(r"<script[^>]*src|<link|<iframe|@import", page) is None
+    without_script = page.replace(report_script(), "")
+    assert re.search(r"https?://", without_script) is None
+    references = re.findall(r'(?:src|href|data)="([^"]*)"|url\(([^)]*)\)', without_script)
     assert {(a or b)[:5] for a, b in references if not (a or b).startswith("#")} <= {"data:"}
 
 
+def test_the_policy_of_a_served_report_allows_its_script_and_no_other() -> None:
+    """The digest in the policy is that of the text between the script's tags."""
+    (script,) = re.findall(r"<script>(.*?)</script>", page_of(run_of(bare())), re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}';" in REPORT_POLICY
+    assert "unsafe-inline'; img" in REPORT_POLICY  # of styles; the script's directive names the digest alone
+    assert f"'{digest}" not in REPORT_POLICY.split("script-src")[0]
+
+
+def test_the_numbers_of_the_charts_are_those_of_the_analysis() -> None:
+    """Samples, fit, flags and amplitudes stand in the page as JSON; without a number there is null."""
+    page = page_of(run_of(damped()))
+    data = json.loads(
+        re.findall(r'<script type="application/json" id="report-data">(.*?)</script>', page, re.DOTALL)[0]
+    )
+    (run,), motion = data["runs"], damped().motion
+    assert isinstance(motion, Oscillation)
+    assert run["t"] == {"start": 0.0, "step": pytest.approx(0.01), "count": len(damped().track)}
+    y = np.array(run["data"]["y"], np.float64)
+    np.testing.assert_allclose(y, 1e3 * damped().track.y, rtol=1e-4)
+    flagged = {row for row, _ in run["data"]["flagged"]}
+    assert flagged == set(np.flatnonzero(((damped().flags & UNUSABLE) != 0) | ~np.isfinite(damped().track.y)).tolist())
+    assert any("false echo" in why for _, why in run["data"]["flagged"])
+    np.testing.assert_allclose(run["data"]["amplitude"]["y"], 1e3 * motion.demodulated.amplitude, rtol=1e-4)
+    assert run["data"]["amplitude"]["laws"][0]["name"] == motion.damping.selected
+    assert data["table"]["latex"] == table_tex(["run"], [damped()])
+    period = damped().estimates["period"]
+    assert f"period\tT\ts\t{period.value!r}\t{period.u!r}" in data["table"]["cells"]
+
+
 def test_no_two_elements_share_an_id_and_every_reference_is_met(tmp_path: Path) -> None:
-    """Inline figures of several runs keep their clip paths and markers to themselves."""
+    """The sections and figures of several runs keep their names apart."""
     page = written(tmp_path, run_of(damped(), "one"), run_of(bare(), "two"))
     ids = re.findall(r'\bid="([^"]+)"', page)
     assert len(ids) == len(set(ids)) > 8
@@ -146,33 +195,35 @@ def test_hostile_text_is_escaped_everywhere() -> None:
     bad = "<script>alert('x')</script>"
     analysis = dataclasses.replace(damped(), findings=(Finding("clipped", "warning", bad),))
     page = page_of(run_of(analysis, bad, title=bad))
-    assert "<script" not in page
+    assert len(re.findall("<script", page)) == 2  # the numbers and the script
+    assert "<script>alert" not in page
     assert page.count("&lt;script&gt;") >= 4
     assert "analyse &lt;run&gt;" in page
 
 
 @pytest.mark.parametrize("make", [damped, bare, still])
-def test_every_finding_is_told_once(make: Any) -> None:
-    """Each code stands on the page in one place; at the top are three at most, errors before warnings."""
+def test_every_finding_is_shown_once(make: Any) -> None:
+    """Each code stands on the page in one place; errors come before warnings."""
     page = page_of(run_of(make()))
     codes = re.findall(r"<code>([a-z_]+)</code>", page)
     assert sorted(codes) == sorted({finding.code for finding in make().findings})
-    top = page[page.index('id="heed"') : page.index('id="position-0"')]
+    top = page[page.index('id="warnings"') : page.index('id="details"')]
     order = re.findall(r'<li class="(\w+)">', top)
-    assert len(order) <= 3
     assert order == sorted(order, key=["error", "warning"].index)
 
 
-def test_what_changes_a_number_says_what_to_do() -> None:
-    """Of many warnings the gravest three stand at the top with a remedy, the others beside what shows them."""
-    many = [Finding(code, "warning", f"{code} has gamma = 2.0e-03 +- 1.0e-04 1/s") for code in ("clipped", "quantised")]
-    many += [Finding("stale_header", "warning", "third"), Finding("rest_drift", "warning", "fourth")]
-    page = html.unescape(page_of(run_of(dataclasses.replace(damped(), findings=tuple(many)))))
-    top, rest = page.split('id="position-0"')
-    assert all(f"<code>{x.code}</code>" in top and ADVICE[x.code] in top for x in many[:3])
+def test_every_warning_says_what_to_do_and_what_to_write() -> None:
+    """The most harmful comes first, each with advice, a sentence for the lab report and a link to its figure."""
+    many = [Finding(code, "warning", f"{code} has gamma = 2.0e-03 +- 1.0e-04 1/s") for code in ("quantised", "clipped")]
+    many += [Finding("rest_drift", "warning", "It drifts"), Finding("stale_header", "warning", "The header is old")]
+    run = run_of(dataclasses.replace(damped(), findings=tuple(many)))
+    page = html.unescape(render_html([run], [{"position": b"<svg/>"}], provenance=PROVENANCE))
+    top = page[page.index('id="warnings"') : page.index('id="details"')]
+    assert re.findall(r"<code>(\w+)</code>", top) == ["stale_header", "clipped", "quantised", "rest_drift"]
+    assert all(x.advice in top for x in many)
     assert "γ = 2.0 × 10⁻³ ± 1.0 × 10⁻⁴ s⁻¹" in top
-    assert "<code>rest_drift</code>" in rest
-    assert "Fourth." in rest
+    assert "“It drifts. The stated uncertainties include this.”" in top
+    assert top.count('<a href="#figure-position-0">') == 3
 
 
 def test_every_warning_of_the_reference_has_a_remedy() -> None:
@@ -181,17 +232,16 @@ def test_every_warning_of_the_reference_has_a_remedy() -> None:
     codes = re.findall(r"^\| `(\w+)` \| ([^|]*)\|", reference, re.MULTILINE)
     grave = {code for code, severity in codes if "warning" in severity or "error" in severity}
     assert len(grave) > 30
-    assert grave - set(ADVICE) - LAW_CODES == set()
+    assert {code for code in grave if not FINDINGS[code].advice} - LAW_CODES == set()
 
 
 def test_the_page_has_landmarks_and_headings_in_order() -> None:
-    """One banner, one navigation to what is there, one main part, and no level of headings is left out."""
+    """One banner, one main part, no level of headings is left out, and every link is met."""
     page = page_of(run_of(damped(), "one"), run_of(still(), "two"))
-    assert [page.count(f"<{name}") for name in ("header", "nav", "main", "h1")] == [1, 1, 1, 1]
+    assert [page.count(f"<{name}") for name in ("header", "main", "h1")] == [1, 1, 1]
     levels = [int(level) for level in re.findall(r"<h(\d)", page)]
     assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
-    linked = re.findall(r'<li><a href="#([^"]+)"', page)
-    assert len(linked) > 5
+    linked = re.findall(r'<a href="#([^"]+)"', page)
     assert set(linked) <= set(re.findall(r'\bid="([^"]+)"', page))
 
 
@@ -213,9 +263,9 @@ def test_the_head_says_when_and_at_which_bench() -> None:
 
 
 def test_rejected_laws_are_named_in_words() -> None:
-    """Two sentences say what holds; the table names what became of every law, with all that speaks for and against."""
+    """Three sentences give the result; the table has every law, with the evidence for and against."""
     sentences = verdict(damped())
-    assert len(sentences) == 2
+    assert len(sentences) == 3
     assert "linear and quadratic drag together" in sentences[1]
     page = page_of(run_of(damped()))
     table = page[page.index('<table class="laws"') :].split("</table>")[0]
@@ -244,11 +294,24 @@ def test_what_holds_states_the_numbers_of_table_1(make: Callable[[], Analysis]) 
     """A coefficient has one value and one uncertainty: the sentence, the finding and Table 1 agree."""
     analysis = make()
     assert isinstance(analysis.motion, Oscillation)
-    stated = analysis.motion.derived.coefficients
-    assert f"γ\u00a0=\u00a0{kept(stated['gamma'])}" in verdict(analysis)[1]
+    derived = analysis.motion.derived
+    stated = derived.coefficients
+    assert kept(derived.estimates["damping_rate"]) in verdict(analysis)[1]
+    rows = {row.name: row for row in table_rows([analysis])}
+    assert rows["damping_rate"].estimates == (derived.estimates["damping_rate"],)
+    if derived.leading is not None:
+        (leading,) = rows[f"{derived.leading.law}.damping_rate"].estimates
+        assert leading == derived.leading.estimates["damping_rate"]
+        assert kept(leading) in verdict(analysis)[1]
+    named = derived.coefficients_of(analysis.motion.damping.selected)
+    assert all(equation(name, x).replace(" ", "\u00a0") in verdict(analysis)[1] for name, x in named.items())
+    for row in laws_of(analysis.motion)["rows"]:
+        if row["name"] == analysis.motion.damping.selected:
+            assert {equation(name, x) for name, x in named.items()} <= set(row["coefficients"])
     for finding in analysis.findings:
         if finding.code == "mixed_drag":
-            assert f"beta = {stated['beta']}" in finding.message
+            assert finding.values["beta"] == stated["beta"].value
+            assert f"beta = {stated['beta']}" in finding.details
 
 
 def test_simulated_data_cannot_pass_for_measured() -> None:
@@ -257,22 +320,47 @@ def test_simulated_data_cannot_pass_for_measured() -> None:
     assert "simulated, not measured" not in page_of(run_of(still()))
 
 
-def test_the_same_arguments_give_the_same_bytes(tmp_path: Path) -> None:
-    """Every file, pictures included, is reproducible byte for byte."""
-    for name in ("a", "b"):
-        written(tmp_path / name, run_of(damped()))
-    assert files_in(tmp_path / "a") == files_in(tmp_path / "b")
-
-
 def test_the_page_of_a_long_record_stays_small(tmp_path: Path) -> None:
-    """Of twelve thousand samples no figure takes more than 150 kB of the page, and the page less than 700 kB."""
+    """Of twelve thousand samples no figure takes more than 300 kB of the page, and the page at most 1.5 MB."""
     track = track_of(120.0)
     run = dataclasses.replace(run_of(analyse(track, SCENE)), classic=classic(track, SCENE))
     page = written(tmp_path, run)
-    drawn = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
-    assert len(drawn) == 7
-    assert max(map(len, drawn)) < 150_000
-    assert len(page.encode()) < 700_000
+    drawn = pictures_in(page)
+    assert len(drawn) == 10
+    assert max(map(len, drawn)) < 300_000
+    assert len(page.encode()) <= 1_500_000
+
+
+def test_the_page_holds_the_files_of_its_figures(tmp_path: Path) -> None:
+    """Every picture of the page is one of the files beside it, and every file is on the page."""
+    page = written(tmp_path, run_of(damped()))
+    files = {content for name, content in files_in(tmp_path).items() if name.startswith("figures/")}
+    assert {base64.b64decode(data) for data in pictures_in(page)} == files
+
+
+@pytest.mark.parametrize("make", [damped, bare, still, clipped])
+def test_nothing_of_a_figure_is_cut_off_or_covered(make: Callable[[], Analysis]) -> None:
+    """Everything lies within its figure, labels of axes do not meet, and legends above a panel cover none."""
+    analysis = make()
+    method = classic(analysis.track, analysis.scene) if analysis.track.t[-1] > 15.0 else None
+    notes = [Note(6.2, "fan on", "mark"), Note(0.5, "threshold m 0.01", "trigger"), Note(3.0, "", "lost")]
+    for name, figure in draw(analysis, notes=notes, classic=method).items():
+        figure.draw_without_rendering()
+        paper = figure.bbox.padded(0.5)
+        labels = [
+            label.get_window_extent()
+            for panel in figure.axes
+            for label in (panel.xaxis.label, panel.yaxis.label, panel.title)
+            if label.get_text()
+        ]
+        assert not any(one.overlaps(other) for one, other in itertools.combinations(labels, 2)), name
+        for panel in figure.axes:
+            box = panel.get_tightbbox()
+            assert box is not None
+            assert (paper.x0 <= box.x0, paper.y0 <= box.y0, box.x1 <= paper.x1, box.y1 <= paper.y1) == (True,) * 4, name
+            legend = panel.get_legend()
+            if legend is not None and name != "drag":  # whose curve leaves the lower left free
+                assert not any(legend.get_window_extent().overlaps(other.bbox) for other in figure.axes), name
 
 
 def test_marks_and_the_trigger_are_drawn() -> None:
@@ -300,8 +388,11 @@ def test_energy_is_split_into_its_parts() -> None:
     above, _, parts = draw(damped())["energy"].axes
     kinetic, potential = (np.asarray(line.get_ydata()) for line in above.lines if "mean" in str(line.get_label()))
     law = next(line for line in above.lines if "law" in str(line.get_label()))
-    expected = np.interp(above.lines[1].get_xdata(), law.get_xdata(), law.get_ydata())
-    np.testing.assert_allclose(kinetic / potential, 1.0, atol=0.02)
+    expected = np.interp(above.lines[0].get_xdata(), law.get_xdata(), law.get_ydata())
+    # Their markers take turns along the time.
+    count = min(kinetic.size, potential.size)
+    kinetic, potential = kinetic[:count], potential[:count]
+    np.testing.assert_allclose(kinetic / potential, 1.0, atol=0.05)
     assert np.median(kinetic + potential) == pytest.approx(np.median(expected), rel=0.02)
     swings = [np.asarray(line.get_ydata()) for line in parts.lines]
     np.testing.assert_allclose(swings[0] + swings[1], swings[2])
@@ -309,12 +400,13 @@ def test_energy_is_split_into_its_parts() -> None:
 
 
 def test_the_legend_names_the_laws_that_matter() -> None:
-    """The selected law and those as good have names, the others together one grey entry."""
+    """The selected law, the exponential and the admissible laws have names, the others together one grey entry."""
     motion = damped().motion
     assert isinstance(motion, Oscillation)
     labels = draw(damped())["amplitude"].axes[0].get_legend_handles_labels()[1]
     assert "linear+quadratic (selected)" in labels
-    assert f"{len(motion.damping.fits) - 1} other laws" in labels
+    assert "exponential, linear drag (rejected)" in labels
+    assert f"{len(motion.damping.fits) - 2} other laws" in labels
 
 
 def test_the_motion_is_written_at_every_sample() -> None:
@@ -359,7 +451,7 @@ def test_a_record_that_cannot_be_smoothed_says_so(tmp_path: Path) -> None:
     assert isinstance(why, str)
     assert "eight usable samples" in why
     assert "motion" not in draw(bare(), why)
-    assert "to smooth this record" in page_of(run_of(blind))
+    assert "Velocity and acceleration were not estimated" in page_of(run_of(blind))
     written(tmp_path, run_of(bare()))
     assert (tmp_path / "motion.csv").exists()
     written(tmp_path, run_of(still()))
@@ -373,9 +465,9 @@ def test_csv_holds_every_estimate_and_every_law() -> None:
     assert isinstance(motion, Oscillation)
     expected = dict(damped().estimates)
     for law, fit in motion.damping.fits.items():
-        expected |= {f"{law}.{name}": x for name, x in fit.joint.estimates().items()}
+        expected |= {f"{law}.{name}": x for name, x in motion.derived.parameters_of(fit).items()}
     read = {row["name"]: Estimate(float(row["value"]), float(row["u"]), row["unit"]) for row in rows}
-    assert read == expected
+    assert read == {name: Estimate(x.value, x.u, x.unit) for name, x in expected.items()}
     assert {row["run"] for row in rows} == {"a, b"}
 
 
@@ -412,11 +504,11 @@ def test_budget_tables_hold_every_input() -> None:
     assert {line.count(" & ") for line in lines} == {0, 3}
     # At 8 pt a letter is 3.9 pt wide on average, and an article's lines on A4 are 345 pt.
     for line in lines:
-        told = re.sub(
+        printed = re.sub(
             r"\\multicolumn\{4\}\{l\}|\\(qty|num|text)|\\times|[{}$]|\\\\$", "", re.sub(r"\\(per|nu|infty)", "1", line)
         )
-        told = re.sub(r"\\(\w{1,3})\w*", r"\1", told)
-        cells = [cell.strip() for cell in told.split(" & ")]
+        printed = re.sub(r"\\(\w{1,3})\w*", r"\1", printed)
+        cells = [cell.strip() for cell in printed.split(" & ")]
         assert len(cells[0]) <= 88 if len(cells) == 1 else 18 + 3.9 * sum(map(len, cells[1:])) <= 0.58 * 345 - 36
     assert budget_csv(["b"], [still()]).count("\n") == 1
     assert budgets_of(still()) == ()
@@ -426,7 +518,7 @@ def test_expanded_uncertainties_and_correlations_stand_on_the_page() -> None:
     """Each result has its U with coverage factor and degrees of freedom, and the main ones their correlations."""
     motion = damped().motion
     assert isinstance(motion, Oscillation)
-    section = page_of(run_of(damped())).split('id="budgets-0"')[1].split("<h2")[0]
+    section = page_of(run_of(damped())).split('id="budgets-0"')[1].split("</details>")[0]
     budget = motion.derived.budgets["gamma"]
     row = re.search(r">linear damping</th>((?:<td[^>]*>[^<]*</td>)+)", section)
     assert row is not None
@@ -536,12 +628,12 @@ def test_a_rest_position_that_moves_is_drawn_by_itself() -> None:
     assert len(draw(steady)["position"].axes) == 4
     assert "rest position" not in caption("position", steady)
     panel = draw(stepping)["position"].axes[4]
-    _, windows, curve = panel.lines
+    windows, curve = panel.lines
     x, y = np.asarray(windows.get_xdata()), np.asarray(windows.get_ydata())
     assert float(np.mean(y[x > 8.2]) - np.mean(y[x < 8.2])) == pytest.approx(0.8, abs=0.02)
     assert np.max(np.abs(y - np.interp(x, curve.get_xdata(), curve.get_ydata()))) < 0.1
     assert panel.get_ylabel() == "rest / mm"
-    assert "rest position of single windows" in caption("position", stepping)
+    assert "the rest position of each window" in caption("position", stepping)
 
 
 @pytest.mark.parametrize("seconds", [1.6, 3.0])
@@ -559,9 +651,9 @@ def test_several_runs_stand_side_by_side(tmp_path: Path) -> None:
     comparison = compare_springs(springs)
     page = written(tmp_path, *runs, compared=Compared(comparison, (), ()))
     assert page.count('<th scope="col">same</th>') == 2
-    assert len(re.findall(r"<h3[^>]*>Phase plot</h3>", page)) == 2
+    assert len(re.findall(r"<h4[^>]*>Phase plot</h4>", page)) == 2
     assert html.escape(comparison.message.replace("+-", "±")) in page
-    assert len([name for name in files_in(tmp_path) if name.endswith(".svg")]) == 13
+    assert len([name for name in files_in(tmp_path) if name.endswith(".svg")]) == 20
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.1])
@@ -572,6 +664,7 @@ def test_a_comparison_is_drawn_with_every_run(factor: float) -> None:
     springs = [SpringRun("a", omega, mass), SpringRun(long, Estimate(8.0 * factor, 1e-4, "rad/s"), mass)]
     found = compare_springs(springs)
     figure = comparison_figure(found)
+    figure.draw_without_rendering()
     left, right = figure.axes
     assert left.get_yticklabels()[0].get_text() == "a"
     assert all(label.get_window_extent().x0 > 0 for label in left.get_yticklabels())
@@ -597,17 +690,6 @@ def test_a_law_that_fails_is_never_called_selected_alone() -> None:
     assert law_status(motion.damping, name) == "selected"
     fits = {law: dataclasses.replace(fit, rejection="misfit") for law, fit in motion.damping.fits.items()}
     assert law_status(dataclasses.replace(motion.damping, fits=fits), name).startswith("rejected")
-
-
-def test_inlining_leaves_the_text_of_a_figure_alone() -> None:
-    """Coordinates lose digits, labels do not, and nothing in the element speaks for the whole page."""
-    figure = draw(still())["position"]
-    figure.axes[0].set_title("0.123456 mm")
-    element = str(inline_svg(render(figure, "svg"), "p"))
-    assert element.startswith("<svg")
-    assert ">0.123456 mm</text>" in element
-    assert "<style" not in element
-    assert "<?xml" not in element
 
 
 def test_a_report_needs_a_run(tmp_path: Path) -> None:

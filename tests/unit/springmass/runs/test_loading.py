@@ -49,7 +49,7 @@ def spoil(path: Path, number: int, *, to: bytes | None) -> None:
 
 
 def test_the_digest_and_the_originals_are_those_of_the_file(path: Path) -> None:
-    """Asked for later, they are what they would have been at once."""
+    """Computed later, they are what they would have been immediately."""
     loaded = springmass.load(path)
     assert loaded.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert loaded.originals == (ORIGINAL,)

@@ -27,18 +27,18 @@ def path(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("name", ["load", "analyse"])
 def test_python_is_answered_with_the_call_that_reads_the_file(path: Path, name: str) -> None:
     """The message ends in the function that was called, with the arguments given and those that are missing."""
-    with pytest.raises(NeedsAnswer) as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         getattr(sm, name)(path, unit="cm")
     call = f'springmass.{name}("{path}", unit="cm", channel="x")'
-    assert str(asked.value).endswith(f"? {call}")
+    assert str(caught.value).endswith(f"? {call}")
     assert eval(call.replace("analyse", "load"), {"springmass": sm}).channel == "x"
 
 
 def test_an_answer_that_fits_nothing_is_not_repeated(path: Path) -> None:
     """The call that is suggested holds the channel once, and it is one of the file."""
-    with pytest.raises(NeedsAnswer) as asked:
+    with pytest.raises(NeedsAnswer) as caught:
         sm.load(path, channel="z", unit="m")
-    assert str(asked.value).endswith(f'springmass.load("{path}", unit="m", channel="x")')
+    assert str(caught.value).endswith(f'springmass.load("{path}", unit="m", channel="x")')
 
 
 @given(st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1))

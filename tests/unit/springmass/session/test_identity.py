@@ -25,7 +25,7 @@ def sensor(identity: Identity | None = None, rate_hz: float | None = None) -> Se
     return Sensor(FAMILY, cast(Transport, SimpleNamespace(name="port")), rate_hz, identity=identity)
 
 
-def said(model: str = MODEL, name: str = "bench-3", version: str = VERSION) -> bytes:
+def identity_line(model: str = MODEL, name: str = "bench-3", version: str = VERSION) -> bytes:
     """Return the line by which a device says what it is."""
     return frame(f"I1,{model},{version},{name},100,116,25000,0,0".encode("ascii"))
 
@@ -71,15 +71,15 @@ def test_a_rate_that_contradicts_the_device_is_said() -> None:
 @pytest.mark.parametrize(
     ("came", "verdict"),
     [
-        (said(), True),
-        (readings(20) + said(), True),
-        (said(version="2.1.0"), True),  # flashed meanwhile: the same board
-        (said(name="bench-4"), False),
-        (said(name=""), False),
-        (said(model="another-rangefinder"), False),
+        (identity_line(), True),
+        (readings(20) + identity_line(), True),
+        (identity_line(version="2.1.0"), True),  # flashed meanwhile: the same board
+        (identity_line(name="bench-4"), False),
+        (identity_line(name=""), False),
+        (identity_line(model="another-rangefinder"), False),
         (readings(20), None),
         (readings(PROOF_BYTES // 30), False),
-        (said()[:-3] + b"00\n", None),
+        (identity_line()[:-3] + b"00\n", None),
     ],
     ids=["same", "behind readings", "updated", "another's name", "none", "model", "unsaid", "never said", "spoilt"],
 )
@@ -152,7 +152,7 @@ def test_a_sensor_that_says_its_name_only_now_is_another() -> None:
     last = Reading(0, device_us=0, sequence=0)
     named: Any = on_port("port").proof(last)
     assert named.feed(10_000_000, readings(5)) is None
-    assert named.feed(20_000_000, said() + readings(7)) is True
+    assert named.feed(20_000_000, identity_line() + readings(7)) is True
     assert named.facts["sensor"] is Back.ANOTHER
     mute: Any = on_port("port").proof(last)
     assert mute.feed(10_000_000, readings(12)) is True

@@ -128,8 +128,8 @@ def test_a_defect_of_a_decoder_costs_no_byte_and_ends_nothing(monkeypatch: pytes
     failures = Failures()
     tee, each = Tee([chain()], failures), chain()
     log = started(tee, [each], 0)
-    told: list[str] = []
-    failures.tell = lambda kind, facts: told.append(f"{kind} {facts['error']} {facts['why']}")
+    events: list[str] = []
+    failures.tell = lambda kind, facts: events.append(f"{kind} {facts['error']} {facts['why']}")
 
     def break_down(host_ns: int, data: bytes) -> Readings:
         raise RuntimeError("no such form")
@@ -138,7 +138,7 @@ def test_a_defect_of_a_decoder_costs_no_byte_and_ends_nothing(monkeypatch: pytes
     for i in range(5):
         tee.reads([(0, i, b"x")])
     assert log.taken == [(0, i, b"x") for i in range(5)]
-    assert told == ["decoder_failed RuntimeError no such form"]
+    assert events == ["decoder_failed RuntimeError no such form"]
     assert list(failures.counts.values()) == [5]
 
 

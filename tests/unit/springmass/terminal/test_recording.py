@@ -9,7 +9,7 @@ from acquisition.block import Block, Flag
 from acquisition.decoders.registry import get_family
 from pipeline.numerics.estimate import Estimate
 from pipeline.streaming import LiveMotion
-from springmass.session.display.progress import Usefulness
+from springmass.session.display.progress import TroubleKind, Usefulness
 from springmass.terminal.recording import trust_in
 from springmass.terminal.trace import LABEL, ROWS, trace_of
 
@@ -27,14 +27,16 @@ def test_only_no_target_codes_are_said_until_a_distance_comes() -> None:
     """The time counts over the blocks, from the first sample without a target."""
     useful = Usefulness()
     useful.push(block(0, [0.2 + 0.001 * i for i in range(50)]))
-    assert useful.trouble(LINES) == ""
+    assert useful.trouble(LINES) is None
     for first in range(50, 250, 50):
         useful.push(block(first, [np.nan] * 50))
-    assert useful.trouble(LINES).startswith(
-        "no target for 2 s: check that the bob hangs over the sensor, 0.02 to 1.6 m"
-    )
+    trouble = useful.trouble(LINES)
+    assert trouble is not None
+    assert trouble.kind is TroubleKind.NO_TARGET
+    assert "2 s" in trouble.text
+    assert "0.02 to 1.6 m" in trouble.text
     useful.push(block(250, [np.nan, 0.3, 0.31]))
-    assert useful.trouble(LINES) == ""
+    assert useful.trouble(LINES) is None
     assert useful.usable == 52
 
 
@@ -43,9 +45,12 @@ def test_one_distance_all_the_time_is_said_until_it_changes() -> None:
     useful = Usefulness()
     for first in (0, 60):
         useful.push(block(first, [0.253] * 60))
-    assert useful.trouble(LINES).startswith("253.0 mm unchanged for 1 s")
+    trouble = useful.trouble(LINES)
+    assert trouble is not None
+    assert trouble.kind is TroubleKind.UNCHANGED
+    assert "253.0 mm" in trouble.text
     useful.push(block(120, [0.253, 0.254]))
-    assert useful.trouble(LINES) == ""
+    assert useful.trouble(LINES) is None
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ import pytest
 from pipeline.analyse import Analysis, analyse
 from pipeline.numerics.estimate import Estimate
 from pipeline.track import Track
-from springmass.report.tables import table_estimates, table_rows
-from springmass.terminal.look import PLAIN, Look
-from springmass.terminal.quantities import concise, prefixed, shown
+from springmass.report.tables import prefixed, table_estimates, table_rows
+from springmass.terminal.quantities import concise, shown
+from springmass.terminal.style import PLAIN, TerminalStyle
 from springmass.terminal.table1 import text_table
 
 COLOUR = re.compile(r"\x1b\[[\d;]*m")
@@ -46,7 +46,7 @@ def test_what_was_kept_of_a_run_prints_as_the_run_does(run: Analysis) -> None:
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_terminal_gets_prefixes_and_rules_within_its_width(run: Analysis, width: int, count: int) -> None:
     """Lengths in millimetres with ± or digits in parentheses, and no line wider than the terminal."""
-    table = COLOUR.sub("", text_table(["a", "b", "c"][:count], [run] * count, Look(True, True, False, width)))
+    table = COLOUR.sub("", text_table(["a", "b", "c"][:count], [run] * count, TerminalStyle(True, True, False, width)))
     assert max(map(len, table.splitlines())) <= width
     assert "mm" in table
     assert "+-" not in table
@@ -56,13 +56,13 @@ def test_a_terminal_gets_prefixes_and_rules_within_its_width(run: Analysis, widt
 
 def test_a_terminal_without_unicode_gets_ascii(run: Analysis) -> None:
     """Latin-1 or POSIX terminals have no superscripts."""
-    assert COLOUR.sub("", text_table(["é"], [run], Look(True, False, False, 80))).isascii()
+    assert COLOUR.sub("", text_table(["é"], [run], TerminalStyle(True, False, False, 80))).isascii()
 
 
 def test_no_color_leaves_no_colour(run: Analysis, monkeypatch: pytest.MonkeyPatch) -> None:
     """NO_COLOR takes the colours from a terminal; what is bold or dim stays."""
     monkeypatch.setenv("NO_COLOR", "1")
-    table = text_table(["a"], [run], Look(True, True, False, 80))
+    table = text_table(["a"], [run], TerminalStyle(True, True, False, 80))
     assert not re.search(r"\x1b\[[\d;]*3\d[;m]", table)
 
 
@@ -81,8 +81,8 @@ def test_no_color_leaves_no_colour(run: Analysis, monkeypatch: pytest.MonkeyPatc
 )
 def test_quantities_read_as_people_write_them(estimate: Estimate, short: str, long: str) -> None:
     """A prefix that leaves 1 to 1000 in front of it, both ways to state u; a pipe gets SI."""
-    look = Look(True, True, False, 80)
-    assert (concise(estimate, look), shown(estimate, look)) == (short, long)
+    style = TerminalStyle(True, True, False, 80)
+    assert (concise(estimate, style), shown(estimate, style)) == (short, long)
     assert shown(estimate, PLAIN).isascii()
     assert prefixed(estimate).value == pytest.approx(
         estimate.value * {"mm": 1e3, "µm": 1e6, "g": 1e3}.get(prefixed(estimate).unit, 1.0), nan_ok=True

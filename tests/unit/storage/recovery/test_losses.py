@@ -33,30 +33,30 @@ def test_a_lost_target_is_measured_in_all_and_at_a_stretch(pieces: int) -> None:
     """Whatever blocks the samples come in; at the beginning, within, and up to the end."""
     missing = np.zeros(1000, bool)
     missing[:50] = missing[300:500] = missing[900:] = True
-    found = count_of(missing, pieces).losses([], 0, 10 * SECOND_NS)
-    assert found.no_target_s == pytest.approx(3.5, abs=0.05)
-    assert found.longest_no_target_s == pytest.approx(2.0, abs=0.02)
-    assert codes(found) == ["no_target"]
+    result = count_of(missing, pieces).losses([], 0, 10 * SECOND_NS)
+    assert result.no_target_s == pytest.approx(3.5, abs=0.05)
+    assert result.longest_no_target_s == pytest.approx(2.0, abs=0.02)
+    assert codes(result) == ["no_target"]
 
 
 def test_a_run_without_loss_says_nothing() -> None:
     """A sensor that was there to the end, with a ping without echo now and then."""
-    found = count_of(np.arange(1000) % 5 != 0).losses([], 0, 10 * SECOND_NS)
-    assert (found.gone_s, found.away) == (None, ())
-    assert codes(found) == []
+    result = count_of(np.arange(1000) % 5 != 0).losses([], 0, 10 * SECOND_NS)
+    assert (result.gone_s, result.away) == (None, ())
+    assert codes(result) == []
 
 
 def test_a_sensor_that_is_silent_at_the_end_is_gone() -> None:
     """From a second and a half on, without a word of its port."""
     count = count_of(np.zeros(1000, bool))
     assert count.losses([], 0, 11 * SECOND_NS).gone_s is None
-    found = count.losses([], 0, 20 * SECOND_NS)
-    assert found.gone_s == pytest.approx(10.01, abs=0.01)
-    assert codes(found) == ["sensor_lost"]
+    result = count.losses([], 0, 20 * SECOND_NS)
+    assert result.gone_s == pytest.approx(10.01, abs=0.01)
+    assert codes(result) == ["sensor_lost"]
 
 
 def test_ports_that_went_and_came_are_told_with_their_times() -> None:
-    """Away twice, another device refused once, then gone for good."""
+    """Lost twice, another device refused once, then lost until the end."""
     events: list[Event] = [
         (1, {"kind": "lost", "facts": {"why": "cable"}}),
         (2, {"kind": "refused", "facts": {}}),
@@ -66,10 +66,10 @@ def test_ports_that_went_and_came_are_told_with_their_times() -> None:
         (6, {"kind": "overflow", "facts": {"records": 7, "bytes": 70}}),
         (7, {"kind": "lost", "facts": {"why": "the plug"}}),
     ]
-    found = count_of(np.zeros(1000, bool)).losses(events, 0, 10 * SECOND_NS)
-    assert found.away == (1.5, 0.5)
-    assert (found.why, found.refused, found.dropped_reads, found.dropped_bytes) == ("the plug", 1, 7, 70)
-    assert codes(found) == ["sensor_lost", "sensor_away", "other_device", "readings_dropped"]
+    result = count_of(np.zeros(1000, bool)).losses(events, 0, 10 * SECOND_NS)
+    assert result.away == (1.5, 0.5)
+    assert (result.why, result.refused, result.dropped_reads, result.dropped_bytes) == ("the plug", 1, 7, 70)
+    assert codes(result) == ["sensor_lost", "sensor_away", "other_device", "readings_dropped"]
 
 
 def test_the_end_is_the_one_noted_or_the_last_that_came() -> None:

@@ -95,7 +95,7 @@ def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
     first, clock, last = report.describe()
     assert first == f"{tmp_path / 'run.h5'}: 200 samples from {log}"
     assert clock.startswith(f"{tmp_path / 'run.h5'}: sensor clock ")
-    assert " ppm against this host's" in clock
+    assert " ppm against this computer's" in clock
     assert last == f"{log}: {report.damage.records} records"
     with open_run(tmp_path / "run.h5") as run:
         run.verify()
@@ -103,17 +103,17 @@ def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
         assert run.originals()[0].data == log.read_bytes()
         assert (run.info, run.title, run.scene) == (live.info("COM3", "simulated"), "Run 3", HEADER.scene)
         assert (run.format, run.traps, run.malformed_rows) == ("wire", (), 0)
-        told = run.provenance
-    assert (told["software"], told["recorded_with"], told["reads"]) == ("springmass", "0.1.0", 201)
-    assert told["log"]["ended"]
-    assert (told["marks"][0]["text"], round(told["marks"][0]["t_s"], 2)) == ("half way", 1.0)
-    assert told["clock_map"]["t0_mono_ns"] == pytest.approx(START_NS + 2_000_000_000, abs=1_000_000)
-    began = datetime.fromisoformat(told["start_time"]) - datetime(2020, 9, 13, 12, 26, 42, tzinfo=UTC)
+        reported = run.provenance
+    assert (reported["software"], reported["recorded_with"], reported["reads"]) == ("springmass", "0.1.0", 201)
+    assert reported["log"]["ended"]
+    assert (reported["marks"][0]["text"], round(reported["marks"][0]["t_s"], 2)) == ("half way", 1.0)
+    assert reported["clock_map"]["t0_mono_ns"] == pytest.approx(START_NS + 2_000_000_000, abs=1_000_000)
+    began = datetime.fromisoformat(reported["start_time"]) - datetime(2020, 9, 13, 12, 26, 42, tzinfo=UTC)
     assert abs(began.total_seconds()) < 2e-3
 
 
 def test_several_sensors_make_several_files(tmp_path: Path) -> None:
-    """Each channel has a run of its own, each with the whole log inside."""
+    """Each channel has a separate run file, each with the whole log inside."""
     sensors = (SensorEntry(0, FAMILY, "A"), SensorEntry(5, FAMILY, "B"))
     log = write(tmp_path / "run.wire", LogHeader(sensors=sensors, mono_ns=0, unix_ns=0))
     report = recover(log, tmp_path / "out.h5")
@@ -175,10 +175,10 @@ def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
             recorder.put(0, host_ns, data)
         recorder.event(0, 1, "calibration", Calibration(offset_m=2.0).to_mapping())
     recover(tmp_path / "b.wire", tmp_path / "b.h5")
-    with open_run(tmp_path / "a.h5") as one, open_run(tmp_path / "b.h5") as other:
-        assert one.samples().distance[0] == pytest.approx(1.3, abs=1e-4)
-        assert other.samples().distance[0] == pytest.approx(2.3, abs=1e-4)
-        assert other.provenance["sensor"]["calibration"]["offset_m"] == 2.0
+    with open_run(tmp_path / "a.h5") as first, open_run(tmp_path / "b.h5") as second:
+        assert first.samples().distance[0] == pytest.approx(1.3, abs=1e-4)
+        assert second.samples().distance[0] == pytest.approx(2.3, abs=1e-4)
+        assert second.provenance["sensor"]["calibration"]["offset_m"] == 2.0
 
 
 def test_a_run_without_samples_is_a_run(tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_nothing_is_written_over_unasked(tmp_path: Path) -> None:
     """A run file stands, unless its overwriting is asked for."""
     log = write(tmp_path / "run.wire", count=10)
     (tmp_path / "run.h5").write_bytes(b"old")
-    with pytest.raises(RunExists, match=r"run\.h5: a new run file was to be written, but a file stands there"):
+    with pytest.raises(RunExists, match=r"run\.h5: already exists"):
         recover(log)
     assert (tmp_path / "run.h5").read_bytes() == b"old"
     assert recover(log, overwrite=True).runs[0].samples == 10
@@ -207,7 +207,7 @@ def test_the_log_goes_only_when_the_run_file_verifies(tmp_path: Path, monkeypatc
     log = write(tmp_path / "run.wire", count=10)
 
     def damaged(_: Run) -> None:
-        raise RunDamaged("run.h5", "the column 'time' is not what was written", "restore it")
+        raise RunDamaged("run.h5", "the column 'time' is damaged", "restore it")
 
     with monkeypatch.context() as patch:
         patch.setattr(Run, "verify", damaged)
@@ -221,15 +221,15 @@ def test_the_log_goes_only_when_the_run_file_verifies(tmp_path: Path, monkeypatc
 
 def test_a_log_is_what_a_run_file_is_held_against(tmp_path: Path) -> None:
     """A run file of this log passes; one of another log, or of this one before it went on, is refused by name."""
-    log, other = write(tmp_path / "run.wire", count=10), write(tmp_path / "other.wire", count=20)
+    log, second = write(tmp_path / "run.wire", count=10), write(tmp_path / "other.wire", count=20)
     recover(log)
-    recover(other)
+    recover(second)
     verify_against_log(tmp_path / "run.h5", log)
-    with pytest.raises(RunDamaged, match=r"run\.h5: the log inside is not .*other\.wire; keep the log"):
-        verify_against_log(tmp_path / "run.h5", other)
+    with pytest.raises(RunDamaged, match=r"run\.h5: the log inside differs from .*other\.wire; keep the log"):
+        verify_against_log(tmp_path / "run.h5", second)
     with log.open("ab") as file:
         file.write(b"more")
-    with pytest.raises(RunDamaged, match=r"the log inside is not .*run\.wire"):
+    with pytest.raises(RunDamaged, match=r"the log inside differs from .*run\.wire"):
         verify_against_log(tmp_path / "run.h5", log)
 
 
@@ -242,11 +242,11 @@ def test_a_recovery_that_was_killed_is_called_again(tmp_path: Path) -> None:
     for channel in (1, 4):
         (tmp_path / f"run.{channel}.h5").unlink()
     again = recover(log)
-    assert [run.stood for run in again.runs] == [True, False, True, True, False, True]
+    assert [run.existed for run in again.runs] == [True, False, True, True, False, True]
     assert [(run.path, run.samples) for run in again.runs] == [(run.path, 40) for run in whole.runs]
     assert {run.path: run.path.read_bytes() for run in again.runs} == bytes_of
     assert (again.marks, again.damage) == (whole.marks, whole.damage) == (1, whole.damage)
-    assert recover(log).describe().__next__().endswith("; it stood there already and holds all of the log")
+    assert recover(log).describe().__next__().endswith("; it existed already and holds the whole log")
     with pytest.raises(RunExists):
         recover(log, speed_of_sound_m_per_s=340.0)
 
@@ -254,18 +254,18 @@ def test_a_recovery_that_was_killed_is_called_again(tmp_path: Path) -> None:
 def test_what_a_killed_build_left_is_removed_and_named(tmp_path: Path) -> None:
     """A temporary file that nobody holds goes; one that a living writer is at work on stays."""
     log = write(tmp_path / "run.wire", count=10)
-    left = tmp_path / ".run.h5.0123abcd.part"
+    remaining = tmp_path / ".run.h5.0123abcd.part"
     with whole_file(tmp_path / "other.h5") as living:
-        left.write_bytes(b"half")
+        remaining.write_bytes(b"half")
         lines = list(recover(log).describe())
         assert living.exists()
-    assert not left.exists()
-    assert lines[0] == f"{left}: left by a build that was killed, removed"
+    assert not remaining.exists()
+    assert lines[0].startswith(f"{remaining}: removed")
 
 
 def test_notes_beyond_the_bound_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A flood of events fills no memory: the first are shown, the rest are counted, the last calibration counts."""
-    monkeypatch.setattr(notes, "KEPT", 5)
+    monkeypatch.setattr(notes, "MAX_NOTES", 5)
     with Recorder(tmp_path / "run.wire", HEADER, VirtualClock()) as recorder:
         for host_ns, data in wire(20):
             recorder.put(0, host_ns, data)
@@ -287,7 +287,7 @@ def test_gaps_beyond_the_bound_are_counted(tmp_path: Path, monkeypatch: pytest.M
     decoding = report.runs[0].decoding
     assert len(decoding["gaps"]) == 5
     assert decoding["gaps_left_out"] == {"count": 34, "lost": 34, "longest_s": pytest.approx(0.01)}
-    assert f"{tmp_path / 'run.h5'}: 39 gaps, 39 readings lost in them, the longest 0.01 s" in report.describe()
+    assert f"{tmp_path / 'run.h5'}: 39 gaps with 39 lost readings, the longest 0.01 s" in report.describe()
 
 
 def test_too_little_memory_is_no_damaged_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -301,7 +301,7 @@ def test_too_little_memory_is_no_damaged_file(tmp_path: Path, monkeypatch: pytes
     with pytest.raises(MemoryError):
         recover(log)
     monkeypatch.setattr(Originals, "take", starved)
-    with pytest.raises(OutOfMemory, match=r"run\.h5: more memory was demanded than there is; end other programs"):
+    with pytest.raises(OutOfMemory, match=r"run\.h5: out of memory"):
         recover(log)
     assert [path.name for path in tmp_path.iterdir()] == ["run.wire"]
 
@@ -327,7 +327,7 @@ def test_a_log_without_its_header_needs_one(tmp_path: Path) -> None:
     data = log.read_bytes()
     first, *_ = read_log(log)
     log.write_bytes(bytes(first.offset + 28 + len(first.payload)) + data[28 + len(first.payload) :])
-    with pytest.raises(NotALog, match=r"header is lost in all its copies \(.*\); say which sensors were recorded"):
+    with pytest.raises(NotALog, match=r"all copies of the log's header are lost \(.*\); "):
         recover(log)
     assert recover(log, header=HEADER).runs[0].samples == 50
 
@@ -336,10 +336,10 @@ def test_a_log_without_its_header_needs_one(tmp_path: Path) -> None:
 def test_what_is_no_log_is_refused_in_one_line(data: bytes, tmp_path: Path) -> None:
     """An empty file, a text and zeros are no logs, nor is a file that is not there."""
     path = tmp_path / "any.wire"
-    with pytest.raises(NotALog, match="got no file that can be read"):
+    with pytest.raises(NotALog, match="cannot be read"):
         recover(path)
     path.write_bytes(data)
-    with pytest.raises(NotALog, match=rf"any\.wire: a wire log was demanded, got {len(data)} bytes without one record"):
+    with pytest.raises(NotALog, match=rf"any\.wire: expected a wire log, got {len(data)} bytes without a record"):
         recover(path)
     assert not (tmp_path / "any.h5").exists()
 
@@ -399,8 +399,8 @@ def test_a_log_without_its_name_is_recovered_from_its_recorder(tmp_path: Path, b
     with open_run(tmp_path / "run.h5") as run:
         (original,) = run.originals()
     assert (original.name, original.data[: len(whole)]) == ("run.wire", whole)
-    left = {path.name: path.read_bytes() for path in tmp_path.rglob("*.wire")}
-    assert left == {"renamed": {"other.wire": original.data}, "replaced": {"run.wire": b"mine"}}.get(by, {})
+    remaining = {path.name: path.read_bytes() for path in tmp_path.rglob("*.wire")}
+    assert remaining == {"renamed": {"other.wire": original.data}, "replaced": {"run.wire": b"mine"}}.get(by, {})
 
 
 def replaced_log(path: Path, counts: tuple[int, ...]) -> None:
@@ -444,8 +444,8 @@ def test_run_files_of_parts_that_stand_there_are_taken_as_they_are(tmp_path: Pat
     replaced_log(log, (100, 300))
     recover(log)
     (tmp_path / "run.1.h5").unlink()
-    assert [(run.stood, run.samples) for run in recover(log).runs] == [(True, 100), (False, 300)]
-    assert [run.stood for run in recover(log).runs] == [True, True]
+    assert [(run.existed, run.samples) for run in recover(log).runs] == [(True, 100), (False, 300)]
+    assert [run.existed for run in recover(log).runs] == [True, True]
     torn = tmp_path / "torn.wire"
     torn.write_bytes(log.read_bytes()[: log.stat().st_size * 2 // 3])
     first, second = recover(torn).runs

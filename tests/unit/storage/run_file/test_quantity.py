@@ -36,8 +36,8 @@ def test_a_run_gives_back_quantity_and_unit(tmp_path: Path, quantity: str) -> No
     path = write_run(tmp_path / "run.h5", [block(quantity), block(quantity, first=100)], INFO)
     with open_run(path) as run:
         run.verify()
-        found = [run.samples(), *run.blocks(64)]
-        assert {(each.quantity, each.unit) for each in found} == {(quantity, UNITS[quantity])}
+        result = [run.samples(), *run.blocks(64)]
+        assert {(each.quantity, each.unit) for each in result} == {(quantity, UNITS[quantity])}
         for dataset in (run.dataset().load(), run.load_dataset()):
             assert dataset.distance.attrs["quantity"] == quantity
             assert dataset.distance.attrs["units"] == dataset.distance_errors.attrs["units"] == UNITS[quantity]
@@ -85,6 +85,6 @@ def test_a_quantity_that_was_edited_is_damage(tmp_path: Path) -> None:
 
 def test_two_quantities_make_no_run(tmp_path: Path) -> None:
     """Nothing is written, and the line says which came where."""
-    with pytest.raises(WriteFailed, match="samples of angle were demanded, got voltage from sample 100"):
+    with pytest.raises(WriteFailed, match="angle, got voltage from sample 100"):
         write_run(tmp_path / "run.h5", [block("angle"), block("voltage", first=100)], INFO)
     assert list(tmp_path.iterdir()) == []

@@ -147,7 +147,7 @@ def test_memory_stays_flat(tmp_path: Path) -> None:
 
 def test_a_block_size_below_one_is_refused(path: Path) -> None:
     """A size that would never end is an error at the call, not at the first sample."""
-    with open_run(path) as run, pytest.raises(ValueError, match="at least 1 sample, got size = 0"):
+    with open_run(path) as run, pytest.raises(ValueError, match=r"size .*, got 0"):
         run.blocks(0)
 
 
@@ -159,7 +159,7 @@ def test_a_closed_run_says_so(path: Path) -> None:
     run.close()
     assert run.title == "Träger 3"
     for read in (run.samples, run.originals, run.verify, run.dataset, run.load_dataset):
-        with pytest.raises(RunClosed, match="read inside its with"):
+        with pytest.raises(RunClosed, match="closed"):
             read()
 
 
@@ -180,7 +180,7 @@ def test_the_loaded_dataset_leaves_no_handle_open(path: Path) -> None:
 
 
 def test_the_lazy_dataset_is_the_checked_one(path: Path) -> None:
-    """Values, attributes of every variable and those of the instrument are the same, read lazily or at once."""
+    """Values, attributes of every variable and of the instrument are the same, read lazily or completely."""
     with open_run(path) as run, run.dataset() as lazy:
         assert {name: lazy[name]._in_memory for name in lazy.data_vars} == dict.fromkeys(lazy.data_vars, False)
         assert (lazy.attrs["kind"], lazy.attrs["rate_hz"], lazy.attrs["sigma_m"]) == ("live", 100.0, 3e-4)
@@ -304,14 +304,14 @@ def test_a_failing_source_leaves_the_old_run(path: Path) -> None:
 @pytest.mark.parametrize(
     ("blocks", "options", "message"),
     [
-        ([block(5), block(5, 6)], {}, r"begins with sample 5 was demanded, got first = 6; number blocks"),
-        ([block(5, -1)], {}, r"got first = -1"),
+        ([block(5), block(5, 6)], {}, r"sample 5, got 6; "),
+        ([block(5, -1)], {}, r"sample 0, got -1"),
         ([block(5, velocity=np.zeros(4))], {}, r"5 values of velocity .* got shape \(4,\)"),
         ([block(5, velocity=np.array([0, 0, 1e13, 0, 0]))], {}, r"velocity of sample 2: expected a number from -1e"),
         ([block(5, host_ns=np.full(5, -2))], {}, r"host_mono_ns of sample 0: expected a number from -1"),
         ([block(5)], {"channel": 7}, r"header\.channel: expected `str`, got 7"),
         ([block(5)], {"malformed_rows": -1}, r"header\.malformed_rows: expected `int` >= 0, got -1"),
-        ([block(5)], {"scene": {"bob": object()}}, r"nothing that JSON can hold"),
+        ([block(5)], {"scene": {"bob": object()}}, r"JSON can store"),
         ([block(5)], {"provenance": {"x": float("nan")}}, r"not JSON compliant"),
     ],
 )
@@ -367,15 +367,15 @@ def test_a_flag_that_does_not_fit_is_refused(tmp_path: Path) -> None:
 
 def test_other_files_are_no_runs(tmp_path: Path) -> None:
     """A missing file, a folder, a text and another program's HDF5 are told apart from a damaged run."""
-    text, other = tmp_path / "a.txt", tmp_path / "other.h5"
+    text, second = tmp_path / "a.txt", tmp_path / "other.h5"
     text.write_text("0.1\t0.5\n")
-    with h5py.File(other, "w") as file:
+    with h5py.File(second, "w") as file:
         file["x"] = 1
     for path, message in [
         (tmp_path / "none.h5", "No such file"),
         (tmp_path, "directory|Permission"),
         (text, "begins with b'0.1"),
-        (other, "HDF5 without /entry/provenance/header"),
+        (second, "HDF5 without /entry/provenance/header"),
     ]:
         with pytest.raises(NotARun, match=message) as caught:
             open_run(path)
@@ -398,7 +398,7 @@ def test_a_later_schema_is_refused(path: Path) -> None:
         file[HEADER].attrs["sha256"] = np.bytes_(hashlib.sha256(text).hexdigest())
 
     edit(path, later)
-    with pytest.raises(NotARun, match=r"schema 1 was demanded, got another \(schema 1 demanded, got 9\)"):
+    with pytest.raises(NotARun, match=r"schema 1, got 9"):
         open_run(path)
 
 
@@ -412,28 +412,28 @@ def test_an_edited_sample_is_found(path: Path, name: str) -> None:
     edit(path, bump)
     with open_run(path) as run:
         for read in (run.samples, run.load_dataset, run.verify, lambda: list(run.blocks(64))):
-            with pytest.raises(RunDamaged, match=f"the column '{name}' is not what was written"):
+            with pytest.raises(RunDamaged, match=f"the column '{name}' is damaged"):
                 read()
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda f: f["raw/sequence"].__setitem__(3, 9), "the column 'sequence' .* SHA-256 differs"),
-        (lambda f: f["entry/signal/distance_errors"].__setitem__(3, 9), "'distance_errors' .* SHA-256"),
-        (lambda f: f["wire/bytes"].__setitem__(3, 9), "the original file 'run position.txt' .* SHA-256"),
+        (lambda f: f["raw/sequence"].__setitem__(3, 9), "the column 'sequence' .*SHA-256"),
+        (lambda f: f["entry/signal/distance_errors"].__setitem__(3, 9), "'distance_errors' .*SHA-256"),
+        (lambda f: f["wire/bytes"].__setitem__(3, 9), "the original file 'run position.txt' .*SHA-256"),
         (
             lambda f: f["entry/instrument/rate_hz"].__setitem__((), 50.0),
             "/entry/instrument/rate_hz .* got .*50",
         ),
-        (lambda f: f.attrs.__setitem__("kind", "simulated"), "/@kind .* b'live' was written"),
-        (lambda f: f["entry/signal/distance"].attrs.__setitem__("units", "mm"), "distance@units .* b'm' was"),
+        (lambda f: f.attrs.__setitem__("kind", "simulated"), "/@kind .* b'live'"),
+        (lambda f: f["entry/signal/distance"].attrs.__setitem__("units", "mm"), "distance@units .* b'm', got"),
         (
             lambda f: f["entry/signal/distance"].attrs.__setitem__("scale_factor", 2.0),
             "scale_factor .* added",
         ),
         (lambda f: f["entry/signal/time"].attrs.__delitem__("units"), "time@units .* missing"),
-        (lambda f: f.__delitem__("raw"), "the column 'host_mono_ns' is not what was written"),
+        (lambda f: f.__delitem__("raw"), "the column 'host_mono_ns' is damaged"),
     ],
 )
 def test_verify_names_what_differs(path: Path, change: Any, message: str) -> None:
@@ -464,12 +464,3 @@ def test_equal_content_has_an_equal_digest(path: Path, tmp_path: Path) -> None:
         with open_run(each) as run:
             digests.append(run.sha256)
     assert digests[0] == digests[1] != digests[2]
-
-
-def test_importing_is_cheap() -> None:
-    """The package imports no h5py, its reader no xarray."""
-    code = (
-        "import sys, storage, storage.atomic, storage.errors; assert 'h5py' not in sys.modules;"
-        "import storage.run_file.reading, storage.run_file.writing; assert 'xarray' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[4])

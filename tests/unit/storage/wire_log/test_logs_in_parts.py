@@ -71,9 +71,9 @@ def test_a_log_in_parts_is_recovered_and_analysed_by_the_program(tmp_path: Path)
 
 def test_a_file_of_another_log_is_left_alone(tmp_path: Path) -> None:
     """A recording that is called like a further file of another is neither read as one nor removed."""
-    other = WireLogWriter(tmp_path / "run.001.wire", HEADER)
-    other.append(Kind.DATA, b"R9999\r", mono_ns=1)
-    other.close()
+    second = WireLogWriter(tmp_path / "run.001.wire", HEADER)
+    second.append(Kind.DATA, b"R9999\r", mono_ns=1)
+    second.close()
     before = (tmp_path / "run.001.wire").read_bytes()
     write(tmp_path / "run.wire", (0, 2, 3, 4))
     assert [part.path.name for part in read_log(tmp_path / "run.wire").parts][:2] == ["run.wire", "run.002.wire"]

@@ -57,6 +57,14 @@ def test_plain_numbers_pass(page: bytes) -> None:
     assert refuse_thousands("a.csv", page, ";") == ""
 
 
+def test_thousands_in_quotes_are_refused_next_to_separating_commas(tmp_path: Path) -> None:
+    """Excel writes 1328 mm as "1,328" between quotes: read as a decimal it would be a thousand times too small."""
+    path = tmp_path / "run.csv"
+    path.write_text("t (s),x (mm)\n" + "".join(f'{i / 50:.2f},"{x:,.0f}"\n' for i, x in enumerate(_VALUES)))
+    with pytest.raises(FormatError):
+        open_recording(path)
+
+
 def test_a_comma_that_may_be_either_in_all_numbers_is_decimal_and_reported(tmp_path: Path) -> None:
     """Where semicolons separate and no other mark stands in the file."""
     path = tmp_path / "run.csv"

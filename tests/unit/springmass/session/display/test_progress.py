@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition.block import Block, Flag
 from pipeline.streaming import LiveMotion, NotYet
-from springmass.session.display.progress import MOTION_EVERY_NS, SECOND_NS, Shown
+from springmass.session.display.progress import MOTION_EVERY_NS, SECOND_NS, LiveState
 
 
 def block(first: int, n: int = 100) -> Block:
@@ -20,7 +20,7 @@ def block(first: int, n: int = 100) -> Block:
 
 def test_samples_and_missing_ones_are_counted_over_all_sensors() -> None:
     """The rate is the first sensor's over the last second."""
-    shown = Shown(100.0)
+    shown = LiveState(100.0)
     for second in range(4):
         shown.push([(0, block(100 * second)), (1, block(50 * second, 50))])
     assert (shown.samples, shown.missing) == (600, 8)
@@ -31,7 +31,7 @@ def test_samples_and_missing_ones_are_counted_over_all_sensors() -> None:
 
 def test_the_motion_is_found_anew_every_other_second() -> None:
     """Before there is one at each asking; then the last one is given for two seconds."""
-    shown = Shown(100.0)
+    shown = LiveState(100.0)
     assert isinstance(shown.motion(0), NotYet)
     for second in range(10):
         shown.push([(0, block(100 * second))])
@@ -45,7 +45,7 @@ def test_the_motion_is_found_anew_every_other_second() -> None:
 
 def test_the_sensor_that_came_back_in_another_channel_is_shown_from_then_on() -> None:
     """Its motion begins anew, and what was wrong with the one before is said no longer."""
-    shown = Shown(100.0)
+    shown = LiveState(100.0)
     for second in range(3):
         shown.push([(0, block(100 * second))])
     shown.follow(2)
@@ -59,3 +59,23 @@ def test_the_sensor_that_came_back_in_another_channel_is_shown_from_then_on() ->
     assert abs(found.period.value - 2 * np.pi / 4.95) < 1e-3
     assert list(shown.useful) == [2]
     assert shown.samples == 1300
+
+
+def test_the_zero_of_the_run_is_the_earliest_stamp_of_a_sample_at_its_time() -> None:
+    """A late stamp does not move it, nor do other sensors or samples after the first thousand."""
+    shown = LiveState(100.0)
+    assert shown.zero_ns is None
+    late = block(0)
+    assert late.host_ns is not None
+    late.host_ns[:] += 5_000_000_000
+    late.host_ns[:50] += 30_000_000
+    shown.push([(0, late), (1, block(0))])
+    assert shown.zero_ns == 5_000_000_000
+    for second in range(1, 10):
+        shown.push([(0, block(100 * second))])
+    assert shown.zero_ns == 0
+    early = block(1000)
+    assert early.host_ns is not None
+    early.host_ns[:] -= 1_000_000_000
+    shown.push([(0, early)])
+    assert shown.zero_ns == 0

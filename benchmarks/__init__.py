@@ -1,0 +1,1 @@
+"""What is measured, as programs, and tests that each of them runs."""

@@ -1,0 +1,1 @@
+"""What the estimates must reach, measured over many seeds."""

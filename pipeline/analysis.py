@@ -1,0 +1,128 @@
+"""The result of an analysis: one run with its estimates, effects and findings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pipeline.bench.scene import Scene
+from pipeline.checks.echoes import count_quality
+from pipeline.errors import AnalysisError
+from pipeline.findings.finding import Finding
+from pipeline.motion.fitted import Fitted
+from pipeline.motion.overdamped import Overdamped
+from pipeline.motion.smoother import Smoothed, smooth
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.threads import one_thread
+from pipeline.params import Params
+from pipeline.registry.quantities import check_quantity
+from pipeline.results.derive import Derived
+from pipeline.results.effects import Effect
+from pipeline.samples.condition import Conditioned
+from pipeline.track import U8, Track
+from pipeline.windows.cycles import Cycles
+
+__all__ = ["Analysis", "Motion", "Oscillation", "Overdamped", "Still"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Oscillation(Fitted):
+    """An oscillation, strongly damped or not: the fit, and what follows from it.
+
+    Parameters
+    ----------
+    cycles : Cycles
+    derived : Derived
+    """
+
+    cycles: Cycles
+    derived: Derived
+
+
+@dataclass(frozen=True, slots=True)
+class Still:
+    """A recording without a motion that these stages can fit.
+
+    Parameters
+    ----------
+    why : str
+        One sentence.
+    """
+
+    why: str
+
+
+Motion = Oscillation | Overdamped | Still
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysis:
+    """One run, analysed.
+
+    Parameters
+    ----------
+    track : Track
+    scene : Scene
+    params : Params
+    conditioned : Conditioned
+    motion : Oscillation, Overdamped or Still
+        Of an overdamped motion ``estimates`` hold the rates, of a still one offset and noise alone.
+    effects : tuple of Effect
+    findings : tuple of Finding
+        Gravest first.
+    estimates : mapping of str to Estimate
+        By names of :data:`pipeline.registry.quantities.QUANTITIES`.
+
+    Raises
+    ------
+    ValueError
+        If the name of an estimate is not registered.
+    """
+
+    track: Track
+    scene: Scene
+    params: Params
+    conditioned: Conditioned
+    motion: Motion
+    effects: tuple[Effect, ...]
+    findings: tuple[Finding, ...]
+    estimates: Mapping[str, Estimate]
+
+    def __post_init__(self) -> None:
+        for name in self.estimates:
+            check_quantity(name)
+
+    @property
+    def flags(self) -> U8:
+        """(n,) uint8: the final flags of every sample."""
+        return self.motion.demodulated.flags if isinstance(self.motion, Oscillation) else self.conditioned.flags
+
+    @property
+    def quality(self) -> dict[str, int]:
+        """Counts of samples by flag, and of those used."""
+        return count_quality(self.flags)
+
+    @one_thread
+    def smoothed(self) -> Smoothed:
+        """Position, velocity and acceleration at every sample with their uncertainties; calculated when called.
+
+        Raises
+        ------
+        AnalysisError
+            If the run does not oscillate.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from pipeline.analyse import analyse
+        >>> t = np.arange(1000) / 100
+        >>> y = 0.2 + 0.05 * np.cos(8.3 * t) + 3e-4 * np.random.default_rng(1).standard_normal(1000)
+        >>> motion = analyse(Track.from_arrays(t, y)).smoothed()
+        >>> error = motion.velocity + 0.05 * 8.3 * np.sin(8.3 * t)
+        >>> bool(np.std(error) < 0.002 * 0.05 * 8.3)
+        True
+        """
+        motion = self.motion
+        if not isinstance(motion, Oscillation):
+            raise AnalysisError(f"there is no oscillation to smooth: {motion.why}")
+        return smooth(self.track, motion.demodulated, motion.phase, motion.rest, motion.disturbances)

@@ -1,0 +1,170 @@
+"""Harmonics: whether every period differs from a sinusoid in the same way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.checks.misfit import Misfit
+from pipeline.checks.residuals import Residuals
+from pipeline.track import F8
+
+__all__ = ["Harmonics", "Params", "find_harmonics"]
+
+BINS = 64  # of the phase; the eighth harmonic keeps sin(pi 8/64)/(pi 8/64) = 0.97 of itself
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`find_harmonics`.
+
+    Parameters
+    ----------
+    false_alarm : float
+        Probability that white noise shows a given harmonic.
+    highest : int
+        Order up to which harmonics are looked for.
+    parts : int
+        Of the run, which have to agree on a harmonic.
+    """
+
+    false_alarm: float = 1e-6
+    highest: int = 8
+    parts: int = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Harmonics:
+    """A wave locked to the oscillation.
+
+    Parameters
+    ----------
+    peak_m : float
+        Its largest value, m, where the amplitude is largest.
+    share : float
+        Of the amplitude there.
+    even : float
+        Share of its power in even harmonics.
+    second : float
+        Share of its power in the second harmonic.
+    near_end : bool
+        Whether it is larger at the near turning point than at the far one.
+    at_samples : (n,) float64, m
+        Its value at the samples of the residuals.
+    misfit : Misfit
+    """
+
+    peak_m: float
+    share: float
+    even: float
+    second: float
+    near_end: bool
+    at_samples: F8
+    misfit: Misfit
+
+
+def find_harmonics(residuals: Residuals, least_m: float, params: Params | None = None) -> Harmonics | None:
+    """Return the harmonics that stand out of the residuals' noise.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    least_m : float
+        Largest value of a wave that rounding and the decay within a period explain, m.
+    params : Params, optional
+
+    Notes
+    -----
+    Every window's fit leaves no constant and no first harmonic, so that of a wave of the same shape in every period
+    the harmonics from the second on are left: :math:`c_k = 2\\overline{r e^{-ik\\varphi}}`. A bent scale or spring
+    makes harmonics that fall with the amplitude A as :math:`A^k`; those are found by weights :math:`A^k`, and taken
+    where they are the less likely by chance. Harmonics are taken in sixteen parts of the run; with F the mean's square
+    over its variance by the parts' scatter, a harmonic by chance is as likely as :math:`(1 + F/(S - 1))^{-(S - 1)}`
+    (F of 2 and 2(S - 1) degrees of freedom).
+
+    What the constant and the first harmonic took in is of the order of what is left, so the largest value of the wave
+    is the uncertainty of amplitude and rest position. Of a third harmonic it is three times as much, for
+    :math:`\\cos^3\\varphi = (3\\cos\\varphi + \\cos 3\\varphi)/4`. Where that falls as the square of the amplitude
+    does, the damping rate is off by twice the same share of itself.
+    """
+    params = params or Params()
+    turns = residuals.phase * (1.0 / (2.0 * math.pi))
+    bins = ((turns - np.floor(turns)) * BINS).astype(np.int64)
+    np.minimum(bins, BINS - 1, out=bins)
+    orders = np.arange(2, min(params.highest, int(math.pi / residuals.radians_per_sample) - 1) + 1)
+    if not orders.size:
+        return None
+    steady = _folded(residuals, bins, orders, np.ones((orders.size, residuals.values.size)), params.parts)
+    mean, chance = steady
+    falls = False
+    if residuals.relative is not None:
+        powers = residuals.relative ** orders[:, None]
+        falling = _folded(residuals, bins, orders, powers, params.parts)
+        if falls := float(np.min(falling[1])) < float(np.min(chance)):
+            mean, chance = falling
+    stands = np.flatnonzero(chance < params.false_alarm)
+    if not stands.size:
+        return None
+    waves = np.exp(1j * orders[:, None] * _CENTRES)[stands]
+    each = np.real(mean[stands, None] * waves)
+    wave = each.sum(axis=0)
+    peak_m = float(np.max(np.abs(wave)))
+    if not peak_m > least_m:
+        return None
+    at_samples = wave[bins]
+    amplitude_m, fall = residuals.amplitude_m, 1.0
+    if falls and residuals.relative is not None:
+        at_samples = np.sum(each[:, bins] * powers[stands], axis=0)
+        amplitude_m /= float(np.mean(residuals.relative))
+        fall = max(1.0, -math.log(max(float(residuals.relative[-1]), 1e-3)))
+    power, order = np.abs(mean[stands]) ** 2, orders[stands]
+    total = float(power.sum())
+    moved_m = peak_m + 2.0 * float(np.sum(np.sqrt(power[order == 3])))
+    misfit = Misfit(
+        name="model_misfit",
+        amplitude_m=moved_m,
+        offset_m=peak_m,
+        phase_rad=peak_m / amplitude_m,
+        damping_rate=2.0 * moved_m / amplitude_m * fall / residuals.seconds,
+    )
+    return Harmonics(
+        peak_m,
+        peak_m / amplitude_m,
+        float(power[order % 2 == 0].sum()) / total,
+        float(power[order == 2].sum()) / total,
+        bool(abs(wave[BINS // 2]) > abs(wave[0])),
+        at_samples,
+        misfit,
+    )
+
+
+_CENTRES = 2.0 * math.pi * (np.arange(BINS) + 0.5) / BINS
+
+
+def _folded(
+    residuals: Residuals, bins: NDArray[np.int64], orders: NDArray[np.int64], weights: F8, parts: int
+) -> tuple[NDArray[np.complex128], F8]:
+    """Return harmonics (o,), m, that fall as weights (o, k) do, and how likely each is by chance.
+
+    Least squares for each part of the run, and of these the mean by their weights.
+    """
+    counts = np.diff(-(-np.arange(parts + 1) * residuals.values.size // parts))
+    place = np.repeat(BINS * np.arange(parts), counts) + bins
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    mean, chance = np.zeros(orders.size, np.complex128), np.ones(orders.size)
+    for i, (order, weight) in enumerate(zip(orders.tolist(), weights, strict=True)):
+        sums = np.bincount(place, residuals.values * weight, parts * BINS).reshape(parts, BINS)
+        own = np.add.reduceat(weight**2, starts)
+        share = own / own.sum()
+        each = 2.0 * (sums @ np.exp(-1j * order * _CENTRES)) / np.maximum(own, 1e-300)
+        mean[i] = share @ each
+        # Parts in which the harmonic is weak say little, and count as little.
+        known = 1.0 / float(share @ share)
+        scatter = float(share**2 @ np.abs(each - mean[i]) ** 2) * known / max(known - 1.0, 1e-9)
+        variance = max(scatter, 4.0 * residuals.noise_m**2 / float(own.sum()))
+        if known > 2.0 and variance > 0.0:
+            chance[i] = (1.0 + abs(mean[i]) ** 2 / variance / (known - 1.0)) ** (1.0 - known)
+    return mean, chance

@@ -1,0 +1,231 @@
+"""Generic checks: does one model describe the whole run?
+
+These checks name no cause. They ask whether the model leaves more than the noise of the samples, whether residuals are
+white at any lag, whether the phases scatter as their noise says, and whether both halves of the run agree with one
+model.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.checks.misfit import Misfit
+from pipeline.checks.residuals import Residuals
+from pipeline.damping.average import average_over_laws
+from pipeline.motion.fitted import Fitted
+from pipeline.numerics.regression import chi2_quantile
+from pipeline.track import F8
+
+__all__ = ["Contradiction", "ModelCheck", "Params", "check_model"]
+
+
+class Contradiction(enum.Enum):
+    """How a run contradicts its model."""
+
+    RESIDUALS = "residuals"
+    PHASE = "phase"
+    HALVES = "halves"
+    COLOUR = "colour"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`check_model`.
+
+    Parameters
+    ----------
+    excess : float
+        Ratio of the residuals of the whole model to the noise within a period from which the model counts as
+        incomplete: what it leaves out is then as large as the noise.
+    false_alarm : float
+        Probability that the phases, or the halves, of a run that follows its model contradict it.
+    colour : float
+        Correlation of residuals, at any lag, from which they are no noise: a half of their variance can be predicted.
+    least_share : float
+        Of the amplitude, that the predictable part of the residuals has at least: a percent is what users can act on.
+    least_windows : int
+        Of a half, for halves to be compared.
+    least_samples : int
+        Of a window, for its residuals to be looked at: of fewer, the five parameters of its fit colour the residuals.
+    """
+
+    excess: float = 1.5
+    false_alarm: float = 1e-4
+    colour: float = 0.5
+    least_share: float = 0.01
+    least_windows: int = 8
+    least_samples: int = 20
+
+
+@dataclass(frozen=True, slots=True)
+class ModelCheck:
+    """How far a run contradicts the model that was fitted to it.
+
+    Parameters
+    ----------
+    contradictions : tuple of Contradiction
+    rms_m : float
+        Root mean square of the residuals of the whole model.
+    noise_m : float
+        Standard deviation of one sample about its window's own fit.
+    scatter_excess_m : float
+        By how much amplitudes of single windows scatter beyond their noise.
+    phase_chi2 : float
+        Reduced chi-square of the phases about their model.
+    halves : float
+        Difference between the halves, in standard uncertainties.
+    correlation, lag_s : float
+        The strongest correlation of the residuals, and at which lag; 0 where they are white.
+    misfits : tuple of Misfit
+        By how much a fit of the whole waveform differs, where the halves disagree.
+    """
+
+    contradictions: tuple[Contradiction, ...]
+    rms_m: float
+    noise_m: float
+    scatter_excess_m: float
+    phase_chi2: float
+    halves: float
+    correlation: float
+    lag_s: float
+    misfits: tuple[Misfit, ...]
+
+
+def check_model(
+    fitted: Fitted,
+    residuals: Residuals | None,
+    fit_waveform: Callable[[], Fitted] | None,
+    params: Params | None = None,
+) -> ModelCheck:
+    """Return how far a run contradicts the model that was fitted to it.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        By windows.
+    residuals : Residuals or None
+        What no named cause explains; None where one explains all of them.
+    fit_waveform : callable or None
+        Fits the whole waveform; it is called where the halves disagree. None where that was done, or takes too long.
+    params : Params, optional
+
+    Notes
+    -----
+    The residuals of amplitudes and phases, over their standard uncertainties, are fitted by a straight line in each
+    half: where the model holds, levels and slopes differ as noise does (four standard normal numbers, of which the
+    largest counts). Where it does not, windows and waveform weigh its failure differently and nothing shows which is
+    right: the windows' values are kept, and their difference from the waveform's is a standard uncertainty of each.
+    """
+    from scipy.special import ndtri
+
+    params = params or Params()
+    demodulated, phase, noise_m = fitted.demodulated, fitted.phase, fitted.demodulated.noise_m
+    found = []
+    if noise_m > 0.0 and fitted.waveform.rms_m > params.excess * noise_m:
+        found.append(Contradiction.RESIDUALS)
+    free = (demodulated.t.size - phase.coefficients.size) / phase.correlation
+    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - params.false_alarm, free) / free:
+        found.append(Contradiction.PHASE)
+    correlation, lag_s = (0.0, 0.0) if residuals is None else _colour(residuals, params)
+    if correlation:
+        found.append(Contradiction.COLOUR)
+    halves = _halves(fitted, params.least_windows)
+    misfits: tuple[Misfit, ...] = ()
+    if halves > -float(ndtri(params.false_alarm / 8.0)):
+        found.append(Contradiction.HALVES)
+        whole = None if fit_waveform is None else fit_waveform()
+        if whole is not None and whole.full is not None and whole.full.converged:
+            misfits = (_difference(fitted, whole),)
+    return ModelCheck(
+        tuple(found),
+        fitted.waveform.rms_m,
+        noise_m,
+        fitted.damping.scatter.excess,
+        phase.reduced_chi2,
+        halves,
+        correlation,
+        lag_s,
+        misfits,
+    )
+
+
+def _colour(residuals: Residuals, params: Params) -> tuple[float, float]:
+    """Return the strongest correlation of the residuals and its lag, s; 0 and 0 where they are white.
+
+    White noise of n samples has correlations with a standard deviation of :math:`n^{-1/2}`; of L lags none is farther
+    off than the quantile of :math:`\\alpha/2L` with the probability :math:`1 - \\alpha` (Bonferroni).
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+    from scipy.special import ndtri
+
+    if residuals.samples_per_window < params.least_samples:
+        return 0.0, 0.0
+    lags = residuals.used.size // 2
+    size = next_fast_len(residuals.used.size + lags, real=True)
+
+    def products(values: F8) -> F8:
+        return np.asarray(irfft(np.abs(rfft(values, size)) ** 2, size)[: lags + 1])
+
+    sums, pairs = products(residuals.on_grid), np.rint(products(residuals.used.astype(np.float64)))
+    if not sums[0] > 0.0:
+        return 0.0, 0.0
+    enough = pairs > 0.25 * pairs[0]
+    correlation = np.where(enough, sums / np.maximum(pairs, 1.0), 0.0) / (sums[0] / pairs[0])
+    lag = 1 + int(np.argmax(np.abs(correlation[1:])))
+    white = -float(ndtri(params.false_alarm / (2.0 * lags))) / math.sqrt(pairs[lag] or 1.0)
+    # Of fewer pairs than samples the estimate may exceed 1, which no correlation does.
+    strongest = max(-1.0, min(float(correlation[lag]), 1.0))
+    predictable_m = math.sqrt(abs(strongest) * sums[0] / pairs[0])
+    if abs(strongest) <= max(params.colour, white) or predictable_m < params.least_share * residuals.amplitude_m:
+        return 0.0, 0.0
+    return strongest, lag * residuals.interval_s
+
+
+def _halves(fitted: Fitted, least_windows: int) -> float:
+    """By how much the halves differ, in standard uncertainties; 0 where they are too short."""
+    demodulated, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
+    if demodulated.t.size < 2 * least_windows:
+        return 0.0
+    amplitudes = demodulated.amplitude - damping.best.amplitude(demodulated.t - damping.t0)
+    phases = demodulated.phase - phase.total(demodulated.t)
+    u_phase = np.sqrt(demodulated.covariance[:, 1, 1])
+    half = demodulated.t.size // 2
+    return max(_apart(part[:half], part[-half:]) for part in (amplitudes / damping.scatter.u, phases / u_phase))
+
+
+def _apart(first: F8, second: F8) -> float:
+    """By how much levels and slopes of two halves of equal length differ, whose points have the uncertainty 1."""
+    n = first.size
+    x = np.arange(n) - 0.5 * (n - 1)
+    change = second - first
+    level = abs(float(change.sum())) / math.sqrt(2.0 * n)
+    slope = abs(float(x @ change)) / math.sqrt(2.0 * float(x @ x))
+    return max(level, slope)
+
+
+def _difference(fitted: Fitted, whole: Fitted) -> Misfit:
+    """What the estimates differ by between windows and waveform."""
+    omega = fitted.phase.angular_frequency.value
+    size_m, rate = (b - a for a, b in zip(_at_start(fitted), _at_start(whole), strict=True))
+    return Misfit(
+        name="choice_of_fit",
+        amplitude_m=abs(size_m),
+        offset_m=abs(whole.rest.mean.value - fitted.rest.mean.value),
+        phase_rad=abs(math.remainder(whole.phase.phase.value - fitted.phase.phase.value, 2.0 * math.pi)),
+        damping_rate=abs(rate),
+        clock=abs(whole.phase.angular_frequency.value / omega - 1.0),
+    )
+
+
+def _at_start(fitted: Fitted) -> tuple[float, float]:
+    """Amplitude, m, and damping rate, 1/s, at the start, averaged over the laws."""
+    laws = average_over_laws(fitted.damping, math.sqrt(float(np.mean(fitted.demodulated.amplitude**2))))
+    return (
+        sum(one.weight * float(one.fit.joint.values[0]) for one in laws),
+        sum(one.weight * one.fit.rate_at_start() for one in laws),
+    )

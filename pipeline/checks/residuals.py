@@ -1,0 +1,101 @@
+"""Residuals: what the windows' fits leave of every sample, as the checks look at it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.motion.phase import PhaseFit
+from pipeline.samples.condition import Conditioned
+from pipeline.track import F8, UNUSABLE
+from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.disturbances import Disturbances
+
+__all__ = ["Residuals", "residuals_of"]
+
+FEWEST = 64  # samples: four in each of the sixteen parts that harmonics are compared in
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Residuals:
+    """Residuals of the windows' fits.
+
+    Parameters
+    ----------
+    values : (k,) float64, m
+        Of the samples used; harmonics that were fitted along are put back.
+    phase : (k,) float64, rad
+        Of the oscillation at these samples.
+    used : (n,) bool
+        Which of all samples they are.
+    noise_m, amplitude_m : float
+        Standard deviation of one sample, and mean amplitude.
+    interval_s, seconds : float
+        From sample to sample, and from the first to the last.
+    radians_per_sample : float
+        Angle by which the oscillation turns from sample to sample.
+    samples_per_window : int
+    relative : (k,) float64 or None
+        Amplitude of the oscillation at these samples over that at the start; None where it is constant.
+    """
+
+    values: F8
+    phase: F8
+    used: NDArray[np.bool_]
+    noise_m: float
+    amplitude_m: float
+    interval_s: float
+    seconds: float
+    radians_per_sample: float
+    samples_per_window: int
+    relative: F8 | None = None
+
+    @property
+    def on_grid(self) -> F8:
+        """(n,) float64, m: the residuals at every sample, 0 where it was not used."""
+        whole = np.zeros(self.used.size)
+        whole[self.used] = self.values
+        return whole
+
+    def less(self, taken_m: F8) -> Residuals:
+        """Return the residuals with something (k,) taken out."""
+        return replace(self, values=self.values - taken_m)
+
+
+def residuals_of(
+    conditioned: Conditioned, demodulated: Demodulated, disturbances: Disturbances, phase: PhaseFit
+) -> Residuals | None:
+    """Return the residuals of a run, None where it has too few samples to look for anything in them.
+
+    Parameters
+    ----------
+    conditioned, demodulated, disturbances, phase
+        Outputs of the stages of those names.
+    """
+    t = conditioned.track.t
+    used = ((demodulated.flags & UNUSABLE) == 0) & np.isfinite(demodulated.residual)
+    rows = np.flatnonzero(used)
+    seconds = float(t[rows[-1]] - t[rows[0]]) if rows.size else 0.0
+    if rows.size < FEWEST or seconds <= 0.0:
+        return None
+    values = demodulated.residual[rows]
+    locked = tuple(mode for mode in disturbances.sideways.modes if mode.kind == "harmonic")
+    if disturbances.modelled and locked:
+        values = values + replace(disturbances.sideways, modes=locked).position(t[rows])
+    step = seconds / int(rows[-1] - rows[0])
+    size = np.abs(phase.damping.best.amplitude(np.maximum(t[rows] - phase.t0, 0.0)))
+    falls = bool(np.isfinite(size).all() and size[0] > 0.0)
+    return Residuals(
+        values,
+        phase.total(t[rows]),
+        used,
+        demodulated.noise_m,
+        float(np.mean(np.abs(demodulated.amplitude))),
+        step,
+        seconds,
+        phase.angular_frequency.value * step,
+        rows.size // demodulated.t.size,
+        size / size[0] if falls else None,
+    )

@@ -1,0 +1,290 @@
+"""Sensor: whether it holds its distances over several samples, or smooths them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.bench.sensor_filter import SensorFilter
+from pipeline.checks.misfit import Misfit
+from pipeline.checks.residuals import Residuals
+from pipeline.samples.condition import Conditioned
+from pipeline.track import F8
+
+__all__ = ["Held", "Params", "Smoothing", "find_held", "find_smoothing", "held_count", "matters"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`find_smoothing`.
+
+    Parameters
+    ----------
+    correlation : float
+        Of neighbouring residuals from which a filter is looked for: a running mean over two samples leaves 0.5.
+    steady : float
+        Ratio by which the covariance of neighbouring residuals may differ between the halves of the recording. The
+        noise of a sensor stays the same; what a model leaves of the motion decays with it. For 1,200 samples behind
+        a filter over ten of them, chance makes the ratio scatter by a quarter.
+    unlike : float
+        Root mean square by which the correlations may differ from those of a filter. Correlations of 1,200 samples
+        scatter by 0.03.
+    fall : float
+        Ratio by which the first correlation's distance from 1 may differ from the filter's, for the sensor to be named:
+        white noise from behind the filter makes it fall within one lag, and so do other residuals of the model.
+    white : float
+        Share of the variance that white noise from behind the filter may have, which lowers all correlations alike.
+    as_stated : float
+        Share by which the loss that the residuals show may differ from that of the filter that the scene states.
+    """
+
+    correlation: float = 0.4
+    steady: float = 2.0
+    unlike: float = 0.08
+    fall: float = 1.3
+    white: float = 0.6
+    as_stated: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A sensor slower than its recording.
+
+    Parameters
+    ----------
+    count : int
+        Samples over which each distance is repeated.
+    interval_s : float
+        From one measurement to the next.
+    misfit : Misfit
+    """
+
+    count: int
+    interval_s: float
+    misfit: Misfit
+
+
+@dataclass(frozen=True, slots=True)
+class Smoothing:
+    """A sensor that smooths.
+
+    Parameters
+    ----------
+    correlation : float
+        Of neighbouring residuals.
+    mean_samples : float
+        Of the running mean that explains the correlations best; 0 where another filter does better.
+    lag_s : float
+        Of the first-order lag that does; 0 where another filter does better.
+    joined_samples : float
+        Between the readings that are joined by straight lines; 0 where another filter does better.
+    loss : float
+        Share of the amplitude that such a filter takes away.
+    late_s : float
+        By how much it delays the motion.
+    certain : bool
+        Whether a filter alone explains the correlations; with white noise besides, other causes do as well, so the
+        uncertainties cover the filter and no finding names it.
+    misfit : Misfit
+    """
+
+    correlation: float
+    mean_samples: float
+    lag_s: float
+    joined_samples: float
+    loss: float
+    late_s: float
+    certain: bool
+    misfit: Misfit
+
+
+def held_count(conditioned: Conditioned) -> int:
+    """Return over how many samples each distance is held; 1 where every sample is new.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+
+    Notes
+    -----
+    Distances in coarse steps repeat too, but change at any row. Those of a sensor slower than the recording change at
+    every k-th row only.
+    """
+    y = conditioned.track.y[conditioned.used]
+    changes = np.flatnonzero(np.diff(y) != 0.0)
+    if not 8 <= changes.size <= 0.6 * y.size:
+        return 1
+    for k in range(min(int(y.size // 8), 200), 1, -1):
+        most = int(np.bincount(changes % k).max())
+        # By chance a k-th of the changes falls on each row of a cycle; for the right k nearly all fall on one.
+        if most > 0.9 * changes.size and most > 2.5 * changes.size / k:
+            return k
+    return 1
+
+
+def find_held(conditioned: Conditioned, residuals: Residuals) -> Held | None:
+    """Return the sensor's own rate where it is slower than the recording.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    residuals : Residuals
+
+    Notes
+    -----
+    Holding each of k samples is a running mean over k of them: the amplitude loses
+    :math:`1 - \\sin(x)/x` with :math:`x = k\\omega h/2`, and the motion is late by :math:`(k - 1)h/2`.
+    """
+    count = held_count(conditioned)
+    if count == 1:
+        return None
+    turn = residuals.radians_per_sample
+    half = 0.5 * count * turn
+    loss = half / math.sin(half) - 1.0 if half < 0.5 * math.pi else 1.0
+    misfit = Misfit(name="held_samples", amplitude_m=residuals.amplitude_m * loss, phase_rad=0.5 * (count - 1) * turn)
+    return Held(count, count * residuals.interval_s, misfit)
+
+
+def matters(
+    found: Smoothing,
+    residuals: Residuals,
+    u_amplitude_m: float,
+    stated: SensorFilter | None = None,
+    params: Params | None = None,
+) -> bool:
+    """Return whether a filter takes enough of the amplitude to matter, and is not the one that the scene states.
+
+    Parameters
+    ----------
+    found : Smoothing
+    residuals : Residuals
+    u_amplitude_m : float
+        Standard uncertainty of the amplitude, m: a filter that takes less than half of it does not matter.
+    stated : SensorFilter, optional
+        From the scene.
+    params : Params, optional
+    """
+    params = params or Params()
+    loss_m, least_m = found.misfit.amplitude_m, 0.5 * u_amplitude_m
+    if stated is None:
+        return loss_m > least_m
+    expected_m = residuals.amplitude_m * stated.shown(residuals.radians_per_sample / residuals.interval_s)
+    return abs(loss_m - expected_m) > max(params.as_stated * max(loss_m, expected_m), least_m)
+
+
+def find_smoothing(residuals: Residuals, params: Params | None = None) -> Smoothing | None:
+    """Return the filter whose correlation the residuals show.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    params : Params, optional
+
+    Notes
+    -----
+    White noise that a sensor smooths over N samples is correlated, :math:`\\rho_l = 1 - l/N` behind a running mean and
+    :math:`e^{-l/\\tau}` behind a first-order lag; the motion loses
+    :math:`1 - \\sin(N\\omega h/2)/(N\\sin(\\omega h/2))` or :math:`1 - (1 + \\omega^2\\tau^2)^{-1/2}` of its amplitude.
+    Readings N samples apart that are joined by straight lines are correlated as a cubic B-spline of width 4N is, and
+    the motion loses :math:`1 - (\\sin x/x)^2` with :math:`x = N\\omega h/2`. White noise from behind the filter lowers
+    all correlations by one factor, which is fitted along.
+    """
+    params = params or Params()
+    whole, turn, step = residuals.on_grid, residuals.radians_per_sample, residuals.interval_s
+    length = residuals.samples_per_window
+    mask = residuals.used.astype(np.float64)
+    if length < 12 or not whole.any():
+        return None
+
+    def covariance(lag: int, rows: slice = slice(None)) -> float:
+        values, used = whole[rows], mask[rows]
+        return float(values[:-lag] @ values[lag:]) / max(float(used[:-lag] @ used[lag:]), 1.0)
+
+    variance = float(whole @ whole) / float(mask.sum())
+    if (first := covariance(1) / variance) < params.correlation:
+        return None
+    halves = [covariance(1, rows) for rows in (slice(whole.size // 2), slice(whole.size // 2, None))]
+    if not 0.0 < max(halves) < params.steady * min(halves):
+        return None
+    lags = np.unique(np.geomspace(1.0, max(length / 4.0, 3.0), 8).astype(np.int64))
+    seen = np.array([covariance(int(lag)) / variance for lag in lags])
+    sizes = np.geomspace(1.5, 0.7 * length, 40)
+    (mean_off, mean_size, mean_fall), (lag_off, lag_size, lag_fall), (joined_off, joined_size, joined_fall) = (
+        _nearest(memory, sizes, lags, seen, length, turn, params.white)
+        for memory in (_mean_memory, _lag_memory, _joined_memory)
+    )
+    nearest = min(mean_off, lag_off, joined_off)
+    if nearest > params.unlike:
+        return None
+    mean_samples = lag_s = joined_samples = 0.0
+    fall = joined_fall
+    if mean_off == nearest:
+        half = 0.5 * mean_size * turn
+        fall = mean_fall
+        gain, late_s, mean_samples = math.sin(half) / half, 0.5 * (mean_size - 1.0) * step, mean_size
+    elif lag_off == nearest:
+        gain, late_s = 1.0 / math.hypot(1.0, turn * lag_size), math.atan(turn * lag_size) * step / turn
+        lag_s, fall = lag_size * step, lag_fall
+    else:
+        half = 0.5 * joined_size * turn
+        gain, late_s, joined_samples = (math.sin(half) / half) ** 2, 0.0, joined_size
+    misfit = Misfit(
+        name="sensor_smoothing",
+        amplitude_m=residuals.amplitude_m * (1.0 / gain - 1.0),
+        phase_rad=late_s / step * turn,
+    )
+    return Smoothing(
+        first, mean_samples, lag_s, joined_samples, 1.0 - gain, late_s, 1.0 / params.fall < fall < params.fall, misfit
+    )
+
+
+def _mean_memory(lags: NDArray[np.int64], sizes: F8) -> F8:
+    """Return the correlation of white noise after a running mean over ``sizes`` samples."""
+    return np.asarray(np.maximum(1.0 - lags / sizes[:, None], 0.0))
+
+
+def _lag_memory(lags: NDArray[np.int64], sizes: F8) -> F8:
+    """Return the correlation of white noise after a first-order lag whose time constant is ``sizes`` samples."""
+    return np.asarray(np.exp(-lags / sizes[:, None]))
+
+
+def _joined_memory(lags: NDArray[np.int64], sizes: F8) -> F8:
+    """Return the mean correlation of white noise that is interpolated linearly over ``sizes`` samples."""
+    u = lags / sizes[:, None]
+    near, far = 1.0 - 1.5 * u**2 + 0.75 * u**3, 0.25 * (2.0 - u) ** 3
+    return np.asarray(np.where(u < 1.0, near, np.where(u < 2.0, far, 0.0)))
+
+
+def _nearest(
+    memory: Callable[[NDArray[np.int64], F8], F8],
+    sizes: F8,
+    lags: NDArray[np.int64],
+    seen: F8,
+    length: int,
+    turn: float,
+    most_white: float,
+) -> tuple[float, float, float]:
+    """How far the nearest filter's correlations are from those seen, its size in samples, and how fast they fall.
+
+    The last is the ratio of the first correlation's distance from 1 to the filter's own.
+
+    Of noise with a memory a window's fit of a constant and a sinusoid takes along more than of white noise: the share
+    :math:`\\sum_l (1 - |l|/L) \\rho_l (1 + 2 \\cos \\omega l)/L` of its variance, L samples a window.
+    """
+    every = np.arange(length)
+    taper = (1.0 - every / length) * (2.0 - (every == 0)) / length
+    remembered = memory(every, sizes) * taper
+    constant, wave = remembered.sum(axis=1), 2.0 * (remembered @ np.cos(turn * every))
+    taken = constant[:, None] + wave[:, None] * np.cos(turn * lags)
+    kept = np.maximum(1.0 - constant - wave, 0.02)
+    expected = (memory(lags, sizes) - taken) / kept[:, None]
+    factor = np.sum(expected * seen, axis=1) / np.maximum(np.sum(expected**2, axis=1), 1e-300)
+    factor = np.clip(factor, 1.0 - most_white, 1.0)
+    away = np.sqrt(np.mean((factor[:, None] * expected - seen) ** 2, axis=1))
+    best = int(np.argmin(away))
+    fall = (1.0 - float(seen[0])) / (1.0 - float(expected[best, 0]))
+    return float(away[best]), float(sizes[best]), fall

@@ -1,0 +1,1 @@
+"""Findings: what is reported about a run, in words."""

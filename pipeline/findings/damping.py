@@ -1,0 +1,146 @@
+"""Findings on damping: which laws the run supports, and which it contradicts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from pipeline.damping.laws import free_power, words_of
+from pipeline.damping.mixture import MixedDrag, find_mixed
+from pipeline.damping.select import Damping
+from pipeline.findings.finding import Finding
+from pipeline.numerics.estimate import Estimate
+
+__all__ = ["damping_findings"]
+
+# Difference of BIC that is "very strong" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773. Among laws that
+# are as likely beforehand a wrong one exceeds the true one by as much in less than exp(-5) of recordings.
+VERY_STRONG = 10.0
+
+
+def damping_findings(damping: Damping, stated: Mapping[str, Estimate]) -> Iterator[Finding]:
+    """Yield which laws fit, which are rejected and which cannot be distinguished.
+
+    Parameters
+    ----------
+    damping : Damping
+    stated : mapping of str to Estimate
+        The coefficients that the results give, with all that they are uncertain by.
+    """
+    rejected = [name for name, fit in damping.fits.items() if fit.rejected]
+    if damping.fits and len(rejected) == len(damping.fits):
+        nearest = min(damping.fits.values(), key=lambda fit: fit.reduced_chi2) if damping.by_statement else damping.best
+        yield Finding(
+            "no_law_fits",
+            "warning",
+            f"No damping law fits: the best has a reduced chi-square of {_number(nearest.reduced_chi2)}, not about 1.",
+            f"The nearest is {words_of(nearest.law)}, which misses the amplitudes by more than their scatter. "
+            "The uncertainties of the coefficients were increased by their residuals.",
+            {"reduced_chi2": nearest.reduced_chi2},
+        )
+    elif damping.stated and (contradicted := _stated_law(damping)) is not None:
+        yield contradicted
+    if rejected or damping.unfitted:
+        yield _rejections(damping, len(rejected))
+    if (mixed := find_mixed(damping)) is not None:
+        yield _mixed(mixed, damping, stated)
+    if len(damping.admissible) > 1:
+        names = [words_of(damping.fits[name].law) for name in damping.admissible]
+        undamped = any(len(damping.fits[name].law.parameters) == 1 for name in damping.admissible)
+        yield Finding(
+            "laws_not_separable",
+            "info",
+            f"{len(names)} damping laws fit this run equally well; a longer run may distinguish them.",
+            f"In order of evidence: {', '.join(names)}."
+            + (" The run does not show for certain that there is any damping." if undamped else ""),
+            {"laws": len(names)},
+        )
+
+
+def _stated_law(damping: Damping) -> Finding | None:
+    """Return what contradicts the stated law although another one fits: its misfit, or far stronger evidence."""
+    if not damping.by_statement:
+        why = damping.unfitted.get(damping.stated, "its fit failed")
+        return Finding(
+            "stated_law_rejected",
+            "warning",
+            f"The stated damping law {damping.stated} was not used, because it could not be fitted.",
+            f"{damping.stated}: not fitted, because {why}. The law was chosen by the recording.",
+        )
+    stated = damping.best
+    other = min((fit for fit in damping.fits.values() if not fit.rejected), key=lambda fit: fit.bic, default=stated)
+    excess = stated.bic - other.bic
+    if not stated.rejected and excess <= VERY_STRONG:
+        return None
+    return Finding(
+        "stated_law_rejected",
+        "warning",
+        f"The recording contradicts the stated damping law {stated.name}: {other.name} fits better.",
+        f"{words_of(stated.law)} has a reduced chi-square of {_number(stated.reduced_chi2)}, {words_of(other.law)} has "
+        f"{_number(other.reduced_chi2)}; the BIC of the stated law is higher by {_number(excess)}.",
+        {"reduced_chi2": stated.reduced_chi2, "bic_excess": excess},
+    )
+
+
+def _mixed(mixed: MixedDrag, damping: Damping, stated: Mapping[str, Estimate]) -> Finding:
+    fit = mixed.fit
+    # A number has one uncertainty wherever it is shown.
+    given = stated if set(stated) == set(fit.joint.names[1:]) else fit.joint.estimates()
+    terms = " and ".join(f"{name} = {given[name]}" for name in fit.joint.names[1:])
+    alone = ", ".join(f"{words_of(damping.fits[name].law)} {_number(excess)}" for name, excess in mixed.against.items())
+    details = f"{terms}. The BIC of one kind alone is higher by: {alone}."
+    if fit.rejected:
+        details += (
+            f" The coefficients change with the amplitude (reduced chi-square {_number(fit.reduced_chi2)}), so the "
+            "uncertainties and the BIC are based on the residuals."
+        )
+        for other in damping.fits.values():
+            if name := free_power(other.law):
+                details += f" A free power of the amplitude gives {name} = {other.joint[name]}."
+    return Finding(
+        "mixed_drag",
+        "info",
+        f"The damping needs {words_of(fit.law)}: one kind alone does not fit.",
+        details,
+        {name: given[name].value for name in fit.joint.names[1:]},
+    )
+
+
+def _rejections(damping: Damping, rejected: int) -> Finding:
+    """One finding on all laws that the run contradicts, with the reason for each."""
+    by_reason: dict[str, list[str]] = {}
+    for fit in damping.fits.values():
+        # As many parameters as windows leave no degree of freedom, and so no reduced chi-square.
+        chi2 = f" ({_number(fit.reduced_chi2)})" if fit.dof > 0 else ""
+        by_reason.setdefault(fit.rejection, []).append(f"{words_of(fit.law)}{chi2}")
+    best = damping.best
+    reasons = []
+    if "misfit" in by_reason:
+        selected = f"; {words_of(best.law)} has {best.reduced_chi2:.2g}" if best.dof > 0 else ""
+        reasons.append(f"Rejected by their reduced chi-square{selected}: {', '.join(by_reason['misfit'])}.")
+    if "negative" in by_reason:
+        reasons.append(
+            "Rejected because a coefficient is negative by more than two standard uncertainties (reduced chi-square "
+            f"in brackets): {', '.join(by_reason['negative'])}."
+        )
+    reasons += [
+        f"{words_of(fit.law)}: no convergence after {fit.tried}."
+        for fit in damping.fits.values()
+        if fit.rejection == "not converged"
+    ]
+    reasons += [f"{name}: not fitted, because {why}." for name, why in damping.unfitted.items()]
+    count = rejected + len(damping.unfitted)
+    tried = len(damping.fits) + len(damping.unfitted)
+    return Finding(
+        "law_rejected",
+        "info",
+        f"{count} of {tried} damping laws tried {'is' if count == 1 else 'are'} rejected.",
+        " ".join(reasons),
+        {"rejected": count, "tried": tried},
+    )
+
+
+def _number(value: float) -> str:
+    """Three digits, in full."""
+    if value > 1e6:
+        return "over a million"
+    return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"

@@ -1,0 +1,184 @@
+"""Findings on samples: how many were usable, how they were measured, and at which times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from pipeline.bench.instrument import Instrument
+from pipeline.checks.echoes import Clusters, count_quality
+from pipeline.findings.finding import Finding
+from pipeline.numerics.quantity import amount, noun, plural
+from pipeline.samples.condition import Conditioned, Cut
+from pipeline.track import U8, Track
+
+__all__ = ["clock_findings", "held_finding", "sample_findings"]
+
+MANY = 0.1  # of the samples: a tenth of false echoes is worth a warning, for the sensor is not well placed
+COARSE = 2.6  # a step this many times the noise is coarse: pure rounding noise is 1/sqrt(12) of a step, that is 3.5
+GUESSED = 3.0  # scatter that a stated error exceeds, of which no normal distribution has a sample in 300
+
+
+def sample_findings(
+    conditioned: Conditioned,
+    flags: U8,
+    noise_m: float,
+    clusters: Clusters | None = None,
+    swing_m: tuple[float, float] | None = None,
+    *,
+    by_chance: bool = False,
+) -> Iterator[Finding]:
+    """Yield the findings on the samples, whether they oscillate or not.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    flags : (n,) uint8
+        Final ones.
+    noise_m : float
+        Standard deviation of one sample, m.
+    clusters : Clusters, optional
+        Of false echoes, where the run oscillates.
+    swing_m : (float, float), optional
+        Rest position and amplitude at the start, m, where the run oscillates.
+    by_chance : bool
+        Whether noise explains all false echoes, so that they need no finding; they are flagged all the same.
+    """
+    track, quantum_m = conditioned.track, conditioned.quantum_m
+    counts, n, unit = count_quality(flags), len(track), track.unit
+    levels_m = [cut.from_m for cut in conditioned.cuts] or conditioned.plateaus_m
+    advice = _distance_to_move(levels_m, swing_m) if swing_m is not None and unit == "m" else ""
+    if unit != "m":
+        advice = "Choose a larger range of the sensor, or release with a smaller amplitude."
+    yield from (_cut_finding(cut, n, unit, advice) for cut in conditioned.cuts)
+    if counts["clipped"] and not conditioned.cuts:
+        levels = " and ".join(amount(level, unit, ".1f") for level in conditioned.plateaus_m)
+        where = f"at {levels}" if levels else "at a level flagged in the recording"
+        yield Finding(
+            "clipped",
+            "warning",
+            f"{counts['clipped']} of {n} samples are cut off {where}; they were left out.",
+            "Something cuts the motion there: a fixed object or a lost target. The amplitude comes from the rest of "
+            "each period.",
+            {"samples": counts["clipped"], **{f"level_{i}_m": m for i, m in enumerate(conditioned.plateaus_m, 1)}},
+            advice,
+        )
+    if (echoes := counts["false_echo"]) and not by_chance:
+        yield Finding(
+            "false_echoes",
+            "warning" if echoes > MANY * n else "info",
+            f"{echoes} of {n} samples ({echoes / n:.1%}) are false echoes; they were left out.",
+            _cluster_details(clusters, unit),
+            {"samples": echoes, "share": echoes / n},
+        )
+    if counts["missing"]:
+        yield Finding(
+            "missing_samples",
+            "info",
+            f"{counts['missing']} of {n} samples have no {noun(unit)}.",
+            values={"samples": counts["missing"]},
+        )
+    if repeated := counts["duplicate_time"]:
+        words = f"{repeated} samples repeat an earlier time; they were left out."
+        yield Finding("duplicate_time", "warning", words, values={"samples": repeated})
+    if backward := counts["non_monotonic_time"]:
+        words = f"{backward} samples run backward in time; they were left out."
+        yield Finding("non_monotonic_time", "warning", words, values={"samples": backward})
+    if track.stated_error_m is not None and track.stated_error_m > GUESSED * noise_m:
+        yield Finding(
+            "stated_error_is_not_noise",
+            "info",
+            f"The file states an error of {amount(track.stated_error_m, unit, '.2f')}, but the samples scatter by "
+            f"{amount(noise_m, unit)}, which was used.",
+            "The stated error was not used as noise.",
+            {"stated_error_m": track.stated_error_m, "noise_m": noise_m},
+        )
+    if quantum_m is not None and quantum_m > COARSE * noise_m:
+        yield Finding(
+            "quantised",
+            "warning",
+            f"The {plural(unit)} come in steps of {amount(quantum_m, unit, '.3g')}, which is more than their noise.",
+            "Amplitudes may be wrong by several times their stated uncertainty.",
+            {"step_m": quantum_m, "noise_m": noise_m},
+        )
+
+
+def _distance_to_move(levels_m: Sequence[float], swing_m: tuple[float, float]) -> str:
+    """How far to move the sensor from a motion that is cut off at one end: by what lacks there, and 1 cm to spare."""
+    rest_m, amplitude_m = swing_m
+    lacks = [(amplitude_m - abs(level - rest_m), "nearer" if level > rest_m else "away") for level in levels_m]
+    if not lacks or len({way for _, way in lacks}) > 1 or max(lacks)[0] <= 0.0:
+        return ""
+    lack_m, way = max(lacks)
+    return f"Move the sensor {math.ceil(100.0 * lack_m + 1.0)} cm {way}."
+
+
+def _cut_finding(cut: Cut, n: int, unit: str, advice: str) -> Finding:
+    end = cut.end if unit == "m" else {"far": "upper", "near": "lower"}[cut.end]
+    return Finding(
+        "clipped",
+        "warning",
+        f"The motion is cut off at the {end} end beyond {amount(cut.from_m, unit, '.1f')} "
+        f"({cut.samples / n:.0%} of the samples).",
+        f"{cut.samples} of {n} samples between {cut.first_s:.2f} and {cut.last_s:.2f} s were left out, by where the "
+        f"fitted motion goes. They lie about {amount(cut.level_m, unit, '.1f')}. The amplitude comes from the rest of "
+        "each period.",
+        {
+            "samples": cut.samples,
+            "from_m": cut.from_m,
+            "level_m": cut.level_m,
+            "first_s": cut.first_s,
+            "last_s": cut.last_s,
+        },
+        advice,
+    )
+
+
+def _cluster_details(clusters: Clusters | None, unit: str) -> str:
+    if clusters is None or not clusters.count:
+        return ""
+    return (
+        f"{clusters.samples} of them come in {clusters.count} cluster{'s' * (clusters.count > 1)}, of which "
+        f"{clusters.turning} lie at turning points. Together they would change the amplitude by "
+        f"{amount(clusters.shift_m, unit, '+.2g')}."
+    )
+
+
+def held_finding(count: int, interval_s: float, unit: str) -> Finding:
+    """Return the finding on a sensor slower than its recording."""
+    return Finding(
+        "held_samples",
+        "warning",
+        f"Each {noun(unit)} is repeated {count} times: the sensor measures only every {interval_s:.3g} s.",
+        f"The held values are late by {0.5 * interval_s * (count - 1) / count:.2g} s on average. The uncertainties of "
+        "amplitude and phase include that.",
+        {"count": count, "interval_s": interval_s},
+    )
+
+
+def clock_findings(track: Track, instrument: Instrument) -> Iterator[Finding]:
+    """Yield what the times show of the sensor's clock and of readings that came late.
+
+    Parameters
+    ----------
+    track : Track
+    instrument : Instrument
+        Of this track.
+    """
+    if track.clock == "nominal":
+        yield Finding(
+            "nominal_clock",
+            "info",
+            "The times are row numbers at the nominal rate, which a crystal keeps to 50 ppm.",
+            "An even distribution over 50 ppm on either side, u = 29 ppm, is part of every period's uncertainty.",
+        )
+    if instrument.clock_refused:
+        yield Finding("clock_refused", "warning", "The clocks of sensor and computer disagree.", instrument.clock_words)
+    if track.held_samples:
+        yield Finding(
+            "late_readings",
+            "info",
+            f"{track.held_samples} readings came up to {track.longest_stall_s:.3g} s late; their own times are used.",
+            "The link stalled, and the readings came together after a silence. Only the others compare the clocks.",
+            {"readings": track.held_samples, "longest_stall_s": track.longest_stall_s},
+        )

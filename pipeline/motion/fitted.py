@@ -1,0 +1,122 @@
+"""The fitted motion: amplitude, phase and rest position against time, by windows or by the equation of motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from pipeline.damping.law_fit import LawFit
+from pipeline.damping.select import Damping
+from pipeline.motion.equation_fit import EquationFit
+from pipeline.motion.phase import Params as PhaseParams
+from pipeline.motion.phase import PhaseFit, fit_phase
+from pipeline.motion.waveform import Rest, Waveform, fit_rest, reconstruct
+from pipeline.motion.waveform_fit import FullFit, fit_record
+from pipeline.motion.waveform_fit import Params as WaveformParams
+from pipeline.numerics.quantity import in_unit
+from pipeline.samples.condition import Conditioned
+from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.disturbances import Disturbances
+
+__all__ = ["Fitted", "fit_by_equation", "fit_by_windows", "fit_waveform"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """An oscillation, as the stages after the fit take it.
+
+    Parameters
+    ----------
+    demodulated : Demodulated
+        With the final flags.
+    disturbances : Disturbances
+        What was taken out of the record before.
+    damping, phase, rest, waveform
+        Of the record without it.
+    full : FullFit or None
+        The fit of the whole waveform, where there was one.
+    """
+
+    demodulated: Demodulated
+    disturbances: Disturbances
+    damping: Damping
+    phase: PhaseFit
+    rest: Rest
+    waveform: Waveform
+    full: FullFit | None
+
+    def in_unit(self, unit: str) -> Fitted:
+        """Return the same of a record in another unit: the stages know only that values have one, and write m."""
+        if unit == "m":
+            return self
+        fits = {name: _law_in_unit(fit, unit) for name, fit in self.damping.fits.items()}
+        damping, backbone = replace(self.damping, fits=fits), self.phase.backbone
+        bent = None if backbone is None else replace(backbone, unit=in_unit(backbone.unit, unit))
+        return replace(
+            self,
+            damping=damping,
+            phase=replace(self.phase, damping=damping, backbone=bent),
+            rest=replace(self.rest, mean=replace(self.rest.mean, unit=unit)),
+        )
+
+
+def _law_in_unit(fit: LawFit, unit: str) -> LawFit:
+    return replace(fit, joint=replace(fit.joint, units=tuple(in_unit(each, unit) for each in fit.joint.units)))
+
+
+def fit_by_windows(
+    demodulated: Demodulated, disturbances: Disturbances, damping: Damping, params: PhaseParams | None = None
+) -> Fitted:
+    """Return a weakly damped oscillation from the amplitudes, phases and rest positions of its windows.
+
+    Parameters
+    ----------
+    demodulated, disturbances, damping
+        Outputs of the stages of those names.
+    params : pipeline.motion.phase.Params, optional
+    """
+    phase, rest = fit_phase(demodulated, damping, params), fit_rest(demodulated)
+    waveform = reconstruct(disturbances.conditioned.track, demodulated, phase, rest)
+    return Fitted(demodulated, disturbances, damping, phase, rest, waveform, None)
+
+
+def fit_waveform(fitted: Fitted, conditioned: Conditioned, params: WaveformParams) -> Fitted:
+    """Return the oscillation from a fit of the whole waveform that begins where the windows arrived.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        By windows.
+    conditioned : Conditioned
+        The samples with all disturbances.
+    params : pipeline.motion.waveform_fit.Params
+    """
+    disturbances = fitted.disturbances
+    # The samples without modes, with the modes' columns, give the same fit as all samples: the columns span what was
+    # taken out.
+    full = fit_record(
+        disturbances.conditioned,
+        fitted.demodulated,
+        fitted.damping,
+        fitted.phase,
+        fitted.rest,
+        fitted.waveform,
+        extra=disturbances.columns(conditioned.track.t),
+        params=params,
+    )
+    demodulated = replace(fitted.demodulated, flags=full.flags)
+    return Fitted(demodulated, disturbances, full.damping, full.phase, full.rest, full.waveform, full)
+
+
+def fit_by_equation(solved: EquationFit, conditioned: Conditioned, demodulated: Demodulated) -> Fitted:
+    """Return a strongly damped oscillation from one solution of the equation of motion.
+
+    Parameters
+    ----------
+    solved : EquationFit
+        Of the whole record, so that nothing was taken out of it.
+    conditioned, demodulated
+        Outputs of the stages of those names.
+    """
+    demodulated = solved.windows(demodulated)
+    phase, rest = solved.phase(demodulated), solved.rest(demodulated)
+    return Fitted(demodulated, Disturbances.nothing(conditioned), solved.damping, phase, rest, solved.waveform, None)

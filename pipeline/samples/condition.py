@@ -1,0 +1,405 @@
+"""Condition: flag every sample that a fit may not take at face value, and drop none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import AnalysisError
+from pipeline.numerics.robust import mad_sigma
+from pipeline.track import F8, U8, UNUSABLE, Quality, Track
+
+__all__ = ["Conditioned", "Cut", "Params", "coarsest_step", "condition", "fourth_difference_noise"]
+
+# Variance of y[i-2] - 4 y[i-1] + 6 y[i] - 4 y[i+1] + y[i+2] for unit white noise: 1 + 16 + 36 + 16 + 1.
+FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
+QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
+TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
+CREST_SIGMAS = 3.5
+BLOCK = 256  # samples that tell the curvature where they are
+LARGEST = 1e100  # of a value that was measured: what lies beyond is a missing sample
+ROUNDING = 1e-9  # of the largest value: values that differ by less are one, converted twice
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`condition`.
+
+    Parameters
+    ----------
+    spike_sigmas : float
+        A sample further than this from the median of its five neighbours, beyond what curvature explains, is a
+        false echo.
+    plateau_contrast : float
+        A plateau holds this many times more samples than the band of equal width beneath it. An unclipped
+        crest holds 1 / (sqrt 2 - 1) = 2.4 times as many.
+    """
+
+    spike_sigmas: float = 8.0
+    plateau_contrast: float = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Where a fixed object or a lost target cuts the motion at one end, as its sinusoid shows.
+
+    Parameters
+    ----------
+    end : {"far", "near"}
+    from_m : float
+        Distance from which on samples are left out, m.
+    level_m : float
+        Median of the outer half of the distances left out, m.
+    samples : int
+        Left out.
+    first_s, last_s : float
+        Times of the first and the last of them, s.
+    """
+
+    end: Literal["far", "near"]
+    from_m: float
+    level_m: float
+    samples: int
+    first_s: float
+    last_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Conditioned:
+    """A track with every sample judged.
+
+    Parameters
+    ----------
+    track : Track
+        As it came.
+    flags : (n,) uint8
+        The track's flags and those found here.
+    noise_m : float
+        Standard deviation of white noise from fourth differences, m; independent of any model of the motion.
+    plateaus_m : tuple of float
+        Distances at which the record is clipped, m.
+    quantum_m : float or None
+        Step in which the distances come: the track's, or a coarser one that the distances themselves show.
+    clipped_from_m : tuple of float
+        For each plateau the distance from which on samples were flagged, m.
+    cuts : tuple of Cut
+        What the sinusoid tells in place of the plateaus, see :mod:`pipeline.windows.clipping`.
+    """
+
+    track: Track
+    flags: U8
+    noise_m: float
+    plateaus_m: tuple[float, ...]
+    quantum_m: float | None
+    clipped_from_m: tuple[float, ...] = ()
+    cuts: tuple[Cut, ...] = ()
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """(n,) bool: samples without any flag that excludes them."""
+        mask: NDArray[np.bool_] = (self.flags & UNUSABLE) == 0
+        return mask
+
+    def less(self, taken_m: F8) -> Conditioned:
+        """Return the record with something (n,) taken out of its distances; flags and times stay."""
+        return replace(self, track=replace(self.track, y=self.track.y - taken_m))
+
+    def near_plateau(self, model_m: F8, noise_m: float) -> NDArray[np.bool_]:
+        """Return where a model comes so near a plateau that noise decides whether a sample is clipped.
+
+        Samples there are left out by the model, not by their own noise: what is left is not biased.
+
+        Parameters
+        ----------
+        model_m : (...) float64, m
+        noise_m : float
+        """
+        near = np.zeros(model_m.shape, np.bool_)
+        middle = float(np.median(model_m)) if self.clipped_from_m else 0.0
+        for bottom in self.clipped_from_m:
+            sign = 1.0 if bottom > middle else -1.0
+            near |= sign * model_m > sign * bottom - CREST_SIGMAS * noise_m
+        return near
+
+
+def condition(track: Track, params: Params | None = None) -> Conditioned:
+    """Flag missing samples, duplicate and backward times, isolated false echoes and clipped plateaus.
+
+    Parameters
+    ----------
+    track : Track
+    params : Params, optional
+
+    Returns
+    -------
+    Conditioned
+
+    Raises
+    ------
+    AnalysisError
+        If fewer than eight samples are left to work with.
+
+    Notes
+    -----
+    Noise is estimated from fourth differences, in which a motion of angular frequency :math:`\\omega` sampled
+    every :math:`h` leaves only :math:`A (\\omega h)^4`, by the median of their absolute values, so that false
+    echoes do not count.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(1000) / 100
+    >>> y = 0.2 + 0.05 * np.cos(8.3 * t)
+    >>> y[500] = 1.4
+    >>> found = condition(Track.from_arrays(t, y))
+    >>> int(found.flags[500]), int(np.count_nonzero(found.flags))
+    (2, 1)
+    """
+    params = params or Params()
+    flags = track.flags.copy()
+    measured = np.abs(track.y) < LARGEST  # and not NaN
+    flags[~measured] |= np.uint8(Quality.MISSING)
+    # A reader that already said which of two exchanged rows is wrong is believed.
+    judged = (flags & np.uint8(Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME)) != 0
+    flags |= _time_flags(np.where(judged, np.nan, track.t), judged)
+    clean = (flags & UNUSABLE) == 0
+    if np.count_nonzero(clean) < 8:
+        flagged = {flag: int(np.count_nonzero(flags & np.uint8(flag))) for flag in Quality if flag & UNUSABLE}
+        why = ", ".join(f"{count} {flag.name.lower()}" for flag, count in flagged.items() if count and flag.name)
+        raise AnalysisError(
+            f"an analysis needs eight usable samples at least, got {np.count_nonzero(clean)} of {len(track)}"
+            f"{f' (flagged: {why})' if why else ''}; record longer, or see to those flagged"
+        )
+    y, rows = track.y[clean], np.flatnonzero(clean)
+    half_step = 0.5 * (track.quantum_m or 0.0)
+    spikes = _spikes(y, half_step, params.spike_sigmas)
+    flags[rows[spikes]] |= np.uint8(Quality.FALSE_ECHO)
+    y_kept, rows = y[~spikes], rows[~spikes]
+    noise_m = fourth_difference_noise(y_kept)
+    plateaus: list[float] = []
+    bottoms: list[float] = []
+    ordered = np.sort(y_kept)
+    found = [
+        (sign, *_plateau(sign * y_kept, increasing, max(noise_m, half_step), params.plateau_contrast))
+        for sign, increasing in ((1.0, ordered), (-1.0, -ordered[::-1]))
+    ]
+    # A record that lies on plateaus for the most part is a step or a still bob, not a clipped motion.
+    if sum(members.size for _, _, _, members in found) <= 0.6 * y_kept.size:
+        for sign, level, bottom, members in found:
+            if members.size:
+                plateaus.append(sign * level)
+                bottoms.append(sign * bottom)
+                flags[rows[members]] |= np.uint8(Quality.CLIPPED)
+    quantum_m = coarsest_step(ordered, track.quantum_m)
+    return Conditioned(track, flags, noise_m, tuple(plateaus), quantum_m, tuple(bottoms))
+
+
+def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
+    """Return the step between neighbouring values where values repeat; files print more digits than sensors have.
+
+    Parameters
+    ----------
+    ordered : (n,) float64, m
+        Distances in increasing order.
+    stated_m : float or None
+        What stands where values do not repeat, or show no coarser step.
+    """
+    steps = np.diff(ordered)
+    apart = steps > ROUNDING * max(-float(ordered[0]), float(ordered[-1]), 0.0)
+    if not 0 < np.count_nonzero(apart) <= 0.5 * ordered.size:
+        return stated_m
+    least = float(steps[apart].min())
+    return least if stated_m is None or least > 1.5 * stated_m else stated_m
+
+
+def fourth_difference_noise(y: F8) -> float:
+    """Return the standard deviation of white noise on a smooth motion.
+
+    Parameters
+    ----------
+    y : (n,) float64, m
+        Equally spaced; fewer than five samples give 0.
+
+    Notes
+    -----
+    :math:`\\hat\\sigma = 1.4826\\,\\mathrm{median}|\\Delta^4 y| / \\sqrt{70}`.
+    """
+    if y.size < 5:
+        return 0.0
+    return float(mad_sigma(np.diff(y, 4)) / FOURTH_DIFFERENCE_GAIN)
+
+
+def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
+    """Flag times that repeat or run behind the latest time seen so far; those judged before stay as they are."""
+    flags = np.zeros(t.size, np.uint8)
+    if np.all(np.diff(t) > 0.0):
+        return flags
+    finite = np.isfinite(t)
+    latest = np.maximum.accumulate(np.where(finite, t, -np.inf))
+    before = np.concatenate([[-np.inf], latest[:-1]])
+    flags[finite & (t == before)] = Quality.DUPLICATE_TIME
+    flags[(~finite & ~judged) | (t < before)] = Quality.NON_MONOTONIC_TIME
+    return flags
+
+
+def _least_noise(second: F8, rounding: float) -> tuple[float, bool]:
+    """Noise that a third of the fourth differences still shows, and whether even so many are not clean.
+
+    From the second differences, three at least; of values in coarse steps many are 0 but for their rounding.
+
+    A fifth of the samples being spikes leaves a third of the fourth differences clean, two fifths leave a twelfth.
+    """
+    size = np.abs(np.diff(second, 2))
+    few, many = size.size // 20, size.size // 4
+    ordered = np.partition(size, many)
+    ordered[:many].partition(few)  # the rest need not be looked at twice
+    gain = float(FOURTH_DIFFERENCE_GAIN)
+    quarter = float(ordered[many]) / (QUARTER_TO_SIGMA * gain)
+    twentieth = float(ordered[few]) / (TWENTIETH_TO_SIGMA * gain)
+    flooded = rounding < twentieth < 0.25 * quarter
+    return (twentieth if flooded else quarter), flooded
+
+
+def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
+    """Return which samples stand off the median of five around them by more than noise and curvature do."""
+    if y.size < 8:
+        return np.zeros(y.size, np.bool_)
+    second = np.diff(y, 2)
+    rounding = 1e-12 * float(np.abs(y).max())
+    noise_m, flooded = _least_noise(second, rounding)
+    if noise_m <= rounding:  # most samples say what their neighbours say: single ones a step beside are no spikes
+        half_step = 0.5 * (coarsest_step(np.sort(y), 2.0 * half_step) or 0.0)
+    # What curvature alone does: a quantile of the second differences that spikes on a fifth of the samples spare; of
+    # a cosine's second differences 0.15 lie within 0.40 of what 0.4 of them do.
+    share, gain = (0.15, 2.5) if flooded else (0.4, 1.0)
+    rank = int(share * second.size)
+    least = sigmas * max(noise_m, half_step)
+    spikes = _beyond(y, least + 5.0 * gain * float(np.partition(np.abs(second), rank)[rank]))
+    if np.count_nonzero(spikes) > 0.05 * y.size:
+        # A bob that has nearly come to rest does not show the curvature at the start: each part is taken alone.
+        blocks = second[: second.size // BLOCK * BLOCK].reshape(-1, BLOCK)
+        if blocks.size and np.count_nonzero(
+            local := _beyond(y, least + 5.0 * gain * _curvature(blocks, share, y.size))
+        ) < 0.5 * np.count_nonzero(spikes):
+            return local
+        # So many come in runs too, which a median of five believes; but hardly any lie within the motion.
+        middle = float(np.median(y[~spikes]))
+        reach = 3.0 * mad_sigma(y[~spikes] - middle)
+        spikes |= np.abs(y - middle) > reach
+    return spikes
+
+
+def _curvature(blocks: F8, share: float, size: int) -> F8:
+    """(size,): for each sample that quantile of the second differences (b, k) of the block that it lies in."""
+    rank = int(share * blocks.shape[1])
+    each = np.partition(np.abs(blocks), rank, axis=1)[:, rank]
+    return np.asarray(each[np.minimum(np.arange(size) // blocks.shape[1], each.size - 1)])
+
+
+def _beyond(y: F8, bound: float | F8) -> NDArray[np.bool_]:
+    """Return which samples stand off the median of five around them by more than a bound."""
+    spikes = np.zeros(y.size, np.bool_)
+    smooth = y
+    for _ in range(4):
+        away = _off_median(smooth)
+        found = np.flatnonzero(away > bound)
+        if not found.size:
+            break
+        # On a slope a spike shifts its neighbours' medians by a step: take the worst out and look again.
+        near = np.clip(found[:, None] + np.arange(-2, 3), 0, y.size - 1)
+        worst = found[away[found] >= away[near].max(axis=1)]
+        spikes[worst] = True
+        kept = np.flatnonzero(~spikes)
+        if kept.size < 8:
+            break
+        smooth = y.copy()
+        smooth[spikes] = np.interp(np.flatnonzero(spikes), kept, y[kept])
+    return spikes
+
+
+def _off_median(y: F8) -> F8:
+    # Continued as point reflections, so that a slope at either end looks like a slope.
+    first, last = _end(y[:5]), _end(y[:-6:-1])
+    padded = np.concatenate([2.0 * first - y[2:0:-1], y, 2.0 * last - y[-2:-4:-1]])
+    return np.abs(y - _median_of_five(*(padded[i : i + y.size] for i in range(5))))
+
+
+def _end(y: F8) -> float:
+    """The first of five samples, or what two of the others continue to where it stands off both."""
+    first, second, third, fifth = float(y[0]), float(y[1]), float(y[2]), float(y[4])
+    return sorted((first, 2.0 * second - third, 2.0 * third - fifth))[1]
+
+
+def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:
+    """Median of five arrays element by element, computed only from minima and maxima.
+
+    Of 12,000 samples in 0.15 ms; scipy.ndimage's filter takes 0.3 ms and 0.2 s to import, numpy's median 1.4 ms.
+    """
+    low = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e))
+
+
+def _visits(y: F8, band: NDArray[np.bool_], low: float) -> int:
+    """How often the motion comes to the band from below ``low``; a bob that settles there comes once."""
+    state = np.where(band, 1, np.where(y < low, -1, 0))
+    known = state[state != 0]
+    return int(np.count_nonzero((known[1:] > 0) & (known[:-1] < 0))) + int(known[0] > 0)
+
+
+def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float, float, NDArray[np.int64]]:
+    """Find a clipped plateau at the upper end of ``y``, which ``ordered`` holds in increasing order.
+
+    A clipped record piles samples into a band a few sigma wide with almost none above and few beneath; an
+    unclipped crest thins out as the square root of the depth below it.
+    """
+    none = np.empty(0, np.int64)
+    low, high = ordered[0], ordered[-1]
+    if (level := _saturated(y, ordered, contrast)) is not None:
+        return level, level, np.flatnonzero(y >= level)
+    width = 6.0 * noise_m
+    if high - low < 6.0 * width or width == 0.0:
+        return 0.0, 0.0, none
+    first = int(np.searchsorted(ordered, low + 0.6 * (high - low)))
+    upper = ordered[first:]
+    few = math.ceil(max(0.02 * y.size, 8))
+    # Bands that begin at these hold enough.
+    starts = np.flatnonzero(upper[few - 1 :] <= upper[: max(upper.size - few + 1, 0)] + width)
+    if not starts.size:
+        return 0.0, 0.0, none
+    counts = np.searchsorted(upper, upper[starts] + width, side="right") - starts
+    fullest = int(np.argmax(counts))
+    start, inside = int(starts[fullest]), int(counts[fullest])
+    bottom = upper[start]
+    above = upper.size - start - inside
+    beneath = first + start - int(np.searchsorted(ordered, bottom - width))
+    if above > 0.1 * inside or inside < contrast * (beneath + 1):
+        return 0.0, 0.0, none
+    band = (y >= bottom) & (y <= bottom + width)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], band.astype(np.int8), [0]])))
+    starts, stops = edges[::2], edges[1::2]
+    if np.median(stops - starts) < 3 or _visits(y, band, bottom - 3.0 * width) < 2:
+        return 0.0, 0.0, none
+    # Heavy tails of the noise stand above the band and belong to the plateau all the same.
+    members = np.flatnonzero(y >= bottom)
+    return float(np.median(y[band])), float(bottom), members
+
+
+def _saturated(y: F8, ordered: F8, contrast: float) -> float | None:
+    """The value at which a sensor that saturates after its noise piles up the top samples, if it does."""
+    few = max(int(0.02 * y.size), 8)
+    level = float(ordered[-max(few // 2, 1)])
+    first, last = np.searchsorted(ordered, level), np.searchsorted(ordered, level, side="right")
+    inside = int(last - first)
+    if inside < few or ordered.size - last > 0.1 * inside or first == 0:
+        return None
+    next_lower = ordered[first - 1]
+    beneath = int(first - np.searchsorted(ordered, next_lower))
+    margin = 0.05 * (level - float(ordered[0]))
+    if inside < contrast * (beneath + 1) or _visits(y, y >= level, level - margin) < 2:
+        return None
+    return level

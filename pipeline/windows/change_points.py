@@ -1,0 +1,287 @@
+"""Change points: where a series of windows jumps, by a test of stated probability of a false alarm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.numerics.robust import mad_sigma
+from pipeline.track import F8
+
+__all__ = ["Change", "Params", "find_changes", "lone_points"]
+
+I8 = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`find_changes`.
+
+    Parameters
+    ----------
+    false_alarm : float
+        Probability that a smooth series shows a jump anywhere: Bonferroni's bound over all places tried.
+    lengths : tuple of int
+        Points in an interval, in ascending order. Doubling loses less than a tenth of the power between two lengths
+        [1]_. Fewer than 8 leave no degrees of freedom; over more than 32 periods drag and drift are no cubics.
+    undisturbed : float
+        Share of the intervals that no jump disturbs at least; the scatter of these is the usual one.
+    apart : int
+        Fewest points between an interval's end and a jump within it, so that two bad windows are none; a quarter
+        of the interval if that is less. At the ends of the series one is enough.
+
+    References
+    ----------
+    .. [1] S. Kovacs, P. Buehlmann, H. Li, A. Munk, "Seeded binary segmentation", Biometrika 110 (2023) 249,
+       doi:10.1093/biomet/asac052.
+    """
+
+    false_alarm: float = 1e-3
+    lengths: tuple[int, ...] = (10, 18, 32)
+    undisturbed: float = 1 / 3
+    apart: int = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One jump of a series.
+
+    Parameters
+    ----------
+    index : int
+        First point after it.
+    false_alarm : float
+        Probability that a smooth series shows as much anywhere.
+    """
+
+    index: int
+    false_alarm: float
+
+
+def find_changes(t: F8, y: F8, u: F8, params: Params | None = None) -> tuple[Change, ...]:
+    """Find where a series of several components jumps, in order of time.
+
+    Parameters
+    ----------
+    t : (n,) float64, s
+        In ascending order.
+    y, u : (m, n) float64
+        Components and their standard uncertainties, independent of each other.
+    params : Params, optional
+
+    Returns
+    -------
+    tuple of Change
+
+    Notes
+    -----
+    In an interval of L points each component is a polynomial with a jump at point k,
+    :math:`y_j = p(t_j) + h\\,[j \\ge k]`, p a cubic, in the shortest intervals a parabola. In all m components together
+    a jump lowers chi-square by G(k) to X(k), which leaves :math:`\\nu` degrees of freedom:
+
+    .. math:: F = \\frac{G/m}{\\max(1, X/\\nu)\\,\\lambda}, \\qquad \\lambda = \\frac{1 + \\rho}{1 - \\rho},
+
+    with the correlation :math:`\\rho \\ge 0` of neighbouring residuals. So points that scatter more than stated, that
+    remember, or that bend otherwise than p count as fewer. F is compared with the quantile of Fisher's distribution of
+    m and :math:`\\nu/\\lambda` degrees of freedom at ``false_alarm`` over the number of places tried: Bonferroni's
+    bound, for normal noise of unknown size, and on the safe side where its size is known.
+
+    The intervals are seeded ones [1]_, each length at steps of a quarter of itself. The series is parted at the
+    strongest jump of the shortest length that shows any (narrowest over threshold [2]_): a short interval has one
+    jump at most, and the polynomial is nearly right there. Then the search goes on in both parts.
+
+    References
+    ----------
+    .. [1] S. Kovacs, P. Buehlmann, H. Li, A. Munk, "Seeded binary segmentation", Biometrika 110 (2023) 249,
+       doi:10.1093/biomet/asac052.
+    .. [2] R. Baranowski, Y. Chen, P. Fryzlewicz, "Narrowest-over-threshold detection of multiple change points",
+       J. R. Statist. Soc. B 81 (2019) 649, doi:10.1111/rssb.12322.
+
+    Examples
+    --------
+    >>> t = np.arange(40.0)
+    >>> y = 1e-3 * t + np.where(t < 25.0, 0.0, 1.0) + 0.1 * np.random.default_rng(1).standard_normal(40)
+    >>> (change,) = find_changes(t, y[None], np.full((1, 40), 0.1))
+    >>> change.index
+    25
+    """
+    params = params or Params()
+    scatter = _scatter(t, y, u, params)
+    trials = sum(length * _starts(t.size, length).size for length in params.lengths if length <= t.size)
+    found: dict[int, float] = {}
+    parts = [(0, t.size)]
+    while parts:
+        first, stop = parts.pop()
+        for length in params.lengths:
+            if length > stop - first:
+                break
+            change = _strongest(t[first:stop], y[:, first:stop], scatter[length][:, first:stop], length, params, trials)
+            if change is not None:
+                index = first + change.index
+                found[index] = change.false_alarm
+                parts += [(first, index), (index, stop)]
+                break
+    # A single point between two jumps holds one jump: before it or after it is the same.
+    for index in sorted(found):
+        if index + 1 in found:
+            found[index + 1] = min(found.pop(index), found[index + 1])
+    return tuple(Change(index, found[index]) for index in sorted(found))
+
+
+def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
+    """Return (n,): points far off, which clusters of echoes pull or which hold a jump; the first and last two are none.
+
+    Parameters
+    ----------
+    y, u : (m, n) float64
+        Components and their standard uncertainties.
+    false_alarm : float
+        Probability, at the most, that noise makes any point one.
+
+    Notes
+    -----
+    Neither what lies between its neighbours nor what the two before or the two after continue to comes near such a
+    point. Of n normal deviations in two components the greatest has :math:`r > \\sqrt{2 \\ln(n/\\alpha)}` with
+    probability :math:`\\alpha`; a mean of two neighbours adds half of the variance.
+    """
+    if y.shape[1] < 5:
+        return np.zeros(y.shape[1], np.bool_)
+    before2, before, here, after, after2 = (y[:, k : y.shape[1] - 4 + k] for k in range(5))
+    expected = (0.5 * (before + after), 0.5 * (before2 + after2), 2.0 * before - before2, 2.0 * after - after2)
+    off = np.min([np.abs(here - each) for each in expected], axis=0)
+    usual = np.maximum(math.sqrt(1.5) * u[:, 2:-2], [[mad_sigma(each)] for each in off])
+    far = math.sqrt(2.0 * math.log(y.shape[1] / false_alarm))
+    return np.concatenate([[False, False], np.any(off > far * usual, axis=0), [False, False]])
+
+
+def _starts(size: int, length: int) -> I8:
+    """First points of the intervals of a length: at steps of a quarter of it, and the last ones."""
+    return np.unique(np.append(np.arange(0, size - length + 1, length // 4), size - length))
+
+
+def _strongest(t: F8, y: F8, u: F8, length: int, params: Params, trials: int) -> Change | None:
+    """The strongest jump within the intervals of one length, if any is significant."""
+    starts = _starts(t.size, length)
+    rows = starts[:, None] + np.arange(length)
+    x = t[rows]
+    x = (x - x.mean(axis=1, keepdims=True)) / (0.5 * (x[:, -1:] - x[:, :1]))
+    degree = _degree(length)
+    weight = 1.0 / u[:, rows]  # (m, intervals, length)
+    m, dof = len(y), len(y) * (length - degree - 2)
+    basis = _orthonormal([weight * x**power for power in range(degree + 1)])
+    left = weight * y[:, rows]
+    for column in basis:
+        left = left - np.sum(column * left, axis=2, keepdims=True) * column
+    gain = _gains(weight, basis, left)
+    after = np.maximum(np.sum(left**2, axis=(0, 2))[:, None] - gain, 0.0)
+    statistic = np.where(_allowed(starts, length, t.size, params.apart), gain / m, 0.0) / np.maximum(1.0, after / dof)
+    place = np.argmax(statistic, axis=1)
+    highest = np.max(statistic, axis=1)
+    best: tuple[float, Change] | None = None
+    # No quantile of F is below that of chi-square; hardly any record without a jump needs scipy's.
+    if m * float(highest.max()) < NormalDist().inv_cdf(0.5 * params.false_alarm / trials) ** 2:
+        return None
+    for i in np.flatnonzero(highest > _threshold(m, dof, params.false_alarm / trials)).tolist():
+        k = int(place[i])
+        design = np.stack([*(x[i] ** power for power in range(degree + 1)), np.arange(length) >= k], axis=1)
+        reach = _correlation(
+            [_residual(w[:, None] * design, w * v) for w, v in zip(weight[:, i], y[:, rows[i]], strict=True)]
+        )
+        corrected = float(highest[i]) / reach
+        chance = trials * _chance(corrected, m, dof / reach)
+        if chance < params.false_alarm and (best is None or corrected > best[0]):
+            best = corrected, Change(int(starts[i]) + k, chance)
+    return None if best is None else best[1]
+
+
+def _scatter(t: F8, y: F8, u: F8, params: Params) -> dict[int, F8]:
+    """By the length of an interval, (m, n): u with what a polynomial of that length misses all along.
+
+    A series that wobbles all along, as one with a second mode does, jumps nowhere, though it wobbles most somewhere.
+    A jump lies in L/(n - L) of the intervals of length L: in two thirds of them or fewer if the series is 2.5 L long.
+    A shorter series takes the excess of the next shorter length.
+    """
+    excess = np.zeros((len(y), 1))
+    found = {}
+    for length in params.lengths:
+        if t.size >= 2.5 * length:
+            rows = _starts(t.size, length)[:, None] + np.arange(length)
+            x = t[rows] - t[rows].mean(axis=1, keepdims=True)
+            powers = (x / np.max(np.abs(x)))[..., None] ** np.arange(_degree(length) + 1)
+            fitted = powers @ np.linalg.pinv(powers)
+            free = length - _degree(length) - 1
+            left = y[:, rows] - np.einsum("ijk,mik->mij", fitted, y[:, rows])
+            noise = np.sum(u[:, rows] ** 2 * (1.0 - np.diagonal(fitted, axis1=1, axis2=2)), axis=2)
+            beyond = (np.sum(left**2, axis=2) - noise) / free
+            excess = np.sqrt(np.maximum(np.quantile(beyond, params.undisturbed, axis=1), 0.0))[:, None]
+        found[length] = np.hypot(u, excess)
+    return found
+
+
+def _degree(length: int) -> int:
+    """Of the polynomials in intervals of a length."""
+    return 3 if length > 10 else 2
+
+
+def _orthonormal(columns: list[F8]) -> list[F8]:
+    """Columns (..., length) made orthonormal along their last axis, one after another."""
+    basis: list[F8] = []
+    for column in columns:
+        for _ in range(2):  # twice, so that rounding leaves nothing where weights differ by much
+            for before in basis:
+                column = column - np.sum(before * column, axis=-1, keepdims=True) * before
+        basis.append(column / np.linalg.norm(column, axis=-1, keepdims=True))
+    return basis
+
+
+def _gains(weight: F8, basis: list[F8], left: F8) -> F8:
+    """(intervals, length): by how much a jump before each point lowers chi-square.
+
+    Sums from the end on give what a step there has in common with the residuals and with the basis.
+    """
+    total = _from_end(weight**2)
+    own = total - sum(_from_end(weight * column) ** 2 for column in basis)
+    # What the polynomial can be as well, to rounding, is no jump.
+    own = np.where(own > 1e-9 * total[:, :, :1], own, np.inf)
+    return np.asarray(np.sum(_from_end(weight * left) ** 2 / own, axis=0))
+
+
+def _from_end(values: F8) -> F8:
+    return np.asarray(np.cumsum(values[..., ::-1], axis=-1)[..., ::-1])
+
+
+def _allowed(starts: I8, length: int, size: int, apart: int) -> NDArray[np.bool_]:
+    """(intervals, length): whether to test for a jump before each point; at an end of the series one point suffices."""
+    k, apart = np.arange(length), min(apart, length // 4)
+    first = np.where(starts == 0, 1, apart)[:, None]
+    last = np.where(starts + length == size, length - 1, length - apart)[:, None]
+    return np.asarray((k >= first) & (k <= last))
+
+
+def _residual(design: F8, y: F8) -> F8:
+    return np.asarray(y - design @ np.linalg.lstsq(design, y, rcond=None)[0])
+
+
+def _correlation(residuals: list[F8]) -> float:
+    """Points that count as one, from what neighbouring residuals have in common."""
+    both = sum(float(each[1:] @ each[:-1]) for each in residuals)
+    rho = both / max(sum(float(each @ each) for each in residuals), 1e-300)
+    return (1.0 + rho) / (1.0 - rho) if rho > 0.0 else 1.0
+
+
+@lru_cache(maxsize=64)
+def _threshold(m: int, dof: float, chance: float) -> float:
+    from scipy.special import fdtri
+
+    return float(fdtri(m, dof, 1.0 - chance))
+
+
+def _chance(statistic: float, m: int, dof: float) -> float:
+    from scipy.special import fdtrc
+
+    return float(fdtrc(m, dof, statistic))

@@ -1,0 +1,385 @@
+"""Demodulate: amplitude, phase, rest position and noise against time, window by window, with covariance.
+
+No library fits every period robustly: on the bundled damped recording, in which clusters of false echoes lie at the
+turning points, one least-squares fit of a damped sine gives the amplitude 3.68 mm wrong, this 0.01 mm
+(``docs/decisions/0004-demodulation-first.md``). :mod:`windows` holds the linear fit and the tuning of its basis, this
+module the passes: let clusters go, rescue, clip, tune, clip.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import AnalysisError
+from pipeline.numerics.regression import scatter, smooth_curve
+from pipeline.numerics.robust import MAD_TO_SIGMA, mad_sigma, median
+from pipeline.samples.condition import Conditioned
+from pipeline.track import F8, U8, Quality
+from pipeline.windows.cycles import Cycles
+from pipeline.windows.sinusoids import Solution, Tuning, Windows, quantile, refit, retune, solve, unwrap
+
+__all__ = ["Demodulated", "Params", "demodulate", "model_error", "polar"]
+
+WEAK = 7.0  # standard uncertainties of an amplitude under which its phase is known to 0.14 rad and less well
+DISTURBING, DRIFTING = 0.1, 0.5  # of the amplitudes' uncertainty; of amplitude and scatter, within a window
+FEWEST_STEADIED = 8  # windows
+VERY_STRONG = 10.0  # difference of BIC: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773
+FINEST = 1e-4  # of the amplitude: scatter below it is a computed record's
+HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, and their quantiles of a normal |x|
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`demodulate`.
+
+    Parameters
+    ----------
+    clip_sigmas : float
+        Residuals beyond this many standard deviations are false echoes and leave the fit.
+    rounds : int
+        Reweighted fits of windows that hold false echoes, before the final ones.
+    """
+
+    clip_sigmas: float = 4.0
+    rounds: int = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Demodulated:
+    """The oscillation in windows of whole periods: what every later stage works on.
+
+    In window j the motion is :math:`o_j + A_j e^{-g\\tau}\\cos(\\omega\\tau + \\varphi_j)`, with :math:`\\tau`
+    counted from the window's centre.
+
+    Parameters
+    ----------
+    t : (w,) float64, s
+        Centres of the windows.
+    amplitude, phase, offset : (w,) float64, m, rad, m
+        The phase is unwrapped, as the total phase of the oscillation at the centre.
+    noise : (w,) float64, m
+        Standard deviation of the samples about the fit, each window by itself.
+    covariance : (w, 3, 3) float64
+        Of (amplitude, phase, offset); windows share no sample, so they are independent of each other.
+    count : (w,) int64
+        Samples that the fit used.
+    angular_frequency : float, rad/s
+        Of the basis.
+    decay : (w,) float64, 1/s
+        g of the basis.
+    residual : (n,) float64, m
+        Every sample less its window's fit; NaN outside all windows and where unmeasured.
+    flags : (n,) uint8
+        The conditioned flags and the false echoes found here.
+    lost : int
+        Windows with too few usable samples, which carry no point.
+    """
+
+    t: F8
+    amplitude: F8
+    phase: F8
+    offset: F8
+    noise: F8
+    covariance: F8
+    count: NDArray[np.int64]
+    angular_frequency: float
+    decay: F8
+    residual: F8
+    flags: U8
+    lost: int
+
+    @cached_property
+    def noise_m(self) -> float:
+        """Standard deviation of one sample over the whole record, m."""
+        dof = np.maximum(self.count - 3, 1)
+        return math.sqrt(float((dof * self.noise**2).sum()) / float(dof.sum()))
+
+
+def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None = None) -> Demodulated:
+    """Fit rest position, amplitude and phase in every window, robustly.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    cycles : Cycles
+    params : Params, optional
+
+    Returns
+    -------
+    Demodulated
+
+    Raises
+    ------
+    AnalysisError
+        If no window holds enough usable samples.
+
+    Notes
+    -----
+    Every window is a linear least-squares problem in :math:`(o, a, b)` of
+    :math:`o + e^{-g\\tau}(a\\cos\\omega\\tau - b\\sin\\omega\\tau)`, all solved together. False echoes come in clusters
+    that move with the bob, a fifth of a period long and more, so the first fit of a window may be pulled by them:
+    weights of Cauchy's form with a scale that shrinks from round to round release them, windows that disagree with
+    their neighbours start again from these, then residuals beyond ``clip_sigmas`` leave the fit permanently. Without
+    :math:`g`, which a second pass knows for each window, the conjugate line would bias the amplitude by
+    :math:`g/2\\omega` of itself.
+    """
+    params = params or Params()
+    windows = Windows.cut(conditioned, cycles.bounds)
+    tuning = Tuning.constant(2.0 * math.pi * cycles.frequency_hz, len(windows.y))
+    basis = windows.basis(tuning.turning, tuning.decay)
+    rough = retune(windows, solve(basis, windows.usable), tuning.angular_frequency, degree=1)
+    basis = windows.decaying(basis, rough.decay)
+    solution, spread = _let_go(windows, basis, conditioned.noise_m, params)
+    _rescue(windows, basis, solution, spread, tuning, params)
+    _clip(windows, basis, solution, spread, rough, params)
+    weights = solution.weights
+    if conditioned.clipped_from_m:
+        level = _typical(_spread(windows.usable, solution.residual), windows, solution)
+        crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
+        windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
+        weights = np.where(crest, 0.0, weights)
+    # Fit again with a basis whose frequency, decay and drift of the rest position are those of each window.
+    windows = _steadied(windows, solution, spread, tuning.angular_frequency)
+    tuning = retune(windows, solution, tuning.angular_frequency)
+    basis = windows.basis(tuning.turning, tuning.decay)
+    solution = solve(basis, weights)
+    spread = _spread(windows.usable, solution.residual)
+    _clip(windows, basis, solution, spread, tuning, params)
+    return _finish(conditioned, windows, solution, tuning)
+
+
+def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tuple[Solution, F8]:
+    """Fit every window; those that scatter more than noise does, with weights that ignore clusters of echoes.
+
+    Returns the fits and the spreads about them (w,).
+    """
+    solution = solve(basis, windows.usable.copy())  # what is put into it must not reach the windows
+    spread = _spread(windows.usable, solution.residual)
+    odd = np.flatnonzero(spread > 1.3 * noise_m)
+    if odd.size:
+        size, least = np.abs(solution.residual[odd]), noise_m + windows.tiny
+        solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, HALF, least, params.rounds))
+        spread[odd] = _spread(windows.usable[odd], solution.residual[odd])
+    return solution, spread
+
+
+def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
+    """Fit windows that disagree with their neighbours again, starting from what the neighbours predict.
+
+    Puts what it finds into the solution and its spreads.
+
+    Where false echoes hold half of a window its own fit may have settled on them; the amplitude, phase and rest
+    position of the windows around it tell which half to believe.
+    """
+    n = len(windows.y)
+    if n < 5:
+        return
+    # Turned back to one instant, so that medians are taken of slow quantities.
+    turning = np.exp(1j * tuning.angular_frequency * (windows.centre - windows.centre[0]))
+    steady = (solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]) / turning
+    slow = np.stack([solution.coefficients[:, 0], steady.real, steady.imag])
+    around = np.sort(slow[:, _neighbours(n)], axis=2)
+    last = around.shape[2] - 1
+    rest, *pair = 0.5 * (around[:, :, last // 2] + around[:, :, (last + 1) // 2])
+    smooth = (pair[0] + 1j * pair[1]) * turning
+    expected = np.stack([rest, smooth.real, smooth.imag], axis=1)
+    away = np.abs(solution.coefficients - expected).max(axis=1)
+    level = _typical(spread, windows, solution)
+    bound = params.clip_sigmas * level
+    before = np.sum((np.abs(solution.residual) <= bound) * windows.usable, axis=1)
+    few = before < 0.7 * windows.usable.sum(axis=1)
+    odd = np.flatnonzero((away > 5.0 * mad_sigma(away)) | few | ~solution.good)
+    if not odd.size:
+        return
+    part, usable = basis[odd], windows.usable[odd]
+    size = np.abs(part[:, 3] - (expected[odd, None, :] @ part[:, :3])[:, 0])
+    # A third of the samples is believed at first, so that echoes may hold more than half of a window.
+    trial = _reweighted(part, usable, size, THIRD, level, params.rounds)
+    after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
+    better = trial.good & ((after > before[odd]) | ~solution.good[odd])
+    solution.put(odd[better], trial.part(better))
+    spread[odd[better]] = _spread(usable[better], trial.residual[better])
+
+
+def _reweighted(basis: F8, usable: F8, size: F8, believed: tuple[float, float], least: float, rounds: int) -> Solution:
+    """Fit windows with weights of Cauchy's form, :math:`(1 + (r/s)^2)^{-2}`, from residuals of a given size (w, l).
+
+    The scale s is that of the share of samples which is believed, with its quantile of a normal |x|; ``least`` at
+    least.
+    """
+    for _ in range(rounds):
+        spread = np.maximum(quantile(size, usable, believed[0]) / believed[1], least)
+        solution = solve(basis, usable / (1.0 + (size / spread[:, None]) ** 2) ** 2)
+        size = np.abs(solution.residual)
+    return solution
+
+
+def _neighbours(n: int) -> NDArray[np.int64]:
+    """(n, 6 or fewer): the nearest other windows of each, one-sided at the record's ends."""
+    reach = min(7, n)
+    first = np.clip(np.arange(n) - reach // 2, 0, n - reach)
+    block = first[:, None] + np.arange(reach)
+    others: NDArray[np.int64] = block[block != np.arange(n)[:, None]].reshape(n, reach - 1)
+    return others
+
+
+def _spread(usable: F8, residual: F8) -> F8:
+    """(w,): standard deviation of each window's samples about its fit, from their median."""
+    return quantile(np.abs(residual), usable, HALF[0]) / HALF[1]
+
+
+def _steadied(windows: Windows, solution: Solution, spread: F8, omega: float) -> Windows:
+    """Take out by how much a drifting rest position moves within each window, where that would disturb amplitudes.
+
+    A window fits a constant, so that of a rest that moves by R over a record of length T all amplitudes are off by up
+    to :math:`2R/\\omega T`, alike where windows begin alike. With X by which a straight line through the N rest
+    positions, of standard deviation :math:`\\sigma`, lowers chi-square, that is :math:`\\sqrt{24 X}/\\omega T` of
+    their mean's uncertainty, :math:`\\sqrt{2/N}\\sigma`.
+    """
+    good = solution.good
+    if np.count_nonzero(good) < FEWEST_STEADIED:
+        return windows
+    t, rest = windows.centre[good], solution.coefficients[good, 0]
+    u = _typical(spread, windows, solution) / np.sqrt(solution.normal[good, 0, 0])
+    deviation = (rest - rest.mean()) / u
+    if 24.0 * (float(deviation @ deviation) - t.size) < (DISTURBING * omega * (t[-1] - t[0])) ** 2:
+        return windows
+    curve, gain = smooth_curve(t, rest, scatter(t, rest, u))
+    if not gain > VERY_STRONG:
+        return windows
+    moved = curve(windows.centre[:, None] + windows.tau) - curve(windows.centre)[:, None]
+    size = np.hypot(solution.coefficients[good, 1], solution.coefficients[good, 2])
+    if np.any(np.abs(moved[good]).max(axis=1) > DRIFTING * np.hypot(size, spread[good])):
+        return windows  # a hand, or another motion: no drift of this one's rest
+    return replace(windows, y=np.where(windows.placed, windows.y - moved, 0.0))
+
+
+def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
+    """The spread that is typical of the record's windows."""
+    return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
+
+
+def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
+    """Take residuals beyond the clip out and fit again."""
+    level = _typical(spread, windows, solution)
+    # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
+    size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
+    least = model_error(size, tuning.decay, tuning.angular_frequency)
+    bound = params.clip_sigmas * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
+    refit(basis, solution, np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0))
+
+
+def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:
+    """Residual that a sinusoid can leave in a motion without noise, m; smaller residuals are never echoes.
+
+    A ten-thousandth of the amplitude, and twice the third harmonic :math:`A g/20\\omega` of quadratic drag.
+    """
+    return (FINEST + np.abs(decay) / (10.0 * angular_frequency)) * np.abs(amplitude)
+
+
+def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuning: Tuning) -> Demodulated:
+    good, weights = solution.good, solution.weights
+    if not good.any():
+        raise AnalysisError(
+            "no period of the record holds enough usable samples for a fit; see the counts of flagged samples"
+        )
+    counts = (weights > 0).sum(axis=1)
+    squares = np.sum(weights * solution.residual**2, axis=1)
+    noise = np.sqrt(squares / np.maximum(counts - 3, 1))
+    pooled = math.sqrt(np.sum(squares[good]) / max(np.sum(counts[good] - 3), 1))
+    pooled = _with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
+    # A window's own noise is known to a tenth only: it is drawn towards the record's.
+    prior = 30.0
+    shrunk = ((prior * pooled**2 + counts * noise**2) / (prior + counts))[good]
+    _, a, b = solution.coefficients[good].T
+    t = windows.centre[good]
+    smooth = unwrap(np.arctan2(b, a), t, tuning.angular_frequency) if tuning.phase is None else tuning.phase[good]
+    expected = None if tuning.amplitude is None else tuning.amplitude[good]
+    amplitude, phase, covariance = polar(a, b, solution.inverse[good] * shrunk[:, None, None], smooth, expected)
+    flags = conditioned.flags.copy()
+    inside = windows.placed & good[:, None]
+    echoes = inside & (windows.usable > 0) & (weights == 0)
+    flags[windows.rows[echoes]] |= np.uint8(Quality.FALSE_ECHO)
+    crests = inside & (windows.usable == 0)
+    if crests.any():
+        crests &= flags[windows.rows] == 0
+        flags[windows.rows[crests]] |= np.uint8(Quality.CLIPPED)
+    residual = np.full(len(conditioned.track), np.nan)
+    residual[windows.rows[inside]] = solution.residual[inside]
+    return Demodulated(
+        t,
+        amplitude,
+        phase,
+        solution.coefficients[good, 0] + windows.level,
+        noise[good],
+        covariance,
+        counts[good],
+        tuning.angular_frequency,
+        tuning.decay[good],
+        residual,
+        flags,
+        int(np.count_nonzero(~good)),
+    )
+
+
+def _with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
+    """The record's noise, drawn towards the one that sensor or scene state, if the two agree.
+
+    A stated noise counts as much as thirty samples; it matters to records of a few periods only.
+    """
+    if stated_m is None or abs(noise_m / stated_m - 1.0) > 3.3 / math.sqrt(2.0 * max(dof, 1.0)):
+        return noise_m
+    return math.sqrt((dof * noise_m**2 + 30.0 * stated_m**2) / (dof + 30.0))
+
+
+def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 | None) -> tuple[F8, F8, F8]:
+    """Return amplitude, total phase and covariance of (amplitude, phase, offset) of windows.
+
+    Parameters
+    ----------
+    a, b : (w,) float64, m
+        Of :math:`a\\cos\\omega\\tau - b\\sin\\omega\\tau`.
+    covariance : (w, 3, 3) float64
+        Of (offset, a, b).
+    smooth_phase : (w,) float64, rad
+        Total phase from a smooth curve through the record; says how many turns lie between windows.
+    smooth_amplitude : (w,) float64, m, or None
+        The same of the amplitude.
+
+    Notes
+    -----
+    An amplitude from :math:`\\sqrt{a^2+b^2}` is too large by half the variance of the phase, which is taken off. Where
+    the smooth amplitude is below seven of its uncertainties, amplitude and phase are read along and across the smooth
+    phase instead: linear in a and b, they are right on average in the deepest noise, and an amplitude may come out
+    negative.
+    """
+    size = np.hypot(a, b)
+    # What is nothing beside the others divides by nothing smaller, whatever the record's unit.
+    least = 1e-30 * float(size.max()) + 1e-150
+    size = np.maximum(size, least)
+    along, scale = np.arctan2(b, a), size
+    weak = np.zeros(a.size, np.bool_)
+    if smooth_amplitude is not None:
+        u = np.sqrt(0.5 * (covariance[:, 1, 1] + covariance[:, 2, 2]))
+        # So is a window without a swing, whatever the curve says there.
+        weak = (smooth_amplitude < WEAK * u) | (size < u)
+        along = np.where(weak, smooth_phase, along)
+        scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
+    cosine, sine = np.cos(along), np.sin(along)
+    turned = np.remainder(along - smooth_phase + math.pi, 2.0 * math.pi) - math.pi
+    if np.ptp(turned) > math.pi:
+        turned[~weak] = np.unwrap(turned[~weak])
+    turned = np.where(weak, (b * cosine - a * sine) / scale, turned)
+    # Derivatives of (amplitude, phase, offset) by (offset, a, b): along the phase, and across it over the amplitude.
+    slope = np.zeros_like(covariance)
+    slope[:, 0, 1], slope[:, 0, 2] = cosine, sine
+    slope[:, 1, 1], slope[:, 1, 2] = -sine / scale, cosine / scale
+    slope[:, 2, 0] = 1.0
+    turned_into = slope @ covariance @ slope.transpose(0, 2, 1)
+    amplitude = np.where(weak, a * cosine + b * sine, size * (1.0 - 0.5 * np.minimum(turned_into[:, 1, 1], 1.0)))
+    return np.where(amplitude == 0.0, least, amplitude), smooth_phase + turned, turned_into

@@ -1,0 +1,173 @@
+"""Disturbances: what a real record holds beside the main oscillation, found and taken out where it would do harm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pipeline.samples.condition import Conditioned
+from pipeline.track import F8
+from pipeline.windows import sideways as swings
+from pipeline.windows import steps as jumps
+from pipeline.windows.cycles import Cycles
+from pipeline.windows.demodulate import Demodulated, demodulate
+from pipeline.windows.demodulate import Params as Demodulation
+from pipeline.windows.modes import Sideways
+from pipeline.windows.sideways import find_sideways
+from pipeline.windows.steps import Step, find_steps, staircase, weighed
+
+__all__ = ["Disturbances", "Params", "separate"]
+
+SHARE = 0.1  # of the uncertainty that an effect may disturb without being modelled
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`separate`.
+
+    Parameters
+    ----------
+    sideways : pipeline.windows.sideways.Params
+    steps : pipeline.windows.steps.Params
+    modes : bool
+        Whether modes are looked for at all.
+    rounds : int
+        Most times that the modes are looked for, with the windows' fits of the record without them.
+    """
+
+    sideways: swings.Params = field(default_factory=swings.Params)
+    steps: jumps.Params = field(default_factory=jumps.Params)
+    modes: bool = True
+    rounds: int = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Disturbances:
+    """What was found beside the main oscillation.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+        The record without it: what later stages work on.
+    sideways : Sideways
+        Modes, harmonics and products of both.
+    modelled : bool
+        Whether ``sideways`` was taken out: it would disturb the amplitude by more than a tenth of its uncertainty.
+    leak_m : float
+        By how much it would, m.
+    steps : tuple of Step
+        Of the rest position; always taken out.
+    position : (n,) float64, m
+        What was taken out, at the record's times.
+    """
+
+    conditioned: Conditioned
+    sideways: Sideways
+    modelled: bool
+    leak_m: float
+    steps: tuple[Step, ...]
+    position: F8
+
+    @classmethod
+    def nothing(cls, conditioned: Conditioned) -> Disturbances:
+        """Return what says that nothing was found, or sought."""
+        return cls(conditioned, Sideways((), None), False, 0.0, (), np.zeros(len(conditioned.track)))
+
+    def __bool__(self) -> bool:
+        return self.modelled or bool(self.steps)
+
+    def columns(self, t: F8) -> F8:
+        """Return (n, k): what was taken out, as columns of a fit that is linear in them."""
+        parts = [np.empty((t.size, 0))]
+        if self.modelled:
+            parts.append(self.sideways.columns(t))
+        parts.extend((t >= step.time.value).astype(np.float64)[:, None] for step in self.steps)
+        return np.concatenate(parts, axis=1)
+
+
+def separate(
+    conditioned: Conditioned,
+    cycles: Cycles,
+    demodulated: Demodulated,
+    params: Params | None = None,
+    demodulation: Demodulation | None = None,
+) -> tuple[Demodulated, Disturbances]:
+    """Look for modes and steps, and demodulate again without them.
+
+    Parameters
+    ----------
+    conditioned, cycles, demodulated
+        Outputs of the stages of those names.
+    params : Params, optional
+    demodulation : pipeline.windows.demodulate.Params, optional
+
+    Returns
+    -------
+    demodulated : Demodulated
+        Of the record without what was found; as given where nothing was.
+    disturbances : Disturbances
+
+    Notes
+    -----
+    A mode of amplitude B at a distance :math:`\\Delta f` from the main frequency leaves up to
+    :math:`B/(\\pi\\,\\Delta f\\,T)` in the amplitude of a record of length T. Where that is less than a tenth of the
+    amplitude's standard uncertainty the mode is reported and left where it is. Where it is taken out, the windows'
+    variances grow by what it costs to know it from the same samples.
+    """
+    params = params or Params()
+    sideways = find_sideways(conditioned, demodulated, params.sideways) if params.modes else Sideways((), None)
+    leak_m = _leak(sideways)
+    modelled = bool(sideways) and leak_m > SHARE * _u_amplitude(demodulated)
+    t, taken = conditioned.track.t, np.zeros(len(conditioned.track))
+    for again in range(params.rounds if modelled else 0):
+        if again:
+            # The windows' fits without the modes tell false echoes and the main oscillation better.
+            sideways = find_sideways(conditioned, demodulated, params.sideways) or sideways
+        taken = sideways.position(t)
+        demodulated = demodulate(conditioned.less(taken), cycles, demodulation)
+    if modelled:
+        demodulated = replace(demodulated, covariance=demodulated.covariance * _price(sideways))
+    steps = find_steps(conditioned.less(taken), demodulated, params.steps)
+    if steps:
+        demodulated = demodulate(conditioned.less(taken + staircase(steps, t)), cycles, demodulation)
+        steps, demodulated = weighed(steps, demodulated)
+        taken = taken + staircase(steps, t)
+    return demodulated, Disturbances(conditioned.less(taken), sideways, modelled, leak_m, steps, taken)
+
+
+def _u_amplitude(demodulated: Demodulated) -> float:
+    return 1.0 / math.sqrt(float(np.sum(1.0 / np.maximum(demodulated.covariance[:, 0, 0], 1e-300))))
+
+
+def _price(sideways: Sideways) -> float:
+    """By what factor variances grow because the modes were estimated from the same samples.
+
+    That of rest position, amplitude, phase, frequency and decay, whichever grows most, from the normal equations with
+    and without the modes' columns, on a dozen times a period.
+    """
+    carrier = sideways.carrier
+    assert carrier is not None
+    start, end = carrier.t[0], carrier.t[-1]
+    t = np.linspace(start, end, int(12 * (end - start) * carrier.angular_frequency / (2.0 * math.pi)))
+    wave, x = carrier.wave(t), (t - start) / (end - start) - 0.5
+    pair = np.array([wave.real, wave.imag])
+    main = np.concatenate([np.ones((1, t.size)), pair, x * pair])
+    both = np.concatenate([main, sideways.columns(t).T])
+    both /= np.linalg.norm(both, axis=1)[:, None]
+    alone = np.linalg.pinv(both[:5] @ both[:5].T, hermitian=True)
+    together = np.linalg.pinv(both @ both.T, hermitian=True)[:5, :5]
+    return max(1.0, float(np.max(np.diag(together) / np.diag(alone))))
+
+
+def _leak(sideways: Sideways) -> float:
+    """The most that any mode would leave in the amplitude of the main oscillation, m."""
+    if sideways.carrier is None:
+        return 0.0
+    carrier = sideways.carrier
+    main, seconds = carrier.angular_frequency / (2.0 * math.pi), float(carrier.t[-1] - carrier.t[0])
+    return max(
+        (mode.amplitude.value / (math.pi * abs(mode.frequency.value - main) * seconds) for mode in sideways.modes),
+        default=0.0,
+    )

@@ -1,0 +1,237 @@
+"""Modes: the main oscillation and those beside it, as functions of time and as columns of a linear fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.robust import mad_sigma
+from pipeline.track import F8
+from pipeline.windows.demodulate import Demodulated
+
+__all__ = ["C16", "Carrier", "Mode", "Sideways", "rotating"]
+
+C16 = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carrier:
+    """The main oscillation as the windows show it, smooth, whatever law it follows.
+
+    Parameters
+    ----------
+    t : (k,) float64, s
+        Nodes: the windows' centres and the record's ends.
+    amplitude, turning, rest : (k,) float64, m, rad, m
+        At the nodes; ``turning`` is the phase beyond ``angular_frequency`` times t - t[0].
+    angular_frequency : float, rad/s
+    degree, rest_degree : int
+        Of the polynomials in time.
+    """
+
+    t: F8
+    amplitude: F8
+    turning: F8
+    rest: F8
+    angular_frequency: float
+    degree: int
+    rest_degree: int
+
+    @classmethod
+    def through(cls, demodulated: Demodulated, start: float, end: float) -> Carrier:
+        """Draw polynomials through the windows' amplitudes, phases and rest positions."""
+        t, omega = demodulated.t, demodulated.angular_frequency
+        degree, rest_degree = min(8, max(1, t.size // 6)), min(6, max(1, t.size // 10))
+        turning = demodulated.phase - omega * (t - start)
+        nodes = np.concatenate([[start], t, [end]])
+        centre, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[-1] - t[0])
+        powers = np.polynomial.legendre.legvander((nodes - centre) / half, max(degree, rest_degree))
+        return cls(
+            nodes,
+            _smooth(powers[:, : degree + 1], demodulated.amplitude),
+            _smooth(powers[:, : degree + 1], turning),
+            _smooth(powers[:, : rest_degree + 1], demodulated.offset),
+            omega,
+            degree,
+            rest_degree,
+        )
+
+    def phase(self, t: F8) -> F8:
+        """Return the total phase at t (n,), rad."""
+        return np.asarray(self.angular_frequency * (t - self.t[0]) + np.interp(t, self.t, self.turning))
+
+    def position(self, t: F8) -> F8:
+        """Return rest position and oscillation at t (n,), m."""
+        return np.asarray(self.swing(t) + np.interp(t, self.t, self.rest))
+
+    def swing(self, t: F8) -> F8:
+        """Return the oscillation about the rest position at t (n,), m."""
+        return np.asarray(np.interp(t, self.t, self.amplitude) * np.cos(self.phase(t)))
+
+    def wave(self, t: F8) -> C16:
+        """Return the oscillation at t (n,) as :math:`e^{i\\varphi}` times the amplitude over its largest value."""
+        relative = np.interp(t, self.t, self.amplitude / float(np.max(self.amplitude)))
+        return rotating(relative, self.phase(t))
+
+
+def rotating(size: F8, angle: F8) -> C16:
+    """Return size (n,) times :math:`e^{i\\,\\mathrm{angle}}`: a fourth of the time of numpy's complex exponential."""
+    wave = np.empty(angle.shape, np.complex128)
+    np.multiply(size, np.cos(angle), out=wave.real)
+    np.multiply(size, np.sin(angle), out=wave.imag)
+    return wave
+
+
+def _smooth(powers: F8, y: F8) -> F8:
+    """Polynomial through points (w,), without those far off, at the points and a node before and after, (w + 2,)."""
+    design, most = powers[1:-1], 2 * powers.shape[1]
+    values = np.linalg.lstsq(design, y, rcond=None)[0]
+    away = np.abs(y - design @ values)
+    kept = away <= 5.0 * mad_sigma(away)
+    if np.count_nonzero(kept) > most and not kept.all():
+        values = np.linalg.lstsq(design[kept], y[kept], rcond=None)[0]
+    return np.asarray(powers @ values)
+
+
+@lru_cache(maxsize=16)
+def _powers_of_legendre(degree: int) -> F8:
+    """(degree + 1, degree + 1): power series of the Legendre polynomials, in columns. One takes numpy 0.2 ms."""
+    series = np.zeros((degree + 1, degree + 1))
+    for k, row in enumerate(np.eye(degree + 1)):
+        series[: k + 1, k] = np.polynomial.legendre.leg2poly(row[: k + 1])
+    return series
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mode:
+    """One oscillation beside the main one: :math:`\\mathrm{Re}\\,E(t) w(t)`.
+
+    The envelope E is a polynomial in time, the wave w turns: at the mode's own frequency, with an exponential decay; or
+    as the power :math:`b` of the main oscillation's and :math:`a` of the first mode's.
+
+    Parameters
+    ----------
+    turns : (int, int)
+        a and b, of the first mode and of the main oscillation; (1, 0) is a mode by itself.
+    frequency : Estimate
+        Mean, Hz.
+    amplitude : Estimate
+        Root mean square of :math:`|E w|` over the record, m.
+    decay : Estimate
+        Logarithmic rate of a mode's own wave, 1/s; 0 for harmonics and products.
+    false_alarm : float
+        Probability that a record without it shows it.
+    span : (float, float)
+        First and last time used, s. Beyond it envelope and decay stay as they are there.
+    coefficients : (degree + 1,) complex128, m
+        Of the envelope, in Legendre polynomials over ``span``.
+    """
+
+    turns: tuple[int, int]
+    frequency: Estimate
+    amplitude: Estimate
+    decay: Estimate
+    false_alarm: float
+    span: tuple[float, float]
+    coefficients: C16
+
+    @property
+    def kind(self) -> Literal["mode", "harmonic", "product"]:
+        """Of another frequency; a multiple of the main one's; or a sum or difference of turns of both."""
+        if self.turns == (1, 0):
+            return "mode"
+        return "product" if self.turns[0] else "harmonic"
+
+    @property
+    def degree(self) -> int:
+        """Of the envelope's polynomial."""
+        return self.coefficients.size - 1
+
+    def wave(self, t: F8, main: C16, first: C16 | None) -> C16:
+        """Return w at times t (n,), given the waves (n,) of the main oscillation and of the first mode."""
+        a, b = self.turns
+        if self.kind == "mode":
+            reach, angle = (
+                0.5 * (self.span[1] - self.span[0]),
+                2.0 * math.pi * self.frequency.value * (t - self.span[0]),
+            )
+            return rotating(np.exp(-self.decay.value * reach * self._x(t)), angle)
+        factors = [main if b > 0 else np.conj(main)] * abs(b) + ([] if first is None else [first] * a)
+        return np.asarray(math.prod(factors[1:], start=factors[0]))
+
+    def envelope(self, t: F8) -> C16:
+        """Return E at times t (n,), m."""
+        if not self.degree:
+            return np.broadcast_to(self.coefficients, t.shape)
+        x, powers = self._x(t), _powers_of_legendre(self.degree) @ self.coefficients
+        envelope = np.full(t.shape, powers[-1])
+        for coefficient in powers[-2::-1]:
+            envelope *= x
+            envelope += coefficient
+        return envelope
+
+    def whole(self, t: F8, wave: C16) -> C16:
+        """Return the wave of which products are made: with the envelope, over the amplitude."""
+        return np.asarray(wave * self.envelope(t) / self.amplitude.value)
+
+    def columns(self, t: F8, wave: C16) -> F8:
+        """Return (n, 2 (degree + 1)): what real and imaginary parts of the coefficients are multiplied by."""
+        powers = np.polynomial.legendre.legvander(self._x(t), self.degree).T if self.degree else np.ones((1, 1))
+        rows = np.empty((self.degree + 1, 2, t.size))
+        np.multiply(powers, wave.real, out=rows[:, 0])  # Re (x + iy) w = x Re w - y Im w
+        np.multiply(powers, -wave.imag, out=rows[:, 1])
+        return rows.reshape(-1, t.size).T
+
+    def _x(self, t: F8) -> F8:
+        start, end = self.span
+        return np.asarray(np.clip(2.0 * (t - start) / (end - start) - 1.0, -1.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sideways:
+    """Every mode found, the strongest of another frequency first.
+
+    Parameters
+    ----------
+    modes : tuple of Mode
+    carrier : Carrier or None
+        None where the record is too short to look.
+    first : Mode or None
+        The mode that products are made of, as it was when they were sought.
+    """
+
+    modes: tuple[Mode, ...]
+    carrier: Carrier | None
+    first: Mode | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.modes)
+
+    def columns(self, t: F8) -> F8:
+        """Return the basis (n, k) of all modes at times t (n,) for a fit that is linear in them."""
+        columns = (mode.columns(t, wave) for mode, wave in self._waves(t))
+        return np.concatenate([np.empty((t.size, 0)), *columns], axis=1)
+
+    def position(self, t: F8) -> F8:
+        """Return what all modes add to the distance at t (n,), m."""
+        total = np.zeros(t.size)
+        for mode, wave in self._waves(t):
+            total += (mode.envelope(t) * wave).real
+        return total
+
+    def _waves(self, t: F8) -> Iterator[tuple[Mode, C16]]:
+        if self.carrier is None or not self.modes:
+            return
+        main, first = self.carrier.wave(t), None
+        for mode in self.modes:
+            wave = mode.wave(t, main, first)
+            if first is None and self.first is not None:
+                first = self.first.whole(t, wave)  # it stands first among the modes
+            yield mode, wave

@@ -1,0 +1,378 @@
+"""Segments: the part of a record in which one free oscillation runs, and what the hand did before, between and after.
+
+The amplitude of a free oscillation falls smoothly and its phase turns steadily. A bob that hangs still, is lifted, held
+or caught has another; a restart, a touch, lost rows or a clock that stood still break either from one period to the
+next: amplitude and phase jump.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.numerics.robust import median
+from pipeline.samples.condition import Conditioned
+from pipeline.track import F8, Quality, Track
+from pipeline.windows import change_points
+from pipeline.windows.change_points import find_changes, lone_points
+from pipeline.windows.cycles import Cycles
+from pipeline.windows.demodulate import FINEST, Demodulated
+
+__all__ = ["Break", "BreakKind", "Params", "Segments", "Span", "SpanKind", "find_free_part"]
+
+MOST_DECAY = 300.0  # logarithm, beyond which numbers overflow
+BRIDGED = 3  # samples that noise may take off a plateau on which a hand holds the bob
+# Of a jump of the phase, that the amplitude's may be besides: one touch in sixteen, at any moment, does no more.
+ALONE = 0.1
+NEAR = 5  # windows on either side of a break or of still windows, from which the motion is continued there
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`find_free_part`.
+
+    Parameters
+    ----------
+    changes : pipeline.windows.change_points.Params
+        Of the search for jumps; its probability of a false alarm holds for still windows too.
+    least_windows : int
+        Fewest of a part that is analysed: a damped oscillation has four parameters.
+    share : float
+        Of the greatest amplitude: a part with less is what the hand left of a motion, and is not analysed.
+    rest_share : float
+        Share of a record that must follow after the motion is lost in the noise, for it to be left out. Less does no
+        harm to a fit.
+    most_fall : float
+        Of the logarithm of the amplitude from window to window, behind the greatest, up to which jumps are searched.
+        The sinusoid of a window has one decay, which misses a stronger one by the square of it (0.4 %): more than
+        noise, and most where the motion begins.
+    held_periods : float
+        For which a distance stays on a plateau only where a hand holds the bob. A crest that is cut above the rest
+        position lasts half a period at most.
+    """
+
+    changes: change_points.Params = field(default_factory=change_points.Params)
+    least_windows: int = 5
+    share: float = 0.2
+    rest_share: float = 0.3
+    most_fall: float = 0.06
+    held_periods: float = 0.75
+
+
+class SpanKind(StrEnum):
+    """What the bob does in seconds that were left out."""
+
+    AT_REST = "at_rest"  # nothing but noise
+    WAITING = "waiting"  # the same, up to the recording's own trigger
+    HANDLED = "handled"  # neither still nor free
+    FREE = "free"  # another free oscillation
+
+
+class BreakKind(StrEnum):
+    """How one free oscillation becomes another."""
+
+    RESTARTED = "restarted"  # with a pause between
+    TOUCHED = "touched"  # the amplitude jumps
+    PHASE_JUMP = "phase_jump"  # the phase alone
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Seconds of a record that were left out.
+
+    Parameters
+    ----------
+    kind : SpanKind
+    first_s, last_s : float
+    """
+
+    kind: SpanKind
+    first_s: float
+    last_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Break:
+    """Where one free oscillation ends and another begins.
+
+    Parameters
+    ----------
+    kind : BreakKind
+    time_s, u_s : float
+    amplitude : float
+        Relative change of the amplitude.
+    phase : float
+        Change of the phase, rad.
+    """
+
+    kind: BreakKind
+    time_s: float
+    u_s: float
+    amplitude: float
+    phase: float
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """The part of a record that is analysed, and what is not.
+
+    Parameters
+    ----------
+    first_s, last_s : float
+        The part's seconds.
+    left_out : tuple of Span
+        In order of time.
+    breaks : tuple of Break
+        In order of time.
+    """
+
+    first_s: float
+    last_s: float
+    left_out: tuple[Span, ...]
+    breaks: tuple[Break, ...] = ()
+
+    def flagged(self, track: Track) -> Track:
+        """Return a track with the samples outside the part flagged."""
+        outside = ~((track.t >= self.first_s) & (track.t <= self.last_s))
+        return replace(track, flags=track.flags | np.where(outside, np.uint8(Quality.OUTSIDE), np.uint8(0)))
+
+    def within(self, before: Segments | None) -> Segments:
+        """Return these, found in the part of others, together with what those left out."""
+        if before is None:
+            return self
+        spans = sorted((*before.left_out, *self.left_out), key=lambda span: span.first_s)
+        breaks = sorted((*before.breaks, *self.breaks), key=lambda each: each.time_s)
+        first_s, last_s = max(self.first_s, before.first_s), min(self.last_s, before.last_s)
+        return Segments(first_s, last_s, tuple(spans), tuple(breaks))
+
+
+def find_free_part(
+    conditioned: Conditioned, cycles: Cycles, windows: Demodulated, params: Params | None = None
+) -> Segments | None:
+    """Return the longest part in which one free oscillation runs; None where that is the whole record.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    cycles : Cycles
+    windows : Demodulated
+    params : Params, optional
+
+    Notes
+    -----
+    Of n windows without any motion the greatest amplitude exceeds :math:`r u = \\sqrt{2 \\ln(n/\\alpha)}\\,u` with
+    probability :math:`\\alpha` (Rayleigh's distribution). Windows below that, where a straight line through their
+    neighbours' amplitudes continues to twice as much, are still. Between still windows the record is parted where
+    amplitude and phase jump, see :func:`pipeline.windows.change_points.find_changes`; the decay and the turning that
+    are usual in the record are taken out before, so that a cubic follows what is left. Where in its window a bob was
+    touched is not known: a window on either side of a jump is left out.
+    """
+    params = params or Params()
+    held = _held(conditioned, cycles, params.held_periods)
+    if held is not None:
+        return held
+    if windows.t.size < 2 * params.least_windows:
+        return None
+    series = _Series.of(windows, params.changes.false_alarm)
+    moving = series.moving()
+    if moving < (1.0 - params.rest_share) * series.t.size:
+        return _faded(series, moving)
+    if series.fall > params.most_fall:
+        return None
+    return _chosen(series, series.parts(params.changes), conditioned, params)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """Windows first to stop - 1, between jumps or still ones."""
+
+    first: int
+    stop: int
+    still: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Series:
+    """The windows in a frame that turns with the oscillation.
+
+    ``values`` and ``u`` (2, w) are amplitude, m, and phase, rad, with their uncertainties, less the decay and the
+    turning that are usual in the record; ``size`` (w,) is the amplitude itself; ``far`` is by how many uncertainties
+    noise alone goes.
+    """
+
+    t: F8
+    values: F8
+    u: F8
+    size: F8
+    far: float
+
+    @classmethod
+    def of(cls, windows: Demodulated, false_alarm: float) -> _Series:
+        t, size = windows.t, np.abs(windows.amplitude)
+        least = 1e-12 * float(size.max()) + 1e-150
+        u = np.maximum(np.sqrt(windows.covariance[:, 0, 0]), np.maximum(FINEST * size, least))
+        far = math.sqrt(2.0 * math.log(t.size / false_alarm))
+        strong = size > far * u
+        both = strong[1:] & strong[:-1]
+        omega, rate = windows.angular_frequency, 0.0
+        if both.any():
+            step = np.diff(t)[both]
+            omega = median(np.diff(windows.phase)[both] / step)
+            rate = median(-np.diff(np.log(np.maximum(size, least)))[both] / step)
+        turned = windows.amplitude * np.exp(1j * (windows.phase - omega * t))
+        phase, u_phase = np.unwrap(np.angle(turned)), u / np.maximum(size, u)
+        steady = np.exp(np.clip(rate * (t - t[0]), -MOST_DECAY, MOST_DECAY))
+        return cls(t, np.array([size * steady, phase]), np.array([u * steady, u_phase]), size, far)
+
+    @property
+    def spacing(self) -> float:
+        """Time between windows, s."""
+        return median(np.diff(self.t))
+
+    @property
+    def weak(self) -> NDArray[np.bool_]:
+        """(w,): whether noise can explain a deviation of this size."""
+        return np.asarray(self.values[0] <= self.far * self.u[0])
+
+    @property
+    def fall(self) -> float:
+        """Of the logarithm of the amplitude from window to window, behind the greatest."""
+        first = int(np.argmax(self.size))
+        steps = -np.diff(np.log(np.maximum(self.size[first : first + NEAR + 3], self.u[0, first])))
+        return median(steps) if steps.size else 0.0
+
+    def moving(self) -> int:
+        """Number of windows up to the last two running that stand out of the noise."""
+        out = ~self.weak
+        pairs = np.flatnonzero(out[1:] & out[:-1])
+        return int(pairs[-1]) + 2 if pairs.size else 0
+
+    def parts(self, params: change_points.Params) -> list[_Part]:
+        """The record cut into still windows, and what lies between jumps."""
+        weak = self.weak
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], weak, [False]])))
+        parts, begin = [], 0
+        for first, stop in edges.reshape(-1, 2).tolist():
+            if self.stands_still(first, stop, weak):
+                parts += [*self.between_jumps(begin, first, params), _Part(first, stop, True)]
+                begin = stop
+        return [*parts, *self.between_jumps(begin, self.t.size, params)]
+
+    def stands_still(self, first: int, stop: int, weak: NDArray[np.bool_]) -> bool:
+        """Whether the moving windows before or after weak ones continue to twice what noise shows there."""
+        before, after = np.flatnonzero(~weak[:first])[-NEAR:], stop + np.flatnonzero(~weak[stop:])[:NEAR]
+        return any(
+            rows.size >= NEAR and self.continued(rows, k)[0] > 2.0 * self.far * self.u[0, k]
+            for rows, k in ((before, first), (after, stop - 1))
+        )
+
+    def continued(self, rows: NDArray[np.int64], k: float) -> F8:
+        """(2,): what windows continue to at window k, along straight lines of median slopes."""
+        t = self.t[rows] - np.interp(k, np.arange(self.t.size), self.t)
+        slope = np.median(np.diff(self.values[:, rows]) / np.diff(t), axis=1)
+        return np.asarray(np.median(self.values[:, rows] - slope[:, None] * t, axis=1))
+
+    def between_jumps(self, first: int, stop: int, params: change_points.Params) -> list[_Part]:
+        """Windows first to stop - 1 parted at their jumps."""
+        if stop - first < NEAR:
+            return [_Part(first, stop, False)] if stop > first else []
+        values, u = self.values[:, first:stop], self.u[:, first:stop]
+        rows = np.flatnonzero(~lone_points(values, u, params.false_alarm))
+        changes = find_changes(self.t[first + rows], values[:, rows], u[:, rows], params)
+        edges = [first, *(first + int(rows[change.index]) for change in changes), stop]
+        return [_Part(a, b, False) for a, b in itertools.pairwise(edges)]
+
+
+def _chosen(series: _Series, parts: list[_Part], conditioned: Conditioned, params: Params) -> Segments | None:
+    """Return the longest of the parts that oscillate, and what lies beside it."""
+    if len(parts) == 1:
+        return None
+    n = series.t.size
+    # A window beside a cut may hold a little of what happened there.
+    limits = [(part.first + (part.first > 0), part.stop - (part.stop < n)) for part in parts]
+    # A decay that outlasts its motion is small for most of its time: where it began counts too.
+    size = np.array([_size(series.size[part.first : part.stop]) for part in parts])
+    length = np.array([stop - first for first, stop in limits])
+    free = ~np.array([part.still for part in parts]) & (length >= params.least_windows)
+    if not free.any():
+        return None
+    free &= size > params.share * size[free].max()
+    chosen = int(np.argmax(np.where(free, length, 0)))
+    t = conditioned.track.t[conditioned.used]
+    begin_s, end_s, half = float(t[0]), float(t[-1]), 0.5 * series.spacing
+
+    def seconds(first: int, stop: int) -> tuple[float, float]:
+        """From the beginning of window first to the end of window stop - 1."""
+        first_s = begin_s if first == 0 else float(series.t[first]) - half
+        return first_s, end_s if stop == n else float(series.t[stop - 1]) + half
+
+    spans, before = [], begin_s
+    for k, part in enumerate(parts):
+        if k != chosen and not (part.still or free[k]):
+            continue
+        first_s, last_s = seconds(*limits[k]) if free[k] else seconds(part.first, part.stop)
+        if first_s - before > half:
+            spans.append(Span(SpanKind.HANDLED, before, first_s))
+        if k != chosen:
+            spans.append(Span(SpanKind.AT_REST if part.still else SpanKind.FREE, max(first_s, before), last_s))
+        before = last_s
+    if end_s - before > half:
+        spans.append(Span(SpanKind.HANDLED, before, end_s))
+    breaks = [_break(series, a[1], b[0]) for a, b in itertools.pairwise(itertools.compress(limits, free))]
+    return Segments(*seconds(*limits[chosen]), tuple(spans), tuple(breaks))
+
+
+def _size(amplitude: F8) -> float:
+    return max(median(amplitude), median(amplitude[:NEAR]))
+
+
+def _break(series: _Series, stop: int, start: int) -> Break:
+    """What happened between the last window of one free oscillation and the first of the next."""
+    middle = 0.5 * (stop - 1 + start)
+    before = series.continued(np.arange(stop - NEAR, stop), middle)
+    after = series.continued(np.arange(start, start + NEAR), middle)
+    ratio = math.log(max(after[0], series.u[0, start]) / max(before[0], series.u[0, stop - 1]))
+    angle = math.remainder(after[1] - before[1], 2.0 * math.pi)
+    first_s, last_s = float(series.t[stop - 1]), float(series.t[start])
+    # Of either straight line through five windows, two windows on from its middle to its end and half a pause on.
+    away = 2.0 + middle - (stop - 1)
+    u_ratio = math.sqrt(0.2 + 0.1 * away**2) * math.hypot(series.u[1, stop - 1], series.u[1, start])
+    alone = abs(ratio) < min(max(series.far * u_ratio, ALONE * abs(angle)), abs(angle))
+    if start - stop >= NEAR:
+        kind = BreakKind.RESTARTED
+    else:
+        kind = BreakKind.PHASE_JUMP if alone else BreakKind.TOUCHED
+    return Break(kind, 0.5 * (first_s + last_s), 0.25 * (last_s - first_s), math.expm1(ratio), angle)
+
+
+def _faded(series: _Series, moving: int) -> Segments | None:
+    """The record up to where its motion is lost in the noise permanently."""
+    if moving < 2:
+        return None
+    last_s = float(series.t[moving - 1]) + series.spacing
+    end_s = float(series.t[-1]) + 0.5 * series.spacing
+    return Segments(-math.inf, last_s, (Span(SpanKind.AT_REST, last_s, end_s),))
+
+
+def _held(conditioned: Conditioned, cycles: Cycles, periods: float) -> Segments | None:
+    """The longer side of a plateau on which the distance stays for the greater part of a period, and longer."""
+    rows = np.flatnonzero(conditioned.flags & np.uint8(Quality.CLIPPED))
+    if not rows.size:
+        return None
+    t, used = conditioned.track.t, np.flatnonzero(conditioned.used)
+    # Noise takes a few samples off a plateau.
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1])
+    ends = np.concatenate([starts[1:], [rows.size]]) - 1
+    longest = int(np.argmax(t[rows[ends]] - t[rows[starts]]))
+    first, last = int(rows[starts[longest]]), int(rows[ends[longest]])
+    if not t[last] - t[first] > periods / cycles.frequency_hz:
+        return None
+    begin, end = float(min(t[first], t[used[0]])), float(max(t[last], t[used[-1]]))
+    if t[first] - begin > end - t[last]:
+        return Segments(-math.inf, float(t[first - 1]), (Span(SpanKind.HANDLED, float(t[first]), end),))
+    return Segments(float(t[last + 1]), math.inf, (Span(SpanKind.HANDLED, begin, float(t[last])),))

@@ -1,0 +1,292 @@
+"""Sideways: modes beside the main oscillation, which make its amplitude and phase beat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.regression import beyond
+from pipeline.numerics.robust import mad_sigma
+from pipeline.numerics.spectrum import (
+    Band,
+    Blocks,
+    Peak,
+    evidence_for,
+    false_alarm,
+    smooth_density,
+    spectral_density,
+    strongest,
+    worth_a_look,
+)
+from pipeline.samples.condition import Conditioned
+from pipeline.track import F8, UNUSABLE
+from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.modes import C16, Carrier, Mode, Sideways
+
+__all__ = ["Params", "find_sideways"]
+
+# Turns of (sideways mode, main oscillation) at which a range measured along a slant shows a product of both.
+PRODUCTS = ((2, 0), (1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2), (3, 0))
+HARMONICS = ((0, 2), (0, 3))
+NO_MODE = Estimate(0.0, 0.0, "Hz")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Params:
+    """Options of :func:`find_sideways`.
+
+    Parameters
+    ----------
+    false_alarm : float
+        Probability that a record without any shows a mode or a harmonic, half for either.
+    most : int
+        Modes sought, harmonics and products not counted.
+    envelope : int
+        Highest degree of the polynomial that a mode's amplitude and phase may follow.
+    least_windows : int
+        Fewer windows show no mode apart from the main oscillation.
+    most_periods : int
+        Longer records are not searched: the model of the blocks would outgrow the memory.
+    """
+
+    false_alarm: float = 0.01
+    most: int = 4
+    envelope: int = 4
+    least_windows: int = 6
+    most_periods: int = 4096
+
+
+def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None) -> Sideways:
+    """Look for lines beside the main oscillation.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    demodulated : Demodulated
+        Its windows give the main oscillation, whatever law that follows, its flags the samples.
+    params : Params, optional
+
+    Returns
+    -------
+    Sideways
+
+    Notes
+    -----
+    The main oscillation is taken out as smooth curves through the windows' values, then, together with each line, by
+    least squares with slowly varying amplitude and phase, on block means of a twelfth of a period.
+    A mode nearer to the main frequency than a few reciprocals of the record's length beats too slowly to be
+    distinguished from a change of the amplitude and is not sought.
+    """
+    params = params or Params()
+    used = (demodulated.flags & UNUSABLE) == 0
+    t = conditioned.track.t[used]
+    if demodulated.t.size < params.least_windows:
+        return Sideways((), None)
+    turn = 2.0 * math.pi / demodulated.angular_frequency
+    if float(t[-1] - t[0]) > params.most_periods * turn:
+        return Sideways((), None)
+    carrier = Carrier.through(demodulated, float(t[0]), float(t[-1]))
+    residual = conditioned.track.y[used] - carrier.position(t)
+    spread = mad_sigma(residual)
+    if spread == 0.0:
+        return Sideways((), carrier)
+    believed = np.abs(residual) <= 8.0 * spread
+    blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, conditioned.track.rate_hz)
+    band = _band(carrier, blocks)
+    multiples = tuple(turns[1] * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
+    if not worth_a_look(blocks, band, multiples, 0.5 * params.false_alarm):
+        return Sideways((), carrier)
+    return _Search(carrier, blocks, band, params).run()
+
+
+def _band(carrier: Carrier, blocks: Blocks) -> Band:
+    main, bin_hz = carrier.angular_frequency / (2.0 * math.pi), 1.0 / blocks.seconds
+    low = max((0.5 * carrier.rest_degree + 2.0) * bin_hz, 0.1 * main)
+    return Band(low, min(3.4 * main, 0.4 / blocks.step), ((main, (0.5 * carrier.degree + 2.0) * bin_hz),))
+
+
+class _Search:
+    """The model of the blocks as it grows, mode by mode."""
+
+    def __init__(self, carrier: Carrier, blocks: Blocks, band: Band, params: Params) -> None:
+        self.carrier, self.blocks, self.band, self.params = carrier, blocks, band, params
+        self.t = blocks.t + blocks.origin
+        self.main = carrier.wave(self.t)
+        self.first: C16 | None = None
+        self.main_hz = carrier.angular_frequency / (2.0 * math.pi)
+        # Columns and data over their standard uncertainty; an orthonormal basis of the columns; what they leave.
+        self.data = blocks.y * blocks.weight
+        self.columns = np.empty((self.t.size, 0))
+        self.basis, self.left = self.columns, self.data
+        self.add(_main_columns(carrier, self.t) * blocks.weight[:, None])
+        self.found = list[Mode]()
+        self.waves = dict[tuple[tuple[int, int], float, float], C16]()
+
+    def run(self) -> Sideways:
+        """Return modes, the strongest first, with their products, then harmonics; all fitted together."""
+        self.locked(HARMONICS, NO_MODE)
+        width = 2.0 / self.blocks.seconds
+        self.hole(*((b * self.main_hz, width) for _, b in HARMONICS))
+        first: Mode | None = None
+        for _ in range(self.params.most):
+            peak = strongest(self.blocks, self.left, self.basis, self.band)
+            if peak is None or peak.false_alarm > 0.5 * self.params.false_alarm:
+                break
+            mode, columns = self.free(peak)
+            if not self.band.inside(np.array([mode.frequency.value]))[0]:
+                break  # the fit drifted to a frequency that the model already contains
+            self.add(columns)
+            self.found.append(mode)
+            self.hole((mode.frequency.value, width))
+            if first is None:
+                first, self.first = mode, mode.whole(self.t, self.wave(mode))
+                self.locked(PRODUCTS, mode.frequency)
+        order = ("mode", "product", "harmonic")
+        return Sideways(tuple(sorted(self.together(), key=lambda mode: order.index(mode.kind))), self.carrier, first)
+
+    def together(self) -> Iterator[Mode]:
+        """Fit the coefficients of all modes together: each was found before the later ones were known."""
+        ends = np.cumsum([0, *(mode.coefficients.size for mode in self.found)])
+        values = np.linalg.lstsq(self.columns, self.data)[0]
+        envelopes: C16 = values[values.size - 2 * ends[-1] :].view(np.complex128)
+        for mode, start, end in zip(self.found, ends[:-1], ends[1:], strict=True):
+            refitted = replace(mode, coefficients=envelopes[start:end])
+            yield replace(refitted, amplitude=replace(mode.amplitude, value=self.size(refitted)))
+
+    def size(self, mode: Mode) -> float:
+        """Root mean square of the mode's amplitude over the record, m."""
+        return _rms(mode.envelope(self.t) * self.wave(mode))
+
+    def wave(self, mode: Mode) -> C16:
+        key = (mode.turns, mode.frequency.value, mode.decay.value)
+        if key not in self.waves:
+            self.waves[key] = mode.wave(self.t, self.main, self.first)
+        return self.waves[key]
+
+    def hole(self, *holes: tuple[float, float]) -> None:
+        self.band = replace(self.band, holes=(*self.band.holes, *holes))
+
+    def add(self, columns: F8) -> None:
+        """Let the model hold further columns (b, k)."""
+        self.columns = np.concatenate([self.columns, columns], axis=1)
+        self.basis = np.concatenate([self.basis, np.linalg.qr(beyond(self.basis, columns))[0]], axis=1)
+        self.left = self.data - self.basis @ (self.basis.T @ self.data)
+
+    def columns_of(self, mode: Mode) -> F8:
+        wave = self.wave(mode) * self.blocks.attenuation(mode.frequency.value)
+        return mode.columns(self.t, wave) * self.blocks.weight[:, None]
+
+    def fitted(self, mode: Mode, values: F8, cofactors: F8, unit: float) -> Mode:
+        """Return the mode with its coefficients, and the amplitude of these; ``unit`` is the variance."""
+        mode = replace(mode, coefficients=values.view(np.complex128))
+        u = math.sqrt(0.5 * unit * float(cofactors[0, 0] + cofactors[1, 1])) * _rms(self.wave(mode))
+        return replace(mode, amplitude=Estimate(self.size(mode), u, "m"))
+
+    def locked(self, orders: tuple[tuple[int, int], ...], base: Estimate) -> None:
+        """Test what turns with the main oscillation and a mode of frequency ``base`` together: none is free.
+
+        One after another, each beyond those that were found before it.
+        """
+        trials = [
+            self.blank((a, b), Estimate(abs(a * base.value + b * self.main_hz), abs(a) * base.u, "Hz"))
+            for a, b in orders
+        ]
+        trials = [trial for trial in trials if self.sought(trial.frequency.value)]
+        if not trials:
+            return
+        taken, fallen = np.empty((self.t.size, 0)), 0.0
+        least = evidence_for(0.5 * self.params.false_alarm, len(orders))
+        for trial in trials:
+            both = np.concatenate([taken, self.columns_of(trial)], axis=1)
+            values, cofactors, fitted = self.fit(both)
+            fall, left = float(fitted @ fitted), self.blocks.unweighted(self.left - fitted)
+            evidence, f = 0.5 * (fall - fallen) / self.blocks.samples, trial.frequency.value
+            smooth = smooth_density(left, f * self.blocks.step)
+            if evidence <= least * smooth:
+                continue  # the density is no less than that
+            density = spectral_density(self.blocks, left, f, self.band, smooth)
+            if evidence > least * density:
+                unit, chance = density * self.blocks.samples, false_alarm(evidence / density, len(orders))
+                found = replace(trial, false_alarm=chance)
+                self.found.append(self.fitted(found, values[-2:], cofactors[-2:, -2:], unit))
+                taken, fallen = both, fall
+        if taken.size:
+            self.add(taken)
+
+    def fit(self, columns: F8) -> tuple[F8, F8, F8]:
+        """Return coefficients (k,) of further columns, their covariance for data of unit variance, and what they fit.
+
+        What they fit is what they hold beyond the model, by which the sum of squares falls.
+        """
+        own = beyond(self.basis, columns)
+        q, r = np.linalg.qr(own)
+        inverse = np.linalg.pinv(r)
+        share = q.T @ self.left
+        return np.asarray(inverse @ share), np.asarray(inverse @ inverse.T), np.asarray(q @ share)
+
+    def sought(self, frequency_hz: float) -> bool:
+        """Whether the blocks show so high a frequency, and the model does not hold it already."""
+        known = any(abs(frequency_hz - centre) < half for centre, half in self.band.holes)
+        return 0.1 * self.main_hz < frequency_hz < 0.4 / self.blocks.step and not known
+
+    def blank(self, turns: tuple[int, int], frequency: Estimate) -> Mode:
+        """Return a mode that is still to be fitted."""
+        span, unknown = (float(self.carrier.t[0]), float(self.carrier.t[-1])), Estimate(0.0, 0.0, "m")
+        return Mode(turns, frequency, unknown, Estimate(0.0, 0.0, "1/s"), 1.0, span, np.zeros(1, np.complex128))
+
+    def free(self, peak: Peak) -> tuple[Mode, F8]:
+        """Refine a peak's frequency, see whether it decays, and choose how far its envelope varies besides.
+
+        Gauss-Newton in frequency and decay: with columns w and :math:`\\tau w`, the ratio of the second's complex
+        coefficient to the first's is :math:`-\\delta + 2\\pi i\\,\\Delta f`.
+        """
+        unit = peak.density * self.blocks.samples
+        f, rate, u_rate = peak.frequency_hz, 0.0, math.inf
+        tau = self.blocks.t - 0.5 * self.blocks.seconds
+        longest = 0.5 / self.blocks.seconds
+        for _ in range(4):
+            angle = 2.0 * math.pi * f * tau
+            pair = np.stack([np.cos(angle), -np.sin(angle)]) * self.blocks.weight
+            values, cofactors, _ = self.fit(np.concatenate([pair, pair * tau]).T)
+            z, slope = values.view(np.complex128).tolist()
+            ratio = slope / z
+            rate, u_rate = -ratio.real, math.sqrt(max(cofactors[2, 2] * unit, 0.0)) / abs(z)
+            step = min(max(ratio.imag / (2.0 * math.pi), -longest), longest)
+            f += step
+            if abs(step) < 2e-3 * longest:
+                break
+        # A mode that varies reaches further; it must not reach what the main oscillation may vary by.
+        room = int(2.0 * (abs(f - self.main_hz) * self.blocks.seconds - 1.0) - self.carrier.degree)
+        degrees = np.arange(min(self.params.envelope, max(room, 0)) + 1)
+        trial = replace(
+            self.blank((1, 0), Estimate(f, u_rate / (2.0 * math.pi), "Hz")),
+            decay=Estimate(rate if abs(rate) > 3.0 * u_rate else 0.0, u_rate, "1/s"),
+            false_alarm=peak.false_alarm,
+            coefficients=np.zeros(degrees.size, np.complex128),
+        )
+        columns = self.columns_of(trial)
+        # The first two columns, the first four, ... lower the sum of squares by what lies along their own directions.
+        q, _ = np.linalg.qr(beyond(self.basis, columns))
+        falls = np.cumsum((q.T @ self.left) ** 2)[1::2]
+        criterion = -falls / unit + 2.0 * (degrees + 1) * math.log(self.blocks.t.size)
+        columns = columns[:, : 2 * (int(np.argmin(criterion)) + 1)]
+        values, cofactors, _ = self.fit(columns)
+        return self.fitted(trial, values, cofactors, unit), columns
+
+
+def _rms(wave: C16) -> float:
+    return float(np.linalg.norm(wave)) / math.sqrt(wave.size)
+
+
+def _main_columns(carrier: Carrier, t: F8) -> F8:
+    """Rest position, cosine and sine of the main oscillation, each times powers of time."""
+    x = np.clip(2.0 * (t - carrier.t[0]) / (carrier.t[-1] - carrier.t[0]) - 1.0, -1.0, 1.0)
+    powers = np.polynomial.legendre.legvander(x, carrier.degree)
+    phase = carrier.phase(t)
+    return np.concatenate(
+        [powers[:, : carrier.rest_degree + 1], powers * np.cos(phase)[:, None], powers * np.sin(phase)[:, None]], axis=1
+    )

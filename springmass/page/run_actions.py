@@ -1,0 +1,97 @@
+"""Actions on a run that is recorded: make its report, add notes, set it aside. Nothing is deleted."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+from springmass.runs.about import about_of, write_about
+
+__all__ = ["ASIDE", "Afterwards"]
+
+ASIDE = "discarded"
+"""Folder next to the runs, which holds those that somebody set aside."""
+
+
+class Afterwards:
+    """Works on one run, whose path the recorder or the command line named; no name comes from the network.
+
+    Parameters
+    ----------
+    run : Path
+    ours : bool
+        Whether it was recorded just now: no other run can be set aside.
+    law : str or None
+        Damping law that is stated, for the report.
+    """
+
+    def __init__(self, run: Path, *, ours: bool, law: str | None = None) -> None:
+        self._run, self.ours, self._law = run, ours, law
+        self._report: Path | None = None
+        self._making = False
+        self._notes: tuple[str, ...] = ()
+        self._aside = ""
+        self._failed = ""
+
+    def state(self) -> dict[str, Any]:
+        """Return the state of the actions for the page."""
+        report = "making" if self._making else "" if self._report is None else "ready"
+        return {"report": report, "noted": list(self._notes), "discarded": self._aside, "failed": self._failed}
+
+    @property
+    def report(self) -> Path | None:
+        """The report, once it is made."""
+        return self._report
+
+    def make_report(self) -> None:
+        """Start a process that analyses the run; a second call during that does nothing."""
+        if self._making:
+            return
+        self._making, self._failed, self._report = True, "", None
+        threading.Thread(target=self._analyse, name="springmass-page-report", daemon=True).start()
+
+    def note(self, text: str) -> None:
+        """Add a note to the file next to the run."""
+        try:
+            write_about(about_of(self._run).with_more(None, (text,), ()))
+            self._notes = (*self._notes, text)
+        except Exception as error:
+            self._failed = f"not noted ({error})"
+
+    def discard(self) -> None:
+        """Move the run and its notes into the folder of discarded runs; nothing there is replaced."""
+        if self._making or self._aside:
+            return
+        folder = self._run.parent / ASIDE
+        try:
+            folder.mkdir(exist_ok=True)
+            number, name = 1, self._run.name
+            while (folder / name).exists():
+                number += 1
+                name = f"{self._run.stem}-{number}{self._run.suffix}"
+            notes, aside = about_of(self._run).path, folder / name
+            self._run.rename(aside)
+            if notes.exists():
+                notes.rename(folder / f"{aside.stem}.about.toml")
+            self._run, self._aside = aside, f"{ASIDE}/{name}"
+        except OSError as error:
+            self._failed = f"not set aside ({error.strerror or error})"
+
+    def _analyse(self) -> None:
+        command = [sys.executable, "-m", "springmass", "-q", "analyse", str(self._run), "-o", str(self._run.parent)]
+        command += [] if self._law is None else ["--law", self._law]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, errors="replace")
+            page = self._run.parent / f"{self._run.stem}.results" / "report.html"
+            if done.returncode == 0 and page.is_file():
+                self._report = page
+            else:
+                lines = done.stderr.strip().splitlines()
+                self._failed = f"no report ({lines[-1] if lines else f'exit code {done.returncode}'})"
+        except OSError as error:
+            self._failed = f"no report ({error})"
+        finally:
+            self._making = False

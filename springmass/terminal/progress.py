@@ -1,0 +1,99 @@
+"""How far a long task is: on a terminal a bar on stderr that is gone at its end, elsewhere a line if asked for."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Self, TypeVar
+
+from springmass.errors import tell
+from springmass.terminal.style import watched
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+__all__ = ["TaskProgress", "counted"]
+
+EVERY_S = 10.0
+"""Between two lines where no terminal shows a bar."""
+
+Item = TypeVar("Item")
+
+
+class TaskProgress:
+    """Shows how many of how many are done and how long the others take; used in a ``with``.
+
+    Parameters
+    ----------
+    what : str
+        Plural noun of what is counted: ``"runs"``, ``"reports"``.
+    total : int, optional
+        How many there are, where that is known before the first.
+    lines : bool
+        Whether to write a line every ten seconds where no terminal shows the bar.
+    quiet : bool
+        Whether to show nothing.
+    seconds : callable
+        Of a clock that runs on, s.
+
+    Notes
+    -----
+    A line reads ``reports 12/300, 40 s left``. The time left takes the others to be as quick as those done on average.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        total: int | None = None,
+        *,
+        lines: bool = False,
+        quiet: bool = False,
+        seconds: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._what, self._total, self._seconds = what, total, seconds
+        self._lines, self._quiet = lines and not quiet, quiet
+        self._began_s = self._shown_s = seconds()
+        self._bar: Progress | None = None
+
+    def __enter__(self) -> Self:
+        if not self._quiet and watched(sys.stderr):
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._bar.add_task(self._what, total=self._total)
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def update(self, done: int, total: int | None = None) -> None:
+        """Show that so many are done, of so many where their number has changed."""
+        self._total = self._total if total is None else total
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], completed=done, total=self._total)
+            return
+        now_s = self._seconds()
+        if not self._lines or self._total is None or not 0 < done < self._total or now_s - self._shown_s < EVERY_S:
+            return
+        self._shown_s = now_s
+        left_s = (now_s - self._began_s) * (self._total - done) / done
+        tell(f"{self._what} {done}/{self._total}, {_duration(left_s)} left")
+
+
+def counted(items: Iterable[Item], total: int, what: str, *, quiet: bool = False) -> Iterator[Item]:
+    """Yield items, and show on a terminal how many of them are done; of a single one nothing."""
+    with TaskProgress(what, total, quiet=quiet or total < 2) as progress:
+        for done, item in enumerate(items, 1):
+            yield item
+            progress.update(done)
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest_s = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest_s} s" if minutes else f"{rest_s} s"

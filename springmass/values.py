@@ -1,0 +1,65 @@
+"""The types of numbers that options take: each states its range, and the command line refuses what lies outside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from pipeline.registry.laws import LAW_NAMES
+
+__all__ = [
+    "ANY_LAW",
+    "Count",
+    "Finite",
+    "LawName",
+    "NotNegative",
+    "PartsPerMillion",
+    "Positive",
+    "ReadingsPerSecond",
+    "SampleShare",
+    "Share",
+    "SignedPartsPerMillion",
+    "TcpPort",
+    "WholeNumber",
+]
+
+
+def _where(holds: Callable[[float], bool], demand: str) -> Parameter:
+    """Return what refuses numbers for which something does not hold; of several numbers each is looked at."""
+
+    def validate(_: object, value: Any) -> None:
+        for each in value if isinstance(value, tuple) else (value,):
+            if each is None:
+                continue
+            if not math.isfinite(each):
+                raise ValueError("must be a finite number")
+            if not holds(each):
+                raise ValueError(demand)
+
+    return Parameter(validator=validate)
+
+
+ANY_LAW = "any"
+"""In place of a law's name: the recording chooses, whatever the scene states."""
+
+
+def _one_of_the_laws(_: object, name: str | None) -> None:
+    if name is not None and name not in (*LAW_NAMES, ANY_LAW):
+        raise ValueError(f"must be one of {', '.join((*LAW_NAMES, ANY_LAW))}")
+
+
+LawName = Annotated[str, Parameter(validator=_one_of_the_laws)]
+Finite = Annotated[float, _where(lambda _: True, "")]
+Positive = Annotated[float, _where(lambda x: x > 0.0, "must be positive")]
+NotNegative = Annotated[float, _where(lambda x: x >= 0.0, "must not be negative")]
+Share = Annotated[float, _where(lambda x: 0.0 <= x <= 1.0, "must lie in 0 to 1")]
+SampleShare = Annotated[float, _where(lambda x: 0.0 <= x <= 0.4, "must lie in 0 to 0.4")]
+ReadingsPerSecond = Annotated[float, _where(lambda x: 1e-3 <= x <= 1e6, "must lie in 0.001 to 1000000")]
+PartsPerMillion = Annotated[float, _where(lambda x: 0.0 <= x <= 1e6, "must lie in 0 to 1000000")]
+SignedPartsPerMillion = Annotated[float, _where(lambda x: abs(x) <= 5e5, "must lie in -500000 to 500000")]
+Count = Annotated[int, _where(lambda x: x >= 1, "must be 1 or more")]
+WholeNumber = Annotated[int, _where(lambda x: x >= 0, "must be 0 or more")]
+TcpPort = Annotated[int, _where(lambda x: 0 <= x <= 65535, "must be a port from 0 to 65535")]

@@ -1,0 +1,145 @@
+"""A damping law on the command line: stated by an option, a scene file or a table of runs."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import springmass
+from tests.cli.conftest import Done
+
+RUN = "undamped_simulated_position.txt"
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """Return a recording in an empty folder."""
+    path = tmp_path / "bob.txt"
+    # With one byte more it is no bundled recording, beside which nothing is noted.
+    path.write_bytes((springmass.sample_data() / RUN).read_bytes() + b"\n")
+    return path
+
+
+def scene(folder: Path, law: str) -> Path:
+    """Return a scene file that states a law."""
+    path = folder / "bench.toml"
+    path.write_text(f'[bob]\nmass_kg = 0.2\n[damping]\nlaw = "{law}"\ngamma_per_s = 0.5\n')
+    return path
+
+
+def test_a_law_is_stated_by_an_option_and_never_noted(cli: Callable[..., Done], run: Path) -> None:
+    """The result holds the law, and nothing is written next to the recording."""
+    done = cli("analyse", run, "--law", "linear", "--json")
+    (result,) = done.results
+    damping = result["damping"]
+    assert (damping["selected"], damping["stated"], damping["law"]) == ("linear", "linear", "linear")
+    assert result["provenance"]["parameters"]["law"] == "linear"
+    assert "law" not in result["provenance"]["parameters"]["scene"].get("damping", {})
+    assert result["estimates"]["damping_rate"]["value"] == pytest.approx(damping["coefficients"]["gamma"]["value"])
+    assert cli("analyse", run, "--law", "linear", "-o", run.parent / "out").code == 0
+    assert not run.with_suffix(".about.toml").exists()
+
+
+def test_a_law_of_a_scene_file_is_named_first(cli: Callable[..., Done], run: Path) -> None:
+    """The first line of the output names law and file; so it does for the notes next to the recording."""
+    bench = scene(run.parent, "linear")
+    done = cli("analyse", run, "--scene", bench, "-o", run.parent / "out")
+    assert done.out.splitlines()[0] == f"damping law linear: stated in {bench}"
+    again = cli("analyse", run, "--no-report")
+    assert again.out.splitlines()[0] == f"damping law linear: stated in {run.with_suffix('.about.toml')}"
+    free = cli("analyse", run, "--no-report", "--law", "any")
+    assert free.out.splitlines()[0].startswith("quantity")
+    assert "any law" in free.out
+
+
+def test_a_law_that_does_not_exist_is_refused(cli: Callable[..., Done], run: Path) -> None:
+    """Option and scene file list the laws."""
+    assert "linear+quadratic" in cli("analyse", run, "--law", "cubic", "--no-report").complaint
+    done = cli("analyse", run, "--scene", scene(run.parent, "cubic"), "--no-report")
+    assert done.code == 2
+    assert "[damping] law must be one of none, linear" in done.complaint
+
+
+def test_without_a_law_both_numbers_and_undetermined_coefficients_are_marked(
+    cli: Callable[..., Done], run: Path
+) -> None:
+    """The JSON says which numbers depend on the law, and which coefficients the recording does not determine."""
+    (result,) = cli("analyse", run, "--json").results
+    damping = result["damping"]
+    assert damping["stated"] is None
+    assert damping["law"] is None
+    assert "damping_rate" in damping["of_law"]
+    assert "period" not in damping["of_law"]
+    assert sum(damping["weights"].values()) == pytest.approx(1.0)
+    beta = damping["coefficients"]["beta"]
+    assert beta["determined"] is False
+    assert beta["u"] > abs(beta["value"])
+    assert beta["upper_limit"] > beta["value"]
+    text = cli("analyse", run, "--no-report").out
+    assert "1/(m s) (95 %)" in text
+
+
+def test_compare_takes_a_stated_law(cli: Callable[..., Done], run: Path) -> None:
+    """Every run's result is stated by it."""
+    other = run.with_name("other.txt")
+    other.write_bytes(run.read_bytes())
+    bench = run.parent / "masses.toml"
+    bench.write_text("[bob]\nmass_kg = 0.2\n[spring]\nmass_kg = 0.01\n")
+    done = cli("compare", run, other, "--scene", bench, "--law", "linear", "--json")
+    (result,) = done.results
+    assert [one["damping"]["stated"] for one in result["runs"]] == ["linear", "linear"]
+    for joint in result["joint_damping"]:
+        assert all("determined" in x for law in joint["laws"].values() for x in law["parameters"].values())
+
+
+def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Callable[..., Done], run: Path) -> None:
+    """The column law of the table of runs takes precedence over the option; the results have both laws."""
+    other = run.with_name("other.txt")
+    other.write_bytes(run.read_bytes())
+    table = run.parent / "runs.csv"
+    table.write_text("path,law\nother.txt,quadratic\n")
+    folder = run.parent / "course"
+    done = cli("batch", run, other, "--runs", table, "--law", "linear", "-o", folder, "--jobs", "1", "--reports", "0")
+    assert done.code == 0, done.err
+    (results,) = folder.glob("*.csv")
+    with results.open(newline="") as file:
+        rows = {row["run"]: row for row in csv.DictReader(file)}
+    assert {name: row["stated_law"] for name, row in rows.items()} == {"bob": "linear", "other": "quadratic"}
+    assert rows["bob"]["law"] == rows["bob"]["one_law"] == "linear"
+    table.write_text("path,law\nother.txt,cubic\n")
+    wrong = cli("batch", run, other, "--runs", table, "-o", folder, "--jobs", "1", "--reports", "0")
+    assert wrong.code == 2
+    assert "law must be one of" in wrong.complaint
+
+
+def test_batch_lists_undetermined_coefficients(cli: Callable[..., Done], run: Path) -> None:
+    """Value and u stay in their columns."""
+    folder = run.parent / "course"
+    assert cli("batch", run, "-o", folder, "--jobs", "1", "--reports", "0").code == 0
+    (results,) = folder.glob("*.csv")
+    with results.open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert row["one_law"] == ""
+    assert row["undetermined"] == "gamma beta"
+    assert float(row["beta_u"]) > abs(float(row["beta"]))
+
+
+def test_a_law_does_nothing_for_a_recording_without_a_page(cli: Callable[..., Done], run: Path) -> None:
+    """Nothing of the terminal's display depends on it."""
+    bench = run.parent / "bench.toml"
+    bench.write_text("[bob]\nmass_kg = 0.2\n")
+    done = cli("record", "--simulate", bench, "--law", "linear", "--seconds", "1", "-o", run.parent / "x.h5")
+    assert done.code == 2
+    assert "--law does nothing without --page" in done.complaint
+
+
+def test_results_json_of_a_report_is_the_same(cli: Callable[..., Done], run: Path) -> None:
+    """results.json in the report's folder holds the stated law."""
+    assert cli("analyse", run, "--law", "linear", "-o", run.parent / "out").code == 0
+    result = json.loads((run.parent / "out" / "bob.results" / "results.json").read_text())
+    result = result[0] if isinstance(result, list) else result
+    assert result["damping"]["stated"] == "linear"

@@ -1,0 +1,275 @@
+"""A technician's session: zero, ruler, trigger, marks, selection, reload, phone, report, and the same run again.
+
+With ``SPRINGMASS_SCREENSHOTS`` naming a folder, every step leaves pictures there, in three widths, light and dark.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, BrowserContext, Page
+
+from springmass.runs.analysing import load_and_analyse
+from tests.pages.test_at_the_bench import PHASE, SEEN, answer, press
+
+WIDTHS = {1366: 768, 768: 1024, 390: 844}
+FITTED = "() => motion && motion.estimates && motion.estimates.period && motion.estimates.period.u"
+WHOLE = "() => motion && motion.accuracy === 'standard' && motion.estimates"
+NUMBERS = "Object.fromEntries(Object.entries(motion.estimates).map(([name, e]) => [name, [e.value, e.u]]))"
+
+
+def look_at(page: Page, step: str) -> None:
+    """Check a step at every width, light and dark: accessibility, nothing beside the screen, nothing under the bar."""
+    before = page.viewport_size
+    for width, height in WIDTHS.items():
+        page.set_viewport_size({"width": width, "height": height})
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+            found = Axe().run(page)
+            assert found.violations_count == 0, f"{step} at {width}, {scheme}: {found.generate_report()}"
+            for whole in ("document.documentElement", "document.getElementById('content')"):
+                assert page.evaluate(f"{whole}.scrollWidth <= {whole}.clientWidth"), (step, width, whole)
+            ends, begins = page.evaluate(
+                "[document.getElementById('content'), document.getElementById('actions')]"
+                ".map((e, i) => i ? e.getBoundingClientRect().top : e.getBoundingClientRect().bottom)"
+            )
+            assert ends <= begins + 0.5
+            if folder := os.environ.get("SPRINGMASS_SCREENSHOTS"):
+                page.screenshot(path=Path(folder) / f"{step}-{width}-{scheme}.png")
+    page.emulate_media(color_scheme="light")
+    assert before is not None
+    page.set_viewport_size(before)
+
+
+def select(page: Page, left: float, right: float) -> None:
+    """Draw over a share of the chart with the mouse."""
+    box = page.locator("#position .u-over").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + left * box["width"], box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + right * box["width"], box["y"] + 60, steps=5)
+    page.mouse.up()
+    page.wait_for_selector("#region-estimates tr[data-name='period']")
+
+
+def calibrate(page: Page) -> None:
+    """Give the distance by the ruler: what cannot be read is named, and the question stays."""
+    press(page, "k")
+    for wrong, says in (("0.25", "Did you mean 0.25 m?"), ("a foot", "Cannot read")):
+        answer(page, wrong)
+        page.wait_for_selector("#ask-error:not([hidden])")
+        assert says in page.inner_text("#ask-error")
+        assert page.locator("#ask[open]").count() == 1
+    look_at(page, "2-calibration")
+    answer(page, "0.25 m")
+    page.wait_for_function("() => bench().phase === 'ready' && bench().ruler_m")
+    assert page.evaluate("bench().ruler_m") == [0.25]
+
+
+@pytest.mark.trials
+def test_a_session_from_the_first_minute_to_the_report(
+    record: Callable[..., Any], start: Callable[..., Any], context: BrowserContext, browser: Browser
+) -> None:
+    """Each number is the same on the page, in the report, by ``analyse`` and on the page of the saved run."""
+    program = record("--ready", "--lan")
+    page = context.new_page()
+    page.set_viewport_size({"width": 1366, "height": 768})
+    page.goto(program.address)
+    page.wait_for_function(PHASE.format(phase="ready"))
+    page.wait_for_function("() => rate_hz() !== null")
+    assert page.evaluate("rate_hz()") == pytest.approx(100.0, abs=5.0)
+    look_at(page, "1-ready")
+    calibrate(page)
+    press(page, "z")
+    page.wait_for_function(PHASE.format(phase="still"))
+    page.keyboard.press("t")  # the recorder is busy: nothing happens
+    page.evaluate("request('arm', { type: 'arm', threshold_m: 0.01, keep_s: 1 })")
+    assert "Not done" in page.inner_text("#told")
+    page.wait_for_function(PHASE.format(phase="ready"))
+
+    press(page, "t")
+    answer(page, "1 cm", "1.5")
+    page.wait_for_function(PHASE.format(phase="armed"))
+    assert page.inner_text("#stage") == "ARMED: 10 mm, 1.5 s kept"
+    page.wait_for_function(PHASE.format(phase="recording"))
+    page.wait_for_function(FITTED)
+    assert page.evaluate("motion.accuracy") == "fast"
+    assert "Fast accuracy" in page.inner_text("#tier")
+    assert abs(page.evaluate("motion.estimates.period.value") - 0.7573) < 0.005
+    assert page.locator("#findings .error").count() == 0
+    press(page, "m")
+    answer(page, "lamp on")
+    page.wait_for_function("() => state.marks.length === 1")
+    page.wait_for_function(SEEN.format(count=900))
+
+    select(page, 0.3, 0.7)
+    chart, panel = page.locator("#position").bounding_box(), page.locator("#region").bounding_box()
+    assert chart is not None
+    assert panel is not None
+    assert 0 <= panel["y"] - chart["y"] - chart["height"] < 80
+    assert page.locator("#region-fits thead th").all_inner_texts()[1:] == ["Selection", "All samples so far"]
+    box = page.locator("#position .u-over").bounding_box()
+    assert box is not None
+    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 60)
+    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 60)
+    read, count = page.inner_text("#cursor"), page.evaluate("samples[0].count")
+    assert re.search(r"from the pin at [\d.]+ s: [\d.]+ s, −?[\d.]+ mm, slope", read)
+    page.wait_for_function(f"() => samples[0].count > {count + 60}")
+    assert page.inner_text("#cursor") == read
+    look_at(page, "3-recording")
+
+    page.reload()
+    page.wait_for_function(FITTED)
+    assert page.evaluate("rate_hz()") == pytest.approx(100.0, abs=5.0)
+    assert "lamp on" in page.inner_text("#marks")
+    assert page.evaluate("position.labels[1]") == "displacement / mm"
+    watch_on_two_phones(browser, page.evaluate("run.share"))
+
+    press(page, "s")
+    answer(page)
+    page.wait_for_function(PHASE.format(phase="built"))
+    page.wait_for_function(WHOLE)
+    assert "Standard accuracy, whole run" in page.inner_text("#tier")
+    assert page.inner_text("#stopping") == ""
+    assert page.evaluate("position.labels[1]") == "displacement / mm"
+    look_at(page, "4-saved")
+    shown, marks = page.evaluate(NUMBERS), page.evaluate("state.marks")
+    press(page, "o")
+    page.wait_for_url("**/v1/report")
+    page.go_back()
+    press(page, "q")
+    answer(page)
+    assert program.ended() == 0
+
+    analysed = load_and_analyse(program.out)
+    stated = {name: [x.value, x.u] for name, x in analysed.analysis.estimates.items()}
+    same = shown.keys() & stated.keys()
+    assert {"period", "damping_rate", "noise", "offset", "spring_constant", "quality_factor"} <= same
+    assert {name: shown[name] for name in same} == {name: stated[name] for name in same}
+    reported = json.loads((program.out.parent / "run.results" / "results.json").read_text())
+    reported = reported[0] if isinstance(reported, list) else reported
+    by_report = {name: [reported["estimates"][name]["value"], reported["estimates"][name]["u"]] for name in same}
+    assert by_report == {name: stated[name] for name in same}
+    assert marks == [[mark["t_s"], mark["text"]] for mark in analysed.loaded.provenance["marks"]]
+
+    again = start("page", str(program.out))
+    page = context.new_page()
+    page.goto(again.address)
+    page.wait_for_function(WHOLE)
+    assert page.evaluate(NUMBERS) == shown
+    assert page.evaluate("state.marks") == marks
+    assert page.evaluate("position.labels[1]") == "displacement / mm"
+    page.locator("#time").fill("0.6")
+    page.wait_for_function("() => moment && Math.abs(moment.to - play_time) < 0.3")
+    look_at(page, "5-replay")
+    again.end()
+
+
+def watch_on_two_phones(browser: Browser, address: str) -> None:
+    """On 390 pixels: the chart, three numbers, the rest folded; no action that changes anything."""
+    for number in range(2):
+        context = browser.new_context(viewport={"width": 390, "height": 844})
+        page = context.new_page()
+        page.goto(address)
+        page.wait_for_function(FITTED)
+        page.wait_for_selector("#estimates dd")
+        tops = [page.locator(each).bounding_box() for each in ("#position", "#estimates")]
+        assert tops[0] is not None
+        assert tops[1] is not None
+        assert tops[0]["y"] < 150 < tops[1]["y"] < 844
+        numbers = page.locator("#estimates > div")
+        assert [each.is_visible() for each in numbers.all()] == [i < 3 for i in range(numbers.count())]
+        for folded in ("#amplitude", "#phase", "#spectrum", "#marks", "#freeze"):
+            assert page.is_hidden(folded)
+        assert page.is_hidden("#stop")
+        page.locator("#unfold").click()
+        page.locator("#more").click()
+        assert all(each.is_visible() for each in numbers.all())
+        for opened in ("#amplitude", "#phase", "#spectrum", "#freeze"):
+            assert page.is_visible(opened)
+        if number == 0:
+            look_at(page, "6-viewer")
+        context.close()
+
+
+BUSY = "while True: pass"
+AGES = """(seconds) => new Promise((done) => {
+  let worst = 0, seen = 0;
+  const unmarked = [], start = performance.now();
+  const timer = setInterval(() => {
+    for (const group of document.querySelectorAll("#estimates > div")) {
+      const age = now_s() - Number(group.dataset.t);
+      seen += 1;
+      worst = Math.max(worst, age);
+      if (age > 2.5 && !(group.classList.contains("stale") && /old/.test(group.querySelector(".age").textContent)))
+        unmarked.push([group.dataset.name, age]);
+    }
+    if (performance.now() - start > 1e3 * seconds) { clearInterval(timer); done({ worst, seen, unmarked }); }
+  }, 100);
+})"""
+
+
+@pytest.mark.trials
+def test_no_old_number_is_without_its_age(record: Callable[..., Any], context: BrowserContext) -> None:
+    """With four busy processes during the recording, and after the page's process is stopped."""
+    program = record()
+    page = context.new_page()
+    page.goto(program.address)
+    page.wait_for_function(FITTED)
+    busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(4)]
+    try:
+        ages = page.evaluate(AGES, 8)
+    finally:
+        for each in busy:
+            each.kill()
+            each.wait()
+    print(f"oldest number with four busy processes: {ages['worst']:.1f} s")
+    assert ages["seen"] > 100
+    assert ages["unmarked"] == []
+    page.evaluate("socket.onclose = null; socket.close()")
+    page.wait_for_selector("#estimates .stale")
+    ages = page.evaluate(AGES, 3)
+    assert ages["worst"] > 3.0
+    assert ages["unmarked"] == []
+    assert "no samples for" in page.inner_text("#clock")
+    program.end()
+
+
+def test_a_forecast_counts_down_and_disappears(start: Callable[..., Any], context: BrowserContext) -> None:
+    """By the age of its analysis; reached, it is left out."""
+    import springmass
+
+    program = start("page", str(springmass.sample_data() / "damped_simulated_position.txt"))
+    page = context.new_page()
+    page.goto(program.address)
+    page.wait_for_function("() => motion && motion.stop")
+    words = [
+        page.evaluate(f"stopping({{ ...motion.stop, more_s: 20, u_clock_s: 0, wanted_u_s: 1e-5 }}, {age})")
+        for age in (0, 5, 21)
+    ]
+    assert "About 20 s more" in words[0]
+    assert "About 15 s more" in words[1]
+    assert "more for" not in words[2]
+    program.end()
+
+
+def test_a_stated_law_is_named(start: Callable[..., Any], context: BrowserContext) -> None:
+    """Beside the numbers that depend on it, and in the legend of the amplitudes."""
+    import springmass
+
+    program = start("page", str(springmass.sample_data() / "damped_simulated_position.txt"), "--law", "linear")
+    page = context.new_page()
+    page.goto(program.address)
+    page.wait_for_function("() => motion && motion.stated_law === 'linear'")
+    assert page.locator("#estimates", has_text="damping rate, law linear").count() == 1
+    assert page.evaluate("amplitude.series.map((s) => s.label).includes('linear (stated)')")
+    program.end()

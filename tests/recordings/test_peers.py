@@ -1,0 +1,77 @@
+"""Recordings of other projects, against the results that these publish or print."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springmass as sm
+from pipeline.track import Track
+
+FOLDER = "peers"
+
+
+def peer(recordings: Path, name: str) -> Path:
+    """Return a recording of another project; the test is skipped where it is absent."""
+    path = recordings / FOLDER / name
+    if not path.is_file():
+        pytest.skip(f"needs ../shared/recordings/{FOLDER}/{name}")
+    return path
+
+
+def numbers_of(path: Path) -> dict[str, list[float]]:
+    """Return the lists of numbers of a YAML file whose top level has keys and lists alone."""
+    lists: dict[str, list[float]] = {}
+    key = ""
+    for line in path.read_text().splitlines():
+        head, colon, _ = line.partition(":")
+        if colon and not head.startswith((" ", "-")):
+            key = head
+        elif line.startswith("- ") and ":" not in line:
+            lists.setdefault(key, []).append(float(line[2:]))
+    return lists
+
+
+@pytest.fixture(scope="module")
+def pendulum(recordings: Path) -> Track:
+    """Return kafe2's pendulum: its angle, rad, at 121 times."""
+    numbers = numbers_of(peer(recordings, "kafe2_pendulum.yml"))
+    return Track.from_arrays(numbers["x_data"], numbers["y_data"], quantity="angle", unit="rad")
+
+
+def test_kafe2s_pendulum_with_its_law_stated(pendulum: Track) -> None:
+    """kafe2 fits a linear law, c = 0.00992(16) 1/s: ours agrees within its u and is no wider than 1.1 of it."""
+    rate = sm.analyse(pendulum, law="linear")["damping_rate"]
+    assert abs(rate.value - 0.00992) < 0.00016
+    assert rate.u <= 1.1 * 0.00016
+
+
+def test_kafe2s_pendulum_without_a_law_has_both_numbers(pendulum: Track) -> None:
+    """The average over laws covers kafe2's rate, and the linear law, which is clearly ahead, gives the stated one's."""
+    analysis = sm.analyse(pendulum)
+    rate, linear = analysis["damping_rate"], analysis["linear.damping_rate"]
+    assert abs(rate.value - 0.00992) < 2.0 * rate.u
+    assert rate.u > 2.0 * linear.u
+    stated = sm.analyse(pendulum, law="linear")["damping_rate"]
+    assert (linear.value, linear.u) == pytest.approx((stated.value, stated.u), rel=1e-9)
+    assert str(analysis["linear.gamma"]) == "0.00993 +- 0.00016 1/s"
+
+
+def test_kafe2s_pendulum_starts_at_its_angle(pendulum: Track) -> None:
+    """kafe2's starting angle is 0.5984(26) rad."""
+    amplitude = sm.analyse(pendulum, law="linear")["amplitude"]
+    assert abs(amplitude.value - 0.5984) < 0.0026
+    assert amplitude.u <= 1.1 * 0.0026
+
+
+def test_phypraks_torsion_pendulum(recordings: Path) -> None:
+    """PhyPraKit prints f = 0.5583 Hz and decay times of 102(10) s and 101(3) s: ours agree within their u."""
+    analysis = sm.analyse(peer(recordings, "Drehpendel.labx"), channel="Winkel phi", unit="rad")
+    assert np.isclose(analysis["frequency"].value, 0.5583, rtol=0.0, atol=analysis["frequency"].u)
+    rate = analysis["damping_rate"]
+    decay_s, u_s = 1.0 / rate.value, rate.u / rate.value**2
+    for printed, u_printed in ((102.0, 10.0), (101.0, 3.0)):
+        assert abs(decay_s - printed) < math.hypot(u_printed, u_s)

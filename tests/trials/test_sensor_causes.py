@@ -1,0 +1,171 @@
+"""Troubles of the sensor that leave a plausible motion: numbers stay within their u, or a warning names the cause."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from pipeline.analyse import analyse
+from pipeline.track import F8, Track
+
+TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "40"))
+NAMES = {
+    *("model_misfit", "not_sinusoidal", "smoothed_sensor", "held_samples", "quantised", "sideways_mode", "clipped"),
+    *("two_modes", "no_oscillation"),
+}
+RATE_HZ = 100.0
+
+pytestmark = pytest.mark.trials
+
+
+class Bench:
+    """One weakly damped bob of random size, period, damping and noise.
+
+    Parameters
+    ----------
+    shape : str
+    seed : int
+    """
+
+    def __init__(self, shape: str, seed: int) -> None:
+        self.rng = np.random.default_rng([113, *shape.encode(), seed])
+        self.period, self.amplitude = self.rng.uniform(0.5, 1.5), self.rng.uniform(0.03, 0.08)
+        self.seconds = float(self.rng.choice([20, 40, 60]))
+        self.rate = self.rng.uniform(0.2, 1.5) / self.seconds
+        self.sigma_m = float(self.rng.choice([1e-4, 3.5e-4]))
+        self.phase = self.rng.uniform(0.0, 2.0 * math.pi)
+        self.t = np.arange(int(RATE_HZ * self.seconds)) / RATE_HZ
+
+    def at(self, t: F8) -> F8:
+        """Return the displacement at times (n,), m."""
+        return self.amplitude * np.exp(-self.rate * t) * np.cos(2.0 * math.pi * t / self.period + self.phase)
+
+    def noise(self, size: int | None = None) -> F8:
+        """Return white noise (n,), m."""
+        return self.sigma_m * self.rng.standard_normal(size or self.t.size)
+
+
+def cube(b: Bench) -> F8:
+    """Return distances on a scale with a cubic term."""
+    x = b.at(b.t)
+    return 0.3 + x * (1.0 + b.rng.choice([-1.0, 1.0]) * b.rng.uniform(0.02, 0.2) * (x / b.amplitude) ** 2) + b.noise()
+
+
+def levels_off(b: Bench) -> F8:
+    """Return distances on a scale that levels off at both ends."""
+    reach = b.amplitude * b.rng.uniform(1.5, 4.0)
+    return 0.3 + reach * np.tanh(b.at(b.t) / reach) + b.noise()
+
+
+def levels_off_at_one_end(b: Bench) -> F8:
+    """Return distances on a scale whose far end levels off."""
+    reach = b.amplitude * b.rng.uniform(2.0, 6.0)
+    return 0.3 + reach * (1.0 - np.exp(-b.at(b.t) / reach)) + b.noise()
+
+
+def interpolated(b: Bench) -> F8:
+    """Return a slow sensor's distances, joined by straight lines."""
+    slow = np.arange(0.0, b.seconds + 1.0, 1.0 / b.rng.uniform(8.0, 25.0))
+    return np.interp(b.t, slow, 0.3 + b.at(slow) + b.noise(slow.size))
+
+
+def interpolated_by_cubics(b: Bench) -> F8:
+    """Return a slow sensor's distances, joined by a spline."""
+    from scipy.interpolate import CubicSpline
+
+    slow = np.arange(0.0, b.seconds + 1.0, 1.0 / b.rng.uniform(8.0, 25.0))
+    return np.asarray(CubicSpline(slow, 0.3 + b.at(slow) + b.noise(slow.size))(b.t))
+
+
+def interpolated_and_printed(b: Bench) -> F8:
+    """Return a slow sensor's distances, joined by straight lines and rounded to 0.1 mm."""
+    return np.round(interpolated(b), 4)
+
+
+def slow_beat(b: Bench) -> F8:
+    """Return a motion with a weaker one that beats with it once in the recording to three times."""
+    near = 1.0 / b.period + b.rng.choice([-1.0, 1.0]) * b.rng.uniform(1.0, 3.0) / b.seconds
+    other = b.rng.uniform(0.02, 0.15) * b.amplitude * np.cos(2.0 * math.pi * near * b.t + b.rng.uniform(0.0, 6.0))
+    return 0.3 + b.at(b.t) + other * np.exp(-b.rate * b.t) + b.noise()
+
+
+def slower_beat(b: Bench) -> F8:
+    """Return a motion with a weaker one that beats with it once in twice the recording or more."""
+    near = 1.0 / b.period + b.rng.choice([-1.0, 1.0]) * b.rng.uniform(0.2, 0.5) / b.seconds
+    other = b.rng.uniform(0.02, 0.15) * b.amplitude * np.cos(2.0 * math.pi * near * b.t + b.rng.uniform(0.0, 6.0))
+    return 0.3 + b.at(b.t) + other * np.exp(-b.rate * b.t) + b.noise()
+
+
+def stuck(b: Bench, set_to: bool) -> F8:
+    """Return distances in steps of 1/8 mm of which one bit of 1 to 8 mm is stuck."""
+    counts = np.round((0.3 + b.at(b.t) + b.noise()) * 8000.0).astype(np.int64)
+    bit = 1 << int(b.rng.integers(3, 7))
+    return (counts | bit if set_to else counts & ~bit) / 8000.0
+
+
+def stuck_high(b: Bench) -> F8:
+    """Return distances of which one bit is always set."""
+    return stuck(b, True)
+
+
+def stuck_low(b: Bench) -> F8:
+    """Return distances of which one bit is never set."""
+    return stuck(b, False)
+
+
+def smoothed(b: Bench) -> F8:
+    """Return the mean of the last samples with the noise in front of it and, a tenth of it, behind."""
+    count = int(b.rng.integers(4, 16))
+    whole = b.at(b.t[:, None] - np.arange(count) / RATE_HZ).mean(axis=1)
+    before = np.convolve(b.noise(b.t.size + count - 1), np.ones(count) / count, "valid")
+    return 0.3 + whole + before + 0.1 * b.noise()
+
+
+def smoothed_and_printed(b: Bench) -> F8:
+    """Return the same, rounded to 0.1 mm."""
+    return np.round(smoothed(b), 4)
+
+
+REACHED = (cube, levels_off_at_one_end, slow_beat, stuck_high, smoothed)
+# Of the first three half is wrong without a warning, of smoothed_and_printed one in six, of the others one in twelve.
+MISSED = (
+    *(interpolated, interpolated_and_printed, slower_beat, smoothed_and_printed),
+    *(levels_off, interpolated_by_cubics, stuck_low),
+)
+CASES = [
+    *(pytest.param(shape, id=shape.__name__) for shape in REACHED),
+    *(
+        pytest.param(
+            shape, id=shape.__name__, marks=pytest.mark.xfail(reason="more than one in twenty is wrong", strict=False)
+        )
+        for shape in MISSED
+    ),
+]
+
+
+@pytest.mark.parametrize("shape", CASES)
+def test_numbers_hold_or_the_cause_is_named(shape: Callable[[Bench], F8]) -> None:
+    """Of one record in twenty at most a number is off by more than four u without a warning."""
+    wrong, right, by, codes = 0, 0, Counter[str](), Counter[str]()
+    for seed in range(TRIALS):
+        bench = Bench(shape.__name__, seed)
+        found = analyse(Track.from_arrays(bench.t, shape(bench)))
+        warnings = {finding.code for finding in found.findings if finding.severity != "info"}
+        codes.update(warnings)
+        truth = {"period": bench.period, "amplitude": bench.amplitude, "damping_rate": bench.rate}
+        off = {
+            name
+            for name, value in truth.items()
+            if name in found.estimates and abs(found.estimates[name].value - value) > 4.0 * found.estimates[name].u
+        }
+        right += not off
+        if off and not warnings & NAMES:
+            wrong += 1
+            by.update(off)
+    print(f"\n{shape.__name__}: {TRIALS} records, {right} right, {wrong} wrong and not named {dict(by)}; {dict(codes)}")
+    assert wrong <= 0.05 * TRIALS

@@ -1,0 +1,142 @@
+"""A run that one model does not describe gives model_misfit, whatever the cause, and noise alone does not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.accuracy import params_for
+from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.findings.finding import Finding
+from pipeline.motion.waveform_fit import Params
+from pipeline.track import F8, Track
+
+OMEGA, AMPLITUDE, RATE = 8.3, 0.05, 0.012
+T: F8 = np.arange(3000) / 100.0
+PLAIN: F8 = AMPLITUDE * np.exp(-RATE * T) * np.cos(OMEGA * T)
+
+
+def analysed(x: F8, seed: int, tier: str = "standard", *, whole: bool = False) -> Analysis:
+    """Return the analysis of displacements with white noise."""
+    track = Track.from_arrays(
+        np.arange(x.size) / 100.0, 0.3 + x + 3e-4 * np.random.default_rng(seed).standard_normal(x.size)
+    )
+    params = params_for(tier)
+    return analyse(track, params=replace(params, full=Params()) if whole else params)
+
+
+def swaying(seed: int, tier: str = "standard", *, whole: bool = False) -> Analysis:
+    """Return the analysis of a run whose phase swings to and fro once by 0.06 rad."""
+    angle = OMEGA * T + 0.06 * np.sin(2.0 * np.pi * T / 25.0)
+    return analysed(AMPLITUDE * np.exp(-RATE * T) * np.cos(angle), seed, tier, whole=whole)
+
+
+def misfit(result: Analysis) -> Finding | None:
+    """Return the finding on a model that does not fit."""
+    found = [finding for finding in result.findings if finding.code == "model_misfit"]
+    assert len(found) <= 1
+    return found[0] if found else None
+
+
+def inputs(result: Analysis, quantity: str) -> set[str]:
+    """Return the names of what contributes to the uncertainty of an estimate."""
+    assert isinstance(result.motion, Oscillation)
+    return {line.name for line in result.motion.derived.budgets[quantity].contributions}
+
+
+@pytest.mark.parametrize("tier", ["fast", "standard", "best"])
+def test_halves_that_differ_are_a_misfit(tier: str) -> None:
+    """A phase that no model of the windows follows leaves halves that differ by more than four uncertainties."""
+    finding = misfit(swaying(1, tier))
+    assert finding is not None
+    assert finding.severity == "warning"
+    assert finding.values["halves"] > 4.0
+    assert finding.values["rms_m"] > 1.5 * finding.values["noise_m"]
+
+
+def test_the_waveform_is_fitted_where_the_halves_differ() -> None:
+    """The standard tier then fits the waveform too and adds the difference; fast and best have no second fit."""
+    for seed in range(3):
+        assert "choice_of_fit" in inputs(swaying(seed), "amplitude")
+    assert "choice_of_fit" not in inputs(swaying(1, "fast"), "amplitude")
+    assert "choice_of_fit" not in inputs(swaying(1, "best"), "amplitude")
+
+
+def test_uncertainties_cover_both_fits() -> None:
+    """Where windows contradict themselves the fit of the waveform lies within two of their uncertainties."""
+    windows, whole = swaying(1).estimates, swaying(1, whole=True).estimates
+    for name in ("period", "amplitude", "phase", "damping_rate", "offset"):
+        assert abs(windows[name].value - whole[name].value) <= 2.0 * windows[name].u, name
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_slow_beat_is_a_misfit(seed: int) -> None:
+    """A second oscillation of 2 mm that beats slower than the run lasts is no damping law and no steady phase."""
+    finding = misfit(analysed(PLAIN + 2e-3 * np.cos(1.012 * OMEGA * T + 2.1 * seed), seed))
+    assert finding is not None
+    assert finding.values["phase_chi2"] > 2.0
+    assert finding.values["halves"] > 4.0
+
+
+OTHER = 0.009 * np.cos(OMEGA * T + 1.0) + 0.01
+ALTERNATING = {
+    "rows of two runs": np.where(np.arange(T.size) % 2, PLAIN + OTHER, PLAIN),
+    "rows of two bobs": np.where(np.arange(T.size) % 2, 0.02 + 0.04 * np.cos(9.3 * T), PLAIN),
+    "two levels": PLAIN + 1e-3 * (np.arange(T.size) % 2),
+    "hum of the mains": PLAIN + 2e-3 * np.sin(2.0 * np.pi * 49.98 * T),
+}
+
+
+@pytest.mark.parametrize("name", ALTERNATING)
+def test_rows_that_alternate_are_a_misfit_by_colour(name: str) -> None:
+    """Residuals that can be predicted from row to row are no noise, and their correlation is never above 1."""
+    finding = misfit(analysed(ALTERNATING[name], 3))
+    assert finding is not None
+    assert 0.5 < abs(finding.values["correlation"]) <= 1.0
+    assert 0.0 < finding.values["lag_s"] <= 15.0
+
+
+@pytest.mark.parametrize("step_m", [0.0, 1e-3], ids=["fine", "1 mm"])
+def test_rows_written_twice_are_a_misfit(step_m: float) -> None:
+    """Times that were counted over doubled rows make the phase wander: nothing silent comes of it."""
+    rng = np.random.default_rng(7)
+    rows = np.sort(np.r_[np.arange(T.size), rng.choice(T.size, T.size // 5, replace=False)])
+    y = PLAIN + 3e-4 * rng.standard_normal(T.size)
+    y = (np.round(y / step_m) * step_m if step_m else y)[rows]
+    finding = misfit(analyse(Track.from_arrays(np.arange(rows.size) / 100.0, 0.3 + y)))
+    assert finding is not None
+    assert finding.values["rms_m"] > 1.5 * finding.values["noise_m"]
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3])
+def test_lost_rows_are_a_misfit(share: float) -> None:
+    """Times that were counted while rows were lost make the phase wander."""
+    kept = np.random.default_rng(5).random(T.size) >= share
+    finding = misfit(analysed(PLAIN[kept], 3))
+    assert finding is not None
+    assert finding.values["rms_m"] > 1.5 * finding.values["noise_m"]
+
+
+def test_noise_alone_is_no_misfit() -> None:
+    """Of forty plain runs at most one has a misfit."""
+    assert sum(misfit(analysed(PLAIN, seed)) is not None for seed in range(40)) <= 1
+
+
+def test_a_frequency_that_follows_the_amplitude_is_no_misfit() -> None:
+    """A frequency that falls with the square of the amplitude has a model and a finding."""
+    size = AMPLITUDE * np.exp(-RATE * T)
+    for seed in range(3):
+        result = analysed(size * np.cos(OMEGA * T + 60.0 * np.cumsum(size**2) / 100.0), seed)
+        assert "amplitude_dependent_frequency" in {finding.code for finding in result.findings}
+        assert misfit(result) is None
+
+
+def test_values_are_plain_numbers() -> None:
+    """Findings carry Python's own floats, whatever the arithmetic before was made with."""
+    finding = misfit(analysed(ALTERNATING["two levels"], 3))
+    assert finding is not None
+    assert {type(value) for value in finding.values.values()} == {float}
+    assert all(math.isfinite(value) for value in finding.values.values())

@@ -1,0 +1,162 @@
+"""A stated law: by it alone results are stated, and the recording may contradict it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.analyse import STANDARD, Analysis, Oscillation, analyse
+from pipeline.bench.scene import Scene
+from pipeline.damping.laws.of_function import make_law
+from pipeline.numerics.estimate import Estimate, UpperLimit
+from pipeline.track import F8, Track
+
+T = np.arange(6000) / 100.0
+
+
+def recorded(amplitude: F8, noise_m: float = 3.5e-4, seed: int = 3) -> Track:
+    """Return 60 s of an oscillation of this amplitude."""
+    noise = noise_m * np.random.default_rng(seed).standard_normal(T.size)
+    return Track.from_arrays(T, 0.2 + amplitude * np.cos(8.3 * T) + noise)
+
+
+def motion_of(analysis: Analysis) -> Oscillation:
+    """Return the motion of a run that oscillates."""
+    assert isinstance(analysis.motion, Oscillation)
+    return analysis.motion
+
+
+def codes_of(analysis: Analysis) -> set[str]:
+    """Return the codes of what affects a run's results."""
+    return {finding.code for finding in analysis.findings if finding.severity != "info"}
+
+
+LINEAR = recorded(0.05 * np.exp(-0.0105 * T))
+QUADRATIC = recorded(0.05 / (1.0 + 0.45 * 0.05 * T))
+
+
+def test_the_law_of_the_scene_is_the_stated_one() -> None:
+    """Its coefficients stay out: the rate is that of the recording, by the law alone, and every law is fitted."""
+    scene = Scene.from_mapping({"damping": {"law": "linear", "gamma_per_s": 0.9}})
+    analysis = analyse(LINEAR, scene)
+    damping, derived = motion_of(analysis).damping, motion_of(analysis).derived
+    assert (damping.selected, damping.admissible, damping.stated) == ("linear", ("linear",), "linear")
+    assert derived.law == "linear"
+    assert derived.leading is None
+    assert len(damping.fits) > 5
+    assert analysis.estimates["damping_rate"].value == pytest.approx(0.0105, rel=0.05)
+    assert derived.coefficients["gamma"].value == pytest.approx(analysis.estimates["damping_rate"].value, rel=1e-9)
+    assert not codes_of(analysis)
+
+
+def test_a_stated_law_is_far_more_certain() -> None:
+    """Over any law the rate is several times as uncertain; the law that is ahead gives the number of the stated one."""
+    free = analyse(LINEAR)
+    stated = analyse(LINEAR, Scene(damping_law="linear")).estimates["damping_rate"]
+    assert free.estimates["damping_rate"].u > 2.0 * stated.u
+    leading = motion_of(free).derived.leading
+    assert leading is not None
+    assert leading.estimates["damping_rate"].value == pytest.approx(stated.value, rel=1e-9)
+    assert leading.estimates["damping_rate"].u == pytest.approx(stated.u, rel=1e-9)
+
+
+def test_an_option_replaces_the_law_of_the_scene() -> None:
+    """Params state another law, or leave the choice to the recording."""
+    scene = Scene(damping_law="linear")
+    other = replace(STANDARD, damping=replace(STANDARD.damping, stated="quadratic"))
+    assert motion_of(analyse(QUADRATIC, scene, other)).damping.selected == "quadratic"
+    none = replace(STANDARD, damping=replace(STANDARD.damping, from_scene=False))
+    assert motion_of(analyse(QUADRATIC, scene, none)).damping.stated == ""
+
+
+def test_a_recording_may_contradict_the_stated_law() -> None:
+    """A warning names the law that fits; the numbers stay those of the stated one."""
+    analysis = analyse(QUADRATIC, Scene(damping_law="friction"))
+    assert motion_of(analysis).damping.selected == "friction"
+    assert "stated_law_rejected" in codes_of(analysis)
+    (finding,) = (finding for finding in analysis.findings if finding.code == "stated_law_rejected")
+    assert "friction" in finding.message
+    assert finding.values["bic_excess"] > 10.0
+
+
+def test_where_no_law_fits_the_stated_one_is_not_charged_alone() -> None:
+    """An amplitude that no law makes gives no_law_fits, with the nearest law, whichever was stated."""
+    analysis = analyse(recorded(0.05 * (1.0 - 0.004 * T + 0.1 * np.sin(0.2 * T))), Scene(damping_law="quadratic"))
+    assert motion_of(analysis).damping.best.rejected
+    assert "no_law_fits" in codes_of(analysis)
+    assert "stated_law_rejected" not in codes_of(analysis)
+
+
+def test_a_law_of_the_users_own_can_be_stated() -> None:
+    """A function becomes the law of the results."""
+
+    def falling(t: F8, A0: float, d: float) -> F8:
+        return A0 / (1.0 + d * np.sqrt(A0) * t / 2.0) ** 2
+
+    def guess(t: F8, amplitude: F8) -> tuple[float, float]:
+        slope, level = np.polyfit(t, 1.0 / np.sqrt(amplitude), 1)
+        return float(level**-2), float(2.0 * slope)
+
+    law = make_law("three-halves", falling, {"d": (-1 / 2, -1)}, guess)
+    params = replace(STANDARD, damping=replace(STANDARD.damping, stated=law))
+    motion = motion_of(analyse(recorded(falling(T, 0.05, 0.1)), params=params))
+    assert motion.damping.by_statement
+    assert motion.derived.coefficients["d"].value == pytest.approx(0.1, rel=0.02)
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "best"])
+def test_every_accuracy_takes_a_stated_law(accuracy: str) -> None:
+    """A law that the fast tier does not try is tried, and the fit of the whole waveform uses it."""
+    from pipeline.accuracy import params_for
+
+    motion = motion_of(analyse(LINEAR, Scene(damping_law="friction"), params_for(accuracy)))
+    assert motion.damping.selected == "friction"
+    assert set(motion.derived.coefficients) == {"mu"}
+
+
+def test_coefficients_that_are_not_determined_are_upper_limits() -> None:
+    """Of ten noisy periods neither drag is determined; both keep value and u, which the limit exceeds."""
+    t = T[:800]
+    y = 0.2 + 0.05 * np.exp(-0.003 * t) * np.cos(8.3 * t)
+    analysis = analyse(Track.from_arrays(t, y + 2e-3 * np.random.default_rng(5).standard_normal(t.size)))
+    coefficients = motion_of(analysis).derived.coefficients
+    assert set(coefficients) == {"gamma", "beta"}
+    for x in coefficients.values():
+        assert isinstance(x, UpperLimit)
+        assert x.u > abs(x.value)
+        assert x.limit > max(x.value, 0.0)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.3, 1.0, 2.0])
+def test_an_upper_limit_covers_in_at_least_95_percent(ratio: float) -> None:
+    """Of normal estimates of what is not negative it lies above the truth in 95 % or more."""
+    values = ratio + np.random.default_rng(7).standard_normal(4000)
+    covered = [UpperLimit(value, 1.0).limit >= ratio for value in values.tolist()]
+    assert np.mean(covered) >= 0.95 - 3.3 * np.sqrt(0.05 * 0.95 / len(covered))
+
+
+def test_an_upper_limit_calculates_as_its_estimate_does() -> None:
+    """It stays correlated with what it was calculated from."""
+    beta = Estimate(0.1, 0.2, "1/(m s)")
+    limit = UpperLimit.of(beta)
+    assert isinstance(limit, UpperLimit)
+    assert (limit.value, limit.u) == (0.1, 0.2)
+    assert UpperLimit.of(Estimate(0.3, 0.2)) == Estimate(0.3, 0.2)
+    of_beta = UpperLimit.of(Estimate(0.1, 0.2, "1/(m s)", beta.ufloat))
+    assert (of_beta - beta).std_dev == 0.0
+
+
+def test_the_quality_factor_is_that_of_the_undamped_frequency() -> None:
+    """Of linear drag with a damping ratio of 1/2 and 0.7 it is 1 and 0.71, whatever way the motion was fitted."""
+    for ratio in (0.5, 0.7):
+        natural = 8.3
+        t = np.arange(400) / 100.0
+        omega = natural * np.sqrt(1.0 - ratio**2)
+        y = 0.2 + 0.05 * np.exp(-ratio * natural * t) * (
+            np.cos(omega * t) + ratio * natural / omega * np.sin(omega * t)
+        )
+        found = analyse(Track.from_arrays(t, y + 2e-5 * np.random.default_rng(2).standard_normal(t.size)))
+        q = found.estimates["quality_factor"]
+        assert q.value == pytest.approx(0.5 / ratio, rel=0.02)
